@@ -1,0 +1,67 @@
+//! The build-up of the six coefficients: the list of derivatives, the sensor biases estimated with them, and the sums
+//! that the wind tunnel tabulates instead of their parts.
+
+use serde::{Deserialize, Serialize};
+
+use super::derivative::{Axis, Derivative, DerivativeUnit, Output};
+
+/// A constant error of one measured output, estimated with the derivatives: `an_bias` in g, `q_bias` in deg/s.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Bias {
+    pub name: String,
+    pub output: Output,
+}
+
+impl Bias {
+    #[must_use]
+    pub fn unit(&self) -> DerivativeUnit {
+        match self.output {
+            Output::An | Output::Ax | Output::Ay => DerivativeUnit::G,
+            Output::P | Output::Q | Output::R => DerivativeUnit::DegPerS,
+            Output::Alpha | Output::Theta | Output::Beta | Output::Phi => DerivativeUnit::Deg,
+        }
+    }
+}
+
+/// A sum that the tunnel tabulates: `CN_ba = CN_0 + CN_alpha α` (eqs. 2.14, 2.15).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Combined {
+    pub name: String,
+    /// The derivative taken once.
+    pub constant: String,
+    /// The derivative taken times the maneuver's mean α in deg.
+    pub slope: String,
+}
+
+/// The aerodynamic model of one aircraft.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Buildup {
+    pub derivatives: Vec<Derivative>,
+    pub biases: Vec<Bias>,
+    pub combined: Vec<Combined>,
+}
+
+impl Buildup {
+    #[must_use]
+    pub fn derivative(&self, name: &str) -> Option<&Derivative> {
+        self.derivatives.iter().find(|d| d.name == name)
+    }
+
+    /// The derivatives of one axis, in the order of the model file.
+    pub fn derivatives_of(&self, axis: Axis) -> impl Iterator<Item = &Derivative> {
+        self.derivatives.iter().filter(move |d| d.coefficient.axis() == axis)
+    }
+
+    /// The biases of one axis's outputs, in the order of the model file.
+    pub fn biases_of(&self, axis: Axis) -> impl Iterator<Item = &Bias> {
+        self.biases.iter().filter(move |b| b.output.axis() == axis)
+    }
+
+    /// The unit of a derivative, bias or combined sum.
+    #[must_use]
+    pub fn unit_of(&self, name: &str) -> Option<DerivativeUnit> {
+        let combined = || self.combined.iter().find(|c| c.name == name).map(|_| DerivativeUnit::Number);
+        let bias = || self.biases.iter().find(|b| b.name == name).map(Bias::unit);
+        self.derivative(name).map(Derivative::unit).or_else(bias).or_else(combined)
+    }
+}

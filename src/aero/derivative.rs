@@ -1,0 +1,204 @@
+//! A derivative: one coefficient's slope along one regressor, e.g. `CN_alpha`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::flight::signal;
+
+/// The two sets of equations: chapter 2 and chapter 3 of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    Longitudinal,
+    Lateral,
+}
+
+impl Axis {
+    /// The three coefficients that act in this axis, in the order of the equations.
+    #[must_use]
+    pub fn coefficients(self) -> [Coefficient; 3] {
+        match self {
+            Axis::Longitudinal => [Coefficient::CN, Coefficient::Cm, Coefficient::CA],
+            Axis::Lateral => [Coefficient::CY, Coefficient::Cl, Coefficient::Cn],
+        }
+    }
+
+    /// The five outputs that are matched, in the order of Tables 2 and 4.
+    #[must_use]
+    pub fn outputs(self) -> [Output; 5] {
+        match self {
+            Axis::Longitudinal => [Output::Alpha, Output::Q, Output::Theta, Output::An, Output::Ax],
+            Axis::Lateral => [Output::Beta, Output::P, Output::R, Output::Phi, Output::Ay],
+        }
+    }
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Axis::Longitudinal => "longitudinal",
+            Axis::Lateral => "lateral",
+        }
+    }
+}
+
+/// A force or moment coefficient: normal and axial force, side force, and the three moments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Coefficient {
+    CN,
+    Cm,
+    CA,
+    CY,
+    Cl,
+    Cn,
+}
+
+impl Coefficient {
+    #[must_use]
+    pub fn axis(self) -> Axis {
+        match self {
+            Coefficient::CN | Coefficient::Cm | Coefficient::CA => Axis::Longitudinal,
+            Coefficient::CY | Coefficient::Cl | Coefficient::Cn => Axis::Lateral,
+        }
+    }
+
+    /// Its place among its axis's three.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.axis().coefficients().iter().position(|c| *c == self).unwrap_or(0)
+    }
+
+    #[must_use]
+    pub fn is_moment(self) -> bool {
+        matches!(self, Coefficient::Cm | Coefficient::Cl | Coefficient::Cn)
+    }
+}
+
+/// A measured response that the estimation matches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    Alpha,
+    Q,
+    Theta,
+    An,
+    Ax,
+    Beta,
+    P,
+    R,
+    Phi,
+    Ay,
+}
+
+impl Output {
+    /// The signal that measures it.
+    #[must_use]
+    pub fn signal(self) -> &'static str {
+        match self {
+            Output::Alpha => signal::ALPHA_VANE,
+            Output::Q => signal::Q,
+            Output::Theta => signal::THETA,
+            Output::An => signal::AN,
+            Output::Ax => signal::AX,
+            Output::Beta => signal::BETA_VANE,
+            Output::P => signal::P,
+            Output::R => signal::R,
+            Output::Phi => signal::PHI,
+            Output::Ay => signal::AY,
+        }
+    }
+
+    #[must_use]
+    pub fn axis(self) -> Axis {
+        if Axis::Longitudinal.outputs().contains(&self) { Axis::Longitudinal } else { Axis::Lateral }
+    }
+}
+
+/// What a derivative multiplies.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Regressor {
+    /// One: the coefficient at zero of everything else.
+    Constant,
+    /// Angle of attack, deg.
+    Alpha,
+    /// Sideslip, deg.
+    Beta,
+    /// p b/2V, rad.
+    RollRate,
+    /// q c̄/2V, rad.
+    PitchRate,
+    /// r b/2V, rad.
+    YawRate,
+    /// A control surface or any other recorded signal, in its own unit (deg).
+    Surface(String),
+    /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in ft·lbf/deg over q̄S and
+    /// the reference length (the bracketed terms of 2.10, 2.12, 2.13, 3.9, 3.12, 3.13).
+    Vane(String),
+}
+
+impl Regressor {
+    /// The signal of the surface or vane, where it is one.
+    #[must_use]
+    pub fn surface(&self) -> Option<&str> {
+        match self {
+            Regressor::Surface(signal) | Regressor::Vane(signal) => Some(signal),
+            _ => None,
+        }
+    }
+}
+
+/// The unit of a derivative, spelled as in the wind-tunnel tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DerivativeUnit {
+    #[serde(rename = "-")]
+    Number,
+    #[serde(rename = "per_deg")]
+    PerDeg,
+    #[serde(rename = "per_rad")]
+    PerRad,
+    #[serde(rename = "lbf_per_deg")]
+    LbfPerDeg,
+    #[serde(rename = "ftlbf_per_deg")]
+    FtLbfPerDeg,
+    #[serde(rename = "g")]
+    G,
+    #[serde(rename = "deg_s")]
+    DegPerS,
+    #[serde(rename = "deg")]
+    Deg,
+}
+
+impl DerivativeUnit {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            DerivativeUnit::Number => "-",
+            DerivativeUnit::PerDeg => "per_deg",
+            DerivativeUnit::PerRad => "per_rad",
+            DerivativeUnit::LbfPerDeg => "lbf_per_deg",
+            DerivativeUnit::FtLbfPerDeg => "ftlbf_per_deg",
+            DerivativeUnit::G => "g",
+            DerivativeUnit::DegPerS => "deg_s",
+            DerivativeUnit::Deg => "deg",
+        }
+    }
+}
+
+/// One term of the build-up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Derivative {
+    pub name: String,
+    pub coefficient: Coefficient,
+    pub regressor: Regressor,
+}
+
+impl Derivative {
+    #[must_use]
+    pub fn unit(&self) -> DerivativeUnit {
+        match self.regressor {
+            Regressor::Constant => DerivativeUnit::Number,
+            Regressor::Alpha | Regressor::Beta | Regressor::Surface(_) => DerivativeUnit::PerDeg,
+            Regressor::RollRate | Regressor::PitchRate | Regressor::YawRate => DerivativeUnit::PerRad,
+            Regressor::Vane(_) if self.coefficient.is_moment() => DerivativeUnit::FtLbfPerDeg,
+            Regressor::Vane(_) => DerivativeUnit::LbfPerDeg,
+        }
+    }
+}

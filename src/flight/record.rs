@@ -1,0 +1,73 @@
+//! A record: the signals of one flight on one uniform clock, each sample marked where it is not what the recorder wrote.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// What happened to one sample of one signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum Mark {
+    /// As recorded.
+    Measured = 0,
+    /// A short dropout or a lost frame, bridged by a straight line.
+    Bridged = 1,
+    /// A single-sample spike, replaced by the line between its neighbours.
+    Despiked = 2,
+    /// Nothing to bridge it with: the value is NaN.
+    Missing = 3,
+}
+
+impl Mark {
+    /// The mark stored as this number; anything unknown counts as missing.
+    #[must_use]
+    pub fn from_u8(code: u8) -> Mark {
+        match code {
+            0 => Mark::Measured,
+            1 => Mark::Bridged,
+            2 => Mark::Despiked,
+            _ => Mark::Missing,
+        }
+    }
+}
+
+/// One signal: its values in the unit of its name, and the marks of its samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    pub values: Vec<f64>,
+    pub marks: Vec<Mark>,
+}
+
+/// The signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's own time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    pub flight_id: String,
+    pub start_s: f64,
+    pub step_s: f64,
+    pub samples: usize,
+    pub signals: BTreeMap<String, Series>,
+}
+
+impl Record {
+    /// The time of a sample, s.
+    #[must_use]
+    pub fn time_s(&self, sample: usize) -> f64 {
+        let k = sample as f64;
+        self.start_s + k * self.step_s
+    }
+
+    /// The sample nearest to a time, kept inside the record.
+    #[must_use]
+    pub fn sample_at(&self, time_s: f64) -> usize {
+        let k = ((time_s - self.start_s) / self.step_s).round().max(0.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and not negative")]
+        let k = k as usize;
+        k.min(self.samples.saturating_sub(1))
+    }
+
+    /// The values of a signal, where the record has it.
+    #[must_use]
+    pub fn values(&self, signal: &str) -> Option<&[f64]> {
+        self.signals.get(signal).map(|s| s.values.as_slice())
+    }
+}

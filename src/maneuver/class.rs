@@ -1,0 +1,134 @@
+//! A maneuver class: how it is recognised in a record, what is estimated from it, with which weights.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::aero::{Axis, Output};
+
+/// What becomes of a derivative in a maneuver of a class (Tables 1 and 3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Free (✓).
+    Estimated,
+    /// Held at the wind-tunnel value (W/T).
+    Held,
+    /// Its surface is not used by the class (N/A).
+    Inactive,
+}
+
+impl Status {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Estimated => "estimated",
+            Status::Held => "held",
+            Status::Inactive => "inactive",
+        }
+    }
+}
+
+/// How many fast steps of one signal a maneuver of the class has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StepCount {
+    #[serde(default)]
+    pub at_least: usize,
+    #[serde(default = "any_number")]
+    pub at_most: usize,
+}
+
+fn any_number() -> usize {
+    usize::MAX
+}
+
+/// How a class is recognised: flags that are up or down, and signals that step. All of it must hold.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recognition {
+    /// Flag signal → whether it is up for most of the maneuver.
+    #[serde(default)]
+    pub flags: BTreeMap<String, bool>,
+    /// Signal → how often it steps. A signal that is not named may do as it likes.
+    pub steps: BTreeMap<String, StepCount>,
+    /// How long before the first step the maneuver begins, s: trimmed flight to start from.
+    pub lead_in_s: f64,
+    /// How long after the end of the excitation the maneuver ends, s: the response's decay.
+    pub decay_s: f64,
+}
+
+/// Settings that hold for part of the α range instead of the class's own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Overrides {
+    /// For maneuvers whose mean α is above this.
+    pub above_alpha_deg: f64,
+    pub weights: BTreeMap<Output, f64>,
+    pub statuses: BTreeMap<String, Status>,
+}
+
+/// One maneuver class.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Class {
+    pub name: String,
+    pub title: String,
+    pub axis: Axis,
+    pub recognition: Recognition,
+    /// Every derivative and bias of the axis → what becomes of it.
+    pub statuses: BTreeMap<String, Status>,
+    /// The diagonal of W₁ (Tables 2 and 4), on residuals in deg, deg/s and g.
+    pub weights: BTreeMap<Output, f64>,
+    pub overrides: Vec<Overrides>,
+}
+
+impl Class {
+    /// What becomes of a derivative at a mean angle of attack.
+    #[must_use]
+    pub fn status(&self, name: &str, alpha_deg: f64) -> Option<Status> {
+        self.overrides_at(alpha_deg)
+            .filter_map(|o| o.statuses.get(name))
+            .last()
+            .or_else(|| self.statuses.get(name))
+            .copied()
+    }
+
+    /// The weight of an output at a mean angle of attack.
+    #[must_use]
+    pub fn weight(&self, output: Output, alpha_deg: f64) -> Option<f64> {
+        self.overrides_at(alpha_deg)
+            .filter_map(|o| o.weights.get(&output))
+            .last()
+            .or_else(|| self.weights.get(&output))
+            .copied()
+    }
+
+    fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &Overrides> {
+        self.overrides.iter().filter(move |o| alpha_deg > o.above_alpha_deg)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_override_holds_above_its_angle_only() {
+        let class = Class {
+            name: "PYRS".into(),
+            title: String::new(),
+            axis: Axis::Lateral,
+            recognition: Recognition::default(),
+            statuses: [("CY_da".to_owned(), Status::Held)].into(),
+            weights: [(Output::P, 3.0)].into(),
+            overrides: vec![Overrides {
+                above_alpha_deg: 22.5,
+                weights: [(Output::P, 6.0)].into(),
+                statuses: [("CY_da".to_owned(), Status::Estimated)].into(),
+            }],
+        };
+        assert_eq!(class.status("CY_da", 20.1), Some(Status::Held));
+        assert_eq!(class.status("CY_da", 25.0), Some(Status::Estimated));
+        assert_eq!(class.weight(Output::P, 22.5), Some(3.0));
+        assert_eq!(class.weight(Output::P, 22.6), Some(6.0));
+    }
+}

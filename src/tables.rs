@@ -1,0 +1,131 @@
+//! The rows of the published tables, one struct per table. Field names are column names; a value that does not exist is
+//! `None` (a null in Parquet, an empty field in CSV). The `maneuvers` table's row is [`crate::maneuver::Maneuver`], the
+//! `problems` table's is [`crate::error::Problem`].
+
+use serde::{Deserialize, Serialize};
+
+/// `channels`: what ingest did to one channel of one flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChannelRow {
+    pub flight_id: String,
+    pub channel: String,
+    pub signal: String,
+    /// Samples on the record's clock.
+    pub samples: usize,
+    /// Of them: bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
+    pub bridged: usize,
+    pub despiked: usize,
+    pub missing: usize,
+    /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in words.
+    pub verdict: String,
+}
+
+/// `checks`: how one kinematic relation between channels came out in one flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CheckRow {
+    pub flight_id: String,
+    /// The relation in words, e.g. `theta rate against q and r`.
+    pub relation: String,
+    /// The signals it ties together, separated by spaces.
+    pub signals: String,
+    /// Least-squares slope of what is measured on what the other signals predict: 1 when units and signs are right.
+    pub slope: Option<f64>,
+    pub correlation: Option<f64>,
+    /// `ok`, `not excited`, `wrong sign`, `wrong scale`, `does not agree`.
+    pub verdict: String,
+}
+
+/// `events`: the analyst's events against what segment found in the record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EventRow {
+    pub flight_id: String,
+    pub given_class: Option<String>,
+    pub given_start_s: Option<f64>,
+    pub given_end_s: Option<f64>,
+    pub found_class: Option<String>,
+    pub found_start_s: Option<f64>,
+    pub found_end_s: Option<f64>,
+    /// `agrees`, `other class`, `other times`, `not found`, `not given`.
+    pub verdict: String,
+}
+
+/// `fits`: how the estimation of one maneuver ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitRow {
+    pub maneuver_id: String,
+    pub class: String,
+    /// `converged`, `not_converged`, `unidentifiable` or `rejected`.
+    pub outcome: String,
+    /// Why it ended so, in words.
+    pub reason: String,
+    pub iterations: usize,
+    /// J of eq. 1.2 at the tunnel's values and at the end.
+    pub initial_cost: Option<f64>,
+    pub final_cost: Option<f64>,
+    /// Of the information matrix with unit diagonal.
+    pub condition_number: Option<f64>,
+    /// Share of the output samples that were marked and left out of the cost.
+    pub left_out: Option<f64>,
+}
+
+/// `estimates`: one derivative of one maneuver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EstimateRow {
+    pub maneuver_id: String,
+    pub flight_id: String,
+    pub class: String,
+    pub alpha_deg: f64,
+    pub mach: f64,
+    pub derivative: String,
+    pub unit: String,
+    /// `estimated`, `held` or `inactive`.
+    pub status: String,
+    /// The estimate, or the value it was held at; none when inactive.
+    pub value: Option<f64>,
+    /// Cramér-Rao bound in its sandwich form; none unless estimated and determined by the data.
+    pub bound: Option<f64>,
+    /// The bound with the residuals' autocorrelation counted.
+    pub bound_corrected: Option<f64>,
+    /// The tunnel's value at the maneuver's α and Mach.
+    pub wind_tunnel: Option<f64>,
+}
+
+/// `trends`: one derivative's least-squares trend across α for one group of classes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrendRow {
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub alpha_deg: f64,
+    pub value: f64,
+    /// Of the trend's value.
+    pub standard_error: f64,
+    pub lower_95: f64,
+    pub upper_95: f64,
+    /// How many maneuvers the trend is fitted through.
+    pub maneuvers: usize,
+    /// Order of the polynomial that the criterion chose.
+    pub order: usize,
+    /// Standard deviation between maneuvers beyond their bounds.
+    pub scatter: f64,
+}
+
+/// `comparison`: flight against tunnel for one derivative at one angle of attack.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ComparisonRow {
+    pub derivative: String,
+    pub unit: String,
+    /// The trend's group that speaks for flight.
+    pub group: String,
+    pub alpha_deg: f64,
+    pub flight: f64,
+    pub standard_error: f64,
+    pub wind_tunnel: Option<f64>,
+    pub difference: Option<f64>,
+    /// Of the tunnel's value.
+    pub difference_pct: Option<f64>,
+    /// Difference over its standard error.
+    pub z: Option<f64>,
+    /// `agrees`, `flight higher`, `flight lower`, `sign differs`, `no tunnel value`.
+    pub verdict: String,
+}
