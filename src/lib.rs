@@ -10,3 +10,6 @@ pub mod flight;
 pub mod maneuver;
 pub mod tables;
 pub mod units;
+
+// Physics: how the aircraft moves and what its sensors read.
+pub mod dynamics;

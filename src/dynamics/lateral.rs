@@ -1,0 +1,180 @@
+//! Lateral-directional equations: states β, p, r, φ (3.1-3.4); outputs β at the vane, p, r, φ, `a_y` (3.7, 3.8).
+//!
+//! Forces: V β̇ = f_y cos β − sin β (f_x cos α + f_z sin α) + g-terms + V (p sin α − r cos α), with f_y = q̄S CY/m.
+//! The longitudinal specific forces f_x, f_z are taken as measured, brought to the c.g.; in 3.1 they stand as C_D sin β
+//! and T cos α sin β (minus: thrust pulls the nose back into the wind's direction). Moments: Euler's equations about x and
+//! z for a symmetric airframe with the engines' momentum H along +x, whose yawing moment is +q H.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::lever::lever;
+use super::{COEFFICIENTS, Equations, Motion, Outputs, Rates};
+use crate::aero::{Axis, Regressor};
+use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::units::{DEG, G0_FT_S2};
+
+/// The lateral-directional axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Lateral;
+
+/// What is known at one instant.
+#[derive(Clone, Debug)]
+pub struct Known {
+    velocity: f64,
+    alpha: f64,
+    sin_alpha: f64,
+    cos_alpha: f64,
+    q: f64,
+    q_dot: f64,
+    sin_theta: f64,
+    cos_theta: f64,
+    /// f_x cos α + f_z sin α, ft/s²: the measured specific force along the wind's projection on the plane of symmetry.
+    along: f64,
+    /// q̄S/m, ft/s².
+    force: f64,
+    gravity: f64,
+    /// q̄Sb times the inverse of the inertia matrix [I_x −I_xz; −I_xz I_z]: rows ṗ, ṙ; columns Cl, Cn.
+    moment: [[f64; 2]; 2],
+    /// ṗ, ṙ = `coupling` (p, r) + `gyroscopic`, rad/s².
+    coupling: [[f64; 2]; 2],
+    gyroscopic: [f64; 2],
+    cg: Position,
+    sensors: Sensors,
+}
+
+const BETA: usize = 0;
+const P: usize = 1;
+const R: usize = 2;
+const PHI: usize = 3;
+const CY: usize = 0;
+const CL: usize = 1;
+const CN: usize = 2;
+
+impl Known {
+    /// ṗ and ṙ, rad/s².
+    fn angular(&self, p: f64, r: f64, c: &[f64; COEFFICIENTS]) -> [f64; 2] {
+        [0, 1].map(|i| {
+            self.coupling[i][0] * p
+                + self.coupling[i][1] * r
+                + self.gyroscopic[i]
+                + self.moment[i][0] * c[CL]
+                + self.moment[i][1] * c[CN]
+        })
+    }
+}
+
+impl Equations<4> for Lateral {
+    type Known = Known;
+
+    const AXIS: Axis = Axis::Lateral;
+    const STATES: [&'static str; 4] = ["beta", "p", "r", "phi"];
+
+    fn known(aircraft: &Aircraft, m: &Motion) -> Known {
+        let determinant = m.ix * m.iz - m.ixz * m.ixz;
+        // Rows of the inverse inertia matrix: what a rolling and a yawing moment give of ṗ and ṙ.
+        let inverse = [[m.iz / determinant, m.ixz / determinant], [m.ixz / determinant, m.ix / determinant]];
+        let q = m.rates[1];
+        // Moments of the rotation itself: L = q r (I_y − I_z) + p q I_xz, N = p q (I_x − I_y) − q r I_xz.
+        let turning = [[q * m.ixz, q * (m.iy - m.iz)], [q * (m.ix - m.iy), -q * m.ixz]];
+        let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
+        let times = |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
+        Known {
+            velocity: m.velocity,
+            alpha: m.alpha,
+            sin_alpha: m.alpha.sin(),
+            cos_alpha: m.alpha.cos(),
+            q,
+            q_dot: m.accelerations[1],
+            sin_theta: m.theta.sin(),
+            cos_theta: m.theta.cos(),
+            along: m.force_x * m.alpha.cos() + m.force_z * m.alpha.sin(),
+            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
+            gravity: m.gravity,
+            moment: inverse.map(|row| row.map(|v| pressure * v)),
+            coupling: [[times(0, 0), times(0, 1)], [times(1, 0), times(1, 1)]],
+            gyroscopic: inverse.map(|row| row[1] * q * m.engine_momentum),
+            cg: m.cg,
+            sensors: aircraft.sensors.clone(),
+        }
+    }
+
+    fn measured_state(m: &Motion) -> SVector<f64, 4> {
+        SVector::from([m.beta, m.rates[0], m.rates[2], m.phi])
+    }
+
+    fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
+        let rate = aircraft.span_ft / (2.0 * m.velocity);
+        match regressor {
+            Regressor::Beta => Some((BETA, DEG)),
+            Regressor::RollRate => Some((P, rate)),
+            Regressor::YawRate => Some((R, rate)),
+            _ => None,
+        }
+    }
+
+    fn rates(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
+        let ((sb, cb), (sp, cp)) = (x[BETA].sin_cos(), x[PHI].sin_cos());
+        let (side, per_speed) = (k.force * c[CY], 1.0 / k.velocity);
+        let weight = k.cos_theta * cp * k.sin_alpha - k.sin_theta * k.cos_alpha;
+        let beta_dot = x[P] * k.sin_alpha - x[R] * k.cos_alpha
+            + per_speed * (side * cb - k.along * sb + k.gravity * (cb * k.cos_theta * sp - sb * weight));
+        let [p_dot, r_dot] = k.angular(x[P], x[R], c);
+        let tan_theta = k.sin_theta / k.cos_theta;
+        let mut out = Rates {
+            rates: SVector::from([beta_dot, p_dot, r_dot, x[P] + tan_theta * (x[R] * cp + k.q * sp)]),
+            by_state: SMatrix::zeros(),
+            by_coefficient: SMatrix::zeros(),
+        };
+        out.by_state[(BETA, BETA)] =
+            per_speed * (-side * sb - k.along * cb + k.gravity * (-sb * k.cos_theta * sp - cb * weight));
+        out.by_state[(BETA, P)] = k.sin_alpha;
+        out.by_state[(BETA, R)] = -k.cos_alpha;
+        out.by_state[(BETA, PHI)] = per_speed * k.gravity * k.cos_theta * (cb * cp + sb * sp * k.sin_alpha);
+        for (row, i) in [(P, 0), (R, 1)] {
+            out.by_state[(row, P)] = k.coupling[i][0];
+            out.by_state[(row, R)] = k.coupling[i][1];
+            out.by_coefficient[(row, CL)] = k.moment[i][0];
+            out.by_coefficient[(row, CN)] = k.moment[i][1];
+        }
+        out.by_state[(PHI, P)] = 1.0;
+        out.by_state[(PHI, R)] = tan_theta * cp;
+        out.by_state[(PHI, PHI)] = tan_theta * (-x[R] * sp + k.q * cp);
+        out.by_coefficient[(BETA, CY)] = per_speed * k.force * cb;
+        out
+    }
+
+    fn outputs(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Outputs<4> {
+        let rates = [x[P], k.q, x[R]];
+        let [p_dot, r_dot] = k.angular(x[P], x[R], c);
+        let flow = Flow { alpha: k.alpha, beta: x[BETA], velocity: k.velocity, rates };
+        let vane = k.sensors.beta_reading(&flow, k.cg);
+        let right = lever(1, k.sensors.ay.arm(k.cg), rates, [p_dot, k.q_dot, r_dot]);
+        let g = 1.0 / G0_FT_S2;
+        let mut out = Outputs {
+            outputs: SVector::from([
+                DEG * vane.angle,
+                DEG * x[P],
+                DEG * x[R],
+                DEG * x[PHI],
+                g * (k.force * c[CY] + right.value),
+            ]),
+            by_state: SMatrix::zeros(),
+            by_coefficient: SMatrix::zeros(),
+        };
+        out.by_state[(0, BETA)] = DEG * vane.by_beta;
+        out.by_state[(0, P)] = DEG * vane.by_rates[0];
+        out.by_state[(0, R)] = DEG * vane.by_rates[2];
+        out.by_state[(1, P)] = DEG;
+        out.by_state[(2, R)] = DEG;
+        out.by_state[(3, PHI)] = DEG;
+        let [by_p_dot, _, by_r_dot] = right.by_accelerations;
+        for (state, j, by_rate) in [(P, 0, right.by_rates[0]), (R, 1, right.by_rates[2])] {
+            out.by_state[(4, state)] = g * (by_rate + by_p_dot * k.coupling[0][j] + by_r_dot * k.coupling[1][j]);
+        }
+        out.by_coefficient[(4, CY)] = g * k.force;
+        for (column, j) in [(CL, 0), (CN, 1)] {
+            out.by_coefficient[(4, column)] = g * (by_p_dot * k.moment[0][j] + by_r_dot * k.moment[1][j]);
+        }
+        out
+    }
+}

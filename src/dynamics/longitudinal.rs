@@ -1,0 +1,156 @@
+//! Longitudinal equations: states α, q, θ (2.1-2.3); outputs α at the vane, q, θ, `a_n`, `a_x` (2.7-2.9).
+//!
+//! Forces: with f the specific force in body axes and gravity g, V cos β α̇ = f_z cos α − f_x sin α + g-terms +
+//! V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S CA)/m. The paper's 2.1 with
+//! C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y for a symmetric airframe (I_xy = I_yz = 0) with
+//! the engines' momentum H along +x, whose moment is −r H.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::lever::lever;
+use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
+use crate::aero::{Axis, Regressor};
+use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::units::{DEG, G0_FT_S2};
+
+/// The longitudinal axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Longitudinal;
+
+/// What is known at one instant.
+#[derive(Clone, Debug)]
+pub struct Known {
+    velocity: f64,
+    beta: f64,
+    /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
+    slip_cos: f64,
+    slip_sin: f64,
+    /// 1/(V cos β).
+    per_speed: f64,
+    /// q̄S/m and T/m, ft/s².
+    force: f64,
+    thrust: f64,
+    gravity: f64,
+    sin_phi: f64,
+    cos_phi: f64,
+    r: f64,
+    p: f64,
+    /// Pitch acceleration that is known, rad/s², and q̄Sc̄/I_y.
+    pitch: f64,
+    moment: f64,
+    /// ṗ and ṙ as measured.
+    p_dot: f64,
+    r_dot: f64,
+    cg: Position,
+    sensors: Sensors,
+}
+
+const ALPHA: usize = 0;
+const Q: usize = 1;
+const THETA: usize = 2;
+const CN: usize = 0;
+const CM: usize = 1;
+const CA: usize = 2;
+
+impl Equations<3> for Longitudinal {
+    type Known = Known;
+
+    const AXIS: Axis = Axis::Longitudinal;
+    const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
+
+    fn known(aircraft: &Aircraft, m: &Motion) -> Known {
+        let [p, _, r] = m.rates;
+        let gyroscopic = -r * m.engine_momentum;
+        let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
+        Known {
+            velocity: m.velocity,
+            beta: m.beta,
+            slip_cos: m.beta.tan() * p,
+            slip_sin: m.beta.tan() * r,
+            per_speed: 1.0 / (m.velocity * m.beta.cos()),
+            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
+            thrust: m.thrust / m.mass,
+            gravity: m.gravity,
+            sin_phi: m.phi.sin(),
+            cos_phi: m.phi.cos(),
+            r,
+            p,
+            pitch: (coupling + gyroscopic) / m.iy,
+            moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft / m.iy,
+            p_dot: m.accelerations[0],
+            r_dot: m.accelerations[2],
+            cg: m.cg,
+            sensors: aircraft.sensors.clone(),
+        }
+    }
+
+    fn measured_state(m: &Motion) -> SVector<f64, 3> {
+        SVector::from([m.alpha, m.rates[1], m.theta])
+    }
+
+    fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
+        match regressor {
+            Regressor::Alpha => Some((ALPHA, DEG)),
+            Regressor::PitchRate => Some((Q, aircraft.chord_ft / (2.0 * m.velocity))),
+            _ => None,
+        }
+    }
+
+    fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
+        let ((sa, ca), (st, ct)) = (x[ALPHA].sin_cos(), x[THETA].sin_cos());
+        let (normal, axial) = (k.force * c[CN], k.thrust - k.force * c[CA]);
+        let weight = k.gravity * (ct * k.cos_phi * ca + st * sa);
+        let alpha_dot = x[Q] - k.slip_cos * ca - k.slip_sin * sa + k.per_speed * (-normal * ca - axial * sa + weight);
+        let by_alpha = k.slip_cos * sa - k.slip_sin * ca
+            + k.per_speed * (normal * sa - axial * ca + k.gravity * (-ct * k.cos_phi * sa + st * ca));
+        let by_theta = k.per_speed * k.gravity * (-st * k.cos_phi * ca + ct * sa);
+        Rates {
+            rates: SVector::from([alpha_dot, k.pitch + k.moment * c[CM], x[Q] * k.cos_phi - k.r * k.sin_phi]),
+            by_state: SMatrix::from_row_slice(&[by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0]),
+            by_coefficient: SMatrix::from_row_slice(&[
+                -k.per_speed * k.force * ca,
+                0.0,
+                k.per_speed * k.force * sa,
+                0.0,
+                k.moment,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ]),
+        }
+    }
+
+    fn outputs(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
+        let rates = [k.p, x[Q], k.r];
+        let accelerations = [k.p_dot, k.pitch + k.moment * c[CM], k.r_dot];
+        let flow = Flow { alpha: x[ALPHA], beta: k.beta, velocity: k.velocity, rates };
+        let vane = k.sensors.alpha_reading(&flow, k.cg);
+        let down = lever(2, k.sensors.an.arm(k.cg), rates, accelerations);
+        let forward = lever(0, k.sensors.ax.arm(k.cg), rates, accelerations);
+        let thrust = if k.sensors.thrust_in_ax { k.thrust } else { 0.0 };
+        let g = 1.0 / G0_FT_S2;
+        let mut out = Outputs {
+            outputs: SVector::from([
+                DEG * vane.angle,
+                DEG * x[Q],
+                DEG * x[THETA],
+                g * (k.force * c[CN] - down.value),
+                g * (thrust - k.force * c[CA] + forward.value),
+            ]),
+            by_state: SMatrix::zeros(),
+            by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),
+        };
+        out.by_state[(0, ALPHA)] = DEG * vane.by_alpha;
+        out.by_state[(0, Q)] = DEG * vane.by_rates[1];
+        out.by_state[(1, Q)] = DEG;
+        out.by_state[(2, THETA)] = DEG;
+        out.by_state[(3, Q)] = -g * down.by_rates[1];
+        out.by_state[(4, Q)] = g * forward.by_rates[1];
+        out.by_coefficient[(3, CN)] = g * k.force;
+        out.by_coefficient[(3, CM)] = -g * down.by_accelerations[1] * k.moment;
+        out.by_coefficient[(4, CA)] = -g * k.force;
+        out.by_coefficient[(4, CM)] = g * forward.by_accelerations[1] * k.moment;
+        out
+    }
+}

@@ -1,0 +1,215 @@
+//! The measured motion: everything that an axis's equations take as known, at the samples and halfway between them.
+//!
+//! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs them at its two ends
+//! and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::lever::lever;
+use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::flight::{Record, signal};
+use crate::units::{DEG, G0_FT_S2};
+
+/// The motion at one instant, in rad, rad/s, rad/s², ft, ft/s, slug, lbf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// At the c.g., from the vanes.
+    pub alpha: f64,
+    pub beta: f64,
+    pub velocity: f64,
+    pub rates: [f64; 3],
+    /// Slopes of the measured rates.
+    pub accelerations: [f64; 3],
+    pub theta: f64,
+    pub phi: f64,
+    /// Specific forces at the c.g. forward and down, from the accelerometers, ft/s².
+    pub force_x: f64,
+    pub force_z: f64,
+    pub gravity: f64,
+    pub qbar: f64,
+    pub mass: f64,
+    pub thrust: f64,
+    pub ix: f64,
+    pub iy: f64,
+    pub iz: f64,
+    pub ixz: f64,
+    /// Angular momentum of both engines along +x, slug ft²/s.
+    pub engine_momentum: f64,
+    pub cg: Position,
+}
+
+/// Whether mass, c.g. and inertias are taken sample by sample or as their means over the maneuver (the paper's choice).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MassProperties {
+    #[default]
+    Recorded,
+    Mean,
+}
+
+const MASS_PROPERTIES: &[&str] =
+    &[signal::MASS, signal::X_CG, signal::Y_CG, signal::Z_CG, signal::IX, signal::IY, signal::IZ, signal::IXZ];
+
+/// The signals of a window of a record at samples and half-samples.
+#[derive(Clone, Debug)]
+pub struct Window {
+    points: BTreeMap<String, Vec<f64>>,
+    pub step_s: f64,
+    pub samples: usize,
+}
+
+impl Window {
+    /// Cuts `range` out of the record, for the named signals besides those the equations need.
+    ///
+    /// # Errors
+    /// A sentence that names the signal and time where a value is missing.
+    pub fn cut<'a>(
+        record: &Record,
+        range: Range<usize>,
+        surfaces: impl IntoIterator<Item = &'a str>,
+        mass_properties: MassProperties,
+    ) -> Result<Window, String> {
+        let mut points = BTreeMap::new();
+        for name in signal::REQUIRED.iter().copied().chain(surfaces) {
+            let values = record.values(name).and_then(|v| v.get(range.clone()));
+            let values = values.ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
+            if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
+                let time_s = record.time_s(range.start + gap);
+                return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
+            }
+            let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
+            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) });
+        }
+        for name in [signal::P, signal::Q, signal::R] {
+            let slope = slope(record.values(name).unwrap_or_default(), &range, record.step_s);
+            points.insert(slope_name(name), halved(&slope));
+        }
+        Ok(Window { points, step_s: record.step_s, samples: range.len() })
+    }
+
+    /// Number of points: samples and the halves between them.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        (2 * self.samples).saturating_sub(1)
+    }
+
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.samples == 0
+    }
+
+    /// A signal's values at the points; all zero for a signal that was not cut out.
+    #[must_use]
+    pub fn signal(&self, name: &str) -> &[f64] {
+        self.points.get(name).map_or(&[], Vec::as_slice)
+    }
+
+    /// The motion at every point.
+    #[must_use]
+    pub fn motion(&self, aircraft: &Aircraft) -> Vec<Motion> {
+        (0..self.len()).map(|i| self.at(aircraft, i)).collect()
+    }
+
+    fn at(&self, aircraft: &Aircraft, i: usize) -> Motion {
+        let value = |name: &str| self.signal(name)[i];
+        let radians = |name: &str| value(name) / DEG;
+        let rates = [signal::P, signal::Q, signal::R].map(radians);
+        let accelerations = [signal::P, signal::Q, signal::R].map(|name| radians(&slope_name(name)));
+        let cg = Position { x_ft: value(signal::X_CG), y_ft: value(signal::Y_CG), z_ft: value(signal::Z_CG) };
+        let read = Flow {
+            alpha: radians(signal::ALPHA_VANE),
+            beta: radians(signal::BETA_VANE),
+            velocity: value(signal::VELOCITY),
+            rates,
+        };
+        let flow = aircraft.sensors.flow_at_cg(&read, cg);
+        let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
+        let rpm = value(signal::RPM_LEFT) + value(signal::RPM_RIGHT);
+        // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
+        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { value(signal::THRUST) / value(signal::MASS) };
+        Motion {
+            alpha: flow.alpha,
+            beta: flow.beta,
+            velocity: flow.velocity,
+            rates,
+            accelerations,
+            theta: radians(signal::THETA),
+            phi: radians(signal::PHI),
+            force_x: G0_FT_S2 * value(signal::AX) - felt(0, aircraft.sensors.ax) + unfelt,
+            force_z: -G0_FT_S2 * value(signal::AN) - felt(2, aircraft.sensors.an),
+            gravity: gravity_ft_s2(aircraft.latitude_deg, value(signal::ALTITUDE)),
+            qbar: value(signal::QBAR),
+            mass: value(signal::MASS),
+            thrust: value(signal::THRUST),
+            ix: value(signal::IX),
+            iy: value(signal::IY),
+            iz: value(signal::IZ),
+            ixz: value(signal::IXZ),
+            engine_momentum: aircraft.engine_inertia_slug_ft2 * rpm * (2.0 * std::f64::consts::PI / 60.0),
+            cg,
+        }
+    }
+}
+
+fn slope_name(name: &str) -> String {
+    format!("slope of {name}")
+}
+
+/// Samples and the means of neighbours between them.
+fn halved(values: &[f64]) -> Vec<f64> {
+    let mut points = Vec::with_capacity(2 * values.len());
+    for pair in values.windows(2) {
+        points.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
+    }
+    points.extend(values.last());
+    points
+}
+
+fn constant(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    vec![mean; (2 * values.len()).saturating_sub(1)]
+}
+
+/// Samples on each side of the local straight line whose slope stands for the derivative: 0.1 s at 40 Hz, short against
+/// the airframe's modes, long enough to hold the gyros' noise under the accelerometers' when it meets an arm.
+const SLOPE_REACH: usize = 4;
+
+/// Slope per second of a signal over a range of the record, by local least squares on up to nine samples.
+fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
+    range
+        .clone()
+        .map(|k| {
+            let reach = SLOPE_REACH.min(k).min(values.len().saturating_sub(k + 1));
+            let (mut up, mut norm) = (0.0, 0.0);
+            for d in 1..=reach {
+                let (weight, change) = (d as f64, values[k + d] - values[k - d]);
+                if change.is_finite() {
+                    up += weight * change;
+                    norm += 2.0 * weight * weight;
+                }
+            }
+            if norm > 0.0 { up / (norm * step_s) } else { 0.0 }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn points_between_samples_are_the_means() {
+        assert_eq!(halved(&[1.0, 3.0, 2.0]), [1.0, 2.0, 3.0, 2.5, 2.0]);
+        assert!(halved(&[]).is_empty());
+    }
+
+    #[test]
+    fn the_slope_of_a_straight_line_is_exact_up_to_the_ends() {
+        let line: Vec<f64> = (0..20).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
+        for s in slope(&line, &(1..19), 0.025) {
+            assert_abs_diff_eq!(s, 20.0, epsilon = 1e-12);
+        }
+    }
+}
