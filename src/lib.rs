@@ -13,3 +13,9 @@ pub mod units;
 
 // Physics: how the aircraft moves and what its sensors read.
 pub mod dynamics;
+
+// Method: how derivatives follow from motion.
+pub mod output_error;
+
+// Stages: functions of values, each from its predecessor's output.
+pub mod estimate;

@@ -129,3 +129,26 @@ pub struct ComparisonRow {
     /// `agrees`, `flight higher`, `flight lower`, `sign differs`, `no tunnel value`.
     pub verdict: String,
 }
+
+/// The time histories of one maneuver, measured against computed, as in the paper's Figures 4 and 12.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct History {
+    pub maneuver_id: String,
+    pub class: String,
+    pub alpha_deg: f64,
+    pub time_s: Vec<f64>,
+    pub outputs: Vec<HistoryOutput>,
+    /// What drove the maneuver: label with unit, values.
+    pub controls: Vec<(String, Vec<f64>)>,
+}
+
+/// One output of a [`History`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HistoryOutput {
+    pub label: String,
+    pub unit: String,
+    pub measured: Vec<f64>,
+    pub computed: Vec<f64>,
+    /// Samples left out of the cost.
+    pub marked: Vec<bool>,
+}

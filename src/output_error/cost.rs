@@ -1,0 +1,69 @@
+//! The cost J (eq. 1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums over the samples that count.
+//!
+//! Here they are kept without the factor 1/(n_t n_z) of the print: as sums they are the likelihood's, and the information
+//! matrix (1.7) is the second gradient without any factor. [`Sums::cost`] is J as printed.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::case::Measurements;
+use super::response::Response;
+use crate::dynamics::OUTPUTS;
+
+/// Σ w v², Σ Sᵀ W v and Σ Sᵀ W S over the samples that count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sums {
+    pub weighted_square: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+    /// Number of output samples that count.
+    pub count: usize,
+}
+
+impl Sums {
+    /// J of eq. 1.2.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        self.weighted_square / (2.0 * self.count.max(1) as f64)
+    }
+}
+
+/// Residuals measured minus computed; zero where a sample does not count.
+#[must_use]
+pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; OUTPUTS]> {
+    let rows = measurements.values.iter().zip(&measurements.used).zip(&response.outputs);
+    rows.map(|((z, used), y)| std::array::from_fn(|o| if used[o] { z[o] - y[o] } else { 0.0 })).collect()
+}
+
+/// Sums for weights W (on residuals in deg, deg/s and g).
+#[must_use]
+pub fn sums(measurements: &Measurements, response: &Response, weights: &[f64; OUTPUTS], parameters: usize) -> Sums {
+    let mut sums = Sums {
+        weighted_square: 0.0,
+        gradient: DVector::zeros(parameters),
+        information: DMatrix::zeros(parameters, parameters),
+        count: 0,
+    };
+    for (sample, v) in residuals(measurements, response).iter().enumerate() {
+        for o in (0..OUTPUTS).filter(|&o| measurements.used[sample][o]) {
+            sums.count += 1;
+            sums.weighted_square += weights[o] * v[o] * v[o];
+            let s = response.sensitivity(sample, o);
+            for (g, s) in sums.gradient.iter_mut().zip(s) {
+                *g += weights[o] * v[o] * s;
+            }
+            add_square(&mut sums.information, weights[o], s);
+        }
+    }
+    sums.information.fill_upper_triangle_with_lower_triangle();
+    sums
+}
+
+/// Adds w s sᵀ to the lower triangle.
+pub(super) fn add_square(matrix: &mut DMatrix<f64>, w: f64, s: &[f64]) {
+    for (j, mut column) in matrix.column_iter_mut().enumerate() {
+        let factor = w * s[j];
+        for (m, s) in column.as_mut_slice()[j..].iter_mut().zip(&s[j..]) {
+            *m += factor * s;
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! How well the data determine the parameters: Cramér-Rao bounds (1.6, 1.7) in a form that holds for any weights.
+//!
+//! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹; it is H⁻¹, the
+//! usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate weights that are not. Correlated residuals are
+//! counted by their autocorrelation (Morelli and Klein 1997), tapered so that every variance stays positive, and never
+//! below the bound for white ones.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::case::Case;
+use super::cost::{add_square, residuals};
+use super::outcome::Fit;
+use super::response::Response;
+use crate::dynamics::{Equations, OUTPUTS};
+
+/// 1/√H_jj, one where the data say nothing of a parameter.
+#[must_use]
+pub fn scale(information: &DMatrix<f64>) -> DVector<f64> {
+    information.diagonal().map(|h| if h > 0.0 { 1.0 / h.sqrt() } else { 1.0 })
+}
+
+/// H with rows and columns scaled.
+#[must_use]
+pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(information.nrows(), information.ncols(), |i, j| information[(i, j)] * scale[i] * scale[j])
+}
+
+/// Whether the data determine every parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Identified {
+    Determined {
+        inverse: DMatrix<f64>,
+        condition_number: f64,
+    },
+    /// The parameters that take part in the least determined direction.
+    Undetermined {
+        condition_number: Option<f64>,
+        parameters: Vec<usize>,
+    },
+}
+
+/// A parameter takes part in a direction when its share of the unit vector's square is at least this.
+const TAKES_PART: f64 = 0.1;
+
+/// Inverts the information matrix, or names what it does not determine.
+#[must_use]
+pub fn identified(information: &DMatrix<f64>, max_condition_number: f64) -> Identified {
+    let silent: Vec<usize> = (0..information.nrows()).filter(|&i| information[(i, i)] <= 0.0).collect();
+    if !silent.is_empty() || !information.iter().all(|h| h.is_finite()) {
+        return Identified::Undetermined { condition_number: None, parameters: silent };
+    }
+    let scale = scale(information);
+    let eigen = SymmetricEigen::new(scaled(information, &scale));
+    let (least, most) = (eigen.eigenvalues.imin(), eigen.eigenvalues.max());
+    let smallest = eigen.eigenvalues[least];
+    if smallest <= most / max_condition_number {
+        let direction = eigen.eigenvectors.column(least);
+        let parameters = (0..direction.len()).filter(|&j| direction[j] * direction[j] >= TAKES_PART).collect();
+        let condition_number = (smallest > 0.0).then(|| most / smallest);
+        return Identified::Undetermined { condition_number, parameters };
+    }
+    let inverse = &eigen.eigenvectors
+        * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
+        * eigen.eigenvectors.transpose();
+    Identified::Determined { inverse: scaled(&inverse, &scale), condition_number: most / smallest }
+}
+
+/// Variances of the residuals, with the parameters counted as spread evenly over the outputs.
+#[must_use]
+pub fn variances(residuals: &[[f64; OUTPUTS]], used: &[usize; OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
+    let total: usize = used.iter().sum();
+    let freedom = 1.0 - (parameters as f64 / total.max(1) as f64).min(0.9);
+    std::array::from_fn(|o| {
+        let square: f64 = residuals.iter().map(|v| v[o] * v[o]).sum();
+        square / (used[o].max(1) as f64 * freedom)
+    })
+}
+
+/// The two covariances of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    pub covariance: DMatrix<f64>,
+    pub corrected: DMatrix<f64>,
+}
+
+/// Bounds of a fit whose information matrix has this inverse.
+#[must_use]
+pub fn bounds<const NX: usize, E: Equations<NX>>(inverse: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
+    let residuals = residuals(&case.measurements, &fit.response);
+    let variances = variances(&residuals, &case.used(), case.parameters());
+    let n = case.parameters();
+    let (mut white, mut extra) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    for o in 0..OUTPUTS {
+        let w = fit.weights[o];
+        let correlation = autocorrelation(residuals.iter().map(|v| v[o]));
+        for k in (0..case.samples()).filter(|&k| case.measurements.used[k][o]) {
+            add_square(&mut white, w * w * variances[o], fit.response.sensitivity(k, o));
+        }
+        extra += coloured(case, &fit.response, o, &correlation) * (w * w * variances[o]);
+    }
+    white.fill_upper_triangle_with_lower_triangle();
+    let covariance = inverse * &white * inverse;
+    let corrected = inverse * (&white + &extra) * inverse;
+    Bounds { corrected: never_below(corrected, &covariance), covariance }
+}
+
+/// Autocorrelation of residuals at lags 1, 2, … with a Bartlett taper to a fifth of the record, so that the sequence
+/// stays positive semidefinite.
+fn autocorrelation(residuals: impl Iterator<Item = f64>) -> Vec<f64> {
+    let v: Vec<f64> = residuals.collect();
+    let square: f64 = v.iter().map(|x| x * x).sum();
+    let reach = v.len() / 5;
+    (1..=reach)
+        .map(|lag| {
+            let product: f64 = v.iter().zip(&v[lag..]).map(|(a, b)| a * b).sum();
+            let taper = 1.0 - lag as f64 / (reach + 1) as f64;
+            if square > 0.0 { taper * product / square } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Σ_{k≠l} ρ(k−l) s_k s_lᵀ of one output: what correlation adds to Σ s_k s_kᵀ.
+fn coloured<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    response: &Response,
+    output: usize,
+    correlation: &[f64],
+) -> DMatrix<f64> {
+    let (n, samples) = (case.parameters(), case.samples());
+    let used = |k: usize| case.measurements.used[k][output];
+    let mut sum = DMatrix::zeros(n, n);
+    let mut later = vec![0.0; n];
+    for k in (0..samples).filter(|&k| used(k)) {
+        later.fill(0.0);
+        for (lag, rho) in (1..).zip(correlation).take_while(|(lag, _)| k + lag < samples) {
+            if used(k + lag) {
+                for (l, s) in later.iter_mut().zip(response.sensitivity(k + lag, output)) {
+                    *l += rho * s;
+                }
+            }
+        }
+        for (j, mut column) in sum.column_iter_mut().enumerate() {
+            for (m, s) in column.iter_mut().zip(response.sensitivity(k, output)) {
+                *m += s * later[j];
+            }
+        }
+    }
+    &sum + sum.transpose()
+}
+
+/// Raises variances that came out below the white ones to them, keeping the correlations.
+fn never_below(mut corrected: DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
+    for j in 0..corrected.nrows() {
+        let (have, need) = (corrected[(j, j)], white[(j, j)]);
+        if have < need {
+            if have > 0.0 {
+                let factor = (need / have).sqrt();
+                corrected.row_mut(j).scale_mut(factor);
+                corrected.column_mut(j).scale_mut(factor);
+            } else {
+                corrected.row_mut(j).copy_from(&white.row(j));
+                corrected.column_mut(j).copy_from(&white.column(j));
+            }
+            corrected[(j, j)] = need;
+        }
+    }
+    corrected
+}

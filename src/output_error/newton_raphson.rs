@@ -1,0 +1,201 @@
+//! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step does not lower the cost.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::case::Case;
+use super::cost::{Sums, residuals, sums};
+use super::cramer_rao::{self, Identified};
+use super::outcome::{Fit, Outcome};
+use crate::dynamics::{Equations, OUTPUTS};
+
+/// When the iteration stops.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    pub max_iterations: usize,
+    /// Converged when a full step would lower J by less than this share of it: at 1e-8 the estimates are within a
+    /// hundredth of their bounds.
+    pub tolerance: f64,
+    /// Beyond this condition number of the information matrix with unit diagonal a direction counts as not determined.
+    pub max_condition_number: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { max_iterations: 50, tolerance: 1e-8, max_condition_number: 1e10 }
+    }
+}
+
+/// What the weights on the residuals are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weights {
+    /// Tables 2 and 4.
+    #[default]
+    Table,
+    /// The inverse of the residuals' variances, re-estimated in alternation with the parameters until both settle.
+    Estimated,
+}
+
+/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled information matrix.
+const FIRST_DAMPING: f64 = 1e-3;
+const MOST_DAMPING: f64 = 1e9;
+/// Rounds of re-estimating the weights, and the relative change of all weights at which they have settled.
+const WEIGHT_ROUNDS: usize = 20;
+const WEIGHTS_SETTLED: f64 = 1e-3;
+
+/// Estimates the free parameters of a case from `start`, with the table's weights or those they settle to.
+///
+/// `resolution` is the smallest standard deviation of each output that is believed when weights are estimated.
+#[must_use]
+pub fn estimate<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    start: Vec<f64>,
+    table: [f64; OUTPUTS],
+    weights: Weights,
+    resolution: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit {
+    let mut fit = iterate(case, start, table, settings);
+    if weights == Weights::Estimated {
+        for _ in 0..WEIGHT_ROUNDS {
+            if fit.outcome != Outcome::Converged {
+                break;
+            }
+            let next = residual_weights(case, &fit, resolution);
+            let settled = next.iter().zip(fit.weights).all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED);
+            if settled {
+                break;
+            }
+            let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
+            fit = iterate(case, fit.values, next, settings);
+            fit.iterations += iterations;
+            fit.initial_cost = initial_cost;
+        }
+    }
+    judge(case, &mut fit, settings);
+    fit
+}
+
+fn residual_weights<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    fit: &Fit,
+    resolution: [f64; OUTPUTS],
+) -> [f64; OUTPUTS] {
+    let variances =
+        cramer_rao::variances(&residuals(&case.measurements, &fit.response), &case.used(), case.parameters());
+    std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
+}
+
+/// The iteration from a start with fixed weights.
+fn iterate<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    start: Vec<f64>,
+    weights: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit {
+    let n = case.parameters();
+    let (mut response, mut trial) = (case.response(), case.response());
+    let mut fit = Fit {
+        outcome: Outcome::NotConverged,
+        reason: format!("not converged after {} iterations", settings.max_iterations),
+        iterations: 0,
+        initial_cost: None,
+        final_cost: None,
+        values: start,
+        weights,
+        response: case.response(),
+        condition_number: None,
+        covariance: None,
+        covariance_corrected: None,
+    };
+    if let Err(diverged) = case.respond(&fit.values, &mut response) {
+        let after_s = diverged.sample as f64 * case.step_s;
+        fit.reason = format!("the integration diverges {after_s:.2} s into the maneuver with the starting values");
+        return fit;
+    }
+    let mut at = sums(&case.measurements, &response, &weights, n);
+    fit.initial_cost = Some(at.cost());
+    let mut damping = 0.0;
+    while fit.iterations < settings.max_iterations {
+        let Some(full) = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING)) else {
+            fit.reason = "the information matrix is singular".into();
+            break;
+        };
+        let gain = at.gradient.dot(&full);
+        if gain <= settings.tolerance * at.weighted_square {
+            fit.outcome = Outcome::Converged;
+            fit.reason = "a further step would not lower the cost".into();
+            break;
+        }
+        fit.iterations += 1;
+        let Some(better) = lower(case, &fit.values, &at, &weights, &mut damping, &mut trial) else {
+            fit.reason = "no step lowers the cost".into();
+            break;
+        };
+        fit.values = better.0;
+        at = better.1;
+        std::mem::swap(&mut response, &mut trial);
+    }
+    fit.final_cost = Some(at.cost());
+    fit.response = response;
+    fit
+}
+
+/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
+fn lower<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    values: &[f64],
+    at: &Sums,
+    weights: &[f64; OUTPUTS],
+    damping: &mut f64,
+    trial: &mut super::Response,
+) -> Option<(Vec<f64>, Sums)> {
+    while *damping < MOST_DAMPING {
+        if let Some(d) = step(at, *damping) {
+            let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
+            if case.respond(&next, trial).is_ok() {
+                let sums = sums(&case.measurements, trial, weights, next.len());
+                if sums.weighted_square < at.weighted_square {
+                    *damping = if *damping > FIRST_DAMPING { *damping / 10.0 } else { 0.0 };
+                    return Some((next, sums));
+                }
+            }
+        }
+        *damping = (*damping * 10.0).max(FIRST_DAMPING);
+    }
+    None
+}
+
+/// Solves (H + damping · diag H) d = g on unit-diagonal scale.
+fn step(at: &Sums, damping: f64) -> Option<DVector<f64>> {
+    let scale = cramer_rao::scale(&at.information);
+    let mut h: DMatrix<f64> = cramer_rao::scaled(&at.information, &scale);
+    for i in 0..h.nrows() {
+        h[(i, i)] += damping;
+    }
+    let solution = Cholesky::new(h)?.solve(&at.gradient.component_mul(&scale));
+    Some(solution.component_mul(&scale))
+}
+
+/// Bounds of a fit, and the verdict on directions that the data do not determine.
+fn judge<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, fit: &mut Fit, settings: &Settings) {
+    if fit.final_cost.is_none() {
+        return;
+    }
+    let at = sums(&case.measurements, &fit.response, &fit.weights, case.parameters());
+    match cramer_rao::identified(&at.information, settings.max_condition_number) {
+        Identified::Determined { inverse, condition_number } => {
+            fit.condition_number = Some(condition_number);
+            let bounds = cramer_rao::bounds(&inverse, case, fit);
+            fit.covariance = Some(bounds.covariance);
+            fit.covariance_corrected = Some(bounds.corrected);
+        }
+        Identified::Undetermined { condition_number, parameters } => {
+            fit.condition_number = condition_number;
+            let names: Vec<&str> = parameters.iter().filter_map(|&j| case.names.get(j)).map(String::as_str).collect();
+            fit.outcome = Outcome::Unidentifiable;
+            fit.reason = format!("the data do not tell apart {}", names.join(", "));
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! How an estimation ended: a failure is data.
+
+use nalgebra::DMatrix;
+
+use super::response::Response;
+use crate::dynamics::OUTPUTS;
+
+/// The end of an estimation, in the words of the `fits` table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The minimum is reached.
+    Converged,
+    /// It is not: the reason says what stopped the iteration.
+    NotConverged,
+    /// The data do not determine some direction of the parameters: the reason names the derivatives.
+    Unidentifiable,
+    /// The maneuver was not estimated at all.
+    Rejected,
+}
+
+impl Outcome {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Outcome::Converged => "converged",
+            Outcome::NotConverged => "not_converged",
+            Outcome::Unidentifiable => "unidentifiable",
+            Outcome::Rejected => "rejected",
+        }
+    }
+}
+
+/// The result of an estimation.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    pub outcome: Outcome,
+    pub reason: String,
+    pub iterations: usize,
+    /// J at the start and at the end.
+    pub initial_cost: Option<f64>,
+    pub final_cost: Option<f64>,
+    /// The parameters in the order of the case's names.
+    pub values: Vec<f64>,
+    /// The weights in force at the end.
+    pub weights: [f64; OUTPUTS],
+    pub response: Response,
+    /// Of the information matrix with unit diagonal.
+    pub condition_number: Option<f64>,
+    /// Sandwich covariance of the parameters; absent where the data determine none.
+    pub covariance: Option<DMatrix<f64>>,
+    /// The same with the residuals' autocorrelation counted.
+    pub covariance_corrected: Option<DMatrix<f64>>,
+}
