@@ -19,3 +19,6 @@ pub mod output_error;
 
 // Stages: functions of values, each from its predecessor's output.
 pub mod estimate;
+
+// Outside: disk and configuration.
+pub mod store;

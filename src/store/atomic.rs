@@ -1,0 +1,72 @@
+//! Files appear whole or not at all: written beside their place under a temporary name, synced, then renamed.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// How the temporary files of an interrupted run are told from everything else.
+const TEMPORARY: &str = ".harvest-";
+
+/// Puts `bytes` at `path`, creating folders as needed. A file that holds these bytes already is left untouched.
+///
+/// # Errors
+/// [`Error::Io`] naming the path.
+pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
+    if fs::read(path).is_ok_and(|present| present == bytes) {
+        return Ok(());
+    }
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY);
+    // A temporary file is the owner's alone; what is published is for everybody to read.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+    let mut file = builder.tempfile_in(folder).map_err(Error::io(folder, "cannot create a file in it"))?;
+    file.write_all(bytes).map_err(Error::io(path, "cannot write it"))?;
+    file.as_file().sync_all().map_err(Error::io(path, "cannot write it to the disk"))?;
+    file.persist(path).map_err(|e| Error::io(path, "cannot put it in its place")(e.error))?;
+    Ok(())
+}
+
+/// Removes what a killed run left half written in a folder.
+///
+/// # Errors
+/// [`Error::Io`] when a leftover cannot be removed.
+pub fn sweep(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            fs::remove_file(entry.path()).map_err(Error::io(&entry.path(), "cannot remove a leftover"))?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_bytes_leave_the_file_untouched_and_other_bytes_replace_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.csv");
+        place(&path, b"one").unwrap();
+        let before = fs::metadata(&path).unwrap().modified().unwrap();
+        place(&path, b"one").unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().modified().unwrap(), before);
+        place(&path, b"two").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"two");
+    }
+
+    #[test]
+    fn leftovers_of_a_killed_run_are_swept_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(format!("{TEMPORARY}xyz")), "half").unwrap();
+        fs::write(folder.path().join("kept.json"), "whole").unwrap();
+        sweep(folder.path()).unwrap();
+        assert!(folder.path().join("kept.json").exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

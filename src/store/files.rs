@@ -1,0 +1,124 @@
+//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::error::{Error, Result};
+use crate::maneuver::Event;
+
+/// A text file whole.
+///
+/// # Errors
+/// [`Error::Io`] naming the file.
+pub fn text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))
+}
+
+/// The files of a folder with this extension, sorted.
+///
+/// # Errors
+/// [`Error::Io`] naming the folder.
+pub fn with_extension(folder: &Path, extension: &str) -> Result<Vec<std::path::PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
+    let mut files: Vec<_> =
+        entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == extension)).collect();
+    files.sort();
+    Ok(files)
+}
+
+/// One line of a wind-tunnel table as written.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct TunnelRow {
+    pub derivative: String,
+    pub alpha_deg: f64,
+    #[serde(default)]
+    pub mach: Option<f64>,
+    pub value: f64,
+    pub unit: String,
+    #[serde(default)]
+    pub uncertainty: Option<f64>,
+    #[serde(default)]
+    pub source: Option<String>,
+}
+
+impl TunnelRow {
+    #[must_use]
+    pub fn point(&self) -> TunnelPoint {
+        TunnelPoint {
+            alpha_deg: self.alpha_deg,
+            mach: self.mach,
+            value: self.value,
+            uncertainty: self.uncertainty,
+            source: self.source.clone(),
+        }
+    }
+}
+
+/// The rows of a wind-tunnel table, CSV with a header, each with its line.
+///
+/// # Errors
+/// [`Error::Config`] naming file, line and column of what cannot be read.
+pub fn tunnel_rows(path: &Path) -> Result<Vec<(usize, TunnelRow)>> {
+    rows(path)
+}
+
+/// The analyst's events, CSV with columns `flight_id,class,start_s,end_s`, each with its line.
+///
+/// # Errors
+/// [`Error::Config`] naming file, line and column of what cannot be read.
+pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
+    rows(path)
+}
+
+fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
+    let content = text(path)?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(content.as_bytes());
+    let header = reader.headers().cloned().unwrap_or_default();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let line = |position: Option<&csv::Position>| position.and_then(|p| usize::try_from(p.line()).ok());
+        let record = record.map_err(|e| Error::config(path, line(e.position()), e.to_string()))?;
+        let at = line(record.position());
+        rows.push((
+            at.unwrap_or(0),
+            record.deserialize(Some(&header)).map_err(|e| {
+                let column = match e.kind() {
+                    csv::ErrorKind::Deserialize { err, .. } => {
+                        let field = err.field().and_then(|f| usize::try_from(f).ok());
+                        field.and_then(|f| header.get(f)).map(|name| format!("column `{name}`: {}", err.kind()))
+                    }
+                    _ => None,
+                };
+                Error::config(path, at, column.unwrap_or_else(|| e.to_string()))
+            })?,
+        ));
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(content: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tunnel.csv");
+        std::fs::write(&path, content).unwrap();
+        tunnel_rows(&path).unwrap_err().to_string().replace(&*path.to_string_lossy(), "tunnel.csv")
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_named_by_line_and_column() {
+        let e = error("derivative,alpha_deg,value,unit\nCN_q,5,4.0,per_rad\nCN_q,ten,4.0,per_rad\n");
+        assert_eq!(e, "tunnel.csv:3: column `alpha_deg`: invalid float literal");
+    }
+
+    #[test]
+    fn a_missing_column_is_named() {
+        let e = error("derivative,alpha_deg,unit\nCN_q,5,per_rad\n");
+        assert!(e.contains("missing field `value`"), "{e}");
+    }
+}

@@ -1,0 +1,10 @@
+//! Everything that touches the disk: the archive, the store of artefacts, the published tables, small text files.
+
+pub mod artefacts;
+pub mod atomic;
+pub mod files;
+pub mod fingerprint;
+pub mod table;
+
+pub use artefacts::Store;
+pub use fingerprint::Fingerprint;

@@ -1,0 +1,141 @@
+//! The published tables: rows to a data frame, to Parquet and CSV.
+
+use std::path::Path;
+
+use polars::prelude::{Column, CsvWriter, DataFrame, NamedFrom, ParquetCompression, ParquetWriter, SerWriter, Series};
+
+use super::atomic;
+use crate::aero::Axis;
+use crate::error::{Error, Problem, Result};
+use crate::maneuver::Maneuver;
+use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, TrendRow};
+
+/// A row type with the name of its table and its columns.
+pub trait Table: Sized {
+    const NAME: &'static str;
+    fn columns(rows: &[Self]) -> Vec<Column>;
+}
+
+/// A type of cell: how a column of it is made.
+trait Cell: Sized {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
+    where
+        Self: 'a;
+}
+
+fn column<T: ?Sized, V: AsRef<T>>(name: &str, values: V) -> Column
+where
+    Series: NamedFrom<V, T>,
+{
+    Series::new(name.into(), values).into()
+}
+
+impl Cell for String {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[&str], _>(name, cells.map(String::as_str).collect::<Vec<_>>())
+    }
+}
+
+impl Cell for Option<String> {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[Option<&str>], _>(name, cells.map(Option::as_deref).collect::<Vec<_>>())
+    }
+}
+
+impl Cell for f64 {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[Option<f64>], _>(name, cells.map(|v| v.is_finite().then_some(*v)).collect::<Vec<_>>())
+    }
+}
+
+impl Cell for Option<f64> {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[Option<f64>], _>(name, cells.map(|v| v.filter(|v| v.is_finite())).collect::<Vec<_>>())
+    }
+}
+
+impl Cell for usize {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[i64], _>(name, cells.map(|v| i64::try_from(*v).unwrap_or(i64::MAX)).collect::<Vec<_>>())
+    }
+}
+
+impl Cell for Axis {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        column::<[&str], _>(name, cells.map(|a| a.name()).collect::<Vec<_>>())
+    }
+}
+
+/// Says which fields of a row type are the columns of which table.
+macro_rules! table {
+    ($row:ty, $name:literal, $($field:ident)*) => {
+        impl Table for $row {
+            const NAME: &'static str = $name;
+            fn columns(rows: &[Self]) -> Vec<Column> {
+                vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*]
+            }
+        }
+    };
+}
+
+table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
+    altitude_ft mass_slug x_cg_ft samples origin);
+table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out);
+table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
+    bound_corrected wind_tunnel);
+table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
+table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
+    difference_pct z verdict);
+table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
+table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
+table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
+table!(Problem, "problems", stage flight_id place reason);
+
+/// Publishes rows as `<name>.parquet` and `<name>.csv` in a folder, each placed whole.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn publish<T: Table>(folder: &Path, rows: &[T]) -> Result<()> {
+    let (parquet, csv) = (folder.join(format!("{}.parquet", T::NAME)), folder.join(format!("{}.csv", T::NAME)));
+    let mut frame = DataFrame::new(rows.len(), T::columns(rows)).map_err(|e| Error::store(&parquet, &e))?;
+    let mut bytes = Vec::new();
+    ParquetWriter::new(&mut bytes)
+        .with_compression(ParquetCompression::Zstd(None))
+        .finish(&mut frame)
+        .map_err(|e| Error::store(&parquet, &e))?;
+    atomic::place(&parquet, &bytes)?;
+    bytes.clear();
+    CsvWriter::new(&mut bytes).finish(&mut frame).map_err(|e| Error::store(&csv, &e))?;
+    atomic::place(&csv, &bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_without_rows_has_its_columns() {
+        let folder = tempfile::tempdir().unwrap();
+        publish::<FitRow>(folder.path(), &[]).unwrap();
+        let csv = std::fs::read_to_string(folder.path().join("fits.csv")).unwrap();
+        assert!(
+            csv.starts_with("maneuver_id,class,outcome,reason,iterations,initial_cost,final_cost,condition_number")
+        );
+    }
+
+    #[test]
+    fn what_does_not_exist_is_an_empty_field() {
+        let folder = tempfile::tempdir().unwrap();
+        let row = CheckRow {
+            flight_id: "f1".into(),
+            relation: "theta rate, against q".into(),
+            signals: "theta_deg q_deg_s".into(),
+            slope: None,
+            correlation: Some(f64::NAN),
+            verdict: "not excited".into(),
+        };
+        publish(folder.path(), &[row]).unwrap();
+        let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
+        assert_eq!(csv.lines().nth(1), Some("f1,\"theta rate, against q\",theta_deg q_deg_s,,,not excited"));
+    }
+}
