@@ -14,6 +14,7 @@ use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::newton_raphson::{self, Weights};
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
+use crate::output_error::{cramer_rao, equation_error};
 use crate::tables::{EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
@@ -29,6 +30,18 @@ pub enum InactiveSurfaces {
     Absent,
 }
 
+/// Where the iteration starts; the other start is tried where it does not converge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// At the derivatives that the measured accelerations imply. An airframe that is unstable without its feedback
+    /// diverges within seconds from a tunnel's values; from these it does not.
+    #[default]
+    EquationError,
+    /// At the tunnel's values (the paper).
+    WindTunnel,
+}
+
 /// Choices of the estimation that hold for all classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -37,6 +50,10 @@ pub struct Settings {
     pub initial_state: InitialState,
     pub mass_properties: MassProperties,
     pub inactive_surfaces: InactiveSurfaces,
+    pub start: Start,
+    /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
+    /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
+    pub held_uncertainty_pct: f64,
     /// A maneuver with a larger share of marked output samples is rejected.
     pub max_marked_share: f64,
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
@@ -51,6 +68,8 @@ impl Default for Settings {
             initial_state: InitialState::default(),
             mass_properties: MassProperties::default(),
             inactive_surfaces: InactiveSurfaces::default(),
+            start: Start::default(),
+            held_uncertainty_pct: 20.0,
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
@@ -81,6 +100,8 @@ pub struct Covariance {
 pub struct Estimated {
     pub fit: FitRow,
     pub estimates: Vec<EstimateRow>,
+    /// The sums that the tunnel tabulates, where both parts were estimated.
+    pub combined: Vec<EstimateRow>,
     pub covariance: Option<Covariance>,
     pub history: Option<History>,
 }
@@ -94,6 +115,21 @@ pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Bas
         Axis::Lateral => run.estimate::<4, Lateral>(),
     };
     estimated.unwrap_or_else(|reason| run.rejected(reason))
+}
+
+impl Estimated {
+    /// The row of a maneuver whose class the configuration does not have.
+    #[must_use]
+    pub fn unknown_class(maneuver: &Maneuver) -> Estimated {
+        let reason = format!("the configuration has no class `{}`", maneuver.class);
+        Estimated {
+            fit: rejected(maneuver, reason),
+            estimates: vec![],
+            combined: vec![],
+            covariance: None,
+            history: None,
+        }
+    }
 }
 
 struct Run<'a> {
@@ -128,16 +164,69 @@ impl<'a> Run<'a> {
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
-        let start = case.starting_values(|name| self.tunnel(name).unwrap_or(0.0));
-        let resolution = self.class.axis.outputs().map(|o| settings.resolution.get(&o).copied().unwrap_or(1e-6));
-        let fit =
-            newton_raphson::estimate(&case, start, self.weights()?, settings.weights, resolution, &settings.iteration);
+        let mut fit = self.fit(&case)?;
+        self.consider::<NX, E>(&case, &window, &model, &mut fit);
         Ok(Estimated {
             estimates: self.rows(Some((&case.names, &fit))),
+            combined: self.combined(&case.names, &fit),
             covariance: covariance(&case.names, &fit),
             history: Some(self.history(&case.measurements, &fit, &window, &surfaces)),
             fit: self.fit_row(&fit, left_out),
         })
+    }
+
+    /// Output error from the configured start, and from the other one if that does not converge.
+    fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<Fit, String> {
+        let settings = self.basis.settings;
+        let tunnel = case.starting_values(|name| self.tunnel(name).unwrap_or(0.0));
+        let implied = equation_error::start(case, &tunnel);
+        let (first, second) = match settings.start {
+            Start::EquationError => (implied, tunnel),
+            Start::WindTunnel => (tunnel, implied),
+        };
+        let resolution = self.class.axis.outputs().map(|o| settings.resolution.get(&o).copied().unwrap_or(1e-6));
+        let weights = self.weights()?;
+        let from =
+            |start| newton_raphson::estimate(case, start, weights, settings.weights, resolution, &settings.iteration);
+        let fit = from(first);
+        if fit.outcome == Outcome::Converged {
+            return Ok(fit);
+        }
+        let other = from(second);
+        Ok(if other.outcome == Outcome::Converged { other } else { fit })
+    }
+
+    /// Adds to the bounds what the uncertainty of the held values does to the estimates (consider covariance).
+    fn consider<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        window: &Window,
+        model: &Model<'a>,
+        fit: &mut Fit,
+    ) {
+        let held: Vec<(&Derivative, f64)> = model.held.iter().map(|(d, _)| (*d, self.held_uncertainty(d))).collect();
+        let all = Model {
+            free: [model.free.clone(), held.iter().map(|(d, _)| *d).collect()].concat(),
+            held: vec![],
+            ..model.clone()
+        };
+        let values: BTreeMap<&str, f64> = model
+            .held
+            .iter()
+            .map(|(d, value)| (d.name.as_str(), *value))
+            .chain(case.names.iter().map(String::as_str).zip(fit.values.iter().copied()))
+            .collect();
+        let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
+        let uncertainties: BTreeMap<&str, f64> = held.iter().map(|(d, u)| (d.name.as_str(), *u)).collect();
+        cramer_rao::consider(case, &wide, &values, &uncertainties, fit);
+    }
+
+    /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
+    fn held_uncertainty(&self, derivative: &Derivative) -> f64 {
+        let tunnel = self.basis.tunnel;
+        let stated = tunnel.value(&derivative.name, self.maneuver.alpha_deg, self.maneuver.mach);
+        let share = self.basis.settings.held_uncertainty_pct / 100.0;
+        stated.and_then(|v| v.uncertainty).unwrap_or_else(|| share * tunnel.root_mean_square(&derivative.name))
     }
 
     fn status(&self, name: &str) -> Option<Status> {
@@ -208,7 +297,7 @@ impl<'a> Run<'a> {
             .collect()
     }
 
-    /// The maneuver's rows: one per derivative and bias of the axis, and one per combined sum.
+    /// The maneuver's rows: one per derivative and bias of the axis.
     fn rows(&self, fit: Option<(&Vec<String>, &Fit)>) -> Vec<EstimateRow> {
         let at = |name: &str| fit.and_then(|(names, _)| names.iter().position(|n| n == name));
         let deviation = |matrix: Option<&DMatrix<f64>>, j: usize| matrix.map(|m| m[(j, j)].sqrt());
@@ -219,6 +308,7 @@ impl<'a> Run<'a> {
                 (Status::Estimated, Some(j), Some((_, fit))) => {
                     row.value = Some(fit.values[j]);
                     row.bound = deviation(fit.covariance.as_ref(), j);
+                    row.bound_held = deviation(fit.covariance_held.as_ref(), j);
                     row.bound_corrected = deviation(fit.covariance_corrected.as_ref(), j);
                 }
                 (Status::Held, ..) => row.value = row.wind_tunnel,
@@ -226,27 +316,25 @@ impl<'a> Run<'a> {
             }
             rows.push(row);
         }
-        for combined in &self.basis.buildup.combined {
-            rows.extend(self.combined_row(combined, at(&combined.constant), at(&combined.slope), fit.map(|f| f.1)));
-        }
         rows
     }
 
-    /// The row of a sum `constant + slope α`, where both parts were estimated.
-    fn combined_row(
-        &self,
-        combined: &Combined,
-        constant: Option<usize>,
-        slope: Option<usize>,
-        fit: Option<&Fit>,
-    ) -> Option<EstimateRow> {
-        let (i, j, fit, alpha) = (constant?, slope?, fit?, self.maneuver.alpha_deg);
+    fn combined(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
+        let at = |name: &str| names.iter().position(|n| n == name);
+        let sums = self.basis.buildup.combined.iter();
+        sums.filter_map(|c| self.combined_row(c, at(&c.constant)?, at(&c.slope)?, fit)).collect()
+    }
+
+    /// The row of a sum `constant + slope α` of parameters `i` and `j`.
+    fn combined_row(&self, combined: &Combined, i: usize, j: usize, fit: &Fit) -> Option<EstimateRow> {
+        let alpha = self.maneuver.alpha_deg;
         let variance = |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
         let deviation = |m: &DMatrix<f64>| variance(m).max(0.0).sqrt();
         let unit = self.basis.buildup.unit_of(&combined.name)?.name();
         Some(EstimateRow {
             value: Some(fit.values[i] + alpha * fit.values[j]),
             bound: fit.covariance.as_ref().map(deviation),
+            bound_held: fit.covariance_held.as_ref().map(deviation),
             bound_corrected: fit.covariance_corrected.as_ref().map(deviation),
             ..self.row(&combined.name, unit, Status::Estimated)
         })
@@ -264,6 +352,7 @@ impl<'a> Run<'a> {
             status: status.name().to_owned(),
             value: None,
             bound: None,
+            bound_held: None,
             bound_corrected: None,
             wind_tunnel: self.tunnel(name),
         }
@@ -284,18 +373,8 @@ impl<'a> Run<'a> {
     }
 
     fn rejected(&self, reason: String) -> Estimated {
-        let fit = FitRow {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            class: self.class.name.clone(),
-            outcome: Outcome::Rejected.name().to_owned(),
-            reason,
-            iterations: 0,
-            initial_cost: None,
-            final_cost: None,
-            condition_number: None,
-            left_out: None,
-        };
-        Estimated { fit, estimates: self.rows(None), covariance: None, history: None }
+        let fit = rejected(self.maneuver, reason);
+        Estimated { fit, estimates: self.rows(None), combined: vec![], covariance: None, history: None }
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {
@@ -318,6 +397,20 @@ impl<'a> Run<'a> {
             outputs: outputs.collect(),
             controls: names.into_iter().map(control).collect(),
         }
+    }
+}
+
+fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
+    FitRow {
+        maneuver_id: maneuver.maneuver_id.clone(),
+        class: maneuver.class.clone(),
+        outcome: Outcome::Rejected.name().to_owned(),
+        reason,
+        iterations: 0,
+        initial_cost: None,
+        final_cost: None,
+        condition_number: None,
+        left_out: None,
     }
 }
 

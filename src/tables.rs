@@ -82,8 +82,11 @@ pub struct EstimateRow {
     pub status: String,
     /// The estimate, or the value it was held at; none when inactive.
     pub value: Option<f64>,
-    /// Cramér-Rao bound in its sandwich form; none unless estimated and determined by the data.
+    /// Cramér-Rao bound in its sandwich form, with the uncertainty of the held values propagated; none unless estimated
+    /// and determined by the data.
     pub bound: Option<f64>,
+    /// The part of both bounds that comes from the uncertainty of the held values.
+    pub bound_held: Option<f64>,
     /// The bound with the residuals' autocorrelation counted.
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.

@@ -59,6 +59,14 @@ impl WindTunnel {
         alphas
     }
 
+    /// Root mean square of a derivative's tabulated values: its typical size. Zero for one without a table.
+    #[must_use]
+    pub fn root_mean_square(&self, derivative: &str) -> f64 {
+        let table = self.tables.get(&key(derivative)).map_or(&[][..], Vec::as_slice);
+        let square: f64 = table.iter().map(|p| p.value * p.value).sum();
+        (square / table.len().max(1) as f64).sqrt()
+    }
+
     /// The value at an angle of attack and Mach number: linear between the tabulated points, constant beyond the ends.
     #[must_use]
     pub fn value(&self, derivative: &str, alpha_deg: f64, mach: f64) -> Option<TunnelValue> {

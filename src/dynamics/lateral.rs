@@ -112,6 +112,16 @@ impl Equations<4> for Lateral {
         }
     }
 
+    fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
+        let k = Self::known(aircraft, m);
+        let [p, q, r] = m.rates;
+        let [p_dot, _, r_dot] = m.accelerations;
+        let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
+        let roll = m.ix * p_dot - m.ixz * r_dot - (q * r * (m.iy - m.iz) + p * q * m.ixz);
+        let yaw = m.iz * r_dot - m.ixz * p_dot - (p * q * (m.ix - m.iy) - q * r * m.ixz) - q * m.engine_momentum;
+        [m.force_y / k.force, roll / pressure, yaw / pressure]
+    }
+
     fn rates(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
         let ((sb, cb), (sp, cp)) = (x[BETA].sin_cos(), x[PHI].sin_cos());
         let (side, per_speed) = (k.force * c[CY], 1.0 / k.velocity);

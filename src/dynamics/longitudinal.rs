@@ -96,6 +96,11 @@ impl Equations<3> for Longitudinal {
         }
     }
 
+    fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
+        let k = Self::known(aircraft, m);
+        [-m.force_z / k.force, (m.accelerations[1] - k.pitch) / k.moment, (k.thrust - m.force_x) / k.force]
+    }
+
     fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
         let ((sa, ca), (st, ct)) = (x[ALPHA].sin_cos(), x[THETA].sin_cos());
         let (normal, axial) = (k.force * c[CN], k.thrust - k.force * c[CA]);

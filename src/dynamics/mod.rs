@@ -61,6 +61,9 @@ pub trait Equations<const NX: usize> {
     /// axis.
     fn state_regressor(aircraft: &Aircraft, motion: &Motion, regressor: &Regressor) -> Option<(usize, f64)>;
 
+    /// The coefficients that the measured motion implies: its accelerations put into the equations.
+    fn coefficients(aircraft: &Aircraft, motion: &Motion) -> [f64; COEFFICIENTS];
+
     fn rates(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Rates<NX>;
 
     fn outputs(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Outputs<NX>;

@@ -23,8 +23,9 @@ pub struct Motion {
     pub accelerations: [f64; 3],
     pub theta: f64,
     pub phi: f64,
-    /// Specific forces at the c.g. forward and down, from the accelerometers, ft/s².
+    /// Specific forces at the c.g. forward, right and down, from the accelerometers, ft/s².
     pub force_x: f64,
+    pub force_y: f64,
     pub force_z: f64,
     pub gravity: f64,
     pub qbar: f64,
@@ -137,6 +138,7 @@ impl Window {
             theta: radians(signal::THETA),
             phi: radians(signal::PHI),
             force_x: G0_FT_S2 * value(signal::AX) - felt(0, aircraft.sensors.ax) + unfelt,
+            force_y: G0_FT_S2 * value(signal::AY) - felt(1, aircraft.sensors.ay),
             force_z: -G0_FT_S2 * value(signal::AN) - felt(2, aircraft.sensors.an),
             gravity: gravity_ft_s2(aircraft.latitude_deg, value(signal::ALTITUDE)),
             qbar: value(signal::QBAR),

@@ -40,6 +40,7 @@ pub(crate) fn steady() -> Motion {
         theta: 0.4,
         phi: 0.0,
         force_x: 10.0,
+        force_y: 0.0,
         force_z: -30.0,
         gravity: 32.07,
         qbar: 52.0,
@@ -291,4 +292,30 @@ fn rate_regressors_are_in_radians_over_the_reference_length() {
     assert_eq!(Lateral::state_regressor(&a, &m, &Regressor::YawRate), Some((2, 37.42 / 640.0)));
     assert_eq!(Longitudinal::state_regressor(&a, &m, &Regressor::Alpha), Some((0, DEG)));
     assert_eq!(Lateral::state_regressor(&a, &m, &Regressor::Alpha), None);
+}
+
+/// The motion that the equations themselves produce with coefficients `C`, with matching accelerations and forces.
+fn produced<const NX: usize, E: Equations<NX>>(
+    forces: [f64; 3],
+    accelerations: impl Fn(&SVector<f64, NX>) -> [f64; 3],
+) -> Motion {
+    let m = lively();
+    let rates = E::rates(&E::known(&aircraft(), &m), &E::measured_state(&m), &C).rates;
+    let [force_x, force_y, force_z] = forces;
+    Motion { accelerations: accelerations(&rates), force_x, force_y, force_z, ..m }
+}
+
+#[test]
+fn coefficients_come_back_from_the_motion_that_they_produce() {
+    let (m, force) = (lively(), 52.0 * 400.0 / 1040.0);
+    let [_, q_dot, _] = m.accelerations;
+    let forces = [m.thrust / m.mass - force * C[2], 0.0, -force * C[0]];
+    let longitudinal = produced::<3, Longitudinal>(forces, |x| [m.accelerations[0], x[1], m.accelerations[2]]);
+    let lateral = produced::<4, Lateral>([m.force_x, force * C[0], m.force_z], |x| [x[1], q_dot, x[2]]);
+    for (back, c) in Longitudinal::coefficients(&aircraft(), &longitudinal).iter().zip(C) {
+        assert_abs_diff_eq!(*back, c, epsilon = 1e-12);
+    }
+    for (back, c) in Lateral::coefficients(&aircraft(), &lateral).iter().zip(C) {
+        assert_abs_diff_eq!(*back, c, epsilon = 1e-12);
+    }
 }

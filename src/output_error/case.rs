@@ -64,6 +64,9 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(super) biased: Vec<usize>,
     pub(super) start: SVector<f64, NX>,
     pub(super) initial_state: InitialState,
+    /// The measured states at every sample, and the coefficients that the measured motion implies.
+    pub(super) states: Vec<SVector<f64, NX>>,
+    pub(super) implied: Vec<[f64; COEFFICIENTS]>,
     pub measurements: Measurements,
     /// Names of the parameters in order; initial states are called `initial alpha` and so on.
     pub names: Vec<String>,
@@ -104,6 +107,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             biased: model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect(),
             start: start_state::<NX, E>(&motion),
             initial_state: model.initial_state,
+            states: motion.iter().step_by(2).map(E::measured_state).collect(),
+            implied: motion.iter().step_by(2).map(|m| E::coefficients(aircraft, m)).collect(),
             measurements,
             names,
             equations: PhantomData,

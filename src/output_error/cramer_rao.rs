@@ -5,10 +5,12 @@
 //! counted by their autocorrelation (Morelli and Klein 1997), tapered so that every variance stays positive, and never
 //! below the bound for white ones.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
-use super::cost::{add_square, residuals};
+use super::cost::{add_square, residuals, sums};
 use super::outcome::Fit;
 use super::response::Response;
 use crate::dynamics::{Equations, OUTPUTS};
@@ -102,6 +104,41 @@ pub fn bounds<const NX: usize, E: Equations<NX>>(inverse: &DMatrix<f64>, case: &
     let covariance = inverse * &white * inverse;
     let corrected = inverse * (&white + &extra) * inverse;
     Bounds { corrected: never_below(corrected, &covariance), covariance }
+}
+
+/// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with
+/// G = −H⁻¹ Σ S_fᵀ W S_h ("consider" covariance).
+///
+/// `wide` is the same maneuver with the held derivatives free as well; `values` has every derivative of it and
+/// `uncertainties` the standard uncertainty of each held one, by name.
+pub fn consider<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    wide: &Case<NX, E>,
+    values: &BTreeMap<&str, f64>,
+    uncertainties: &BTreeMap<&str, f64>,
+    fit: &mut Fit,
+) {
+    let (Some(covariance), Some(corrected)) = (&mut fit.covariance, &mut fit.covariance_corrected) else { return };
+    let start: Vec<f64> = wide.names.iter().map(|name| values.get(name.as_str()).copied().unwrap_or(0.0)).collect();
+    let mut response = wide.response();
+    if wide.respond(&start, &mut response).is_err() {
+        return;
+    }
+    let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
+    let at = |name: &str| wide.names.iter().position(|n| n == name);
+    let free: Vec<usize> = case.names.iter().filter_map(|name| at(name)).collect();
+    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
+    let Identified::Determined { inverse, .. } = identified(&own, f64::INFINITY) else { return };
+    let mut held = DMatrix::zeros(free.len(), free.len());
+    for (name, uncertainty) in uncertainties {
+        let Some(h) = at(name) else { continue };
+        let cross = DVector::from_fn(free.len(), |i, _| information[(free[i], h)]);
+        let shift = &inverse * cross * *uncertainty;
+        held += &shift * shift.transpose();
+    }
+    *covariance += &held;
+    *corrected += &held;
+    fit.covariance_held = Some(held);
 }
 
 /// Autocorrelation of residuals at lags 1, 2, … with a Bartlett taper to a fifth of the record, so that the sequence

@@ -6,6 +6,7 @@
 mod case;
 pub mod cost;
 pub mod cramer_rao;
+pub mod equation_error;
 pub mod newton_raphson;
 mod outcome;
 mod response;

@@ -37,8 +37,9 @@ pub enum Weights {
     Estimated,
 }
 
-/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled information matrix.
-const FIRST_DAMPING: f64 = 1e-3;
+/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled information matrix:
+/// about the smallest eigenvalue of a maneuver that determines its derivatives badly.
+const FIRST_DAMPING: f64 = 1e-8;
 const MOST_DAMPING: f64 = 1e9;
 /// Rounds of re-estimating the weights, and the relative change of all weights at which they have settled.
 const WEIGHT_ROUNDS: usize = 20;
@@ -107,6 +108,7 @@ fn iterate<const NX: usize, E: Equations<NX>>(
         response: case.response(),
         condition_number: None,
         covariance: None,
+        covariance_held: None,
         covariance_corrected: None,
     };
     if let Err(diverged) = case.respond(&fit.values, &mut response) {
@@ -156,8 +158,9 @@ fn lower<const NX: usize, E: Equations<NX>>(
             let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
             if case.respond(&next, trial).is_ok() {
                 let sums = sums(&case.measurements, trial, weights, next.len());
-                if sums.weighted_square < at.weighted_square {
-                    *damping = if *damping > FIRST_DAMPING { *damping / 10.0 } else { 0.0 };
+                let gain = at.weighted_square - sums.weighted_square;
+                if gain > 0.0 {
+                    *damping = next_damping(*damping, gain / predicted_gain(at, &d));
                     return Some((next, sums));
                 }
             }
@@ -165,6 +168,22 @@ fn lower<const NX: usize, E: Equations<NX>>(
         *damping = (*damping * 10.0).max(FIRST_DAMPING);
     }
     None
+}
+
+/// What a step would lower Σ w v² by if the residuals were linear in the parameters.
+fn predicted_gain(at: &Sums, d: &DVector<f64>) -> f64 {
+    2.0 * at.gradient.dot(d) - (&at.information * d).dot(d)
+}
+
+/// Less damping after a step that did what it promised, more after one that overshot: where the residuals stay large,
+/// undamped Gauss-Newton steps zigzag across the minimum.
+fn next_damping(damping: f64, kept: f64) -> f64 {
+    match kept {
+        k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,
+        k if k > 0.75 => 0.0,
+        k if k < 0.25 => (damping * 10.0).max(FIRST_DAMPING),
+        _ => damping,
+    }
 }
 
 /// Solves (H + damping · diag H) d = g on unit-diagonal scale.

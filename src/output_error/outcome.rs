@@ -46,8 +46,10 @@ pub struct Fit {
     pub response: Response,
     /// Of the information matrix with unit diagonal.
     pub condition_number: Option<f64>,
-    /// Sandwich covariance of the parameters; absent where the data determine none.
+    /// Sandwich covariance of the parameters, the held values' part in it; absent where the data determine none.
     pub covariance: Option<DMatrix<f64>>,
-    /// The same with the residuals' autocorrelation counted.
+    /// What the uncertainty of the held values contributes to both covariances.
+    pub covariance_held: Option<DMatrix<f64>>,
+    /// The covariance with the residuals' autocorrelation counted.
     pub covariance_corrected: Option<DMatrix<f64>>,
 }

@@ -88,7 +88,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     }
 
     /// The coefficients at a point and state, and their slopes along the states; the regressors go to `regressors`.
-    fn coefficients(
+    pub(super) fn coefficients(
         &self,
         point: usize,
         parameters: &[f64],

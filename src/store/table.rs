@@ -82,7 +82,7 @@ table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alp
     altitude_ft mass_slug x_cg_ft samples origin);
 table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
-    bound_corrected wind_tunnel);
+    bound_held bound_corrected wind_tunnel);
 table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
     difference_pct z verdict);
