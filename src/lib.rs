@@ -10,3 +10,9 @@ pub mod flight;
 pub mod maneuver;
 pub mod tables;
 pub mod units;
+
+// Stages: functions of values, in the order of the pipeline.
+pub mod ingest;
+
+// Outside: the only code that touches the disk.
+pub mod store;
