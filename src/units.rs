@@ -105,6 +105,11 @@ impl Unit {
             .unwrap_or(number)
     }
 
+    /// Every unit that measures the same, this one among them.
+    pub fn alike(self) -> impl Iterator<Item = Unit> {
+        UNITS.iter().copied().filter(move |u| u.quantity == self.quantity)
+    }
+
     /// The factor from values in this unit to values in `target`, where the two measure the same.
     #[must_use]
     pub fn factor_to(self, target: Unit) -> Option<f64> {

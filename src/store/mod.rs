@@ -1,9 +1,11 @@
 //! Everything that touches the disk: the archive, the store of artefacts, the published tables, small text files.
 
+pub mod archive;
 pub mod artefacts;
 pub mod atomic;
 pub mod files;
 pub mod fingerprint;
+pub mod record_file;
 pub mod table;
 
 pub use artefacts::Store;

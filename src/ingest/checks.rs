@@ -1,0 +1,204 @@
+//! How each kinematic relation comes out in one flight: slope, correlation and a verdict in words.
+
+use super::Checks;
+use super::motion::{Blocks, Motion};
+use super::relations::{self, Choice, Relation, Side};
+use crate::aircraft::Aircraft;
+use crate::tables::CheckRow;
+
+/// How a relation came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    Ok,
+    NotExcited,
+    WrongSign,
+    WrongScale,
+    DoesNotAgree,
+}
+
+impl Verdict {
+    pub fn words(self) -> &'static str {
+        match self {
+            Verdict::Ok => "ok",
+            Verdict::NotExcited => "not excited",
+            Verdict::WrongSign => "wrong sign",
+            Verdict::WrongScale => "wrong scale",
+            Verdict::DoesNotAgree => "does not agree",
+        }
+    }
+
+    pub fn failed(self) -> bool {
+        !matches!(self, Verdict::Ok | Verdict::NotExcited)
+    }
+}
+
+/// One relation of one flight.
+#[derive(Clone, Copy, Debug)]
+pub struct Check {
+    pub relation: Relation,
+    pub verdict: Verdict,
+    pub fit: Option<Fit>,
+}
+
+impl Check {
+    pub fn row(&self, flight_id: &str) -> CheckRow {
+        CheckRow {
+            flight_id: flight_id.to_owned(),
+            relation: self.relation.name.to_owned(),
+            signals: self.relation.signals.join(" "),
+            slope: self.fit.map(|f| f.slope),
+            correlation: self.fit.map(|f| f.correlation),
+            verdict: self.verdict.words().to_owned(),
+        }
+    }
+}
+
+/// The least-squares line through the origin, measured on predicted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    pub slope: f64,
+    pub standard_error: f64,
+    pub correlation: f64,
+    /// Root mean square of measured minus predicted over that of the larger side.
+    pub misfit: f64,
+}
+
+/// All relations whose signals the record has.
+pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
+    let motion: Vec<Option<Motion>> = (0..blocks.blocks).map(|k| Motion::of(blocks, k, aircraft, settings)).collect();
+    let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
+    // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
+    let check = |relation: Relation| {
+        let pairs = chosen(&relation, windows(&relation, &motion, blocks.block_s, settings));
+        if pairs.len() < settings.least_windows.max(2) {
+            return Check { relation, verdict: Verdict::NotExcited, fit: None };
+        }
+        let fit = fit(&pairs);
+        let dead = match relation.choice {
+            Choice::Above(_) => Verdict::DoesNotAgree,
+            Choice::Largest(_) => Verdict::NotExcited,
+        };
+        let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
+        Check { relation, verdict, fit }
+    };
+    relations::all(settings).into_iter().filter(possible).map(check).collect()
+}
+
+/// The signals that some relation confirms.
+pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
+    let good = checks.iter().filter(|c| c.verdict == Verdict::Ok);
+    good.flat_map(|c| c.relation.dominant()).copied().collect()
+}
+
+/// (predicted, measured) in every window in which both are known.
+fn windows(relation: &Relation, motion: &[Option<Motion>], block_s: f64, settings: &Checks) -> Vec<(f64, f64)> {
+    let length = super::gaps::longest(settings.window_s, block_s).max(1);
+    let pair = |start: usize| {
+        let window = motion.get(start..=start + length)?;
+        let value = |side: &Side| over(side, window, block_s).map(|v| v * relation.unit);
+        Some((value(&relation.predicted)?, value(&relation.measured)?))
+    };
+    (0..motion.len()).step_by(length).filter_map(pair).collect()
+}
+
+/// A side over a window of blocks, per second: the change of its state plus the trapezoidal integral of its rate. The mean
+/// over a block smooths states and rates alike, so the two stay consistent.
+fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
+    let window: Vec<&Motion> = window.iter().map(Option::as_ref).collect::<Option<_>>()?;
+    let (first, last) = (window.first()?, window.last()?);
+    let steps = (window.len() - 1) as f64;
+    let change = side.state.map_or(0.0, |state| (state(last) - state(first)) / (steps * block_s));
+    let integral = side.rate.map_or(0.0, |rate| {
+        let sum: f64 = window.iter().map(|m| rate(m)).sum();
+        (sum - 0.5 * (rate(first) + rate(last))) / steps
+    });
+    Some(change + integral).filter(|v| v.is_finite())
+}
+
+/// The windows that say something. Where they are the largest of the predicting side, both sides lose their medians: a
+/// bias would otherwise be the largest thing there is.
+fn chosen(relation: &Relation, mut pairs: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    match relation.choice {
+        Choice::Above(level) => pairs.retain(|(x, y)| x.abs().max(y.abs()) > level),
+        Choice::Largest(share) => {
+            let x0 = median(pairs.iter().map(|p| p.0).collect());
+            let y0 = median(pairs.iter().map(|p| p.1).collect());
+            pairs.iter_mut().for_each(|p| *p = (p.0 - x0, p.1 - y0));
+            pairs.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
+            pairs.truncate((pairs.len() as f64 * share).ceil().max(0.0) as usize);
+        }
+    }
+    pairs
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
+}
+
+/// None where one side is nothing but zeros.
+fn fit(pairs: &[(f64, f64)]) -> Option<Fit> {
+    let sum = |term: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(x, y)| term(x, y)).sum::<f64>();
+    let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
+    let slope = xy / xx;
+    let residual = sum(&|x, y| (y - slope * x).powi(2));
+    let fit = Fit {
+        slope,
+        standard_error: (residual / (pairs.len() - 1) as f64 / xx).sqrt(),
+        correlation: xy / (xx * yy).sqrt(),
+        misfit: (sum(&|x, y| (y - x).powi(2)) / xx.max(yy)).sqrt(),
+    };
+    [fit.slope, fit.standard_error, fit.correlation, fit.misfit].iter().all(|v| v.is_finite()).then_some(fit)
+}
+
+/// A verdict needs the slope to be wrong by several standard errors. Correlation counts only where the windows were chosen
+/// by a level that noise does not reach.
+fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
+    let margin = settings.standard_errors * fit.standard_error;
+    let (low, high) = (fit.slope - margin, fit.slope + margin);
+    let level = matches!(relation.choice, Choice::Above(_));
+    if level && fit.correlation.abs() < settings.least_correlation {
+        Verdict::DoesNotAgree
+    } else if high < 0.0 {
+        Verdict::WrongSign
+    } else if low > settings.slope_factor || high < 1.0 / settings.slope_factor {
+        Verdict::WrongScale
+    } else if low <= 0.0 {
+        Verdict::NotExcited
+    } else {
+        Verdict::Ok
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(choice: Choice, slope: f64, standard_error: f64, correlation: f64) -> Verdict {
+        let settings = Checks::default();
+        let relation = Relation { choice, ..relations::all(&settings)[0] };
+        judge(&Fit { slope, standard_error, correlation, misfit: 0.1 }, &relation, &settings)
+    }
+
+    #[test]
+    fn verdicts_need_several_standard_errors() {
+        let level = Choice::Above(1.0);
+        assert_eq!(verdict(level, 0.98, 0.01, 0.99), Verdict::Ok);
+        assert_eq!(verdict(level, -1.0, 0.01, -0.99), Verdict::WrongSign);
+        assert_eq!(verdict(level, 57.3, 0.5, 0.99), Verdict::WrongScale);
+        assert_eq!(verdict(level, 0.02, 0.001, 0.99), Verdict::WrongScale);
+        assert_eq!(verdict(level, 0.1, 0.1, 0.1), Verdict::DoesNotAgree);
+        assert_eq!(verdict(level, 0.6, 0.05, 0.8), Verdict::Ok);
+        let weak = Choice::Largest(0.05);
+        assert_eq!(verdict(weak, 0.4, 0.15, 0.3), Verdict::NotExcited);
+        assert_eq!(verdict(weak, 0.9, 0.1, 0.7), Verdict::Ok);
+        assert_eq!(verdict(weak, -0.9, 0.1, -0.7), Verdict::WrongSign);
+    }
+
+    #[test]
+    fn a_fit_of_nothing_but_zeros_is_none() {
+        assert_eq!(fit(&[(0.0, 0.0); 10]), None);
+        assert_eq!(fit(&[(1.0, 0.0); 10]), None);
+    }
+}

@@ -1,0 +1,83 @@
+//! Gaps: dropouts and lost frames, bridged where they are short, left missing where they are long.
+
+use crate::flight::Mark;
+
+/// How a short gap is bridged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bridge {
+    /// A straight line between the samples on either side.
+    Line,
+    /// What was last recorded.
+    Held,
+}
+
+/// The largest number of samples that a gap of this length lacks.
+pub fn longest(bridge_s: f64, step_s: f64) -> usize {
+    let samples = (bridge_s / step_s + 1e-6).floor().max(0.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "floored and not negative")]
+    let samples = samples as usize;
+    samples
+}
+
+/// Bridges the gaps (NaN) of at most `longest` samples in place and says what every sample is now. A gap at either end
+/// of the record has only one side and stays missing.
+pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge) -> Vec<Mark> {
+    let mut marks = vec![Mark::Measured; values.len()];
+    let mut from = 0;
+    while let Some(start) = (from..values.len()).find(|&k| values[k].is_nan()) {
+        let end = (start..values.len()).find(|&k| !values[k].is_nan()).unwrap_or(values.len());
+        let sides = start.checked_sub(1).and_then(|k| values.get(k).copied()).zip(values.get(end).copied());
+        let mark = match sides {
+            Some((before, after)) if end - start <= longest => {
+                let steps = (end - start + 1) as f64;
+                for k in start..end {
+                    let share = (k - start + 1) as f64 / steps;
+                    values[k] = if bridge == Bridge::Line { before + share * (after - before) } else { before };
+                }
+                Mark::Bridged
+            }
+            _ => Mark::Missing,
+        };
+        marks[start..end].fill(mark);
+        from = end;
+    }
+    marks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GAP: f64 = f64::NAN;
+
+    #[test]
+    fn a_short_gap_is_bridged_by_a_straight_line_and_marked() {
+        let mut values = [1.0, GAP, GAP, 4.0, 5.0];
+        let marks = fill(&mut values, 2, Bridge::Line);
+        assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(marks, [Mark::Measured, Mark::Bridged, Mark::Bridged, Mark::Measured, Mark::Measured]);
+    }
+
+    #[test]
+    fn a_long_gap_and_gaps_at_the_ends_stay_missing() {
+        let mut values = [GAP, 1.0, GAP, GAP, GAP, 4.0, GAP];
+        let marks = fill(&mut values, 2, Bridge::Line);
+        let missing: Vec<usize> = (0..7).filter(|&k| marks[k] == Mark::Missing).collect();
+        assert_eq!(missing, [0, 2, 3, 4, 6]);
+        assert!(missing.iter().all(|&k| values[k].is_nan()));
+    }
+
+    #[test]
+    fn a_flag_holds_its_last_value_and_never_takes_one_between() {
+        let mut values = [0.0, GAP, GAP, 1.0];
+        fill(&mut values, 5, Bridge::Held);
+        assert_eq!(values, [0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_gap_of_exactly_the_longest_length_is_bridged() {
+        assert_eq!(longest(0.25, 0.025), 10);
+        assert_eq!(longest(0.25, 0.024_999_98), 10);
+        assert_eq!(longest(0.0, 0.025), 0);
+    }
+}

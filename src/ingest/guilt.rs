@@ -1,0 +1,229 @@
+//! Which channel is wrong when relations fail: the one whose correction by a sign or a unit makes all of them hold.
+//!
+//! A wrong channel spoils every relation it is in, so the failed relations alone name too many. Each channel in them is
+//! tried with a reversed sign, with each unit that it could have been recorded in, and with a conversion done twice; the
+//! trial after which every relation holds names the channel and the cause. Where none does, the channels common to the
+//! failed relations and confirmed by no other are named without a cause.
+
+use std::collections::BTreeMap;
+
+use super::Checks;
+use super::checks::{self, Check, Verdict};
+use super::motion::Blocks;
+use crate::aircraft::Aircraft;
+use crate::flight::{Channel, signal};
+use crate::units::Unit;
+
+/// A channel that fails its checks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guilty {
+    pub channel: String,
+    pub signal: String,
+    /// What is probably wrong with it, where a correction makes the relations hold.
+    pub cause: Option<String>,
+    /// Whether others explain the failed relations as well.
+    pub alone: bool,
+}
+
+impl Guilty {
+    /// For the `channels` table.
+    pub fn verdict(&self) -> String {
+        let cause = self.cause.as_deref().unwrap_or("does not agree with the other channels");
+        if self.alone { cause.to_owned() } else { format!("suspect: {cause}") }
+    }
+}
+
+/// The accused channels of a flight in words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Accusation {
+    pub place: String,
+    pub reason: String,
+    /// Whether an accused channel is one that the equations cannot do without.
+    pub required: bool,
+}
+
+/// Trials whose squared misfit is within this factor of the best explain the failure as well as it does.
+const AS_GOOD: f64 = 3.0;
+
+/// More independent faults than this are not looked for in one flight.
+const FAULTS: usize = 3;
+
+/// The channels that make relations fail; `recorded` are the signals that come from channels.
+pub fn find(
+    blocks: &Blocks,
+    found: &[Check],
+    channels: &BTreeMap<String, Channel>,
+    recorded: &[String],
+    aircraft: &Aircraft,
+    settings: &Checks,
+) -> Vec<Guilty> {
+    let (mut blocks, mut found) = (blocks.clone(), found.to_vec());
+    let mut guilty = Vec::new();
+    for _ in 0..FAULTS {
+        if !found.iter().any(|c| c.verdict.failed()) {
+            return guilty;
+        }
+        let mut trials = Vec::new();
+        for (name, channel) in suspects(&found, channels, recorded) {
+            for (factor, cause) in corrections(channel) {
+                let checks = checks::all(&blocks.with(&channel.signal, factor), aircraft, settings);
+                trials.push(Trial {
+                    name,
+                    channel,
+                    factor,
+                    cause,
+                    bad: bad(&checks, &found),
+                    misfit: misfit(&checks),
+                    checks,
+                });
+            }
+        }
+        trials.sort_by(|a, b| a.bad.cmp(&b.bad).then(a.misfit.total_cmp(&b.misfit)));
+        let Some(best) = trials.first().filter(|t| t.bad < bad(&found, &found)) else { break };
+        if best.bad == 0 {
+            guilty.extend(as_good_as(best, &trials));
+            return guilty;
+        }
+        guilty.push(best.guilty(true));
+        blocks = blocks.with(&best.channel.signal, best.factor);
+        found.clone_from(&best.checks);
+    }
+    guilty.extend(common(&found, channels, recorded));
+    guilty
+}
+
+/// One channel corrected in one way.
+struct Trial<'a> {
+    name: &'a str,
+    channel: &'a Channel,
+    factor: f64,
+    cause: String,
+    bad: usize,
+    misfit: f64,
+    checks: Vec<Check>,
+}
+
+impl Trial<'_> {
+    fn guilty(&self, alone: bool) -> Guilty {
+        Guilty {
+            channel: self.name.to_owned(),
+            signal: self.channel.signal.clone(),
+            cause: Some(self.cause.clone()),
+            alone,
+        }
+    }
+}
+
+/// Channels in a failed relation.
+fn suspects<'a>(
+    found: &[Check],
+    channels: &'a BTreeMap<String, Channel>,
+    recorded: &[String],
+) -> Vec<(&'a str, &'a Channel)> {
+    let failed = |signal: &str| found.iter().any(|c| c.verdict.failed() && c.relation.signals.contains(&signal));
+    let suspect = |c: &Channel| recorded.contains(&c.signal) && failed(&c.signal);
+    channels.iter().filter(|(_, c)| suspect(c)).map(|(name, c)| (name.as_str(), c)).collect()
+}
+
+/// The factors that would correct a channel, each with what it would mean.
+fn corrections(channel: &Channel) -> Vec<(f64, String)> {
+    let mut corrections = vec![(-1.0, "its sign is reversed".to_owned())];
+    let Ok(mapped) = Unit::parse(&channel.unit) else { return corrections };
+    for other in mapped.alike() {
+        let Some(factor) = other.factor_to(mapped).filter(|f| (f - 1.0).abs() > 1e-6) else { continue };
+        let (was, is) = (other.name, mapped.name);
+        let recorded = format!("it is recorded in {was}, not in {is}");
+        let twice = format!("it is converted from {was} to {is} once too often");
+        corrections.push((-factor, format!("{recorded}, and its sign is reversed")));
+        corrections.push((-1.0 / factor, format!("{twice}, and its sign is reversed")));
+        corrections.push((factor, recorded));
+        corrections.push((1.0 / factor, twice));
+    }
+    corrections
+}
+
+/// Relations that fail, or that say nothing any more though they did before.
+fn bad(checks: &[Check], before: &[Check]) -> usize {
+    let silenced = |c: &Check, b: &Check| c.verdict == Verdict::NotExcited && b.verdict != Verdict::NotExcited;
+    checks.iter().zip(before).filter(|(c, b)| c.verdict.failed() || silenced(c, b)).count()
+}
+
+/// The sum of the squared misfits of the relations that say something.
+fn misfit(checks: &[Check]) -> f64 {
+    let excited = checks.iter().filter(|c| c.verdict != Verdict::NotExcited);
+    excited.filter_map(|c| c.fit).map(|f| f.misfit.powi(2)).sum()
+}
+
+/// The best trial and the best ones of other channels that explain the failure as well.
+fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
+    let mut chosen: Vec<&Trial> = Vec::new();
+    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit) {
+        if !chosen.iter().any(|c| c.name == trial.name) {
+            chosen.push(trial);
+        }
+    }
+    let alone = chosen.len() == 1;
+    chosen.into_iter().map(|t| t.guilty(alone)).collect()
+}
+
+/// The channels that all failed relations share, without those that another relation confirms; where the failed relations
+/// share none, every unconfirmed channel that dominates one of them.
+fn common(found: &[Check], channels: &BTreeMap<String, Channel>, recorded: &[String]) -> Vec<Guilty> {
+    let cleared = checks::cleared(found);
+    let failed: Vec<&Check> = found.iter().filter(|c| c.verdict.failed()).collect();
+    let candidates = |test: &dyn Fn(&str) -> bool| -> Vec<(&String, &Channel)> {
+        channels.iter().filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal)).collect()
+    };
+    let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
+    let dominates = |s: &str| failed.iter().any(|c| c.relation.dominant().contains(&s));
+    let unconfirmed = |s: &str| !cleared.contains(&s);
+    let attempts: [&dyn Fn(&str) -> bool; 4] = [
+        &|s| shared(s) && dominates(s) && unconfirmed(s),
+        &|s| shared(s) && unconfirmed(s),
+        &|s| dominates(s) && unconfirmed(s),
+        &|s| dominates(s),
+    ];
+    let chosen = attempts.iter().map(|test| candidates(test)).find(|c| !c.is_empty()).unwrap_or_default();
+    let alone = chosen.len() == 1;
+    let guilty = |(name, channel): (&String, &Channel)| Guilty {
+        channel: name.clone(),
+        signal: channel.signal.clone(),
+        cause: None,
+        alone,
+    };
+    chosen.into_iter().map(guilty).collect()
+}
+
+/// What the failed checks and the guilty channels amount to; none where nothing failed.
+pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
+    let failed: Vec<String> = found.iter().filter(|c| c.verdict.failed()).map(described).collect();
+    if failed.is_empty() {
+        return None;
+    }
+    let named = |g: &Guilty| format!("`{}`", g.channel);
+    let causes: Vec<String> =
+        guilty.iter().filter_map(|g| Some(format!("`{}`: {}", g.channel, g.cause.as_ref()?))).collect();
+    let names: Vec<String> = guilty.iter().map(named).collect();
+    let several = if guilty.iter().any(|g| !g.alone) { "one of these is wrong: " } else { "" };
+    let likely = if causes.is_empty() {
+        "no sign and no unit would set it right".to_owned()
+    } else {
+        format!("likely {}", causes.join(", or "))
+    };
+    let reason = format!(
+        "{several}{} do not agree with the other channels ({}); {likely}. Correct the channel map, or leave the flight out",
+        names.join(", "),
+        failed.join("; ")
+    );
+    let place = if names.len() == 1 { "channel" } else { "channels" };
+    let required = guilty.is_empty() || guilty.iter().any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
+    Some(Accusation { place: format!("{place} {}", names.join(", ")), reason, required })
+}
+
+fn described(check: &Check) -> String {
+    let words = check.verdict.words();
+    match check.fit {
+        Some(fit) => format!("{}: slope {:.3}, {words}", check.relation.name, fit.slope),
+        None => format!("{}: {words}", check.relation.name),
+    }
+}

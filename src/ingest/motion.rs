@@ -1,0 +1,213 @@
+//! The motion that the channels of a record describe, block by block: what the kinematic relations tie together.
+//!
+//! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the angles at the c.g.
+
+use std::collections::BTreeMap;
+
+use super::Checks;
+use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::flight::{Record, signal};
+use crate::units::{DEG, G0_FT_S2};
+
+/// The signals that the relations use.
+const USED: &[&str] = &[
+    signal::ALPHA_VANE,
+    signal::BETA_VANE,
+    signal::VELOCITY,
+    signal::MACH,
+    signal::ALTITUDE,
+    signal::P,
+    signal::Q,
+    signal::R,
+    signal::THETA,
+    signal::PHI,
+    signal::PSI,
+    signal::AN,
+    signal::AX,
+    signal::AY,
+    signal::QBAR,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
+/// The signals averaged over short blocks; a block with fewer than half of its samples is NaN.
+#[derive(Clone, Debug)]
+pub struct Blocks {
+    pub block_s: f64,
+    pub blocks: usize,
+    values: BTreeMap<&'static str, Vec<f64>>,
+}
+
+impl Blocks {
+    pub fn of(record: &Record, settings: &Checks) -> Blocks {
+        let samples = super::gaps::longest(settings.block_s, record.step_s).max(1);
+        let means = |values: &[f64]| values.chunks_exact(samples).map(mean).collect::<Vec<f64>>();
+        let values = USED.iter().filter_map(|name| Some((*name, means(record.values(name)?)))).collect();
+        Blocks { block_s: samples as f64 * record.step_s, blocks: record.samples / samples, values }
+    }
+
+    pub fn has(&self, signal: &str) -> bool {
+        self.values.contains_key(signal)
+    }
+
+    /// These blocks with one signal multiplied: what the record would say if that channel were wrong by the factor.
+    pub fn with(&self, signal: &str, factor: f64) -> Blocks {
+        let mut changed = self.clone();
+        if let Some(values) = changed.values.get_mut(signal) {
+            values.iter_mut().for_each(|v| *v *= factor);
+        }
+        changed
+    }
+
+    fn at(&self, signal: &str, block: usize) -> f64 {
+        self.values.get(signal).and_then(|v| v.get(block)).copied().unwrap_or(f64::NAN)
+    }
+}
+
+fn mean(samples: &[f64]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for value in samples.iter().filter(|v| v.is_finite()) {
+        sum += value;
+        count += 1;
+    }
+    if 2 * count >= samples.len() { sum / count as f64 } else { f64::NAN }
+}
+
+/// The motion in one block.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    /// p, q, r, rad/s.
+    pub rates: [f64; 3],
+    /// Rad.
+    pub theta: f64,
+    pub phi: f64,
+    pub psi: f64,
+    /// True airspeed and its components u, v, w at the c.g., ft/s.
+    pub velocity: f64,
+    pub along: [f64; 3],
+    pub altitude: f64,
+    /// Gravity in body axes, ft/s².
+    pub gravity: [f64; 3],
+    /// Sensor readings, g.
+    pub an: f64,
+    pub ax: f64,
+    pub ay: f64,
+    pub mach: f64,
+    pub qbar: f64,
+    /// Standard atmosphere at the altitude: slug/ft³ and ft/s.
+    pub density: f64,
+    pub sound: f64,
+    /// From the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and down.
+    pub arms: [[f64; 3]; 3],
+}
+
+impl Motion {
+    /// The motion in a block; none where the aircraft is not flying.
+    pub fn of(blocks: &Blocks, k: usize, aircraft: &Aircraft, settings: &Checks) -> Option<Motion> {
+        let at = |signal| blocks.at(signal, k);
+        let angle = |signal| at(signal) / DEG;
+        let velocity = at(signal::VELOCITY);
+        if velocity.abs() < settings.least_velocity_ft_s {
+            return None;
+        }
+        let rates = [angle(signal::P), angle(signal::Q), angle(signal::R)];
+        let cg = Position { x_ft: at(signal::X_CG), y_ft: at(signal::Y_CG), z_ft: at(signal::Z_CG) };
+        let read = Flow { alpha: angle(signal::ALPHA_VANE), beta: angle(signal::BETA_VANE), velocity, rates };
+        let flow = aircraft.sensors.flow_at_cg(&read, cg);
+        let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
+        let (theta, phi, altitude) = (angle(signal::THETA), angle(signal::PHI), at(signal::ALTITUDE));
+        let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
+        let g = gravity_ft_s2(aircraft.latitude_deg, altitude);
+        let (density, sound) = atmosphere(altitude);
+        let s = &aircraft.sensors;
+        Some(Motion {
+            rates,
+            theta,
+            phi,
+            psi: angle(signal::PSI),
+            velocity,
+            along: [velocity * ca * cb, velocity * sb, velocity * sa * cb],
+            altitude,
+            gravity: [-g * st, g * ct * sp, g * ct * cp],
+            an: at(signal::AN),
+            ax: at(signal::AX),
+            ay: at(signal::AY),
+            mach: at(signal::MACH),
+            qbar: at(signal::QBAR),
+            density,
+            sound,
+            arms: [s.an.arm(cg), s.ax.arm(cg), s.ay.arm(cg)],
+        })
+    }
+
+    /// The specific force at the c.g. that the accelerometers stand for, ft/s², without their arms.
+    pub fn force(&self) -> [f64; 3] {
+        [self.ax * G0_FT_S2, self.ay * G0_FT_S2, -self.an * G0_FT_S2]
+    }
+
+    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance beside the change of the velocity.
+    pub fn turning(&self) -> [f64; 3] {
+        let turned = cross(self.rates, self.along);
+        [turned[0] - self.gravity[0], turned[1] - self.gravity[1], turned[2] - self.gravity[2]]
+    }
+
+    /// ω × (ω × arm), ft/s².
+    pub fn centripetal(&self, arm: [f64; 3]) -> [f64; 3] {
+        cross(self.rates, cross(self.rates, arm))
+    }
+
+    /// ω × arm, ft/s: the velocity of a sensor relative to the c.g.; its change is the sensor's own acceleration.
+    pub fn swing(&self, arm: [f64; 3]) -> [f64; 3] {
+        cross(self.rates, arm)
+    }
+
+    /// The rate of climb, ft/s.
+    pub fn climb(&self) -> f64 {
+        let [u, v, w] = self.along;
+        let ((st, ct), (sp, cp)) = (self.theta.sin_cos(), self.phi.sin_cos());
+        u * st - v * sp * ct - w * cp * ct
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
+fn atmosphere(altitude_ft: f64) -> (f64, f64) {
+    const FT: f64 = 0.304_8;
+    const KG_M3: f64 = 515.378_818;
+    const GAS: f64 = 287.052_87;
+    let h = altitude_ft * FT;
+    let temperature = (288.15 - 0.006_5 * h).max(216.65);
+    let pressure = if h < 11_000.0 {
+        101_325.0 * (temperature / 288.15).powf(5.255_88)
+    } else {
+        22_632.06 * (-(h - 11_000.0) / 6_341.62).exp()
+    };
+    (pressure / (GAS * temperature) / KG_M3, (1.4 * GAS * temperature).sqrt() / FT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn the_atmosphere_is_the_standard_one() {
+        for (altitude, density, sound) in
+            [(0.0, 2.376_9e-3, 1116.45), (25_000.0, 1.065_5e-3, 1016.1), (45_000.0, 4.622_7e-4, 968.08)]
+        {
+            let (rho, a) = atmosphere(altitude);
+            assert_relative_eq!(rho, density, max_relative = 2e-3);
+            assert_relative_eq!(a, sound, max_relative = 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_block_with_fewer_than_half_its_samples_has_no_mean() {
+        assert!(mean(&[1.0, f64::NAN, f64::NAN]).is_nan());
+        assert_relative_eq!(mean(&[1.0, f64::NAN, 3.0, f64::NAN]), 2.0);
+    }
+}

@@ -1,0 +1,136 @@
+//! What the analyst may decide about ingest, with defaults reasoned from recorders and flight mechanics.
+
+use serde::{Deserialize, Serialize};
+
+/// The settings of ingest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// The recorder's rate, Hz; without it the median time step says.
+    pub sampling_rate_hz: Option<f64>,
+    /// The longest gap of a channel that a straight line bridges, s. A quarter of a second is short against the
+    /// short period and the Dutch roll of a fighter; anything longer would be invention.
+    pub longest_bridge_s: f64,
+    /// The longest gap of the clock that is kept as missing samples, s; a longer one is two flights in one file.
+    pub longest_clock_gap_s: f64,
+    pub spikes: Spikes,
+    /// What happens to a flight when a required channel fails its checks.
+    pub on_failed_check: OnFailedCheck,
+    pub checks: Checks,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            sampling_rate_hz: None,
+            longest_bridge_s: 0.25,
+            longest_clock_gap_s: 600.0,
+            spikes: Spikes::default(),
+            on_failed_check: OnFailedCheck::Refuse,
+            checks: Checks::default(),
+        }
+    }
+}
+
+/// What happens to a flight when a required channel fails its checks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnFailedCheck {
+    /// The flight is refused: derivatives from a wrong sign are worse than none.
+    #[default]
+    Refuse,
+    /// The problem is reported and the flight goes on.
+    Report,
+}
+
+/// When a single sample is a spike.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Spikes {
+    /// Whether single-sample spikes are looked for at all.
+    pub remove: bool,
+    /// How far a spike stands off its neighbours, in standard deviations of the channel's noise: far beyond what noise
+    /// does once in a campaign of ten million samples.
+    pub deviations: f64,
+    /// The time on either side of a sample in which its local noise is measured, s.
+    pub window_s: f64,
+    /// How well the samples before and those after must agree about the value between them, as a share of the spike's
+    /// height: where they do not, the motion itself is fast and the sample may be real.
+    pub agreement: f64,
+}
+
+impl Default for Spikes {
+    fn default() -> Spikes {
+        Spikes { remove: true, deviations: 8.0, window_s: 0.5, agreement: 0.5 }
+    }
+}
+
+/// How units and signs are checked. Only gross faults count: a sign, a unit, a channel that belongs elsewhere; biases,
+/// scale errors of some per cent and noise are the estimator's business.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Checks {
+    /// Samples are averaged over blocks of this length first, s: noise falls, motion stays.
+    pub block_s: f64,
+    /// Relations are integrated over windows of this length, s.
+    pub window_s: f64,
+    /// Fewer excited windows than this decide nothing.
+    pub least_windows: usize,
+    /// How far the slope of a relation may be from one, as a factor. The smallest confusion of units that occurs,
+    /// knots for feet per second, is 1.69.
+    pub slope_factor: f64,
+    /// The least correlation that counts as agreement.
+    pub least_correlation: f64,
+    /// How many standard errors of the slope a verdict needs.
+    pub standard_errors: f64,
+    /// Below this velocity the aircraft is not flying and the vanes mean nothing, ft/s.
+    pub least_velocity_ft_s: f64,
+    pub excitation: Excitation,
+}
+
+impl Default for Checks {
+    fn default() -> Checks {
+        Checks {
+            block_s: 0.2,
+            window_s: 1.0,
+            least_windows: 8,
+            slope_factor: 1.5,
+            least_correlation: 0.5,
+            standard_errors: 4.0,
+            least_velocity_ft_s: 50.0,
+            excitation: Excitation::default(),
+        }
+    }
+}
+
+/// From where on a window says something about a relation: several times what biases and noise can make.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Excitation {
+    /// Change of an attitude, deg/s.
+    pub attitude_deg_s: f64,
+    /// Normal acceleration, g.
+    pub normal_g: f64,
+    /// Axial acceleration, g.
+    pub axial_g: f64,
+    /// Change of a body-axis velocity, ft/s².
+    pub velocity_ft_s2: f64,
+    /// Climb, ft/s.
+    pub climb_ft_s: f64,
+    /// The share of the windows, those with the largest lateral acceleration, in which it is checked: it is so small
+    /// beside the terms that balance it that no level of its own can be named.
+    pub lateral_share: f64,
+}
+
+impl Default for Excitation {
+    fn default() -> Excitation {
+        Excitation {
+            attitude_deg_s: 1.0,
+            normal_g: 0.3,
+            axial_g: 0.1,
+            velocity_ft_s2: 5.0,
+            climb_ft_s: 20.0,
+            lateral_share: 0.05,
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Single-sample spikes: a sample that stands off its neighbours by far more than the noise, while the samples before it
+//! and those after it agree about what should be there.
+//!
+//! With `x` the sample, the line through the two samples before it says `2 x₋₁ − x₋₂`, the line through the two after
+//! it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike stands off all three in the same sense. A step, the
+//! reversal of a surface at its full rate, or a stick pulse of two samples stands off at most two of them.
+
+use super::Spikes;
+
+/// Standard deviations of a normal distribution in its median absolute deviation.
+const MAD: f64 = 1.482_602_218_505_602;
+
+/// Variance of a sample minus its neighbours' mean, in variances of the noise: 1 + 1/4 + 1/4.
+const MEAN_VARIANCE: f64 = 1.5;
+
+/// Half a quantisation step: what rounding alone can do to a sample.
+const QUANTISATION: f64 = 0.5;
+
+/// How far the two lines may miss each other by noise alone, in its standard deviations (the difference has √10).
+const LINES_NOISE: f64 = 3.0;
+
+/// Replaces single-sample spikes by their neighbours' mean and returns where they were.
+pub fn remove(values: &mut [f64], step_s: f64, settings: &Spikes) -> Vec<usize> {
+    if !settings.remove {
+        return Vec::new();
+    }
+    let roughness: Vec<f64> = (0..values.len()).map(|k| off_mean(values, k).abs()).collect();
+    let floor = deviation(roughness.iter().copied()).max(QUANTISATION * quantisation(values));
+    let window = super::gaps::longest(settings.window_s, step_s).max(4);
+    let is_spike = |&k: &usize| {
+        let Some(height) = height(values, k) else { return false };
+        if height.stands_off <= settings.deviations * floor {
+            return false;
+        }
+        let noise = floor.max(local(&roughness, k, window));
+        let meets = settings.agreement * height.stands_off + LINES_NOISE * noise;
+        height.stands_off > settings.deviations * noise && height.lines_miss <= meets
+    };
+    let spikes: Vec<usize> = (0..values.len()).filter(is_spike).collect();
+    let repaired: Vec<f64> = spikes.iter().map(|&k| values[k] - off_mean(values, k)).collect();
+    for (&k, value) in spikes.iter().zip(repaired) {
+        values[k] = value;
+    }
+    spikes
+}
+
+/// A sample minus the mean of its neighbours; NaN at the ends and beside a gap.
+fn off_mean(values: &[f64], k: usize) -> f64 {
+    match (k.checked_sub(1).and_then(|i| values.get(i)), values.get(k), values.get(k + 1)) {
+        (Some(before), Some(x), Some(after)) => x - 0.5 * (before + after),
+        _ => f64::NAN,
+    }
+}
+
+struct Height {
+    /// The least that the sample stands off the neighbours' mean and the two lines; zero where the senses differ.
+    stands_off: f64,
+    /// How far the two lines miss each other.
+    lines_miss: f64,
+}
+
+/// How a sample stands off; none beside a gap. Where only one sample is left on a side, its line is level.
+fn height(values: &[f64], k: usize) -> Option<Height> {
+    let at = |i: Option<usize>| i.and_then(|i| values.get(i)).copied().filter(|v| v.is_finite());
+    let (x, before, after) = (at(Some(k))?, at(k.checked_sub(1))?, at(Some(k + 1))?);
+    let left = 2.0 * before - at(k.checked_sub(2)).unwrap_or(before);
+    let right = 2.0 * after - at(Some(k + 2)).unwrap_or(after);
+    let off = [x - left, x - right, x - 0.5 * (before + after)];
+    let same_sense = off.iter().all(|o| *o > 0.0) || off.iter().all(|o| *o < 0.0);
+    let least = off.iter().fold(f64::INFINITY, |least, o| least.min(o.abs()));
+    Some(Height { stands_off: if same_sense { least } else { 0.0 }, lines_miss: (left - right).abs() })
+}
+
+/// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left out.
+fn local(roughness: &[f64], k: usize, window: usize) -> f64 {
+    let from = k.saturating_sub(window);
+    let around = roughness.iter().enumerate().skip(from).take(k + window + 1 - from);
+    deviation(around.filter(|(i, _)| i.abs_diff(k) > 1).map(|(_, r)| *r))
+}
+
+/// The noise's standard deviation from absolute deviations off the neighbours' mean, by their median.
+fn deviation(roughness: impl Iterator<Item = f64>) -> f64 {
+    MAD / MEAN_VARIANCE.sqrt() * quantile(roughness.filter(|r| r.is_finite()).collect(), 0.5)
+}
+
+/// The recorder's quantisation step: what its smallest changes are; a low quantile, as a repaired or converted sample may
+/// lie off the grid.
+fn quantisation(values: &[f64]) -> f64 {
+    let changes = values.windows(2).map(|p| (p[1] - p[0]).abs());
+    quantile(changes.filter(|c| c.is_finite() && *c > 0.0).collect(), 0.05)
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
+    let rank = ((values.len() - 1) as f64 * share) as usize;
+    *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spikes(values: &[f64]) -> Vec<usize> {
+        remove(&mut values.to_vec(), 0.025, &Spikes::default())
+    }
+
+    /// Noise of a standard deviation near one, the same on every run.
+    fn noise(k: usize) -> f64 {
+        let mut state = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678;
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 11) as f64 / (1u64 << 53) as f64;
+        }
+        sum - 6.0
+    }
+
+    fn noisy(samples: usize, sd: f64, signal: impl Fn(f64) -> f64) -> Vec<f64> {
+        (0..samples).map(|k| signal(k as f64 * 0.025) + sd * noise(k)).collect()
+    }
+
+    #[test]
+    fn a_spike_is_replaced_by_its_neighbours_mean() {
+        let mut values = noisy(400, 0.02, f64::sin);
+        let clean = values.clone();
+        values[200] += 0.6;
+        assert_eq!(remove(&mut values, 0.025, &Spikes::default()), [200]);
+        assert!((values[200] - 0.5 * (clean[199] + clean[201])).abs() < 1e-12);
+        assert_eq!(values[201..], clean[201..]);
+    }
+
+    #[test]
+    fn noise_alone_makes_no_spike() {
+        assert!(spikes(&noisy(100_000, 0.08, |t| 10.0 + 3.0 * (0.7 * t).sin())).is_empty());
+    }
+
+    #[test]
+    fn a_spike_on_a_fast_roll_is_found() {
+        let mut values = noisy(400, 0.04, |t| 30.0 * t);
+        values[150] -= 1.6;
+        assert_eq!(spikes(&values), [150]);
+    }
+
+    #[test]
+    fn a_surface_doublet_at_its_full_rate_is_left_alone() {
+        let doublet = |t: f64| match t {
+            t if t < 2.0 => 0.0,
+            t if t < 2.1 => 100.0 * (t - 2.0),
+            t if t < 2.3 => 10.0 - 100.0 * (t - 2.1),
+            t if t < 2.4 => -10.0 + 100.0 * (t - 2.3),
+            _ => 0.0,
+        };
+        assert!(spikes(&noisy(400, 0.02, doublet)).is_empty());
+        // The shortest triangle that a rate limit allows: up for two samples, down for two.
+        let triangle = |t: f64| (5.0 - 100.0 * (t - 2.0).abs()).max(0.0);
+        assert!(spikes(&noisy(400, 0.02, triangle)).is_empty());
+    }
+
+    #[test]
+    fn steps_and_two_sample_pulses_of_the_stick_are_left_alone() {
+        let step = |t: f64| if t < 3.0 { 0.0 } else { 2.0 };
+        let pulse = |t: f64| if (3.0..3.04).contains(&t) { 2.0 } else { 0.0 };
+        let overshoot = |t: f64| match t {
+            t if t < 2.99 => 0.0,
+            t if t < 3.01 => 1.0,
+            _ => 0.5,
+        };
+        for signal in [step, pulse, overshoot] {
+            assert!(spikes(&noisy(400, 0.0, signal)).is_empty());
+            assert!(spikes(&noisy(400, 0.005, signal)).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_vibration_is_its_own_noise() {
+        let vibration = |t: f64| if (4.0..6.0).contains(&t) { (97.0 * t).sin() } else { 0.0 };
+        assert!(spikes(&noisy(400, 0.01, vibration)).is_empty());
+    }
+
+    #[test]
+    fn the_last_bit_of_a_coarse_converter_is_no_spike() {
+        let mut values = vec![1.0; 400];
+        values[100] = 1.1;
+        values[300] = 1.2;
+        values.extend((0..400).map(|k| if k % 7 == 0 { 1.1 } else { 1.0 }));
+        assert!(spikes(&values).is_empty());
+    }
+
+    #[test]
+    fn samples_beside_a_gap_are_left_alone_and_nothing_breaks_at_the_ends() {
+        let mut values = noisy(100, 0.01, |_| 0.0);
+        (values[0], values[50], values[51], values[99]) = (5.0, f64::NAN, 5.0, 5.0);
+        assert!(spikes(&values).is_empty());
+        for short in 0..4 {
+            assert!(spikes(&vec![1.0; short]).is_empty());
+        }
+    }
+}
