@@ -10,3 +10,6 @@ pub mod flight;
 pub mod maneuver;
 pub mod tables;
 pub mod units;
+
+// Stages: pure functions of values.
+pub mod segment;
