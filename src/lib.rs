@@ -13,3 +13,4 @@ pub mod units;
 
 // Stages: pure functions of values.
 pub mod segment;
+pub mod trend;
