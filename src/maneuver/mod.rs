@@ -3,5 +3,5 @@
 pub mod class;
 pub mod found;
 
-pub use class::{Class, Overrides, Status, StepCount};
+pub use class::{Class, Overrides, Recognition, Status, StepCount};
 pub use found::{Event, Maneuver};

@@ -1,0 +1,71 @@
+//! The mean flight condition of a maneuver over its window, with missing samples left out.
+
+use std::ops::RangeInclusive;
+
+use crate::aircraft::{Aircraft, Flow, Position};
+use crate::flight::{Record, signal};
+use crate::maneuver::{Class, Maneuver};
+use crate::units::DEG;
+
+/// The maneuver of a class in a window (s on the record's clock), cut at the record.
+///
+/// # Errors
+/// What keeps its flight condition from being known, in words.
+pub(super) fn maneuver(
+    record: &Record,
+    aircraft: &Aircraft,
+    class: &Class,
+    (start_s, end_s): (f64, f64),
+    origin: &str,
+) -> Result<Maneuver, String> {
+    let (first, last) = (record.sample_at(start_s), record.sample_at(end_s));
+    if last <= first {
+        return Err(format!("the window of a maneuver like {} holds no samples", class.name));
+    }
+    let mean = |name: &str| mean(record, name, first..=last);
+    let start_s = record.time_s(first);
+    Ok(Maneuver {
+        maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),
+        flight_id: record.flight_id.clone(),
+        class: class.name.clone(),
+        axis: class.axis,
+        start_s,
+        end_s: record.time_s(last),
+        alpha_deg: mean_alpha_deg(record, aircraft, first..=last).ok_or("no sample has the signals that α takes")?,
+        mach: mean(signal::MACH)?,
+        qbar_psf: mean(signal::QBAR)?,
+        velocity_ft_s: mean(signal::VELOCITY)?,
+        altitude_ft: mean(signal::ALTITUDE)?,
+        mass_slug: mean(signal::MASS)?,
+        x_cg_ft: mean(signal::X_CG)?,
+        samples: last - first + 1,
+        origin: origin.to_owned(),
+    })
+}
+
+fn mean(record: &Record, name: &str, window: RangeInclusive<usize>) -> Result<f64, String> {
+    let values = record.values(name).and_then(|v| v.get(window)).unwrap_or_default();
+    finite_mean(values.iter().copied()).ok_or_else(|| format!("`{name}` has no sample in the maneuver"))
+}
+
+fn finite_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (n, sum) = values.filter(|v| v.is_finite()).fold((0_usize, 0.0), |(n, sum), v| (n + 1, sum + v));
+    (n > 0).then(|| sum / n as f64)
+}
+
+/// Mean angle of attack at the c.g., deg, from both vanes, the rates and the c.g.
+fn mean_alpha_deg(record: &Record, aircraft: &Aircraft, mut window: RangeInclusive<usize>) -> Option<f64> {
+    let alpha = |k: usize| -> Option<f64> {
+        let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied();
+        let read = Flow {
+            alpha: at(signal::ALPHA_VANE)? / DEG,
+            beta: at(signal::BETA_VANE)? / DEG,
+            velocity: at(signal::VELOCITY)?,
+            rates: [at(signal::P)? / DEG, at(signal::Q)? / DEG, at(signal::R)? / DEG],
+        };
+        let cg = Position { x_ft: at(signal::X_CG)?, y_ft: at(signal::Y_CG)?, z_ft: at(signal::Z_CG)? };
+        Some(aircraft.sensors.flow_at_cg(&read, cg).alpha * DEG)
+    };
+    let alphas: Option<Vec<f64>> = window.by_ref().map(alpha).collect();
+    finite_mean(alphas?.into_iter())
+}

@@ -1,0 +1,100 @@
+//! The analyst's events: they take precedence over what was found, and are compared with it.
+
+use crate::aircraft::Aircraft;
+use crate::error::did_you_mean;
+use crate::flight::Record;
+use crate::maneuver::{Class, Event, Maneuver};
+use crate::tables::EventRow;
+
+use super::{Segmented, condition, problem};
+
+/// Start and end of a found maneuver agree with a given event when both are within this, s.
+const AGREEMENT_S: f64 = 1.0;
+
+/// Replaces what was found by the events given for this flight where the two overlap, and says how they compare.
+///
+/// An event of an unknown class or outside the record becomes a problem and replaces nothing. Without any event for any
+/// flight nothing is compared.
+#[must_use]
+pub fn with_events(
+    found: Segmented,
+    record: &Record,
+    events: &[Event],
+    classes: &[Class],
+    aircraft: &Aircraft,
+) -> (Segmented, Vec<EventRow>) {
+    if events.is_empty() {
+        return (found, Vec::new());
+    }
+    let Segmented { maneuvers: found, mut problems } = found;
+    let mut given = Vec::new();
+    let mut rows = Vec::new();
+    for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
+        match as_given(event, record, classes, aircraft) {
+            Ok(maneuver) => {
+                rows.push(compared(Some(event), most_overlapping(event, &found)));
+                given.push(maneuver);
+            }
+            Err(reason) => problems.push(problem(record, event.start_s, reason)),
+        }
+    }
+    let is_replaced = |f: &Maneuver| given.iter().any(|g| overlap_s(f, g.start_s, g.end_s) > 0.0);
+    let kept: Vec<Maneuver> = found.into_iter().filter(|f| !is_replaced(f)).collect();
+    rows.extend(kept.iter().map(|f| compared(None, Some(f))));
+    let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();
+    maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    let time = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    (Segmented { maneuvers, problems }, rows)
+}
+
+/// The maneuver that an event names, or why there is none.
+fn as_given(event: &Event, record: &Record, classes: &[Class], aircraft: &Aircraft) -> Result<Maneuver, String> {
+    let class = classes.iter().find(|c| c.name == event.class).ok_or_else(|| {
+        let near = did_you_mean(&event.class, classes.iter().map(|c| c.name.as_str()));
+        format!("an event is of the unknown class `{}`{near}", event.class)
+    })?;
+    let (first_s, last_s) = (record.time_s(0), record.time_s(record.samples.saturating_sub(1)));
+    // A half sample of rounding in the analyst's list is no mistake.
+    let half = record.step_s / 2.0;
+    let inside = first_s - half <= event.start_s && event.start_s < event.end_s && event.end_s <= last_s + half;
+    if !inside {
+        let (start, end) = (event.start_s, event.end_s);
+        return Err(format!(
+            "the event {} from {start:.1} to {end:.1} s is not inside the record, {first_s:.1} to {last_s:.1} s",
+            event.class
+        ));
+    }
+    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), "given")
+}
+
+fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {
+    m.end_s.min(end_s) - m.start_s.max(start_s)
+}
+
+fn most_overlapping<'a>(event: &Event, found: &'a [Maneuver]) -> Option<&'a Maneuver> {
+    let overlap = |m: &&Maneuver| overlap_s(m, event.start_s, event.end_s);
+    found.iter().filter(|m| overlap(m) > 0.0).max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
+}
+
+fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
+    let verdict = match (given, found) {
+        (Some(_), None) => "not found",
+        (None, _) => "not given",
+        (Some(g), Some(f)) if g.class != f.class => "other class",
+        (Some(g), Some(f)) => {
+            let apart_s = (g.start_s - f.start_s).abs().max((g.end_s - f.end_s).abs());
+            if apart_s <= AGREEMENT_S { "agrees" } else { "other times" }
+        }
+    };
+    EventRow {
+        flight_id: given.map(|g| &g.flight_id).or(found.map(|f| &f.flight_id)).cloned().unwrap_or_default(),
+        given_class: given.map(|g| g.class.clone()),
+        given_start_s: given.map(|g| g.start_s),
+        given_end_s: given.map(|g| g.end_s),
+        found_class: found.map(|f| f.class.clone()),
+        found_start_s: found.map(|f| f.start_s),
+        found_end_s: found.map(|f| f.end_s),
+        verdict: verdict.into(),
+    }
+}

@@ -1,0 +1,221 @@
+//! Trend fits least squares across α through the estimates of one derivative, for the group of classes that speaks for
+//! it and for each class alone.
+//!
+//! The fit is in [`fit`]: a polynomial in α whose order a criterion chooses, with weights 1/(bound² + τ²), where τ is
+//! the scatter between maneuvers beyond their bounds.
+
+mod fit;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Problem;
+use crate::maneuver::Status;
+use crate::tables::{EstimateRow, TrendRow};
+
+use fit::{Fit, Point};
+
+/// A trend through fewer maneuvers than this has no scatter to speak of and is not drawn.
+const FEWEST_MANEUVERS: usize = 3;
+
+/// What the analyst decides about trends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Highest order of the polynomial in α. Default 6: a derivative of an aircraft that goes through stall turns a few
+    /// times between 5° and 60°.
+    #[serde(default = "default_max_order")]
+    pub max_order: usize,
+    /// What chooses the order. Default `aicc`.
+    #[serde(default)]
+    pub criterion: Criterion,
+    /// The trend is published at the multiples of this that lie inside the range of the data, deg. Default 5°.
+    #[serde(default = "default_alpha_step")]
+    pub alpha_step_deg: f64,
+    /// A multiple that lies no further than this beyond the outermost maneuver counts as inside, deg: a maneuver flown
+    /// for 60° has a mean of 59.8°. Default 0.5°.
+    #[serde(default = "default_alpha_reach")]
+    pub alpha_reach_deg: f64,
+    /// Whether each class has a trend of its own beside the group's. Default true.
+    #[serde(default = "default_per_class")]
+    pub per_class: bool,
+    /// Which classes speak for which derivatives. The first group that names a derivative, or that names none, is the
+    /// derivative's. Default: one group, `all`, of all classes for all derivatives.
+    #[serde(default = "default_groups")]
+    pub groups: Vec<Group>,
+    /// Names that have no trend across α: sensor biases.
+    #[serde(default)]
+    pub leave_out: BTreeSet<String>,
+}
+
+/// The classes that speak for some derivatives.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    pub name: String,
+    /// Empty: every derivative that no group before this one names.
+    #[serde(default)]
+    pub derivatives: Vec<String>,
+    /// Empty: every class.
+    #[serde(default)]
+    pub classes: Vec<String>,
+}
+
+/// What chooses the order: both weigh the misfit against the number of coefficients.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Criterion {
+    /// Akaike's criterion with the correction for few data.
+    #[default]
+    Aicc,
+    /// The Bayesian criterion of Schwarz.
+    Bic,
+}
+
+fn default_max_order() -> usize {
+    6
+}
+fn default_alpha_step() -> f64 {
+    5.0
+}
+fn default_alpha_reach() -> f64 {
+    0.5
+}
+fn default_per_class() -> bool {
+    true
+}
+fn default_groups() -> Vec<Group> {
+    vec![Group { name: "all".into(), derivatives: Vec::new(), classes: Vec::new() }]
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            max_order: default_max_order(),
+            criterion: Criterion::default(),
+            alpha_step_deg: default_alpha_step(),
+            alpha_reach_deg: default_alpha_reach(),
+            per_class: default_per_class(),
+            groups: default_groups(),
+            leave_out: BTreeSet::new(),
+        }
+    }
+}
+
+impl Settings {
+    /// The group that speaks for a derivative; none where no group names it and none takes the rest.
+    #[must_use]
+    pub fn group_of(&self, derivative: &str) -> Option<&Group> {
+        let names = |g: &&Group| g.derivatives.iter().any(|d| d == derivative);
+        let rest = |g: &&Group| g.derivatives.is_empty();
+        self.groups.iter().find(names).or_else(|| self.groups.iter().find(rest))
+    }
+}
+
+impl Group {
+    #[must_use]
+    pub fn has(&self, class: &str) -> bool {
+        self.classes.is_empty() || self.classes.iter().any(|c| c == class)
+    }
+}
+
+/// The trends of every derivative, in the order in which the derivatives first appear: its group's, then its classes'.
+///
+/// Give it the estimates of converged fits only. Of them it takes those with status `estimated`, a value and a bound
+/// (the corrected one where there is one). A group of fewer than three maneuvers has no trend and is a problem; a
+/// single class of so few is passed over.
+#[must_use]
+pub fn trends(estimates: &[EstimateRow], settings: &Settings) -> (Vec<TrendRow>, Vec<Problem>) {
+    let (mut rows, mut problems) = (Vec::new(), Vec::new());
+    for (derivative, of_it) in by_derivative(estimates, settings) {
+        let group = settings.group_of(derivative);
+        if let Some(group) = group {
+            let members = of_it.iter().filter(|e| group.has(&e.class)).copied();
+            match trend(&members.collect::<Vec<_>>(), &group.name, settings) {
+                Ok(trend) => rows.extend(trend),
+                Err(reason) => problems.push(problem(derivative, &group.name, reason)),
+            }
+        }
+        if settings.per_class {
+            let classes: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
+            for class in classes.into_iter().filter(|c| group.is_none_or(|g| g.name != *c)) {
+                let members = of_it.iter().filter(|e| e.class == class).copied();
+                rows.extend(trend(&members.collect::<Vec<_>>(), class, settings).unwrap_or_default());
+            }
+        }
+    }
+    (rows, problems)
+}
+
+/// The usable estimates of each derivative, derivatives in order of appearance.
+fn by_derivative<'a>(estimates: &'a [EstimateRow], settings: &Settings) -> Vec<(&'a str, Vec<&'a EstimateRow>)> {
+    let mut order: Vec<(&str, Vec<&EstimateRow>)> = Vec::new();
+    let mut place: BTreeMap<&str, usize> = BTreeMap::new();
+    let is_free =
+        |e: &&EstimateRow| e.status == Status::Estimated.name() && !settings.leave_out.contains(&e.derivative);
+    for estimate in estimates.iter().filter(is_free) {
+        let at = *place.entry(&estimate.derivative).or_insert(order.len());
+        if at == order.len() {
+            order.push((&estimate.derivative, Vec::new()));
+        }
+        if point(estimate).is_some() {
+            order[at].1.push(estimate);
+        }
+    }
+    order
+}
+
+/// An estimate as the fit sees it; none without a value and a bound.
+fn point(e: &EstimateRow) -> Option<Point> {
+    let bound = e.bound_corrected.or(e.bound)?;
+    let p = Point { alpha_deg: e.alpha_deg, value: e.value?, bound };
+    (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0).then_some(p)
+}
+
+/// One trend on the published grid.
+fn trend(members: &[&EstimateRow], group: &str, settings: &Settings) -> Result<Vec<TrendRow>, String> {
+    if members.len() < FEWEST_MANEUVERS {
+        return Err(format!("{} maneuvers with an estimate and a bound are too few for a trend", members.len()));
+    }
+    let mut points: Vec<Point> = members.iter().filter_map(|e| point(e)).collect();
+    // Sums do not depend on the order in which the maneuvers come.
+    points.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(std::cmp::Ordering::Equal));
+    let fit = Fit::best(&points, settings).ok_or("the least-squares fit has no solution")?;
+    let half_width = fit.quantile_95();
+    let row = |alpha_deg: f64| {
+        let (value, standard_error) = fit.at(alpha_deg);
+        TrendRow {
+            derivative: members[0].derivative.clone(),
+            unit: members[0].unit.clone(),
+            group: group.to_owned(),
+            alpha_deg,
+            value,
+            standard_error,
+            lower_95: value - half_width * standard_error,
+            upper_95: value + half_width * standard_error,
+            maneuvers: points.len(),
+            order: fit.order(),
+            scatter: fit.scatter(),
+        }
+    };
+    Ok(grid(&points, settings).into_iter().map(row).collect())
+}
+
+/// The multiples of the step inside the range of the data.
+fn grid(points: &[Point], settings: &Settings) -> Vec<f64> {
+    let (step, reach) = (settings.alpha_step_deg, settings.alpha_reach_deg);
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+    if step.is_nan() || step <= 0.0 {
+        return Vec::new();
+    }
+    let from = ((first.alpha_deg - reach) / step).ceil();
+    let to = ((last.alpha_deg + reach) / step).floor();
+    std::iter::successors(Some(from), |k| Some(k + 1.0)).take_while(|k| *k <= to).map(|k| k * step).collect()
+}
+
+fn problem(derivative: &str, group: &str, reason: String) -> Problem {
+    Problem { stage: "trend".into(), flight_id: String::new(), place: format!("{derivative}, group {group}"), reason }
+}

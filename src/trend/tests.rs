@@ -1,0 +1,145 @@
+//! Trend on estimates made up from known truths.
+
+use approx::assert_relative_eq;
+
+use super::*;
+
+fn estimate(derivative: &str, class: &str, alpha_deg: f64, value: f64, bound: f64) -> EstimateRow {
+    EstimateRow {
+        maneuver_id: format!("f1_t{alpha_deg:05.1}"),
+        flight_id: "f1".into(),
+        class: class.into(),
+        alpha_deg,
+        mach: 0.3,
+        derivative: derivative.into(),
+        unit: "per_deg".into(),
+        status: "estimated".into(),
+        value: Some(value),
+        bound: Some(bound / 5.0),
+        bound_corrected: Some(bound),
+        wind_tunnel: None,
+    }
+}
+
+/// Numbers that look random and are the same every time: Knuth's linear congruential generator, normal by summing.
+struct Lcg(u64);
+
+impl Lcg {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn groups_of<'a>(rows: &'a [TrendRow], derivative: &str) -> BTreeSet<&'a str> {
+    rows.iter().filter(|r| r.derivative == derivative).map(|r| r.group.as_str()).collect()
+}
+
+#[test]
+fn the_band_covers_the_truth_as_often_as_it_says() {
+    let truth = |a: f64| 0.06 - 2e-3 * (a - 30.0) + 3e-5 * (a - 30.0).powi(2);
+    let mut random = Lcg(7);
+    let (mut inside, mut all) = (0.0, 0.0);
+    for _ in 0..200 {
+        let draw = |i: u32| {
+            let alpha = 5.0 + 5.0 * f64::from(i % 12) + 0.4 * random.normal();
+            let bound = 0.004 * (0.5 + random.uniform());
+            let value = truth(alpha) + bound * random.normal() + 0.008 * random.normal();
+            estimate("d", "A", alpha, value, bound)
+        };
+        let estimates: Vec<EstimateRow> = (0..40).map(draw).collect();
+        let (rows, problems) = trends(&estimates, &Settings { per_class: false, ..Settings::default() });
+        assert_eq!(problems, []);
+        for row in rows {
+            all += 1.0;
+            inside += f64::from(u8::from((row.lower_95..=row.upper_95).contains(&truth(row.alpha_deg))));
+        }
+    }
+    let covered = inside / all;
+    assert!((0.90..=0.98).contains(&covered), "{covered}");
+}
+
+#[test]
+fn the_order_of_the_maneuvers_does_not_matter_to_the_bit() {
+    let mut random = Lcg(1);
+    let mut estimates: Vec<EstimateRow> = (0..30)
+        .map(|i| {
+            estimate("d", ["A", "B"][i % 2], 5.0 + 55.0 * random.uniform(), random.normal(), 0.1 + random.uniform())
+        })
+        .collect();
+    let (rows, _) = trends(&estimates, &Settings::default());
+    assert_eq!(groups_of(&rows, "d"), ["A", "B", "all"].into());
+    estimates.reverse();
+    estimates.swap(3, 17);
+    assert_eq!(trends(&estimates, &Settings::default()).0, rows);
+}
+
+#[test]
+fn the_first_group_that_names_a_derivative_speaks_for_it() {
+    let group = |name: &str, derivatives: &[&str], classes: &[&str]| Group {
+        name: name.into(),
+        derivatives: derivatives.iter().map(|&s| s.to_owned()).collect(),
+        classes: classes.iter().map(|&s| s.to_owned()).collect(),
+    };
+    let groups = vec![group("all", &[], &[]), group("B", &["vane"], &["B"]), group("A and B", &["rate"], &["A", "B"])];
+    let settings = Settings { groups, ..Settings::default() };
+    let value = |class: &str| if class == "B" { 2.0 } else { 1.0 };
+    let estimates: Vec<EstimateRow> = ["vane", "rate", "other"]
+        .iter()
+        .flat_map(|d| ["A", "B", "C"].map(|c| (*d, c)))
+        .flat_map(|(d, c)| (0..8).map(move |i| estimate(d, c, 10.0 + 5.0 * f64::from(i), value(c), 0.1)))
+        .collect();
+    let (rows, problems) = trends(&estimates, &settings);
+    assert_eq!(problems, []);
+    assert_eq!(groups_of(&rows, "vane"), ["A", "B", "C"].into());
+    assert_eq!(groups_of(&rows, "rate"), ["A", "A and B", "B", "C"].into());
+    assert_eq!(groups_of(&rows, "other"), ["A", "B", "C", "all"].into());
+    let of = |d: &str, g: &str| rows.iter().find(|r| r.derivative == d && r.group == g).expect("a trend");
+    assert_relative_eq!(of("vane", "B").value, 2.0, max_relative = 1e-9);
+    assert_eq!(of("rate", "A and B").maneuvers, 16);
+    assert_relative_eq!(of("other", "all").value, 4.0 / 3.0, max_relative = 1e-6);
+}
+
+#[test]
+fn the_grid_stays_inside_the_data() {
+    let estimates: Vec<EstimateRow> =
+        [11.0, 14.8, 20.1, 25.0, 29.7].iter().map(|&a| estimate("d", "A", a, 1.0, 0.1)).collect();
+    let at = |reach| {
+        let settings = Settings { alpha_reach_deg: reach, per_class: false, ..Settings::default() };
+        trends(&estimates, &settings).0.iter().map(|r| r.alpha_deg).collect::<Vec<_>>()
+    };
+    assert_eq!(at(0.0), [15.0, 20.0, 25.0]);
+    assert_eq!(at(0.5), [15.0, 20.0, 25.0, 30.0]);
+}
+
+#[test]
+fn held_unbounded_and_left_out_estimates_have_no_part() {
+    let mut estimates: Vec<EstimateRow> =
+        (0..6).map(|i| estimate("d", "A", 10.0 + 5.0 * f64::from(i), 1.0, 0.1)).collect();
+    let wrong = |change: &dyn Fn(&mut EstimateRow)| {
+        let mut row = estimate("d", "A", 20.0, 99.0, 0.1);
+        change(&mut row);
+        row
+    };
+    estimates.push(wrong(&|e| e.status = "held".into()));
+    estimates.push(wrong(&|e| (e.bound, e.bound_corrected) = (None, None)));
+    estimates.push(wrong(&|e| e.bound_corrected = Some(f64::INFINITY)));
+    estimates.push(wrong(&|e| e.derivative = "bias".into()));
+    let settings = Settings { leave_out: ["bias".to_owned()].into(), ..Settings::default() };
+    let (rows, problems) = trends(&estimates, &settings);
+    assert_eq!(problems, []);
+    assert!(rows.iter().all(|r| r.derivative == "d" && r.maneuvers == 6 && (r.value - 1.0).abs() < 1e-9));
+}
+
+#[test]
+fn too_few_maneuvers_are_a_problem_of_the_group_and_silent_for_a_class() {
+    let few = [estimate("d", "A", 10.0, 1.0, 0.1), estimate("d", "B", 20.0, 1.0, 0.1)];
+    let (rows, problems) = trends(&few, &Settings::default());
+    assert_eq!(rows, []);
+    assert_eq!(problems.len(), 1);
+    assert_eq!(problems[0].place, "d, group all");
+}
