@@ -19,6 +19,7 @@ pub mod output_error;
 
 // Stages: functions of values, each from its predecessor's output.
 pub mod estimate;
+pub mod report;
 
 // Outside: disk and configuration.
 pub mod store;
