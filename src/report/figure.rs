@@ -5,6 +5,7 @@
 //! crate's own scene: it draws bars over hollow marks otherwise, and each with an element of its own.
 
 use std::fmt::Write;
+use std::sync::Arc;
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
@@ -16,21 +17,23 @@ use kuva::render::plots::Plot;
 use kuva::render::render::{PathData, Primitive, Scene, render_multiple};
 
 use super::marks::Mark;
-use super::notation::escaped;
+use super::notation::{Digits, escaped};
 use super::scale::Scale;
 
 /// Width of a figure in its own units. At half a page (90 mm) a unit is 0.67 pt, so that 14 is over 9 pt.
 const WIDTH: f64 = 380.0;
-const HEIGHT: f64 = 285.0;
-const PANEL_HEIGHT: f64 = 175.0;
+const HEIGHT: f64 = 256.0;
+const PANEL_HEIGHT: f64 = 164.0;
+/// Room above and below the frame: half a line of text for the topmost tick label, and ticks and label of the x axis.
+const MARGINS: (f64, f64) = (9.0, 44.0);
 const TEXT: u32 = 14;
 const FONT: &str = "Helvetica, Arial, Liberation Sans, sans-serif";
 
 /// What speaks for flight: the trend, and the computed response.
 pub const INK: &str = "#111111";
 pub const TUNNEL_COLOUR: &str = "#a50026";
-pub const MEASURED_COLOUR: &str = "#0060a8";
-pub const LEFT_OUT_COLOUR: &str = "#d06000";
+pub const MEASURED_COLOUR: &str = "#4f9bd9";
+pub const LEFT_OUT_COLOUR: &str = "#c44e00";
 
 /// Beyond so many the tunnel's line has no marks: they would hide it.
 const MOST_TUNNEL_MARKS: usize = 25;
@@ -100,11 +103,11 @@ pub fn derivative(figure: &DerivativeFigure) -> String {
 pub fn panel(panel: &Panel) -> String {
     let layout = || layout("time, s", &panel.y_label, PANEL_HEIGHT, panel.time, panel.scale);
     let lines = panel.lines.iter().map(|line| Plot::Line(curve(&line.points, line.colour, 1.4, line.dash)));
-    let mut scene = render_multiple(lines.collect(), layout());
+    let mut scene = render_multiple(std::iter::once(nothing()).chain(lines).collect(), layout());
     let place = ComputedLayout::from_layout(&layout());
     let pen = Pen { place: &place, scale: panel.scale };
-    pen.dots(&mut scene, &panel.dots, MEASURED_COLOUR, 2.2);
-    pen.dots(&mut scene, &panel.left_out, LEFT_OUT_COLOUR, 3.4);
+    pen.dots(&mut scene, &panel.left_out, LEFT_OUT_COLOUR, 4.0);
+    pen.dots(&mut scene, &panel.dots, MEASURED_COLOUR, 2.6);
     inline(&SvgBackend::new().render_scene(&scene), panel.id, panel.title)
 }
 
@@ -115,15 +118,16 @@ fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layo
         .with_x_axis_min(x.min)
         .with_x_axis_max(x.max)
         .with_x_tick_step(x.step)
-        .with_x_tick_format(TickFormat::Fixed(x.decimals()))
+        .with_x_tick_format(ticks(x))
         .with_y_axis_min(y.min)
         .with_y_axis_max(y.max)
         .with_y_tick_step(y.step)
-        .with_y_tick_format(if y.step < 1e-6 { TickFormat::Sci } else { TickFormat::Fixed(y.decimals()) })
+        .with_y_tick_format(ticks(y))
         .with_x_label(x_label)
         .with_y_label(y_label)
         .with_label_size(TEXT)
         .with_tick_size(TEXT)
+        .with_force_margins_y(MARGINS.0, MARGINS.1)
         .with_box_axes()
         .with_grid_line_width(0.5)
         .with_font_family(FONT);
@@ -131,13 +135,27 @@ fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layo
     if crosses_zero { layout.with_reference_line(zero_line()) } else { layout }
 }
 
+/// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper minus.
+fn ticks(scale: Scale) -> TickFormat {
+    let digits = match scale.decimals() {
+        decimals if decimals <= 6 => Digits::Decimals(decimals),
+        _ => Digits::Scientific(1),
+    };
+    TickFormat::Custom(Arc::new(move |value| digits.write(Some(value))))
+}
+
 fn zero_line() -> ReferenceLine {
     ReferenceLine::horizontal(0.0).with_color("#777777").with_stroke_width(0.8).with_dasharray("none")
 }
 
+/// A plot without points: the crate draws no axes where there is no plot at all.
+fn nothing() -> Plot {
+    Plot::Scatter(ScatterPlot::new())
+}
+
 /// Band, trend and tunnel, from back to front.
 fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
-    let mut plots = Vec::new();
+    let mut plots = vec![nothing()];
     if figure.band.len() > 1 {
         let (alpha, ends): (Vec<f64>, Vec<(f64, f64)>) = figure.band.iter().map(|&(a, l, u)| (a, (l, u))).unzip();
         let (lower, upper): (Vec<f64>, Vec<f64>) = ends.into_iter().unzip();
@@ -210,28 +228,35 @@ impl Pen<'_> {
         );
     }
 
+    /// Dots behind everything else in the plot area: the computed line stays in sight on top of the measured samples.
     fn dots(&self, scene: &mut Scene, points: &[(f64, f64)], colour: &str, size: f64) {
         let mut path = String::new();
         for &(t, value) in points.iter().filter(|p| self.scale.contains(p.1)) {
             let (x, y, r) = (self.place.map_x(t), self.place.map_y(value), 0.5 * size);
             let _ = write!(path, "M{:.1} {:.1}h{size}v{size}h-{size}z", x - r, y - r);
         }
-        stroke(scene, path, "none", 0.0, Some(colour));
+        let begin = scene.elements.iter().position(|e| matches!(e, Primitive::ClipStart { .. }));
+        if let (Some(begin), false) = (begin, path.is_empty()) {
+            scene.elements.insert(begin + 1, path_of(path, "none", 0.0, Some(colour)));
+        }
     }
 }
 
 fn stroke(scene: &mut Scene, d: String, colour: &str, width: f64, fill: Option<&str>) {
-    if d.is_empty() {
-        return;
+    if !d.is_empty() {
+        scene.add(path_of(d, colour, width, fill));
     }
-    scene.add(Primitive::Path(Box::new(PathData {
+}
+
+fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive {
+    Primitive::Path(Box::new(PathData {
         d,
         fill: fill.map(Color::from),
         stroke: Color::from(colour),
         stroke_width: width,
         opacity: None,
         stroke_dasharray: None,
-    })));
+    }))
 }
 
 /// Makes a drawing of the crate fit to stand in a page with others: it scales with its column, says its title to those
@@ -303,6 +328,13 @@ mod tests {
         let svg = derivative(&figure());
         let without = derivative(&DerivativeFigure { classes: vec![], ..figure() });
         assert_eq!(svg.matches("<path").count(), without.matches("<path").count() + 3);
+    }
+
+    #[test]
+    fn a_figure_without_curves_has_axes_all_the_same() {
+        let (band, trend, tunnel) = (vec![], vec![], vec![]);
+        let svg = derivative(&DerivativeFigure { band, trend, tunnel, ..figure() });
+        assert!(svg.contains(">0.04</text>") && svg.contains(">60</text>"), "{svg}");
     }
 
     #[test]

@@ -186,23 +186,22 @@ fn lines_legend(subject: &Subject) -> Vec<LegendView> {
 
 /// What the reader must know to read one figure: how many estimates, what the bars are, what is not drawn.
 fn caption(subject: &Subject, scale: Scale) -> String {
-    let mut parts = vec![count(subject.points.len(), "estimate")];
+    let estimates = count(subject.points.len(), "estimate");
     let corrected = subject.points.iter().filter(|p| p.corrected).count();
-    if !subject.points.is_empty() {
-        parts.push(match subject.points.len() - corrected {
-            0 => "bars ± one bound, corrected for coloured residuals".to_owned(),
-            n if corrected == 0 => format!("bars ± one bound, uncorrected (all {n})"),
-            n => format!("bars ± one bound, corrected for coloured residuals (uncorrected for {n})"),
-        });
-    }
-    if subject.tunnel.is_empty() {
+    let mut parts = vec![match subject.points.len() - corrected {
+        _ if subject.points.is_empty() => estimates,
+        0 => format!("{estimates}, bars ± corrected bound"),
+        _ if corrected == 0 => format!("{estimates}, bars ± bound, not corrected"),
+        n => format!("{estimates}, bars ± corrected bound ({n} not corrected)"),
+    }];
+    if subject.tunnel.is_empty() && subject.coefficient.is_some() {
         parts.push("no wind-tunnel value".to_owned());
     }
     let outside = subject.points.iter().filter(|p| !scale.contains(p.value)).count();
     let unseen = [
-        (outside, "outside the axes (arrowheads at the edge)"),
-        (subject.undetermined, "not determined by the data, not drawn"),
-        (subject.unconverged, "of fits that did not converge, not drawn"),
+        (outside, "outside the axes (arrowheads)"),
+        (subject.undetermined, "not drawn: not determined by the data"),
+        (subject.unconverged, "not drawn: fit not converged"),
     ];
     parts.extend(unseen.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")));
     parts.join("; ") + "."
@@ -249,7 +248,7 @@ mod tests {
         let subjects = subject::gather(&contents);
         let subject = subjects.iter().find(|s| s.name == name).expect("the subject");
         let text = caption(subject, shown(subject).scale());
-        assert!(text.contains("1 not determined by the data"), "{text}");
-        assert!(text.contains("1 of fits that did not converge"), "{text}");
+        assert!(text.contains("1 not drawn: not determined"), "{text}");
+        assert!(text.contains("1 not drawn: fit not converged"), "{text}");
     }
 }

@@ -106,7 +106,7 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         verdicts: summary::verdicts(&subjects, &anchors),
         groups: gallery::groups(contents, &subjects, &anchors),
         never_estimated: never_estimated(contents, &subjects),
-        comparison: subjects.iter().filter(|s| !s.comparison.is_empty()).map(comparison).collect(),
+        comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),
@@ -154,10 +154,17 @@ fn comparison(subject: &Subject) -> TableView {
     let heads = ["α", "flight", "standard error", "wind tunnel", "difference", "%", "z", "verdict"];
     TableView {
         title: if unit.is_empty() { subject.name.to_owned() } else { format!("{}, {unit}", subject.name) },
-        note: if subject.group.is_empty() { String::new() } else { format!("trend of {}", subject.group) },
+        note: subject.trend.first().map_or_else(String::new, |t| trend_in_words(t)),
         heads: heads.map(str::to_owned).to_vec(),
         rows: rows.iter().map(row).collect(),
     }
+}
+
+/// What the trend that speaks for flight was fitted through, and how.
+fn trend_in_words(trend: &TrendRow) -> String {
+    let maneuvers = notation::count(trend.maneuvers, "maneuver");
+    let scatter = number(Some(trend.scatter), 2);
+    format!("trend of {}: {maneuvers}, order {}, scatter {scatter}", trend.group, trend.order)
 }
 
 /// Every maneuver with its flight condition and how its fit ended.

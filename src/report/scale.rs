@@ -3,7 +3,7 @@
 
 use super::notation::power_of_ten;
 
-/// Round limits, with ticks at every multiple of the step between them.
+/// Round limits, at half steps at least, with ticks at every multiple of the step between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     pub min: f64,
@@ -23,10 +23,10 @@ impl Scale {
     pub fn covering(low: f64, high: f64) -> Scale {
         let (low, high) = widened(low, high);
         let step = round_step((high - low) / STEPS);
-        Scale { min: (low / step).floor() * step, max: (high / step).ceil() * step, step }
+        Scale::with_step(low, high, 0.5 * step, step)
     }
 
-    /// The scale from one multiple of `step` to another that covers an interval.
+    /// The scale from one multiple of `margin` to another that covers an interval.
     #[must_use]
     pub fn with_step(low: f64, high: f64, margin: f64, step: f64) -> Scale {
         let (low, high) = widened(low, high);
@@ -140,9 +140,9 @@ mod tests {
             let scale = Scale::covering(low, high);
             let slack = 1e-9 * scale.step;
             assert!(scale.min <= low + slack && scale.max >= high - slack && scale.max > scale.min, "{scale:?}");
-            let steps = (scale.max - scale.min) / scale.step;
-            assert_relative_eq!(steps, steps.round(), epsilon = 1e-6);
-            assert!((2.0..=8.0).contains(&steps), "{low} {high}: {steps} steps");
+            let halves = 2.0 * (scale.max - scale.min) / scale.step;
+            assert_relative_eq!(halves, halves.round(), epsilon = 1e-6);
+            assert!((4.0..=14.0).contains(&halves), "{low} {high}: {halves} half steps");
         }
     }
 

@@ -39,6 +39,12 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
+    /// Whether flight is compared with the tunnel here; a bias of an instrument is not, whatever rows there are.
+    #[must_use]
+    pub fn is_compared(&self) -> bool {
+        self.coefficient.is_some() && !self.comparison.is_empty()
+    }
+
     /// How many maneuvers speak for flight: those of the trend, or of the estimates where there is no trend.
     #[must_use]
     pub fn maneuvers(&self) -> usize {

@@ -111,14 +111,11 @@ fn class(name: &str, title: &str, axis: Axis, flown: &[Maneuver], fits: &BTreeMa
 /// The verdict tables, one per axis. `anchors` says where each derivative's figure is.
 #[must_use]
 pub fn verdicts(subjects: &[Subject], anchors: &BTreeMap<&str, String>) -> Vec<VerdictGroup> {
-    let groups =
-        [(Some(Axis::Longitudinal), "Longitudinal"), (Some(Axis::Lateral), "Lateral-directional"), (None, "Other")];
-    let of_group = |axis: Option<Axis>| -> Vec<&Subject> {
-        subjects.iter().filter(|s| s.axis == axis && !s.comparison.is_empty()).collect()
-    };
-    groups
+    let of_axis =
+        |axis: Axis| -> Vec<&Subject> { subjects.iter().filter(|s| s.axis == Some(axis) && s.is_compared()).collect() };
+    [(Axis::Longitudinal, "Longitudinal"), (Axis::Lateral, "Lateral-directional")]
         .into_iter()
-        .map(|(axis, title)| (title, of_group(axis)))
+        .map(|(axis, title)| (title, of_axis(axis)))
         .filter(|(_, subjects)| !subjects.is_empty())
         .map(|(title, subjects)| verdict_group(title, &subjects, anchors))
         .collect()
@@ -204,7 +201,7 @@ fn flown(contents: &Contents, classes: &[ClassView]) -> String {
 fn compared(subjects: &[Subject]) -> Vec<String> {
     let mut agreement: Vec<f64> = Vec::new();
     let mut without = 0;
-    for subject in subjects.iter().filter(|s| !s.comparison.is_empty()) {
+    for subject in subjects.iter().filter(|s| s.is_compared()) {
         let with_tunnel = subject.comparison.iter().filter(|c| c.wind_tunnel.is_some()).count();
         let agreeing = subject.comparison.iter().filter(|c| c.verdict == "agrees").count();
         match with_tunnel {

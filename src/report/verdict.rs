@@ -37,18 +37,37 @@ pub fn runs<'a>(rows: &[&'a ComparisonRow]) -> Vec<Run<'a>> {
     runs
 }
 
-/// The runs in words: `agrees 5°–25°, flight lower 30°–60°`.
+/// More runs than these are read more easily by verdict than by angle of attack.
+const MOST_RUNS: usize = 4;
+
+/// The runs in words: `agrees 5°–25°, flight lower 30°–60°`; many of them by verdict, the most frequent first:
+/// `agrees 5°, 15°–30°; flight lower 10°, 35°–60°`.
 #[must_use]
 pub fn phrase(runs: &[Run]) -> String {
-    let words: Vec<String> = runs.iter().map(Run::words).collect();
-    words.join(", ")
+    if runs.len() <= MOST_RUNS {
+        let words: Vec<String> = runs.iter().map(|run| format!("{} {}", run.verdict, run.range())).collect();
+        return words.join(", ");
+    }
+    let mut verdicts: Vec<&str> = Vec::new();
+    for run in runs {
+        if !verdicts.contains(&run.verdict) {
+            verdicts.push(run.verdict);
+        }
+    }
+    let of = |verdict: &str| runs.iter().filter(|run| run.verdict == verdict).collect::<Vec<_>>();
+    let extent = |verdict: &str| of(verdict).iter().map(|run| run.right_deg - run.left_deg).sum::<f64>();
+    verdicts.sort_by(|a, b| extent(b).total_cmp(&extent(a)));
+    let words: Vec<String> = verdicts
+        .iter()
+        .map(|verdict| {
+            let ranges: Vec<String> = of(verdict).iter().map(|run| run.range()).collect();
+            format!("{verdict} {}", ranges.join(", "))
+        })
+        .collect();
+    words.join("; ")
 }
 
 impl Run<'_> {
-    fn words(&self) -> String {
-        format!("{} {}", self.verdict, self.range())
-    }
-
     /// The angles of attack it covers: `5°–25°`.
     #[must_use]
     pub fn range(&self) -> String {
@@ -127,6 +146,15 @@ mod tests {
         ]);
         let runs = runs(&rows.iter().collect::<Vec<_>>());
         assert_eq!(phrase(&runs), "agrees 5°\u{2013}10°, flight lower 15°, agrees 20°\u{2013}30.5°");
+    }
+
+    #[test]
+    fn many_runs_are_told_by_verdict_the_most_frequent_first() {
+        let verdicts = ["agrees", "flight lower", "flight lower", "agrees", "flight lower", "flight higher"];
+        let rows =
+            rows(&verdicts.iter().zip([5.0, 10.0, 15.0, 20.0, 25.0, 30.0]).map(|(v, a)| (a, *v)).collect::<Vec<_>>());
+        let runs = runs(&rows.iter().collect::<Vec<_>>());
+        assert_eq!(phrase(&runs), "flight lower 10°\u{2013}15°, 25°; agrees 5°, 20°; flight higher 30°");
     }
 
     #[test]
