@@ -186,8 +186,9 @@ fn maneuvers(contents: &Contents) -> TableView {
             of_fit(|f| f.initial_cost),
             of_fit(|f| f.final_cost),
             of_fit(|f| f.condition_number),
-            of_fit(|f| f.left_out.map(|share| 100.0 * share)),
-            fit.map_or_else(String::new, |f| f.reason.clone()),
+            fit.and_then(|f| f.left_out).map_or_else(|| NOTHING.to_owned(), |share| fixed(100.0 * share, 2)),
+            // That a fit converged needs no reason; for the others the reader wants it beside the flight condition.
+            fit.filter(|f| f.outcome != "converged").map_or_else(String::new, |f| f.reason.clone()),
         ]
     };
     let heads = [
