@@ -10,6 +10,7 @@ use super::notation::angle;
 use super::scale::{Scale, extent};
 use super::subject::by_name;
 use crate::tables::{History, HistoryOutput};
+use crate::units::Unit;
 
 /// So many samples are drawn of one signal at most: more cannot be told apart at half a page.
 const MOST_SAMPLES: usize = 300;
@@ -101,13 +102,18 @@ fn output_panel(history: &History, output: &HistoryOutput, number: usize, i: usi
     figure::panel(&Panel {
         id: &id,
         title: &format!("{} of {}", output.label, history.maneuver_id),
-        y_label: label(&output.label, &output.unit),
+        y_label: label(without_unit(&output.label), &output.unit),
         time: time_scale(history),
         scale,
         lines,
         dots: every(kept),
         left_out,
     })
+}
+
+/// A signal's name without the unit at its end, which the axis states anyway.
+fn without_unit(signal: &str) -> &str {
+    Unit::of_signal(signal).suffix.and_then(|suffix| signal.strip_suffix(suffix)).unwrap_or(signal)
 }
 
 fn lines_scale(lines: &[PanelLine], dots: &[(f64, f64)]) -> Scale {
@@ -174,4 +180,33 @@ fn history_legend(history: &History) -> Vec<LegendView> {
         legend.push(LegendView { key: dot(figure::LEFT_OUT_COLOUR, 6.0), label: "left out of the cost".to_owned() });
     }
     legend
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples;
+    use super::*;
+
+    #[test]
+    fn one_maneuver_of_each_class_is_shown_the_one_in_the_middle() {
+        let campaign = samples::campaign();
+        let views = views(&campaign.contents());
+        assert_eq!(views.len(), campaign.classes.len());
+        assert!(views.iter().all(|view| view.alpha == "30°" && view.panels.len() == 2));
+    }
+
+    #[test]
+    fn the_unit_is_said_once() {
+        assert_eq!(label(without_unit("alpha_vane_deg"), "deg"), "alpha_vane, deg");
+        assert_eq!(label(without_unit("an_g"), "g"), "an, g");
+    }
+
+    #[test]
+    fn what_hardly_moved_is_not_drawn() {
+        let mut history = samples::campaign().histories.remove(0);
+        history.controls.push(("dlef_deg".into(), vec![33.0; history.time_s.len()]));
+        let (lines, legend) = controls(&history);
+        assert_eq!(lines.len(), 1);
+        assert!(legend.iter().all(|entry| entry.label != "dlef_deg"));
+    }
 }
