@@ -1,0 +1,167 @@
+//! How the field writes things: derivatives with subscripts, units in words, numbers with the digits that mean something.
+
+use minijinja::HtmlEscape;
+
+use crate::aero::{Axis, Coefficient};
+
+/// What stands where there is no value.
+pub const NOTHING: &str = "\u{2013}";
+
+/// The coefficient a derivative belongs to, by its name `<coefficient>_<regressor>`; none for a bias.
+#[must_use]
+pub fn coefficient_of(name: &str) -> Option<Coefficient> {
+    let (prefix, _) = name.split_once('_')?;
+    [Axis::Longitudinal, Axis::Lateral]
+        .into_iter()
+        .flat_map(Axis::coefficients)
+        .find(|coefficient| format!("{coefficient:?}") == prefix)
+}
+
+/// A derivative as the field writes it, in HTML: a C with the rest as its subscript, surfaces with a δ, angles in Greek.
+/// What is no derivative (a bias) is its own name.
+#[must_use]
+pub fn symbol(name: &str) -> String {
+    let (Some(_), Some((prefix, regressor))) = (coefficient_of(name), name.split_once('_')) else {
+        return escaped(name);
+    };
+    let coefficient = prefix.strip_prefix('C').unwrap_or(prefix);
+    format!("C<sub>{}{}</sub>", escaped(coefficient), escaped(&regressor_symbol(regressor)))
+}
+
+fn regressor_symbol(regressor: &str) -> String {
+    match regressor {
+        "alpha" => "α".to_owned(),
+        "beta" => "β".to_owned(),
+        _ => match regressor.strip_prefix('d') {
+            Some(surface) if !surface.is_empty() => format!("δ{surface}"),
+            _ if regressor.len() > 1 => format!("_{regressor}"),
+            _ => regressor.to_owned(),
+        },
+    }
+}
+
+/// Text made safe to stand in HTML.
+#[must_use]
+pub fn escaped(text: &str) -> String {
+    HtmlEscape(text).to_string()
+}
+
+/// A derivative's unit as a reader says it; nothing for a pure number.
+#[must_use]
+pub fn unit(name: &str) -> String {
+    match name {
+        "-" => String::new(),
+        "per_deg" => "per deg".to_owned(),
+        "per_rad" => "per rad".to_owned(),
+        "lbf_per_deg" => "lbf/deg".to_owned(),
+        "ftlbf_per_deg" => "ft·lbf/deg".to_owned(),
+        "deg_s" => "deg/s".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+/// A number with so many significant digits, a proper minus, and a dash where it is missing or not finite.
+#[must_use]
+pub fn number(value: Option<f64>, significant: usize) -> String {
+    let Some(value) = value.filter(|v| v.is_finite()) else { return NOTHING.to_owned() };
+    Digits::of([value], significant).write(Some(value))
+}
+
+/// So many decimals, and a dash where there is no number.
+#[must_use]
+pub fn fixed(value: f64, decimals: usize) -> String {
+    Digits::Decimals(decimals).write(Some(value))
+}
+
+/// An angle of attack in whole degrees where it is one, else with one decimal.
+#[must_use]
+pub fn angle(alpha_deg: f64) -> String {
+    let whole = (alpha_deg - alpha_deg.round()).abs() < 0.05;
+    format!("{}°", fixed(alpha_deg, usize::from(!whole)))
+}
+
+/// `1 maneuver`, `2 maneuvers`.
+#[must_use]
+pub fn count(n: usize, noun: &str) -> String {
+    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+}
+
+/// One form for all the numbers of a column, so that their decimal points stand under each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Digits {
+    Decimals(usize),
+    Scientific(usize),
+}
+
+impl Digits {
+    /// The form in which the largest of the values shows so many significant digits.
+    #[must_use]
+    pub fn of(values: impl IntoIterator<Item = f64>, significant: usize) -> Digits {
+        let largest = values.into_iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+        if largest == 0.0 {
+            return Digits::Decimals(0);
+        }
+        let shown = i32::try_from(significant).unwrap_or(i32::MAX);
+        let magnitude = power_of_ten(largest);
+        let decimals = shown.saturating_sub(1).saturating_sub(magnitude);
+        match usize::try_from(decimals) {
+            Ok(decimals) if decimals <= 8 => Digits::Decimals(decimals),
+            Err(_) if magnitude < 9 => Digits::Decimals(0),
+            _ => Digits::Scientific(significant.saturating_sub(1)),
+        }
+    }
+
+    /// The number in this form; a dash where it is missing or not finite.
+    #[must_use]
+    pub fn write(self, value: Option<f64>) -> String {
+        let Some(value) = value.filter(|v| v.is_finite()) else { return NOTHING.to_owned() };
+        let text = match self {
+            Digits::Decimals(decimals) => format!("{value:.decimals$}"),
+            Digits::Scientific(decimals) => format!("{value:.decimals$e}"),
+        };
+        let zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
+        if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "\u{2212}") }
+    }
+}
+
+/// The power of ten of a positive finite number's first digit.
+#[expect(clippy::cast_possible_truncation, reason = "the logarithm of a finite number is within ±324")]
+#[must_use]
+pub fn power_of_ten(value: f64) -> i32 {
+    value.log10().floor() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_written_as_the_field_writes_them() {
+        for (name, html) in [
+            ("CN_alpha", "C<sub>Nα</sub>"),
+            ("Cn_beta", "C<sub>nβ</sub>"),
+            ("Cm_dpv", "C<sub>mδpv</sub>"),
+            ("CA_0", "C<sub>A0</sub>"),
+            ("CN_ba", "C<sub>N_ba</sub>"),
+            ("an_bias", "an_bias"),
+            ("CX_<b>", "CX_&lt;b&gt;"),
+            ("CN_<b>", "C<sub>N_&lt;b&gt;</sub>"),
+        ] {
+            assert_eq!(symbol(name), html);
+        }
+    }
+
+    #[test]
+    fn numbers_show_their_significant_digits_and_dashes_where_there_are_none() {
+        assert_eq!(number(Some(-0.012_345), 3), "\u{2212}0.0123");
+        assert_eq!(number(Some(12_345.6), 3), "12346");
+        assert_eq!(number(Some(0.0), 3), "0");
+        assert_eq!(number(Some(1.2e-12), 3), "1.20e\u{2212}12");
+        assert_eq!(number(Some(f64::NAN), 3), NOTHING);
+        assert_eq!(number(Some(f64::NEG_INFINITY), 3), NOTHING);
+        assert_eq!(number(None, 3), NOTHING);
+        assert_eq!(fixed(-0.001, 1), "0.0");
+        assert_eq!(angle(29.98), "30°");
+        assert_eq!(angle(29.5), "29.5°");
+    }
+}

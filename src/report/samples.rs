@@ -1,0 +1,203 @@
+//! A small campaign with every kind of row, for the tests of the report.
+
+use super::Contents;
+use crate::aero::Axis;
+use crate::error::Problem;
+use crate::maneuver::Maneuver;
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, HistoryOutput, TrendRow,
+};
+
+/// Owns what [`Contents`] borrows.
+#[derive(Clone, Debug, Default)]
+pub struct Campaign {
+    pub maneuvers: Vec<Maneuver>,
+    pub fits: Vec<FitRow>,
+    pub estimates: Vec<EstimateRow>,
+    pub trends: Vec<TrendRow>,
+    pub comparison: Vec<ComparisonRow>,
+    pub channels: Vec<ChannelRow>,
+    pub checks: Vec<CheckRow>,
+    pub events: Vec<EventRow>,
+    pub problems: Vec<Problem>,
+    pub histories: Vec<History>,
+    pub order: Vec<String>,
+    pub classes: Vec<(String, String, Axis)>,
+}
+
+impl Campaign {
+    pub fn contents(&self) -> Contents<'_> {
+        Contents {
+            title: "A campaign",
+            aircraft: "an aircraft",
+            archive: "an archive",
+            wind_tunnel: "a tunnel, reconstructed",
+            maneuvers: &self.maneuvers,
+            fits: &self.fits,
+            estimates: &self.estimates,
+            trends: &self.trends,
+            comparison: &self.comparison,
+            channels: &self.channels,
+            checks: &self.checks,
+            events: &self.events,
+            problems: &self.problems,
+            histories: &self.histories,
+            order: &self.order,
+            classes: &self.classes,
+        }
+    }
+}
+
+const LONGITUDINAL: [(&str, &str); 4] =
+    [("CN_0", "-"), ("CN_alpha", "per_deg"), ("Cm_de", "per_deg"), ("an_bias", "g")];
+const LATERAL: [(&str, &str); 4] =
+    [("CY_beta", "per_deg"), ("Cn_0", "-"), ("Cn_alpha", "per_deg"), ("Cn_dyv", "ftlbf_per_deg")];
+
+/// Two classes of each axis at α 10° to 50°; names that differ by case alone, a wild estimate, one fit that failed.
+pub fn campaign() -> Campaign {
+    let mut campaign = Campaign::default();
+    for (class, axis) in
+        [("OLON", Axis::Longitudinal), ("3211", Axis::Longitudinal), ("OLAT", Axis::Lateral), ("PYRS", Axis::Lateral)]
+    {
+        campaign.classes.push((class.into(), format!("{class} steps"), axis));
+        for alpha in [10.0, 20.0, 30.0, 40.0, 50.0] {
+            fly(&mut campaign, class, axis, alpha);
+        }
+    }
+    for (name, unit) in LONGITUDINAL.into_iter().chain(LATERAL) {
+        campaign.order.push(name.into());
+        for alpha_deg in [10.0, 20.0, 30.0, 40.0, 50.0] {
+            compare(&mut campaign, name, unit, alpha_deg);
+        }
+    }
+    campaign.fits[0].outcome = "not_converged".into();
+    campaign.estimates[5].value = Some(1e6);
+    campaign.checks.push(CheckRow {
+        flight_id: "1".into(),
+        relation: "theta rate against q and r".into(),
+        signals: "theta_deg q_deg_s".into(),
+        slope: Some(-1.0),
+        correlation: None,
+        verdict: "wrong sign".into(),
+    });
+    campaign.channels.push(ChannelRow {
+        flight_id: "1".into(),
+        channel: "alpha".into(),
+        signal: "alpha_vane_deg".into(),
+        samples: 100,
+        bridged: 3,
+        despiked: 1,
+        missing: 0,
+        verdict: "ok".into(),
+    });
+    campaign.problems.push(problem("a file that is no record"));
+    campaign.events.push(EventRow {
+        flight_id: "1".into(),
+        given_class: Some("OLON".into()),
+        given_start_s: Some(10.0),
+        given_end_s: Some(20.0),
+        found_class: None,
+        found_start_s: None,
+        found_end_s: None,
+        verdict: "not found".into(),
+    });
+    campaign
+}
+
+pub fn problem(reason: &str) -> Problem {
+    Problem { stage: "ingest".into(), flight_id: "7".into(), place: "flight_007.parquet".into(), reason: reason.into() }
+}
+
+fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
+    let maneuver_id = format!("1-{class}-{alpha_deg}");
+    campaign.maneuvers.push(Maneuver {
+        maneuver_id: maneuver_id.clone(),
+        flight_id: "1".into(),
+        class: class.into(),
+        axis,
+        start_s: 10.0,
+        end_s: 25.0,
+        alpha_deg,
+        mach: 0.3,
+        qbar_psf: 60.0,
+        velocity_ft_s: 350.0,
+        altitude_ft: 25_000.0,
+        mass_slug: 1_050.0,
+        x_cg_ft: 20.0,
+        samples: 600,
+        origin: "found".into(),
+    });
+    campaign.fits.push(FitRow {
+        maneuver_id: maneuver_id.clone(),
+        class: class.into(),
+        outcome: "converged".into(),
+        reason: "steps below the tolerance".into(),
+        iterations: 6,
+        initial_cost: Some(12.0),
+        final_cost: Some(0.4),
+        condition_number: Some(150.0),
+        left_out: Some(0.0),
+    });
+    for (name, unit) in if axis == Axis::Longitudinal { LONGITUDINAL } else { LATERAL } {
+        campaign.estimates.push(EstimateRow {
+            maneuver_id: maneuver_id.clone(),
+            flight_id: "1".into(),
+            class: class.into(),
+            alpha_deg,
+            mach: 0.3,
+            derivative: name.into(),
+            unit: unit.into(),
+            status: "estimated".into(),
+            value: Some(0.05 - 0.001 * alpha_deg),
+            bound: Some(0.002),
+            bound_corrected: Some(0.004),
+            wind_tunnel: Some(0.05),
+        });
+    }
+    campaign.histories.push(history(&maneuver_id, class, alpha_deg));
+}
+
+fn history(maneuver_id: &str, class: &str, alpha_deg: f64) -> History {
+    let time_s: Vec<f64> = (0..600).map(|i| 10.0 + 0.025 * f64::from(i)).collect();
+    let computed: Vec<f64> = time_s.iter().map(|t| t.sin()).collect();
+    let output = HistoryOutput {
+        label: "alpha_vane".into(),
+        unit: "deg".into(),
+        measured: computed.iter().map(|v| v + 0.01).collect(),
+        computed,
+        marked: (0..600).map(|i| i == 300).collect(),
+    };
+    let controls = vec![("de_deg".to_owned(), time_s.iter().map(|t| t.cos()).collect())];
+    let (maneuver_id, class) = (maneuver_id.into(), class.into());
+    History { maneuver_id, class, alpha_deg, time_s, outputs: vec![output], controls }
+}
+
+fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
+    let value = 0.05 - 0.001 * alpha_deg;
+    campaign.trends.push(TrendRow {
+        derivative: name.into(),
+        unit: unit.into(),
+        group: "all".into(),
+        alpha_deg,
+        value,
+        standard_error: 0.001,
+        lower_95: value - 0.002,
+        upper_95: value + 0.002,
+        maneuvers: 10,
+        order: 2,
+        scatter: 0.001,
+    });
+    campaign.comparison.push(ComparisonRow {
+        derivative: name.into(),
+        unit: unit.into(),
+        group: "all".into(),
+        alpha_deg,
+        flight: value,
+        standard_error: 0.001,
+        wind_tunnel: Some(0.05),
+        difference: Some(value - 0.05),
+        difference_pct: Some(100.0 * (value - 0.05) / 0.05),
+        z: Some(-3.0),
+        verdict: if alpha_deg < 25.0 { "agrees" } else { "flight lower" }.into(),
+    });
+}
