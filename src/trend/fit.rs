@@ -16,10 +16,13 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::{Criterion, Settings};
 
-/// Standard deviations beyond which a residual is wild. Normal residuals are so once in eighty.
-const HUBER: f64 = 2.5;
+/// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit then bears a quarter
+/// of wild estimates, and costs 4% of efficiency where there are none.
+const HUBER: f64 = 1.5;
 /// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the equation for τ².
-const HUBER_VARIANCE: f64 = 0.977_556;
+const HUBER_VARIANCE: f64 = 0.778_465;
+/// Standard deviations beyond which a residual says nothing about the order of the polynomial.
+const WILD: f64 = 3.0;
 /// No bound is taken as smaller than this share of the median bound.
 const BOUND_FLOOR: f64 = 0.25;
 /// Steps of the iteration between coefficients, τ² and Huber's weights; it settles in about ten.
@@ -168,7 +171,7 @@ fn weight(residual: f64, variance: f64) -> f64 {
 /// Minus twice the log-likelihood of one residual; a wild one costs the same however wild it is, so that no order is
 /// chosen for coming nearer to it.
 fn deviance(residual: f64, variance: f64) -> f64 {
-    variance.ln() + (residual * residual / variance).min(HUBER * HUBER)
+    variance.ln() + (residual * residual / variance).min(WILD * WILD)
 }
 
 /// What `k` parameters fitted to `n` data cost.
