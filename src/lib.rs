@@ -21,7 +21,9 @@ pub mod output_error;
 pub mod ingest;
 pub mod segment;
 pub mod estimate;
+pub mod trend;
 pub mod report;
 
 // Outside: disk and configuration.
 pub mod store;
+
