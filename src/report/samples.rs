@@ -150,6 +150,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             status: "estimated".into(),
             value: Some(0.05 - 0.001 * alpha_deg),
             bound: Some(0.002),
+            bound_held: None,
             bound_corrected: Some(0.004),
             wind_tunnel: Some(0.05),
         });

@@ -96,7 +96,15 @@ table!(Problem, "problems", stage flight_id place reason);
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn publish<T: Table>(folder: &Path, rows: &[T]) -> Result<()> {
-    let (parquet, csv) = (folder.join(format!("{}.parquet", T::NAME)), folder.join(format!("{}.csv", T::NAME)));
+    publish_as(folder, T::NAME, rows)
+}
+
+/// Publishes rows as [`publish`] does, under another name than their type's: a second table of the same columns.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn publish_as<T: Table>(folder: &Path, name: &str, rows: &[T]) -> Result<()> {
+    let (parquet, csv) = (folder.join(format!("{name}.parquet")), folder.join(format!("{name}.csv")));
     let mut frame = DataFrame::new(rows.len(), T::columns(rows)).map_err(|e| Error::store(&parquet, &e))?;
     let mut bytes = Vec::new();
     ParquetWriter::new(&mut bytes)

@@ -1,0 +1,230 @@
+//! The command line: arguments as typed, progress bars, the few lines that a run says, exit codes.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::config::{Config, Overrides};
+use crate::maneuver::Status;
+use crate::pipeline::{self, Campaign, Progress, Stage};
+use crate::store::archive;
+
+/// Flight-test archives in, trusted aerodynamic derivatives out.
+///
+/// harvest reads Parquet flight records, finds the maneuvers in them, estimates the stability and control derivatives of
+/// each by maximum likelihood (output error), fits trends across angle of attack, compares them with a wind-tunnel
+/// database, and writes tables (Parquet and CSV) and a report (HTML).
+#[derive(Debug, Parser)]
+#[command(version, after_long_help = AFTER)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const AFTER: &str = "\
+Every stage first brings its predecessors up to date; what is up to date is not done again, and a run that was
+killed goes on where it was.
+
+Examples:
+  harvest run                                    the pipeline pipelines/harv, to the report
+  harvest check my_campaign                      is pipelines/my_campaign right, and what would it do
+  harvest run --archive flights/ --reports out/  the same analysis on another archive
+  harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
+
+Exit codes:
+  0  all well
+  1  could not run: the configuration, the archive or the disk is at fault; the message says where
+  2  ran, and something was rejected: the table `problems` and the end of the report say what and why";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// All stages, to the report
+    Run(Options),
+    /// Read the archive: channels to signals on one clock, repairs, checks of units and signs
+    Ingest(Options),
+    /// Find the maneuvers and their classes
+    Segment(Options),
+    /// Estimate the derivatives of every maneuver
+    Estimate(Options),
+    /// Fit least-squares trends across angle of attack
+    Trend(Options),
+    /// Compare the trends with the wind-tunnel database
+    Compare(Options),
+    /// Write the report
+    Report(Options),
+    /// Validate a pipeline's configuration and say what it would do
+    Check(Options),
+}
+
+#[derive(Args, Debug)]
+struct Options {
+    /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its name under pipelines/
+    #[arg(default_value = "harv")]
+    pipeline: PathBuf,
+    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also partitioned as flight=…/
+    #[arg(long)]
+    archive: Option<String>,
+    /// Wind-tunnel table instead of the pipeline's: CSV with derivative, alpha_deg, value, unit[, mach, uncertainty, source]
+    #[arg(long, value_name = "FILE")]
+    wind_tunnel: Option<PathBuf>,
+    /// The analyst's events instead of the pipeline's: CSV with flight_id, class, start_s, end_s
+    #[arg(long, value_name = "FILE")]
+    events: Option<PathBuf>,
+    /// Folder of the intermediate artefacts [default: data/store/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    store: Option<PathBuf>,
+    /// Folder of the tables and the report [default: reports/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    reports: Option<PathBuf>,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// No progress bars and no summary
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Runs the program.
+#[must_use]
+#[expect(clippy::print_stderr, reason = "the one place where an error is said")]
+pub fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("harvest: {error:#}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    let (until, options) = match command {
+        Command::Run(options) | Command::Report(options) => (Stage::Report, options),
+        Command::Ingest(options) => (Stage::Ingest, options),
+        Command::Segment(options) => (Stage::Segment, options),
+        Command::Estimate(options) => (Stage::Estimate, options),
+        Command::Trend(options) => (Stage::Trend, options),
+        Command::Compare(options) => (Stage::Compare, options),
+        Command::Check(options) => return check(&options),
+    };
+    if let Some(threads) = options.threads {
+        anyhow::ensure!(threads > 0, "--threads must be at least 1");
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+    }
+    let config = options.load()?;
+    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let campaign = pipeline::run(&config, until, &bars)?;
+    if !options.quiet {
+        summary(&config, &campaign, until);
+    }
+    Ok(if campaign.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+}
+
+impl Options {
+    fn load(&self) -> anyhow::Result<Config> {
+        let folder =
+            if self.pipeline.is_dir() { self.pipeline.clone() } else { Path::new("pipelines").join(&self.pipeline) };
+        anyhow::ensure!(
+            folder.is_dir(),
+            "there is no pipeline {}: give a folder, or the name of one under pipelines/",
+            self.pipeline.display()
+        );
+        let overrides = Overrides {
+            archive: self.archive.clone(),
+            wind_tunnel: self.wind_tunnel.clone(),
+            store: self.store.clone(),
+            reports: self.reports.clone(),
+            events: self.events.clone(),
+        };
+        Ok(Config::load(&folder, overrides)?)
+    }
+}
+
+#[expect(clippy::print_stdout, reason = "what a run says")]
+fn summary(config: &Config, campaign: &Campaign, until: Stage) {
+    println!("{} flights, {} refused", campaign.flights.len(), campaign.refused());
+    if until >= Stage::Segment {
+        println!("{} maneuvers", campaign.maneuvers.len());
+    }
+    if until >= Stage::Estimate {
+        println!("{} of them converged", campaign.converged());
+    }
+    for problem in campaign.problems.iter().take(10) {
+        println!("  {}: {} ({}): {}", problem.stage, problem.flight_id, problem.place, problem.reason);
+    }
+    if campaign.problems.len() > 10 {
+        println!("  and {} more in {}", campaign.problems.len() - 10, config.reports.join("problems.csv").display());
+    }
+    println!("tables in {}", config.reports.display());
+    if let Some(report) = &campaign.report {
+        println!("report: {}", report.display());
+    }
+}
+
+/// Says what a pipeline would do.
+#[expect(clippy::print_stdout, reason = "what a check says")]
+fn check(options: &Options) -> anyhow::Result<ExitCode> {
+    let config = options.load()?;
+    let flights = archive::find(&config.archive)?;
+    println!("pipeline   {}: {}", config.name, config.title);
+    println!("archive    {}: {} flights", config.archive, flights.len());
+    println!("aircraft   {}, {} channels", config.aircraft.name, config.channels.len());
+    println!("model      {} derivatives, {} biases", config.buildup.derivatives.len(), config.buildup.biases.len());
+    println!("tunnel     {}", config.wind_tunnel.display());
+    println!(
+        "events     {}",
+        if config.events.is_empty() { "found in the records".into() } else { format!("{} given", config.events.len()) }
+    );
+    println!("classes    estimated  held  inactive");
+    for class in &config.classes {
+        let count = |status| class.statuses.values().filter(|s| **s == status).count();
+        let [free, held, inactive] = [Status::Estimated, Status::Held, Status::Inactive].map(count);
+        println!("  {:<10} {free:>7} {held:>5} {inactive:>9}  {}", class.name, class.title);
+    }
+    println!("store      {}", config.store.display());
+    println!("reports    {}", config.reports.display());
+    println!("The configuration is right.");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A progress bar per stage on the terminal; nothing where there is none.
+struct Bars {
+    quiet: bool,
+    bar: Mutex<ProgressBar>,
+}
+
+impl Bars {
+    fn with(&self, act: impl FnOnce(&mut ProgressBar)) {
+        if let Ok(mut bar) = self.bar.lock() {
+            act(&mut bar);
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn begin(&self, stage: &str, items: usize) {
+        let new = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(items as u64) };
+        if let Ok(style) =
+            ProgressStyle::with_template("{prefix:>9} {bar:32} {pos:>4}/{len:<4} {elapsed:>4}  {wide_msg}")
+        {
+            new.set_style(style);
+        }
+        new.set_prefix(stage.to_owned());
+        self.with(|bar| *bar = new);
+    }
+
+    fn advance(&self, item: &str) {
+        self.with(|bar| {
+            bar.set_message(item.to_owned());
+            bar.inc(1);
+        });
+    }
+
+    fn end(&self) {
+        self.with(|bar| bar.finish_with_message(""));
+    }
+}

@@ -1,0 +1,116 @@
+//! Configuration: YAML as written, checked whole before any flight is opened, as checked types.
+//!
+//! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages), `aircraft.yaml` (geometry,
+//! sensors, channel map), `model.yaml` (the build-up) and `maneuvers/*.yaml` (one class per file).
+
+mod check;
+mod source;
+mod written;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::error::Result;
+use crate::flight::Channel;
+use crate::maneuver::{Class, Event};
+use crate::{compare, estimate, ingest, segment, trend};
+
+pub use written::ReportSettings;
+
+/// Everything that decides a campaign's results, checked.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Name of the pipeline: its folder's.
+    pub name: String,
+    pub title: String,
+    /// Folder or glob of the flight archive.
+    pub archive: String,
+    /// The wind-tunnel table's file, as the report names it.
+    pub wind_tunnel: PathBuf,
+    pub store: PathBuf,
+    pub reports: PathBuf,
+    pub aircraft: Aircraft,
+    pub channels: BTreeMap<String, Channel>,
+    pub constants: BTreeMap<String, f64>,
+    pub buildup: Buildup,
+    pub tunnel: WindTunnel,
+    pub classes: Vec<Class>,
+    pub events: Vec<Event>,
+    pub ingest: ingest::Settings,
+    pub segment: segment::Settings,
+    pub estimate: estimate::Settings,
+    pub trend: trend::Settings,
+    pub compare: compare::Settings,
+    pub report: ReportSettings,
+    /// The analyst's own report template, where there is one.
+    pub template: Option<String>,
+}
+
+/// What the command line says instead of the pipeline's YAML.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    pub archive: Option<String>,
+    pub wind_tunnel: Option<PathBuf>,
+    pub store: Option<PathBuf>,
+    pub reports: Option<PathBuf>,
+    pub events: Option<PathBuf>,
+}
+
+impl Config {
+    /// Reads and checks a pipeline's folder.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first thing that is wrong.
+    pub fn load(folder: &Path, overrides: Overrides) -> Result<Config> {
+        let files = source::Files::read(folder)?;
+        let pipeline = files.pipeline()?;
+        let aircraft = files.aircraft()?;
+        let buildup = files.model()?;
+        let classes = files.classes()?;
+        let wind_tunnel = overrides.wind_tunnel.unwrap_or(pipeline.wind_tunnel);
+        let name = folder.file_name().map_or_else(|| "pipeline".to_owned(), |n| n.to_string_lossy().into_owned());
+        let events = overrides.events.or(pipeline.events);
+        let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
+        let config = Config {
+            tunnel: check::tunnel(&wind_tunnel, &buildup)?,
+            events: check::events(events.as_deref(), &classes)?,
+            title: pipeline.title,
+            archive: overrides.archive.unwrap_or(pipeline.archive),
+            wind_tunnel,
+            store: overrides.store.or(pipeline.store).unwrap_or_else(|| Path::new("data/store").join(&name)),
+            reports: overrides.reports.or(pipeline.reports).unwrap_or_else(|| Path::new("reports").join(&name)),
+            name,
+            aircraft: aircraft.aircraft,
+            channels: aircraft.channels,
+            constants: aircraft.constants,
+            buildup,
+            classes,
+            ingest: pipeline.ingest,
+            segment: pipeline.segment,
+            estimate: pipeline.estimate,
+            trend: pipeline.trend,
+            compare: pipeline.compare,
+            report: pipeline.report,
+            template,
+        };
+        check::whole(&config, &files)?;
+        Ok(config)
+    }
+
+    #[must_use]
+    pub fn class(&self, name: &str) -> Option<&Class> {
+        self.classes.iter().find(|c| c.name == name)
+    }
+
+    /// Names of derivatives and combined sums in the order of the model, as trends and figures have them.
+    #[must_use]
+    pub fn derivative_names(&self) -> Vec<String> {
+        let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
+        derivatives.chain(self.buildup.combined.iter().map(|c| &c.name)).cloned().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,102 @@
+//! The text of a pipeline's files: parsed with errors that name file and line, and searched for the line of a name.
+
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use super::written::{AircraftFile, ClassFile, ModelFile, PipelineFile};
+use crate::aero::Buildup;
+use crate::error::{Error, Result};
+use crate::maneuver::Class;
+use crate::store::files;
+
+/// One file and its text.
+#[derive(Clone, Debug)]
+pub(super) struct Source {
+    pub path: PathBuf,
+    text: String,
+}
+
+/// The files of a pipeline.
+#[derive(Clone, Debug)]
+pub(super) struct Files {
+    pub pipeline: Source,
+    pub aircraft: Source,
+    pub model: Source,
+    pub classes: Vec<Source>,
+}
+
+impl Source {
+    fn read(path: PathBuf) -> Result<Source> {
+        let text = files::text(&path)?;
+        Ok(Source { path, text })
+    }
+
+    fn parse<T: DeserializeOwned>(&self) -> Result<T> {
+        serde_yaml::from_str(&self.text).map_err(|e| {
+            let line = e.location().map(|l| l.line());
+            Error::config(&self.path, line, e.to_string())
+        })
+    }
+
+    /// An error about a name, at the first line on which it stands as a word of its own.
+    pub fn error(&self, name: &str, what: impl Into<String>) -> Error {
+        let word = |c: char| c.is_alphanumeric() || c == '_';
+        let holds = |line: &str| line.split(|c| !word(c)).any(|w| w == name);
+        let line = self.text.lines().position(holds).map(|i| i + 1);
+        Error::config(&self.path, line, what)
+    }
+}
+
+impl Files {
+    pub fn read(folder: &Path) -> Result<Files> {
+        if !folder.join("pipeline.yaml").is_file() {
+            let what =
+                "no pipeline here: a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/";
+            return Err(Error::config(folder, None, what));
+        }
+        let maneuvers = folder.join("maneuvers");
+        let classes = files::with_extension(&maneuvers, "yaml")?;
+        if classes.is_empty() {
+            return Err(Error::config(&maneuvers, None, "no maneuver class: each is a file `<class>.yaml` here"));
+        }
+        Ok(Files {
+            pipeline: Source::read(folder.join("pipeline.yaml"))?,
+            aircraft: Source::read(folder.join("aircraft.yaml"))?,
+            model: Source::read(folder.join("model.yaml"))?,
+            classes: classes.into_iter().map(Source::read).collect::<Result<_>>()?,
+        })
+    }
+
+    pub fn pipeline(&self) -> Result<PipelineFile> {
+        self.pipeline.parse()
+    }
+
+    pub fn aircraft(&self) -> Result<AircraftFile> {
+        self.aircraft.parse()
+    }
+
+    pub fn model(&self) -> Result<Buildup> {
+        self.model.parse::<ModelFile>().map(Buildup::from)
+    }
+
+    pub fn classes(&self) -> Result<Vec<Class>> {
+        let mut classes = Vec::<Class>::new();
+        for source in &self.classes {
+            let file: ClassFile = source.parse()?;
+            let lists = [&file.estimated, &file.held, &file.inactive];
+            let mut names: Vec<&String> = lists.into_iter().flatten().collect();
+            names.sort();
+            if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+                let name = twice[0];
+                return Err(source.error(name, format!("`{name}` stands twice among estimated, held and inactive")));
+            }
+            let class = Class::from(file);
+            if classes.iter().any(|c| c.name == class.name) {
+                return Err(source.error(&class.name, format!("class `{}` is defined twice", class.name)));
+            }
+            classes.push(class);
+        }
+        Ok(classes)
+    }
+}

@@ -1,0 +1,440 @@
+//! The conductor: brings the stages of a campaign up to date in order, in parallel within each, and publishes their tables.
+//!
+//! Per flight: ingest, segment. Per maneuver: estimate. Their artefacts lie in the store under fingerprints of all that
+//! decides them, so what is up to date is not done again, and a killed run goes on where it was. Trend, compare and report
+//! are small and are made anew from the artefacts. Results are collected in the order of flights and maneuvers, whatever
+//! thread made them.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::config::Config;
+use crate::error::{Problem, Result};
+use crate::estimate::{Basis, Estimated};
+use crate::flight::Record;
+use crate::maneuver::Maneuver;
+use crate::output_error::Outcome;
+use crate::segment::Segmented;
+use crate::store::archive::FlightFiles;
+use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
+use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::{compare, estimate, ingest, report, segment, trend};
+
+/// Versions of the methods: one goes up when its stage's numbers change for the same input.
+const INGEST_VERSION: u32 = 1;
+const SEGMENT_VERSION: u32 = 1;
+const ESTIMATE_VERSION: u32 = 1;
+
+/// The stages in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    Ingest,
+    Segment,
+    Estimate,
+    Trend,
+    Compare,
+    Report,
+}
+
+/// Where the conductor says how far it is.
+pub trait Progress: Sync {
+    fn begin(&self, stage: &str, items: usize);
+    fn advance(&self, item: &str);
+    fn end(&self);
+}
+
+/// One flight after ingest: where its record lies, or why there is none.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    pub flight_id: String,
+    fingerprint: String,
+    record: PathBuf,
+    artefacts: Vec<PathBuf>,
+    ingested: Ingested,
+}
+
+/// What the store keeps of ingest besides the record.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Ingested {
+    accepted: bool,
+    channels: Vec<ChannelRow>,
+    checks: Vec<CheckRow>,
+    problems: Vec<Problem>,
+}
+
+/// What the store keeps of segment.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Found {
+    maneuvers: Vec<Maneuver>,
+    events: Vec<EventRow>,
+    problems: Vec<Problem>,
+}
+
+/// The campaign as far as it has been brought.
+#[derive(Clone, Debug, Default)]
+pub struct Campaign {
+    pub flights: Vec<Flight>,
+    pub channels: Vec<ChannelRow>,
+    pub checks: Vec<CheckRow>,
+    pub maneuvers: Vec<Maneuver>,
+    pub events: Vec<EventRow>,
+    pub fits: Vec<FitRow>,
+    pub estimates: Vec<EstimateRow>,
+    /// The sums that the tunnel tabulates, with the variance of the sum.
+    pub combined: Vec<EstimateRow>,
+    pub trends: Vec<TrendRow>,
+    pub comparison: Vec<ComparisonRow>,
+    pub problems: Vec<Problem>,
+    /// The report, where it was written.
+    pub report: Option<PathBuf>,
+}
+
+impl Campaign {
+    /// Flights that ingest refused.
+    #[must_use]
+    pub fn refused(&self) -> usize {
+        self.flights.iter().filter(|f| !f.ingested.accepted).count()
+    }
+
+    /// The estimates and the combined sums.
+    fn estimated(&self) -> impl Iterator<Item = &EstimateRow> {
+        self.estimates.iter().chain(&self.combined)
+    }
+
+    #[must_use]
+    pub fn converged(&self) -> usize {
+        self.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).count()
+    }
+}
+
+/// Brings the campaign up to date as far as `until`.
+///
+/// # Errors
+/// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
+/// the campaign's problems.
+pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
+    let files = archive::find(&config.archive)?;
+    let store = Store::open(&config.store)?;
+    atomic::sweep(&config.reports)?;
+    let run = Run { config, store, progress };
+    let mut campaign = Campaign::default();
+    run.ingest(&files, &mut campaign)?;
+    if until >= Stage::Segment {
+        run.segment(&mut campaign)?;
+    }
+    if until >= Stage::Estimate {
+        run.estimate(&mut campaign)?;
+    }
+    if until >= Stage::Trend {
+        run.trend(&mut campaign)?;
+    }
+    if until >= Stage::Compare {
+        campaign.comparison =
+            compare::comparison(&campaign.trends, &config.tunnel, &campaign.maneuvers, &config.compare);
+        table::publish(&config.reports, &campaign.comparison)?;
+    }
+    if until >= Stage::Report {
+        run.report(&mut campaign)?;
+    }
+    table::publish(&config.reports, &campaign.problems)?;
+    Ok(campaign)
+}
+
+struct Run<'a> {
+    config: &'a Config,
+    store: Store,
+    progress: &'a dyn Progress,
+}
+
+impl Run<'_> {
+    /// Does `work` on every item in parallel with a progress bar; results in the order of the items.
+    fn each<T: Sync, R: Send>(
+        &self,
+        stage: &str,
+        items: &[T],
+        name: impl Fn(&T) -> &str + Sync,
+        work: impl Fn(&T) -> Result<R> + Sync,
+    ) -> Result<Vec<R>> {
+        self.progress.begin(stage, items.len());
+        let results = items
+            .par_iter()
+            .map(|item| {
+                let result = work(item);
+                self.progress.advance(name(item));
+                result
+            })
+            .collect();
+        self.progress.end();
+        results
+    }
+
+    fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
+        campaign.flights = self.each("ingest", files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
+        for flight in &campaign.flights {
+            campaign.channels.extend_from_slice(&flight.ingested.channels);
+            campaign.checks.extend_from_slice(&flight.ingested.checks);
+            campaign.problems.extend_from_slice(&flight.ingested.problems);
+        }
+        let records: Vec<PathBuf> = campaign.flights.iter().map(|f| f.record.clone()).collect();
+        let artefacts: Vec<PathBuf> = campaign.flights.iter().flat_map(|f| f.artefacts.clone()).collect();
+        self.store.keep_only("records", &records)?;
+        self.store.keep_only("ingest", &artefacts)?;
+        table::publish(&self.config.reports, &campaign.channels)?;
+        table::publish(&self.config.reports, &campaign.checks)
+    }
+
+    fn ingest_flight(&self, files: &FlightFiles) -> Result<Flight> {
+        let config = self.config;
+        let id = &files.flight_id;
+        let decides = Fingerprint::of("ingest", INGEST_VERSION)
+            .with(id)
+            .with(&config.channels)
+            .with(&config.constants)
+            .with(&config.aircraft)
+            .with(&config.ingest);
+        let fingerprint = match files.files.iter().try_fold(decides, |f, path| f.with_file(path)) {
+            Ok(fingerprint) => fingerprint.finish(),
+            Err(error) => return Ok(self.refused(id, "unreadable", problem("ingest", id, id, &error.to_string()))),
+        };
+        let path = self.store.path("ingest", id, &fingerprint, "json");
+        let record = self.store.path("records", id, &fingerprint, "parquet");
+        if let Some(ingested) = self.store.load::<Ingested>(&path)
+            && (!ingested.accepted || record.is_file())
+        {
+            return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], ingested });
+        }
+        let done = archive::read(files, &config.channels).and_then(|raw| {
+            ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
+        });
+        let flight = match done {
+            Ok(done) => {
+                let mut bytes = Vec::new();
+                record_file::write(&done.record, &mut bytes).map_err(|e| crate::error::Error::store(&record, &e))?;
+                atomic::place(&record, &bytes)?;
+                let (channels, checks, problems) = (done.channels, done.checks, done.problems);
+                let ingested = Ingested { accepted: true, channels, checks, problems };
+                Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], ingested }
+            }
+            Err(problem) => self.refused(id, &fingerprint, problem),
+        };
+        self.store.save(&path, &flight.ingested)?;
+        Ok(flight)
+    }
+
+    fn refused(&self, id: &str, fingerprint: &str, problem: Problem) -> Flight {
+        Flight {
+            flight_id: id.to_owned(),
+            fingerprint: fingerprint.to_owned(),
+            record: self.store.path("records", id, fingerprint, "parquet"),
+            artefacts: vec![self.store.path("ingest", id, fingerprint, "json")],
+            ingested: Ingested { accepted: false, channels: vec![], checks: vec![], problems: vec![problem] },
+        }
+    }
+
+    fn segment(&self, campaign: &mut Campaign) -> Result<()> {
+        let accepted: Vec<&Flight> = campaign.flights.iter().filter(|f| f.ingested.accepted).collect();
+        let found = self.each("segment", &accepted, |f| &f.flight_id, |f| self.segment_flight(f))?;
+        let (paths, found): (Vec<PathBuf>, Vec<Found>) = found.into_iter().unzip();
+        self.store.keep_only("segment", &paths)?;
+        for flight in found {
+            campaign.maneuvers.extend(flight.maneuvers);
+            campaign.events.extend(flight.events);
+            campaign.problems.extend(flight.problems);
+        }
+        let unflown = |flight_id: &str| !campaign.flights.iter().any(|f| f.flight_id == flight_id);
+        for event in self.config.events.iter().filter(|e| unflown(&e.flight_id)) {
+            let place = format!("event {} at {:.1} s", event.class, event.start_s);
+            let reason = "the archive has no such flight; the analyst's list names it";
+            campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
+        }
+        table::publish(&self.config.reports, &campaign.maneuvers)?;
+        table::publish(&self.config.reports, &campaign.events)
+    }
+
+    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+        let config = self.config;
+        let events: Vec<_> = config.events.iter().filter(|e| e.flight_id == flight.flight_id).cloned().collect();
+        let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
+        let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
+            .with(&flight.fingerprint)
+            .with(&rules)
+            .with(&config.segment)
+            .with(&events)
+            .finish();
+        let path = self.store.path("segment", &flight.flight_id, &fingerprint, "json");
+        if let Some(found) = self.store.load(&path) {
+            return Ok((path, found));
+        }
+        let record = record_file::read(&flight.record)?;
+        let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
+        let (Segmented { maneuvers, problems }, events) = if events.is_empty() {
+            (found, Vec::new())
+        } else {
+            segment::with_events(found, &record, &events, &config.classes, &config.aircraft)
+        };
+        let found = Found { maneuvers, events, problems };
+        self.store.save(&path, &found)?;
+        Ok((path, found))
+    }
+
+    fn estimate(&self, campaign: &mut Campaign) -> Result<()> {
+        let of_flight = |f: &Flight| campaign.maneuvers.iter().filter(|m| m.flight_id == f.flight_id).collect();
+        let flights: Vec<(&Flight, Vec<&Maneuver>)> = campaign.flights.iter().map(|f| (f, of_flight(f))).collect();
+        self.progress.begin("estimate", campaign.maneuvers.len());
+        let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
+        self.progress.end();
+        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
+        self.store.keep_only("estimate", &paths)?;
+        for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
+            let fit = estimated.fit;
+            if fit.outcome != Outcome::Converged.name() {
+                let reason = format!("{}: {}", fit.outcome, fit.reason);
+                campaign.problems.push(problem("estimate", &maneuver.flight_id, &maneuver.maneuver_id, &reason));
+            }
+            campaign.fits.push(fit);
+            campaign.estimates.extend(estimated.estimates);
+            campaign.combined.extend(estimated.combined);
+        }
+        table::publish(&self.config.reports, &campaign.fits)?;
+        table::publish(&self.config.reports, &campaign.estimates)?;
+        table::publish_as(&self.config.reports, "combined", &campaign.combined)
+    }
+
+    /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
+    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
+        let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
+        let present: Vec<Option<Estimated>> = paths.iter().map(|path| self.store.load(path)).collect();
+        let record = if present.iter().all(Option::is_some) { None } else { Some(record_file::read(&flight.record)?) };
+        let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
+        items
+            .into_par_iter()
+            .map(|((maneuver, path), present)| {
+                let estimated = match (present, &record) {
+                    (Some(estimated), _) => estimated,
+                    (None, Some(record)) => {
+                        let estimated = Estimated { history: None, ..self.estimate_maneuver(record, maneuver) };
+                        self.store.save(&path, &estimated)?;
+                        estimated
+                    }
+                    (None, None) => return Err(crate::error::Error::store(&path, &"its flight's record was not read")),
+                };
+                self.progress.advance(&maneuver.maneuver_id);
+                Ok((path, estimated))
+            })
+            .collect()
+    }
+
+    fn estimate_path(&self, flight: &Flight, maneuver: &Maneuver) -> PathBuf {
+        let config = self.config;
+        let fingerprint = Fingerprint::of("estimate", ESTIMATE_VERSION)
+            .with(&flight.fingerprint)
+            .with(maneuver)
+            .with(&config.class(&maneuver.class))
+            .with(&config.aircraft)
+            .with(&config.buildup)
+            .with(&config.tunnel)
+            .with(&config.estimate)
+            .finish();
+        self.store.path("estimate", &maneuver.maneuver_id, &fingerprint, "json")
+    }
+
+    fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
+        let config = self.config;
+        let basis = Basis {
+            aircraft: &config.aircraft,
+            buildup: &config.buildup,
+            tunnel: &config.tunnel,
+            settings: &config.estimate,
+        };
+        match config.class(&maneuver.class) {
+            Some(class) => estimate::maneuver(record, maneuver, class, &basis),
+            None => Estimated::unknown_class(maneuver),
+        }
+    }
+
+    fn trend(&self, campaign: &mut Campaign) -> Result<()> {
+        let converged: std::collections::BTreeSet<&str> = campaign
+            .fits
+            .iter()
+            .filter(|f| f.outcome == Outcome::Converged.name())
+            .map(|f| f.maneuver_id.as_str())
+            .collect();
+        let names = self.config.derivative_names();
+        let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
+        let estimates: Vec<EstimateRow> = campaign.estimated().filter(counts).cloned().collect();
+        let (trends, problems) = trend::trends(&estimates, &self.config.trend);
+        campaign.trends = trends;
+        campaign.problems.extend(problems);
+        table::publish(&self.config.reports, &campaign.trends)
+    }
+
+    fn report(&self, campaign: &mut Campaign) -> Result<()> {
+        let config = self.config;
+        let path = config.reports.join("report.html");
+        let histories = self.histories(campaign)?;
+        let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
+        let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
+        let contents = report::Contents {
+            title: &config.title,
+            aircraft: &config.aircraft.name,
+            archive: &config.archive,
+            wind_tunnel: &config.wind_tunnel.to_string_lossy(),
+            maneuvers: &campaign.maneuvers,
+            fits: &campaign.fits,
+            estimates: &estimates,
+            trends: &campaign.trends,
+            comparison: &campaign.comparison,
+            channels: &campaign.channels,
+            checks: &campaign.checks,
+            events: &campaign.events,
+            problems: &campaign.problems,
+            histories: &histories,
+            order: &config.derivative_names(),
+            classes: &classes,
+        };
+        let html =
+            report::html(&contents, config.template.as_deref()).map_err(|e| crate::error::Error::store(&path, &e))?;
+        atomic::place(&path, html.as_bytes())?;
+        campaign.report = Some(path);
+        Ok(())
+    }
+
+    /// Time histories of one maneuver per class: the converged one nearest to the configured angle of attack. They are
+    /// computed again rather than stored: an estimation takes milliseconds, its histories a quarter of a megabyte.
+    fn histories(&self, campaign: &Campaign) -> Result<Vec<History>> {
+        let at = self.config.report.histories_at_alpha_deg;
+        let shown: Vec<&Maneuver> = self
+            .config
+            .classes
+            .iter()
+            .filter_map(|class| {
+                let fits = campaign.maneuvers.iter().zip(&campaign.fits);
+                fits.filter(|(m, f)| m.class == class.name && f.outcome == Outcome::Converged.name())
+                    .map(|(m, _)| m)
+                    .min_by(|a, b| (a.alpha_deg - at).abs().total_cmp(&(b.alpha_deg - at).abs()))
+            })
+            .collect();
+        let histories = self.each(
+            "report",
+            &shown,
+            |m| &m.maneuver_id,
+            |maneuver| {
+                let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
+                let record = flight.map(|f| record_file::read(&f.record)).transpose()?;
+                Ok(record.and_then(|record| self.estimate_maneuver(&record, maneuver).history))
+            },
+        )?;
+        Ok(histories.into_iter().flatten().collect())
+    }
+}
+
+fn problem(stage: &str, flight_id: &str, place: &str, reason: &str) -> Problem {
+    Problem {
+        stage: stage.to_owned(),
+        flight_id: flight_id.to_owned(),
+        place: place.to_owned(),
+        reason: reason.to_owned(),
+    }
+}
