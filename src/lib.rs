@@ -14,3 +14,4 @@ pub mod units;
 // Stages: pure functions of values.
 pub mod segment;
 pub mod trend;
+pub mod compare;
