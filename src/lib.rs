@@ -3,13 +3,13 @@
 //! The modules in order; a module uses only modules listed above it (`tests/house.rs` holds that).
 
 // Vocabulary: what the words mean.
-pub mod aero;
-pub mod aircraft;
+pub mod units;
 pub mod error;
 pub mod flight;
+pub mod aircraft;
+pub mod aero;
 pub mod maneuver;
 pub mod tables;
-pub mod units;
 
 // Physics: how the aircraft moves and what its sensors read.
 pub mod dynamics;
@@ -18,17 +18,17 @@ pub mod dynamics;
 pub mod output_error;
 
 // Stages: functions of values, each from its predecessor's output.
-pub mod compare;
-pub mod estimate;
 pub mod ingest;
-pub mod report;
 pub mod segment;
+pub mod estimate;
 pub mod trend;
+pub mod compare;
+pub mod report;
 
 // Outside: disk and configuration.
-pub mod config;
 pub mod store;
+pub mod config;
 
 // Conductor: the stages in order, and the command line.
-pub mod cli;
 pub mod pipeline;
+pub mod cli;

@@ -132,7 +132,7 @@ pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Cam
     }
     if until >= Stage::Compare {
         campaign.comparison =
-            compare::comparison(&campaign.trends, &config.tunnel, &campaign.maneuvers, &config.compare);
+            compare::comparison(&campaign.trends, &campaign.maneuvers, &config.tunnel, &config.trend, &config.compare);
         table::publish(&config.reports, &campaign.comparison)?;
     }
     if until >= Stage::Report {
