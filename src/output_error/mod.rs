@@ -14,3 +14,6 @@ mod response;
 pub use case::{Case, InitialState, Measurements, Model};
 pub use outcome::{Fit, Outcome};
 pub use response::{Diverged, Response};
+
+#[cfg(test)]
+mod tests;

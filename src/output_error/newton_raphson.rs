@@ -118,6 +118,8 @@ fn iterate<const NX: usize, E: Equations<NX>>(
     }
     let mut at = sums(&case.measurements, &response, &weights, n);
     fit.initial_cost = Some(at.cost());
+    // Where the model fits to the last digit, rounding is all that a further step could lower.
+    let floor = f64::EPSILON * f64::EPSILON.sqrt() * at.weighted_square;
     let mut damping = 0.0;
     while fit.iterations < settings.max_iterations {
         let Some(full) = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING)) else {
@@ -125,7 +127,7 @@ fn iterate<const NX: usize, E: Equations<NX>>(
             break;
         };
         let gain = at.gradient.dot(&full);
-        if gain <= settings.tolerance * at.weighted_square {
+        if gain <= settings.tolerance * at.weighted_square + floor {
             fit.outcome = Outcome::Converged;
             fit.reason = "a further step would not lower the cost".into();
             break;
