@@ -380,7 +380,7 @@ impl Run<'_> {
             title: &config.title,
             aircraft: &config.aircraft.name,
             archive: &config.archive,
-            wind_tunnel: &config.wind_tunnel.to_string_lossy(),
+            wind_tunnel: &tunnel_and_sources(config),
             maneuvers: &campaign.maneuvers,
             fits: &campaign.fits,
             estimates: &estimates,
@@ -427,6 +427,16 @@ impl Run<'_> {
             },
         )?;
         Ok(histories.into_iter().flatten().collect())
+    }
+}
+
+/// The tunnel table's name, with the sources of its values where it states them: a review must see what was judged.
+fn tunnel_and_sources(config: &Config) -> String {
+    let (name, sources) = (config.wind_tunnel.display(), config.tunnel.sources());
+    if sources.is_empty() {
+        format!("{name} (no sources stated)")
+    } else {
+        format!("{name} (sources: {})", sources.join("; "))
     }
 }
 

@@ -49,6 +49,15 @@ impl WindTunnel {
         self.tables.contains_key(&key(derivative))
     }
 
+    /// Where the values come from, as far as the database says: every source once, sorted.
+    #[must_use]
+    pub fn sources(&self) -> Vec<&str> {
+        let mut sources: Vec<&str> = self.tables.values().flatten().filter_map(|p| p.source.as_deref()).collect();
+        sources.sort_unstable();
+        sources.dedup();
+        sources
+    }
+
     /// The α at which a derivative is tabulated (at any Mach), ascending.
     #[must_use]
     pub fn alphas_deg(&self, derivative: &str) -> Vec<f64> {

@@ -1,0 +1,138 @@
+//! How long the stages take on the demonstration campaign, side by side in one run: `make bench`.
+//!
+//! The machine's speed drifts, so quote ratios of lines of one run, not times: exact sensitivities against a response
+//! alone (finite differences would cost one response per parameter), and the stages against reading the flight.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use harvest::aero::Axis;
+use harvest::config::{Config, Overrides};
+use harvest::dynamics::motion::{MassProperties, Window};
+use harvest::dynamics::{Longitudinal, OUTPUTS};
+use harvest::estimate::{self, Basis};
+use harvest::flight::Record;
+use harvest::maneuver::{Class, Maneuver, Status};
+use harvest::output_error::{Case, Measurements, Model};
+use harvest::store::archive;
+use harvest::{ingest, segment};
+
+/// A flight of the demonstration campaign with one maneuver in which every surface of its axis moves.
+struct Bench {
+    config: Config,
+    record: Record,
+    maneuver: Maneuver,
+    class: Class,
+}
+
+fn load() -> anyhow::Result<Bench> {
+    let config = Config::load(Path::new("pipelines/harv"), Overrides::default())?;
+    for files in archive::find(&config.archive)? {
+        let raw = archive::read(&files, &config.channels).map_err(|p| anyhow::anyhow!(p.reason))?;
+        let record = ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
+            .map_err(|p| anyhow::anyhow!(p.reason))?
+            .record;
+        let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
+        let most_free = |m: &Maneuver| {
+            let class = config.class(&m.class)?;
+            let free = class.statuses.values().filter(|s| **s == Status::Estimated).count();
+            (class.axis == Axis::Longitudinal && free > 20).then(|| class.clone())
+        };
+        if let Some((maneuver, class)) = found.maneuvers.iter().find_map(|m| Some((m.clone(), most_free(m)?))) {
+            return Ok(Bench { config, record, maneuver, class });
+        }
+    }
+    anyhow::bail!("the demonstration campaign has no longitudinal maneuver with all surfaces")
+}
+
+/// The maneuver's case with the class's derivatives free, or with none.
+fn case(bench: &Bench, free: bool) -> Result<Case<3, Longitudinal>, String> {
+    let derivatives: Vec<_> = bench.config.buildup.derivatives_of(Axis::Longitudinal).collect();
+    let tunnel = |name: &str| {
+        bench.config.tunnel.value(name, bench.maneuver.alpha_deg, bench.maneuver.mach).map_or(0.0, |v| v.value)
+    };
+    let mut model = Model::default();
+    for derivative in derivatives {
+        if free && bench.class.statuses.get(&derivative.name) == Some(&Status::Estimated) {
+            model.free.push(derivative);
+        } else {
+            model.held.push((derivative, tunnel(&derivative.name)));
+        }
+    }
+    let range = bench.record.sample_at(bench.maneuver.start_s)..bench.record.sample_at(bench.maneuver.end_s) + 1;
+    let samples = range.len();
+    let surfaces = bench.config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    let window = Window::cut(&bench.record, range, surfaces, MassProperties::Recorded)?;
+    let measurements = Measurements { values: vec![[0.0; OUTPUTS]; samples], used: vec![[true; OUTPUTS]; samples] };
+    Ok(Case::new(&bench.config.aircraft, &window, measurements, &model))
+}
+
+fn responses(c: &mut Criterion, bench: &Bench) -> Result<(), String> {
+    let values: BTreeMap<String, f64> = bench
+        .config
+        .buildup
+        .derivatives
+        .iter()
+        .filter_map(|d| {
+            let value = bench.config.tunnel.value(&d.name, bench.maneuver.alpha_deg, bench.maneuver.mach)?;
+            Some((d.name.clone(), value.value))
+        })
+        .collect();
+    for (label, free) in [("response alone", false), ("response with sensitivities", true)] {
+        let case = case(bench, free)?;
+        let start = case.starting_values(|name| values.get(name).copied().unwrap_or(0.0));
+        let mut response = case.response();
+        c.bench_function(&format!("{label}, {} parameters", case.parameters()), |b| {
+            b.iter(|| case.respond(&start, &mut response));
+        });
+    }
+    Ok(())
+}
+
+fn stages(c: &mut Criterion) {
+    let bench = match load() {
+        Ok(bench) => bench,
+        Err(error) => {
+            // A benchmark has nobody else to tell.
+            #[expect(clippy::print_stderr, reason = "the benchmark's own output")]
+            {
+                eprintln!("no benchmark: {error}");
+            }
+            return;
+        }
+    };
+    let config = &bench.config;
+    let Some(files) = archive::find(&config.archive).ok().and_then(|files| files.into_iter().next()) else { return };
+    c.bench_function("read one flight", |b| b.iter(|| archive::read(&files, &config.channels)));
+    if let Ok(raw) = archive::read(&files, &config.channels) {
+        c.bench_function("ingest one flight", |b| {
+            b.iter(|| ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest));
+        });
+    }
+    c.bench_function("segment one flight", |b| {
+        b.iter(|| segment::maneuvers(&bench.record, &config.classes, &config.aircraft, &config.segment));
+    });
+    let basis = Basis {
+        aircraft: &config.aircraft,
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+        settings: &config.estimate,
+    };
+    c.bench_function("estimate one maneuver", |b| {
+        b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &basis));
+    });
+    if let Err(error) = responses(c, &bench) {
+        #[expect(clippy::print_stderr, reason = "the benchmark's own output")]
+        {
+            eprintln!("no benchmark of responses: {error}");
+        }
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10).measurement_time(std::time::Duration::from_secs(3));
+    targets = stages
+}
+criterion_main!(benches);
