@@ -59,13 +59,15 @@ pub struct Fit {
     pub slope: f64,
     pub standard_error: f64,
     pub correlation: f64,
+    /// Root mean square of the predicting side.
+    pub size: f64,
     /// Root mean square of measured minus predicted over that of the larger side.
     pub misfit: f64,
 }
 
 /// All relations whose signals the record has.
 pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
-    let motion: Vec<Option<Motion>> = (0..blocks.blocks).map(|k| Motion::of(blocks, k, aircraft, settings)).collect();
+    let motion: Vec<Option<Motion>> = (0..blocks.count).map(|k| Motion::of(blocks, k, aircraft, settings)).collect();
     let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
     // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
     let check = |relation: Relation| {
@@ -76,7 +78,7 @@ pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check
         let fit = fit(&pairs);
         let dead = match relation.choice {
             Choice::Above(_) => Verdict::DoesNotAgree,
-            Choice::Largest(_) => Verdict::NotExcited,
+            Choice::Largest { .. } => Verdict::NotExcited,
         };
         let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
         Check { relation, verdict, fit }
@@ -120,10 +122,12 @@ fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
 fn chosen(relation: &Relation, mut pairs: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     match relation.choice {
         Choice::Above(level) => pairs.retain(|(x, y)| x.abs().max(y.abs()) > level),
-        Choice::Largest(share) => {
+        Choice::Largest { share, .. } => {
             let x0 = median(pairs.iter().map(|p| p.0).collect());
             let y0 = median(pairs.iter().map(|p| p.1).collect());
-            pairs.iter_mut().for_each(|p| *p = (p.0 - x0, p.1 - y0));
+            for pair in &mut pairs {
+                *pair = (pair.0 - x0, pair.1 - y0);
+            }
             pairs.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
             pairs.truncate((pairs.len() as f64 * share).ceil().max(0.0) as usize);
@@ -147,21 +151,27 @@ fn fit(pairs: &[(f64, f64)]) -> Option<Fit> {
         slope,
         standard_error: (residual / (pairs.len() - 1) as f64 / xx).sqrt(),
         correlation: xy / (xx * yy).sqrt(),
+        size: (xx / pairs.len() as f64).sqrt(),
         misfit: (sum(&|x, y| (y - x).powi(2)) / xx.max(yy)).sqrt(),
     };
     [fit.slope, fit.standard_error, fit.correlation, fit.misfit].iter().all(|v| v.is_finite()).then_some(fit)
 }
 
-/// A verdict needs the slope to be wrong by several standard errors. Correlation counts only where the windows were chosen
+/// What biases may leave of a relation, as a share of the level from which it counts as excited.
+const BIAS: f64 = 0.5;
+
+/// A verdict needs the slope to be wrong by several standard errors and by more than biases can make it. Correlation counts only where the windows were chosen
 /// by a level that noise does not reach.
 fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
-    let margin = settings.standard_errors * fit.standard_error;
+    let margin = settings.standard_errors * fit.standard_error + BIAS * relation.choice.level() / fit.size;
     let (low, high) = (fit.slope - margin, fit.slope + margin);
     let level = matches!(relation.choice, Choice::Above(_));
-    if level && fit.correlation.abs() < settings.least_correlation {
+    if level && fit.correlation.abs() < relation.correlation {
         Verdict::DoesNotAgree
     } else if high < 0.0 {
         Verdict::WrongSign
+    } else if fit.slope < 0.0 {
+        Verdict::NotExcited
     } else if low > settings.slope_factor || high < 1.0 / settings.slope_factor {
         Verdict::WrongScale
     } else if low <= 0.0 {
@@ -177,8 +187,8 @@ mod tests {
 
     fn verdict(choice: Choice, slope: f64, standard_error: f64, correlation: f64) -> Verdict {
         let settings = Checks::default();
-        let relation = Relation { choice, ..relations::all(&settings)[0] };
-        judge(&Fit { slope, standard_error, correlation, misfit: 0.1 }, &relation, &settings)
+        let relation = Relation { choice, correlation: 0.5, ..relations::all(&settings)[0] };
+        judge(&Fit { slope, standard_error, correlation, size: 10.0, misfit: 0.1 }, &relation, &settings)
     }
 
     #[test]
@@ -190,7 +200,7 @@ mod tests {
         assert_eq!(verdict(level, 0.02, 0.001, 0.99), Verdict::WrongScale);
         assert_eq!(verdict(level, 0.1, 0.1, 0.1), Verdict::DoesNotAgree);
         assert_eq!(verdict(level, 0.6, 0.05, 0.8), Verdict::Ok);
-        let weak = Choice::Largest(0.05);
+        let weak = Choice::Largest { share: 0.05, level: 0.01 };
         assert_eq!(verdict(weak, 0.4, 0.15, 0.3), Verdict::NotExcited);
         assert_eq!(verdict(weak, 0.9, 0.1, 0.7), Verdict::Ok);
         assert_eq!(verdict(weak, -0.9, 0.1, -0.7), Verdict::WrongSign);

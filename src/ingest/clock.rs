@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn jitter_does_not_move_a_row_into_another_slot() {
         let jitter = [0.0, 0.0011, -0.0009, 0.0004, -0.0012, 0.0007];
-        let times: Vec<f64> = (0..3000).map(|k| f64::from(k) * 0.025 + jitter[k as usize % 6]).collect();
+        let times: Vec<f64> = (0..3000).map(|k| k as f64 * 0.025 + jitter[k % 6]).collect();
         let clock = clock(&times).expect("a clock");
         assert!(clock.slots.iter().enumerate().all(|(k, slot)| k == *slot));
     }
@@ -165,10 +165,10 @@ mod tests {
     #[test]
     fn a_long_gap_is_counted_in_whole_steps_despite_jitter() {
         let jitter = [0.0, 0.0008, -0.0006, 0.0002, -0.0005];
-        let slots: Vec<i32> = (0..2000).chain(14_000..16_000).collect();
-        let times: Vec<f64> = slots.iter().map(|&k| f64::from(k) * 0.025 + jitter[k as usize % 5]).collect();
+        let slots: Vec<usize> = (0..2000).chain(14_000..16_000).collect();
+        let times: Vec<f64> = slots.iter().map(|&k| k as f64 * 0.025 + jitter[k % 5]).collect();
         let clock = clock(&times).expect("a clock");
-        assert!(clock.slots.iter().zip(&slots).all(|(a, b)| *a == *b as usize));
+        assert_eq!(clock.slots, slots);
     }
 
     #[test]
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn times_without_a_steady_step_are_refused_before_memory_is_asked_for() {
         let mut times: Vec<f64> = (0..20).map(|k| f64::from(k) * 1e-7).collect();
-        times.extend((1..20).map(|k| f64::from(k) * 500.0));
+        times.extend((1..15).map(|k| f64::from(k) * 500.0));
         assert!(clock(&times).expect_err("unsteady").contains("not steady"));
     }
 }

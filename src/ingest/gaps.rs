@@ -30,9 +30,9 @@ pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge) -> Vec<Mark> {
         let mark = match sides {
             Some((before, after)) if end - start <= longest => {
                 let steps = (end - start + 1) as f64;
-                for k in start..end {
-                    let share = (k - start + 1) as f64 / steps;
-                    values[k] = if bridge == Bridge::Line { before + share * (after - before) } else { before };
+                for (k, value) in values[start..end].iter_mut().enumerate() {
+                    let share = (k + 1) as f64 / steps;
+                    *value = if bridge == Bridge::Line { before + share * (after - before) } else { before };
                 }
                 Mark::Bridged
             }
@@ -46,6 +46,8 @@ pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge) -> Vec<Mark> {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::float_cmp, reason = "the values are exact")]
+
     use super::*;
 
     const GAP: f64 = f64::NAN;

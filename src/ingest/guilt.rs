@@ -57,8 +57,14 @@ pub fn find(
     aircraft: &Aircraft,
     settings: &Checks,
 ) -> Vec<Guilty> {
+    let dead = |s: &str| {
+        found.iter().any(|c| c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks))
+    };
+    let mut guilty = accused(channels, recorded, blocks, &dead);
+    if !guilty.is_empty() {
+        return guilty;
+    }
     let (mut blocks, mut found) = (blocks.clone(), found.to_vec());
-    let mut guilty = Vec::new();
     for _ in 0..FAULTS {
         if !found.iter().any(|c| c.verdict.failed()) {
             return guilty;
@@ -88,8 +94,13 @@ pub fn find(
         blocks = blocks.with(&best.channel.signal, best.factor);
         found.clone_from(&best.checks);
     }
-    guilty.extend(common(&found, channels, recorded));
+    guilty.extend(common(&found, &blocks, channels, recorded));
     guilty
+}
+
+/// A signal that never changes, in a relation whose other signals do.
+fn is_dead(signal: &str, check: &Check, blocks: &Blocks) -> bool {
+    blocks.still(signal) && check.relation.signals.iter().any(|s| !blocks.still(s))
 }
 
 /// One channel corrected in one way.
@@ -168,12 +179,9 @@ fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
 
 /// The channels that all failed relations share, without those that another relation confirms; where the failed relations
 /// share none, every unconfirmed channel that dominates one of them.
-fn common(found: &[Check], channels: &BTreeMap<String, Channel>, recorded: &[String]) -> Vec<Guilty> {
+fn common(found: &[Check], blocks: &Blocks, channels: &BTreeMap<String, Channel>, recorded: &[String]) -> Vec<Guilty> {
     let cleared = checks::cleared(found);
     let failed: Vec<&Check> = found.iter().filter(|c| c.verdict.failed()).collect();
-    let candidates = |test: &dyn Fn(&str) -> bool| -> Vec<(&String, &Channel)> {
-        channels.iter().filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal)).collect()
-    };
     let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
     let dominates = |s: &str| failed.iter().any(|c| c.relation.dominant().contains(&s));
     let unconfirmed = |s: &str| !cleared.contains(&s);
@@ -183,15 +191,31 @@ fn common(found: &[Check], channels: &BTreeMap<String, Channel>, recorded: &[Str
         &|s| dominates(s) && unconfirmed(s),
         &|s| dominates(s),
     ];
-    let chosen = attempts.iter().map(|test| candidates(test)).find(|c| !c.is_empty()).unwrap_or_default();
-    let alone = chosen.len() == 1;
-    let guilty = |(name, channel): (&String, &Channel)| Guilty {
-        channel: name.clone(),
-        signal: channel.signal.clone(),
-        cause: None,
-        alone,
-    };
-    chosen.into_iter().map(guilty).collect()
+    let attempts = attempts.iter().map(|test| accused(channels, recorded, blocks, test));
+    attempts.into_iter().find(|guilty| !guilty.is_empty()).unwrap_or_default()
+}
+
+/// The recorded channels whose signals pass a test, accused together.
+fn accused(
+    channels: &BTreeMap<String, Channel>,
+    recorded: &[String],
+    blocks: &Blocks,
+    test: &dyn Fn(&str) -> bool,
+) -> Vec<Guilty> {
+    let suspects = channels.iter().filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal));
+    let mut guilty: Vec<Guilty> = suspects
+        .map(|(name, channel)| Guilty {
+            channel: name.clone(),
+            signal: channel.signal.clone(),
+            cause: blocks.still(&channel.signal).then(|| "it never changes".to_owned()),
+            alone: true,
+        })
+        .collect();
+    let alone = guilty.len() == 1;
+    for g in &mut guilty {
+        g.alone = alone;
+    }
+    guilty
 }
 
 /// What the failed checks and the guilty channels amount to; none where nothing failed.

@@ -11,6 +11,9 @@ mod relations;
 mod settings;
 mod spikes;
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
 pub use settings::{Checks, Excitation, OnFailedCheck, Settings, Spikes};

@@ -17,8 +17,17 @@ use crate::units::{DEG, G0_FT_S2};
 pub enum Choice {
     /// Those in which either side is larger than this.
     Above(f64),
-    /// This share of the windows, those with the largest deviation of the predicting side from its median.
-    Largest(f64),
+    /// This share of the windows, those with the largest deviation of the predicting side from its median; noise reaches
+    /// the level.
+    Largest { share: f64, level: f64 },
+}
+
+impl Choice {
+    pub fn level(self) -> f64 {
+        match self {
+            Choice::Above(level) | Choice::Largest { level, .. } => level,
+        }
+    }
 }
 
 type Term = fn(&Motion) -> f64;
@@ -43,6 +52,8 @@ pub struct Relation {
     /// From the sides' own unit to the one that the choice is in.
     pub unit: f64,
     pub choice: Choice,
+    /// The least correlation that counts as agreement.
+    pub correlation: f64,
 }
 
 impl Relation {
@@ -83,6 +94,7 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
         predicted,
         unit: DEG,
         choice,
+        correlation: settings.least_attitude_correlation,
     };
     vec![
         relation(
@@ -115,6 +127,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         predicted,
         unit: 1.0,
         choice,
+        correlation: settings.least_correlation,
     };
     vec![
         relation(
@@ -146,7 +159,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
                 |m| (m.turning()[1] + m.centripetal(m.arms[2])[1]) / G0_FT_S2,
             ),
             integral(|m| m.ay),
-            Choice::Largest(settings.excitation.lateral_share),
+            Choice::Largest { share: settings.excitation.lateral_share, level: settings.excitation.lateral_g },
         ),
     ]
 }
@@ -161,6 +174,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         predicted,
         unit: 1.0,
         choice,
+        correlation: settings.least_correlation,
     };
     vec![
         relation(
@@ -196,6 +210,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
         predicted,
         unit: 1.0,
         choice,
+        correlation: settings.least_correlation,
     };
     vec![
         relation(
@@ -212,7 +227,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             2,
             integral(|m| m.qbar),
             integral(|m| 0.5 * m.density * m.velocity * m.velocity),
-            Choice::Above(0.0),
+            Choice::Above(settings.excitation.qbar_psf),
         ),
         relation(
             "Mach against velocity and altitude",
@@ -220,7 +235,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             2,
             integral(|m| m.mach),
             integral(|m| m.velocity / m.sound),
-            Choice::Above(0.0),
+            Choice::Above(settings.excitation.mach),
         ),
     ]
 }

@@ -79,8 +79,10 @@ pub struct Checks {
     /// How far the slope of a relation may be from one, as a factor. The smallest confusion of units that occurs,
     /// knots for feet per second, is 1.69.
     pub slope_factor: f64,
-    /// The least correlation that counts as agreement.
+    /// The least correlation that counts as agreement between forces, flow and motion, which gusts blur.
     pub least_correlation: f64,
+    /// The least correlation that counts as agreement between attitudes and rates, which nothing but noise blurs.
+    pub least_attitude_correlation: f64,
     /// How many standard errors of the slope a verdict needs.
     pub standard_errors: f64,
     /// Below this velocity the aircraft is not flying and the vanes mean nothing, ft/s.
@@ -96,6 +98,7 @@ impl Default for Checks {
             least_windows: 8,
             slope_factor: 1.5,
             least_correlation: 0.5,
+            least_attitude_correlation: 0.9,
             standard_errors: 4.0,
             least_velocity_ft_s: 50.0,
             excitation: Excitation::default(),
@@ -103,7 +106,8 @@ impl Default for Checks {
     }
 }
 
-/// From where on a window says something about a relation: several times what biases and noise can make.
+/// From where on a window says something about a relation: twice what biases may leave of it where nothing moves. Half
+/// of it is allowed for as an error of the relation that does not average out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Excitation {
@@ -115,10 +119,15 @@ pub struct Excitation {
     pub axial_g: f64,
     /// Change of a body-axis velocity, ft/s².
     pub velocity_ft_s2: f64,
-    /// Climb, ft/s.
+    /// Climb, ft/s; a vane that is off by a degree or two alone makes half of it.
     pub climb_ft_s: f64,
-    /// The share of the windows, those with the largest lateral acceleration, in which it is checked: it is so small
-    /// beside the terms that balance it that no level of its own can be named.
+    /// Dynamic pressure, lbf/ft².
+    pub qbar_psf: f64,
+    pub mach: f64,
+    /// Lateral acceleration, g. It is small beside the terms that balance it, whose noise reaches this level: the windows
+    /// are chosen by the next item instead.
+    pub lateral_g: f64,
+    /// The share of the windows, those with the largest lateral acceleration, in which it is checked.
     pub lateral_share: f64,
 }
 
@@ -129,7 +138,10 @@ impl Default for Excitation {
             normal_g: 0.3,
             axial_g: 0.1,
             velocity_ft_s2: 5.0,
-            climb_ft_s: 20.0,
+            climb_ft_s: 30.0,
+            qbar_psf: 10.0,
+            mach: 0.05,
+            lateral_g: 0.01,
             lateral_share: 0.05,
         }
     }

@@ -13,8 +13,14 @@ const MAD: f64 = 1.482_602_218_505_602;
 /// Variance of a sample minus its neighbours' mean, in variances of the noise: 1 + 1/4 + 1/4.
 const MEAN_VARIANCE: f64 = 1.5;
 
-/// Half a quantisation step: what rounding alone can do to a sample.
-const QUANTISATION: f64 = 0.5;
+/// Relative differences below this are the arithmetic's.
+const EXACT: f64 = 1e-12;
+
+/// Fewer samples off their neighbours' mean than this do not tell the quantisation.
+const FEW_STEPS: usize = 20;
+
+/// The share of its height off the mean that a spike must stand off each line: the lines are twice as noisy as the mean.
+const LINES: f64 = 0.75;
 
 /// How far the two lines may miss each other by noise alone, in its standard deviations (the difference has √10).
 const LINES_NOISE: f64 = 3.0;
@@ -25,16 +31,18 @@ pub fn remove(values: &mut [f64], step_s: f64, settings: &Spikes) -> Vec<usize> 
         return Vec::new();
     }
     let roughness: Vec<f64> = (0..values.len()).map(|k| off_mean(values, k).abs()).collect();
-    let floor = deviation(roughness.iter().copied()).max(QUANTISATION * quantisation(values));
+    let floor = deviation(roughness.iter().copied()).max(rounding(values, &roughness));
     let window = super::gaps::longest(settings.window_s, step_s).max(4);
     let is_spike = |&k: &usize| {
         let Some(height) = height(values, k) else { return false };
-        if height.stands_off <= settings.deviations * floor {
+        if height.off_mean <= settings.deviations * floor {
             return false;
         }
         let noise = floor.max(local(&roughness, k, window));
-        let meets = settings.agreement * height.stands_off + LINES_NOISE * noise;
-        height.stands_off > settings.deviations * noise && height.lines_miss <= meets
+        let meets = settings.agreement * height.off_mean + LINES_NOISE * noise;
+        height.off_mean > settings.deviations * noise
+            && height.off_lines > LINES * settings.deviations * noise
+            && height.lines_miss <= meets
     };
     let spikes: Vec<usize> = (0..values.len()).filter(is_spike).collect();
     let repaired: Vec<f64> = spikes.iter().map(|&k| values[k] - off_mean(values, k)).collect();
@@ -53,8 +61,10 @@ fn off_mean(values: &[f64], k: usize) -> f64 {
 }
 
 struct Height {
-    /// The least that the sample stands off the neighbours' mean and the two lines; zero where the senses differ.
-    stands_off: f64,
+    /// How far the sample stands off the neighbours' mean.
+    off_mean: f64,
+    /// The lesser of how far it stands off the two lines, in the sense that it stands off the mean.
+    off_lines: f64,
     /// How far the two lines miss each other.
     lines_miss: f64,
 }
@@ -65,10 +75,9 @@ fn height(values: &[f64], k: usize) -> Option<Height> {
     let (x, before, after) = (at(Some(k))?, at(k.checked_sub(1))?, at(Some(k + 1))?);
     let left = 2.0 * before - at(k.checked_sub(2)).unwrap_or(before);
     let right = 2.0 * after - at(Some(k + 2)).unwrap_or(after);
-    let off = [x - left, x - right, x - 0.5 * (before + after)];
-    let same_sense = off.iter().all(|o| *o > 0.0) || off.iter().all(|o| *o < 0.0);
-    let least = off.iter().fold(f64::INFINITY, |least, o| least.min(o.abs()));
-    Some(Height { stands_off: if same_sense { least } else { 0.0 }, lines_miss: (left - right).abs() })
+    let off_mean = x - 0.5 * (before + after);
+    let off_lines = ((x - left) * off_mean.signum()).min((x - right) * off_mean.signum());
+    Some(Height { off_mean: off_mean.abs(), off_lines, lines_miss: (left - right).abs() })
 }
 
 /// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left out.
@@ -83,11 +92,13 @@ fn deviation(roughness: impl Iterator<Item = f64>) -> f64 {
     MAD / MEAN_VARIANCE.sqrt() * quantile(roughness.filter(|r| r.is_finite()).collect(), 0.5)
 }
 
-/// The recorder's quantisation step: what its smallest changes are; a low quantile, as a repaired or converted sample may
-/// lie off the grid.
-fn quantisation(values: &[f64]) -> f64 {
-    let changes = values.windows(2).map(|p| (p[1] - p[0]).abs());
-    quantile(changes.filter(|c| c.is_finite() && *c > 0.0).collect(), 0.05)
+/// What rounding alone puts a sample off its neighbours' mean: half the recorder's quantisation step, the least that is not
+/// nothing. A low quantile, as a repaired or converted sample may lie off the grid; a channel that hardly ever changes has
+/// too few of them to say.
+fn rounding(values: &[f64], roughness: &[f64]) -> f64 {
+    let largest = values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let steps: Vec<f64> = roughness.iter().copied().filter(|r| r.is_finite() && *r > EXACT * largest).collect();
+    if steps.len() < FEW_STEPS { 0.0 } else { quantile(steps, 0.05) }
 }
 
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {

@@ -242,3 +242,6 @@ fn numbers(array: &dyn Array, clock_factor: Option<f64>) -> Result<Vec<f64>, arr
     let factor = clock_factor.unwrap_or(1.0);
     Ok(plain.as_primitive::<Float64Type>().iter().map(|v| v.map_or(f64::NAN, |v| v * factor)).collect())
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,194 @@
+//! Archives good and bad: what is found, what is read, and what is said about files that cannot be.
+
+use std::sync::Arc;
+
+use arrow::array::{
+    ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, StringArray, TimestampMillisecondArray,
+};
+use arrow::datatypes::Schema;
+use parquet::arrow::ArrowWriter;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use super::*;
+
+type Column = (&'static str, Option<&'static str>, ArrayRef);
+
+fn parquet(columns: Vec<Column>) -> Vec<u8> {
+    let field = |(name, unit, array): &Column| {
+        let field = Field::new(*name, array.data_type().clone(), true);
+        field.with_metadata(unit.map(|u| (UNIT.to_owned(), u.to_owned())).into_iter().collect())
+    };
+    let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<Field>>()));
+    let arrays = columns.into_iter().map(|c| c.2).collect();
+    let batch = RecordBatch::try_new(schema.clone(), arrays).unwrap();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, schema, None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    bytes
+}
+
+fn floats(values: &[f64]) -> ArrayRef {
+    Arc::new(Float64Array::from(values.to_vec()))
+}
+
+fn simple(times: &[f64]) -> Vec<u8> {
+    parquet(vec![("time", Some("s"), floats(times)), ("q", Some("deg/s"), floats(times))])
+}
+
+fn channels() -> BTreeMap<String, Channel> {
+    let channel = |name: &str, signal: &str, unit: &str| {
+        let (signal, unit) = (signal.to_owned(), unit.to_owned());
+        (name.to_owned(), Channel { signal, unit, sign: 1.0, scale: 1.0, wraps_at: None })
+    };
+    [channel("time", "time_s", "s"), channel("q", "q_deg_s", "deg/s"), channel("obes", "obes", "0/1")].into()
+}
+
+/// An archive of these files, and the text that names it.
+fn archive(files: &[(&str, &[u8])]) -> (TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    let text = folder.path().display().to_string();
+    (folder, text)
+}
+
+fn read_one(bytes: &[u8]) -> Result<RawFlight, Problem> {
+    let (_folder, text) = archive(&[("f.parquet", bytes)]);
+    read(&find(&text).unwrap()[0], &channels())
+}
+
+#[test]
+fn a_folder_gives_its_parquet_files_sorted_by_flight() {
+    let (_folder, text) =
+        archive(&[("b.parquet", b""), ("sub/a.parquet", b""), ("notes.txt", b""), ("_x.parquet", b"")]);
+    let ids: Vec<String> = find(&text).unwrap().into_iter().map(|f| f.flight_id).collect();
+    assert_eq!(ids, ["a", "b"]);
+    let ids: Vec<String> = find(&format!("{text}/b*")).unwrap().into_iter().map(|f| f.flight_id).collect();
+    assert_eq!(ids, ["b"]);
+}
+
+#[test]
+fn the_files_of_a_hive_folder_are_one_flight_in_the_order_of_their_names() {
+    let (_folder, text) = archive(&[
+        ("year=1995/flight=007/part-1.parquet", &simple(&[2.0, 3.0])),
+        ("year=1995/flight=007/part-0.parquet", &simple(&[0.0, 1.0])),
+        ("year=1995/flight=008/part-0.parquet", &simple(&[5.0])),
+    ]);
+    let found = find(&text).unwrap();
+    let ids: Vec<&str> = found.iter().map(|f| f.flight_id.as_str()).collect();
+    assert_eq!(ids, ["007", "008"]);
+    assert_eq!(read(&found[0], &channels()).unwrap().columns["time"].values, [0.0, 1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn two_records_of_one_name_are_refused() {
+    let (_folder, text) = archive(&[("one/f.parquet", b""), ("two/f.parquet", b"")]);
+    assert!(find(&text).unwrap_err().to_string().contains("two records would be flight `f`"));
+}
+
+#[test]
+fn an_empty_archive_says_what_was_looked_for() {
+    let (_folder, text) = archive(&[("notes.txt", b"")]);
+    for nothing in [text.clone(), format!("{text}/*.parquet"), format!("{text}/nowhere")] {
+        let error = find(&nothing).unwrap_err().to_string();
+        assert!(error.starts_with(&nothing) && error.contains("*.parquet"), "{error}");
+    }
+}
+
+#[test]
+fn every_kind_of_number_becomes_a_number_and_a_null_none() {
+    let time: ArrayRef = Arc::new(Int64Array::from(vec![1, 2, 3]));
+    let q: ArrayRef = Arc::new(Float32Array::from(vec![Some(0.5), None, Some(1.5)]));
+    let obes: ArrayRef = Arc::new(BooleanArray::from(vec![true, false, true]));
+    let other: ArrayRef = Arc::new(StringArray::from(vec!["not", "mapped", "here"]));
+    let flight = read_one(&parquet(vec![
+        ("time", None, time),
+        ("comment", None, other),
+        ("q", Some("deg/s"), q),
+        ("obes", None, obes),
+    ]))
+    .unwrap();
+    assert_eq!(flight.columns.keys().collect::<Vec<_>>(), ["obes", "q", "time"]);
+    assert_eq!(flight.columns["time"].values, [1.0, 2.0, 3.0]);
+    let q = &flight.columns["q"];
+    assert_eq!(q.unit.as_deref(), Some("deg/s"));
+    assert_eq!((q.values[0], q.values[1].is_nan(), q.values[2]), (0.5, true, 1.5));
+    assert_eq!(flight.columns["obes"].values, [1.0, 0.0, 1.0]);
+    let small: ArrayRef = Arc::new(Int8Array::from(vec![0, 1]));
+    assert_eq!(read_one(&parquet(vec![("obes", None, small)])).unwrap().columns["obes"].values, [0.0, 1.0]);
+}
+
+#[test]
+fn timestamps_become_seconds() {
+    let time: ArrayRef = Arc::new(TimestampMillisecondArray::from(vec![1_000, 1_025, 1_050]));
+    let flight = read_one(&parquet(vec![("time", None, time)])).unwrap();
+    assert_eq!(flight.columns["time"].values, [1.0, 1.025, 1.05]);
+}
+
+#[test]
+fn a_column_of_text_is_named_with_the_type_found_and_expected() {
+    let q: ArrayRef = Arc::new(StringArray::from(vec!["1.0", "2.0"]));
+    let problem = read_one(&parquet(vec![("time", None, floats(&[0.0, 1.0])), ("q", None, q)])).unwrap_err();
+    assert_eq!(problem.flight_id, "f");
+    assert!(problem.place.ends_with("f.parquet"));
+    let expected = "column `q` (signal `q_deg_s`) is of type Utf8; expected a number (float, integer or boolean)";
+    assert_eq!(problem.reason, expected);
+}
+
+#[test]
+fn a_timestamp_where_no_time_is_meant_is_refused() {
+    let q: ArrayRef = Arc::new(TimestampMillisecondArray::from(vec![1]));
+    let problem = read_one(&parquet(vec![("q", None, q)])).unwrap_err();
+    assert!(problem.reason.contains("is of type Timestamp"), "{}", problem.reason);
+}
+
+#[test]
+fn truncated_and_other_files_are_named_with_the_reason() {
+    let whole = simple(&[0.0, 1.0, 2.0]);
+    for bytes in [&whole[..whole.len() - 10], &whole[..20], b"", b"time,q\n0,1\n"] {
+        let problem = read_one(bytes).unwrap_err();
+        assert!(problem.place.ends_with("f.parquet"));
+        assert!(problem.reason.starts_with("not a readable Parquet file"), "{}", problem.reason);
+    }
+}
+
+#[test]
+fn a_column_that_one_part_lacks_is_missing_there() {
+    let (_folder, text) = archive(&[
+        ("flight=1/a.parquet", &parquet(vec![("time", None, floats(&[0.0, 1.0]))])),
+        ("flight=1/b.parquet", &simple(&[2.0])),
+        ("flight=1/c.parquet", &parquet(vec![("time", None, floats(&[3.0]))])),
+    ]);
+    let flight = read(&find(&text).unwrap()[0], &channels()).unwrap();
+    let q = &flight.columns["q"].values;
+    assert_eq!(q.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [true, true, false, true]);
+}
+
+#[test]
+fn parts_in_different_units_are_refused() {
+    let in_radians = parquet(vec![("time", None, floats(&[2.0])), ("q", Some("rad/s"), floats(&[0.1]))]);
+    let (_folder, text) = archive(&[("flight=1/a.parquet", &simple(&[0.0])), ("flight=1/b.parquet", &in_radians)]);
+    let problem = read(&find(&text).unwrap()[0], &channels()).unwrap_err();
+    assert!(problem.place.ends_with("b.parquet"));
+    assert_eq!(problem.reason, "column `q` is in `rad/s` here and in `deg/s` in an earlier file of the flight");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_bytes_make_reading_panic(mangled in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+        let mut bytes = simple(&[0.0, 0.025, 0.05, 0.075]);
+        for (place, byte) in mangled {
+            let k = place.index(bytes.len());
+            bytes[k] = byte;
+        }
+        // Either outcome is fine, as long as there is one.
+        let _ = read_one(&bytes);
+    }
+}
