@@ -18,6 +18,8 @@ options = \
 harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 
 .DEFAULT_GOAL := help
+# Stages share a store: one at a time, also under make -j.
+.NOTPARALLEL:
 .PHONY: ingest segment estimate trend compare report nightly check build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
