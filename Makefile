@@ -1,0 +1,73 @@
+# One target per stage of the pipeline, and the chores. `make` alone says what there is.
+#
+#   make nightly                                   the main job on the pipeline pipelines/harv
+#   make nightly PIPELINE=mine                     on pipelines/mine
+#   make trend ARCHIVE='flights/*.parquet' THREADS=1
+
+PIPELINE ?= harv
+
+# Handed to harvest where they are set; otherwise the pipeline's own settings hold.
+options = \
+	$(if $(ARCHIVE),--archive '$(ARCHIVE)') \
+	$(if $(WIND_TUNNEL),--wind-tunnel '$(WIND_TUNNEL)') \
+	$(if $(EVENTS),--events '$(EVENTS)') \
+	$(if $(STORE),--store '$(STORE)') \
+	$(if $(REPORTS),--reports '$(REPORTS)') \
+	$(if $(THREADS),--threads '$(THREADS)')
+
+harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
+
+.DEFAULT_GOAL := help
+# Stages share a store: one at a time, also under make -j.
+.NOTPARALLEL:
+.PHONY: ingest segment estimate trend compare report nightly check build test bench lint clean help
+
+ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
+	$(call harvest,ingest)
+
+segment: build ## find the maneuvers and their classes
+	$(call harvest,segment)
+
+estimate: build ## estimate the derivatives of every maneuver
+	$(call harvest,estimate)
+
+trend: build ## fit least-squares trends across angle of attack
+	$(call harvest,trend)
+
+compare: build ## compare the trends with the wind-tunnel database
+	$(call harvest,compare)
+
+report: build ## write the report
+	$(call harvest,report)
+
+nightly: build ## the main job: every stage, to the report
+	$(call harvest,run)
+
+check: build ## is the pipeline's configuration right, and what would it do
+	$(call harvest,check)
+
+# By itself, so that the long first build shows its progress; the stages then only start the binary.
+build: ## build the binary (the first time takes minutes)
+	cargo build --release --locked
+
+test: ## run the tests
+	cargo test --locked
+
+bench: ## run the benchmarks
+	cargo bench --locked
+
+lint: ## formatting and lints, as .ci/run has them
+	cargo fmt --check
+	cargo clippy --all-targets --locked -- -D warnings
+
+clean: ## remove what runs made: data/store and the folders under reports (cargo clean removes the build)
+	rm -rf data/store reports/*/
+
+help: ## this list
+	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [STORE=] [REPORTS=] [THREADS=]'
+	@echo
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo
+	@echo 'Every stage first brings its predecessors up to date; what is up to date is not done again.'
+	@echo 'make ends with "Error 2" when harvest ran and rejected something (a flight, a maneuver): the tables and'
+	@echo 'the report are there, and the report says what and why. "Error 1": it could not run.'
