@@ -56,11 +56,11 @@ pub(super) struct Fit {
 impl Fit {
     /// The fit of the order that the criterion likes best, the lower one on a tie. Points are sorted by α.
     ///
-    /// At least two degrees of freedom are left to the residuals, and a polynomial of more than first order has fewer
-    /// coefficients than there are distinct α, so that it never runs through the middle of every cluster.
+    /// At least two degrees of freedom are left to the residuals, and there are no more coefficients than distinct α: with
+    /// several maneuvers at each, a trend may run through the middle of every cluster, and must be able to where a
+    /// derivative bends between them.
     pub(super) fn best(points: &[Point], settings: &Settings) -> Option<Fit> {
-        let clusters = clusters(points, settings.alpha_step_deg);
-        let by_alpha = if clusters > 2 { clusters - 2 } else { clusters.saturating_sub(1) };
+        let by_alpha = clusters(points, settings.alpha_step_deg).saturating_sub(1);
         let highest = settings.max_order.min(by_alpha).min(points.len().checked_sub(3)?);
         let fits = (0..=highest).filter_map(|order| Fit::of_order(points, order, settings.criterion));
         fits.reduce(|best, next| if next.criterion < best.criterion { next } else { best })
@@ -292,10 +292,18 @@ mod tests {
     }
 
     #[test]
+    fn a_bend_between_few_alpha_is_followed() {
+        let bent = |a: f64| if a < 15.0 { 0.08 } else { 0.04 };
+        let four: Vec<f64> = [10.0, 20.0, 30.0, 40.0].iter().flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3]).collect();
+        let fit = Fit::best(&points(bent, &four), &Settings::default()).expect("a fit");
+        assert!((fit.at(20.0).0 - 0.04).abs() < 0.002, "{}", fit.at(20.0).0);
+    }
+
+    #[test]
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
         let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
-        assert!(Fit::best(&points(wavy, &three), &Settings::default()).expect("a fit").order() <= 1);
+        assert!(Fit::best(&points(wavy, &three), &Settings::default()).expect("a fit").order() <= 2);
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
         assert_eq!(Fit::best(&points(wavy, &one), &Settings::default()).expect("a fit").order(), 0);
     }
