@@ -121,7 +121,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     if !options.quiet {
         summary(&config, &campaign, until);
     }
-    Ok(if campaign.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+    Ok(if campaign.rejected() { ExitCode::from(2) } else { ExitCode::SUCCESS })
 }
 
 impl Options {
@@ -154,7 +154,9 @@ fn summary(config: &Config, campaign: &Campaign, until: Stage) {
         println!("{} of them converged", campaign.converged());
     }
     for problem in campaign.problems.iter().take(10) {
-        println!("  {}: {} ({}): {}", problem.stage, problem.flight_id, problem.place, problem.reason);
+        let place = [problem.flight_id.as_str(), problem.place.as_str()].map(str::trim);
+        let place: Vec<&str> = place.into_iter().filter(|s| !s.is_empty()).collect();
+        println!("  {}: {}: {}", problem.stage, place.join(", "), problem.reason);
     }
     if campaign.problems.len() > 10 {
         println!("  and {} more in {}", campaign.problems.len() - 10, config.reports.join("problems.csv").display());

@@ -12,8 +12,8 @@ pub enum Error {
     #[error("{}: {what}", place.display())]
     Archive { place: PathBuf, what: String },
     /// The disk said no.
-    #[error("{}: {what}: {source}", path.display())]
-    Io { path: PathBuf, what: &'static str, source: std::io::Error },
+    #[error("{}: {what}: {cause}", path.display())]
+    Io { path: PathBuf, what: &'static str, cause: std::io::Error },
     /// An artefact could not be written or read back.
     #[error("{}: {what}", path.display())]
     Store { path: PathBuf, what: String },
@@ -35,7 +35,7 @@ impl Error {
     /// For `map_err` on a disk operation: `.map_err(Error::io(path, "cannot create the folder"))`.
     pub fn io(path: &Path, what: &'static str) -> impl FnOnce(std::io::Error) -> Error {
         let path = path.to_owned();
-        move |source| Error::Io { path, what, source }
+        move |cause| Error::Io { path, what, cause }
     }
 }
 

@@ -103,6 +103,13 @@ impl Campaign {
         self.estimates.iter().chain(&self.combined)
     }
 
+    /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for a trend is among the
+    /// problems, but nothing of it was rejected.
+    #[must_use]
+    pub fn rejected(&self) -> bool {
+        self.problems.iter().any(|p| p.stage != "trend")
+    }
+
     #[must_use]
     pub fn converged(&self) -> usize {
         self.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).count()

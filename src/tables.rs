@@ -59,7 +59,7 @@ pub struct FitRow {
     /// Why it ended so, in words.
     pub reason: String,
     pub iterations: usize,
-    /// J of eq. 1.2 at the tunnel's values and at the end.
+    /// J of eq. 1.2 at the start of the iteration and at the end.
     pub initial_cost: Option<f64>,
     pub final_cost: Option<f64>,
     /// Of the information matrix with unit diagonal.

@@ -235,8 +235,9 @@ pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
         format!("likely {}", causes.join(", or "))
     };
     let reason = format!(
-        "{several}{} do not agree with the other channels ({}); {likely}. Correct the channel map, or leave the flight out",
+        "{several}{} {} not agree with the other channels ({}); {likely}. Correct the channel map, or leave the flight out",
         names.join(", "),
+        if names.len() == 1 { "does" } else { "do" },
         failed.join("; ")
     );
     let place = if names.len() == 1 { "channel" } else { "channels" };

@@ -65,7 +65,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
 
 /// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other programs' own.
 fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-    let unreadable = |source| Error::Io { path: folder.to_owned(), what: "cannot read the archive's folder", source };
+    let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(['.', '_']));

@@ -9,7 +9,9 @@
 //! were just that far (Huber's weights in the fit, his proposal 2 for τ). And no maneuver is trusted beyond a share
 //! `BOUND_FLOOR` of the group's median bound: bounds are themselves only known to a factor of a few.
 //!
-//! The band takes the order as known; what choosing it adds to the uncertainty is not counted.
+//! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not chosen count in the
+//! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance), each with its own
+//! variance and its distance from the chosen trend.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -53,17 +55,46 @@ pub(super) struct Fit {
     criterion: f64,
 }
 
+/// The trend of the order that the criterion likes best, with the other orders' doubts about it.
+#[derive(Clone, Debug)]
+pub(super) struct Trend {
+    pub best: Fit,
+    /// Every order with its Akaike weight; the weights sum to one.
+    orders: Vec<(f64, Fit)>,
+}
+
+impl Trend {
+    /// The trend through points sorted by α: the lower order on a tie, none where no order has a solution.
+    pub(super) fn through(points: &[Point], settings: &Settings) -> Option<Trend> {
+        let fits = Fit::all(points, settings);
+        let best = fits.iter().reduce(|best, next| if next.criterion < best.criterion { next } else { best })?.clone();
+        let likelihood = |fit: &Fit| (0.5 * (best.criterion - fit.criterion)).exp();
+        let total: f64 = fits.iter().map(likelihood).sum();
+        Some(Trend { orders: fits.iter().map(|fit| (likelihood(fit) / total, fit.clone())).collect(), best })
+    }
+
+    /// Value and standard error at an angle of attack.
+    pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
+        let (value, _) = self.best.at(alpha_deg);
+        let variance = |(weight, fit): &(f64, Fit)| {
+            let (other, error) = fit.at(alpha_deg);
+            weight * (error * error + (other - value).powi(2))
+        };
+        (value, self.orders.iter().map(variance).sum::<f64>().sqrt())
+    }
+}
+
 impl Fit {
-    /// The fit of the order that the criterion likes best, the lower one on a tie. Points are sorted by α.
+    /// The fits of every order that the data allow. Points are sorted by α.
     ///
     /// At least two degrees of freedom are left to the residuals, and there are no more coefficients than distinct α: with
     /// several maneuvers at each, a trend may run through the middle of every cluster, and must be able to where a
     /// derivative bends between them.
-    pub(super) fn best(points: &[Point], settings: &Settings) -> Option<Fit> {
+    fn all(points: &[Point], settings: &Settings) -> Vec<Fit> {
         let by_alpha = clusters(points, settings.alpha_step_deg).saturating_sub(1);
-        let highest = settings.max_order.min(by_alpha).min(points.len().checked_sub(3)?);
-        let fits = (0..=highest).filter_map(|order| Fit::of_order(points, order, settings.criterion));
-        fits.reduce(|best, next| if next.criterion < best.criterion { next } else { best })
+        let Some(by_points) = points.len().checked_sub(3) else { return Vec::new() };
+        let highest = settings.max_order.min(by_alpha).min(by_points);
+        (0..=highest).filter_map(|order| Fit::of_order(points, order, settings.criterion)).collect()
     }
 
     /// The fit of one order; none where the normal equations have no solution.
@@ -233,8 +264,8 @@ mod tests {
             p.value += 0.01 * [1.1, -0.7, 0.2, -1.3, 0.9, -0.2][i % 6];
         }
         for criterion in [Criterion::Aicc, Criterion::Bic] {
-            let fit = Fit::best(&data, &Settings { criterion, ..Settings::default() }).expect("a fit");
-            assert_eq!(fit.order(), 3);
+            let fit = Trend::through(&data, &Settings { criterion, ..Settings::default() }).expect("a fit");
+            assert_eq!(fit.best.order(), 3);
             for a in [5.0, 20.0, 40.0, 60.0] {
                 assert_relative_eq!(fit.at(a).0, cubic(a), epsilon = 0.01);
             }
@@ -273,13 +304,13 @@ mod tests {
             p.value += if i % 2 == 0 { 0.01 } else { -0.01 };
         }
         let settings = Settings::default();
-        let clean = Fit::best(&data, &settings).expect("a fit");
+        let clean = Trend::through(&data, &settings).expect("a fit");
         data.push(Point { alpha_deg: 60.0, value: 5.0, bound: 0.01 });
-        let wild = Fit::best(&data, &settings).expect("a fit");
+        let wild = Trend::through(&data, &settings).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {
             assert_relative_eq!(wild.at(a).0, clean.at(a).0, epsilon = 0.01);
         }
-        assert!(wild.scatter() < 0.02, "{}", wild.scatter());
+        assert!(wild.best.scatter() < 0.02, "{}", wild.best.scatter());
     }
 
     #[test]
@@ -293,18 +324,18 @@ mod tests {
 
     #[test]
     fn a_bend_between_few_alpha_is_followed() {
-        let bent = |a: f64| if a < 15.0 { 0.08 } else { 0.04 };
+        let bent = |a: f64| if a < 15.0 { 0.8 } else { 0.4 };
         let four: Vec<f64> = [10.0, 20.0, 30.0, 40.0].iter().flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3]).collect();
-        let fit = Fit::best(&points(bent, &four), &Settings::default()).expect("a fit");
-        assert!((fit.at(20.0).0 - 0.04).abs() < 0.002, "{}", fit.at(20.0).0);
+        let fit = Trend::through(&points(bent, &four), &Settings::default()).expect("a fit");
+        assert!((fit.at(20.0).0 - 0.4).abs() < 0.02, "{}", fit.at(20.0).0);
     }
 
     #[test]
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
         let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
-        assert!(Fit::best(&points(wavy, &three), &Settings::default()).expect("a fit").order() <= 2);
+        assert!(Trend::through(&points(wavy, &three), &Settings::default()).expect("a fit").best.order() <= 2);
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
-        assert_eq!(Fit::best(&points(wavy, &one), &Settings::default()).expect("a fit").order(), 0);
+        assert_eq!(Trend::through(&points(wavy, &one), &Settings::default()).expect("a fit").best.order(), 0);
     }
 }

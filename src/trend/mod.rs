@@ -16,7 +16,7 @@ use crate::error::Problem;
 use crate::maneuver::Status;
 use crate::tables::{EstimateRow, TrendRow};
 
-use fit::{Fit, Point};
+use fit::{Point, Trend};
 
 /// A trend through fewer maneuvers than this has no scatter to speak of and is not drawn.
 const FEWEST_MANEUVERS: usize = 3;
@@ -25,8 +25,8 @@ const FEWEST_MANEUVERS: usize = 3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Highest order of the polynomial in α. Default 6: a derivative of an aircraft that goes through stall turns a few
-    /// times between 5° and 60°.
+    /// Highest order of the polynomial in α. Default 10: an aircraft that goes through stall bends its derivatives at
+    /// every few degrees between 5° and 60°. The criterion chooses below it.
     #[serde(default = "default_max_order")]
     pub max_order: usize,
     /// What chooses the order. Default `aicc`.
@@ -76,7 +76,7 @@ pub enum Criterion {
 }
 
 fn default_max_order() -> usize {
-    6
+    10
 }
 fn default_alpha_step() -> f64 {
     5.0
@@ -183,10 +183,11 @@ fn trend(members: &[&EstimateRow], group: &str, settings: &Settings) -> Result<V
     let mut points: Vec<Point> = members.iter().filter_map(|e| point(e)).collect();
     // Sums do not depend on the order in which the maneuvers come.
     points.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(std::cmp::Ordering::Equal));
-    let fit = Fit::best(&points, settings).ok_or("the least-squares fit has no solution")?;
-    let half_width = fit.quantile_95();
+    let fit = Trend::through(&points, settings).ok_or("the least-squares fit has no solution")?;
+    let half_width = fit.best.quantile_95();
     let row = |alpha_deg: f64| {
-        let (value, standard_error) = fit.at(alpha_deg);
+        let (value, own_error) = fit.at(alpha_deg);
+        let standard_error = own_error.hypot(held_error(members, alpha_deg, settings.alpha_step_deg));
         TrendRow {
             derivative: members[0].derivative.clone(),
             unit: members[0].unit.clone(),
@@ -197,11 +198,25 @@ fn trend(members: &[&EstimateRow], group: &str, settings: &Settings) -> Result<V
             lower_95: value - half_width * standard_error,
             upper_95: value + half_width * standard_error,
             maneuvers: points.len(),
-            order: fit.order(),
-            scatter: fit.scatter(),
+            order: fit.best.order(),
+            scatter: fit.best.scatter(),
         }
     };
     Ok(grid(&points, settings).into_iter().map(row).collect())
+}
+
+/// What the uncertainty of held values does to the trend at an angle of attack. Maneuvers that hold the same derivative
+/// at the same tunnel err together, so it does not average out: it is the mean over the maneuvers within a step of α,
+/// each with its weight 1/bound².
+fn held_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
+    let near = members.iter().filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (held, p) in near.filter_map(|e| Some((e.bound_held?, point(e)?))) {
+        let weight = p.bound.powi(-2);
+        sum += weight * held;
+        weights += weight;
+    }
+    if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
 /// The multiples of the step inside the range of the data.

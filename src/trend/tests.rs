@@ -144,3 +144,16 @@ fn too_few_maneuvers_are_a_problem_of_the_group_and_silent_for_a_class() {
     assert_eq!(problems.len(), 1);
     assert_eq!(problems[0].place, "d, group all");
 }
+
+#[test]
+fn the_uncertainty_of_held_values_does_not_average_out() {
+    let mut estimates: Vec<EstimateRow> =
+        (0..40).map(|i| estimate("Cm_dpv", "PPSSTV", 10.0 + f64::from(i), 1.0, 0.1)).collect();
+    let without = trends(&estimates, &Settings::default()).0[0].standard_error;
+    for e in &mut estimates {
+        e.bound_held = Some(0.08);
+    }
+    let with = trends(&estimates, &Settings::default()).0[0].standard_error;
+    assert_relative_eq!(with, without.hypot(0.08), max_relative = 1e-9);
+    assert!(without < 0.05 && with >= 0.08);
+}
