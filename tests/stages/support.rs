@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
-use arrow::array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch};
+use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use parquet::arrow::ArrowWriter;
@@ -251,11 +251,15 @@ pub fn write(record: &RecordBatch, path: &Path) {
 /// The values of a channel.
 pub fn values(record: &RecordBatch, channel: &str) -> Vec<f64> {
     let numbers = cast(record.column_by_name(channel).unwrap(), &DataType::Float64).unwrap();
-    numbers.as_primitive::<Float64Type>().values().to_vec()
+    numbers.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)).collect()
 }
 
 /// The record with a channel's field and values replaced.
-pub fn replaced(record: &RecordBatch, channel: &str, edit: impl FnOnce(&Field, &ArrayRef) -> (Field, ArrayRef)) -> RecordBatch {
+pub fn replaced(
+    record: &RecordBatch,
+    channel: &str,
+    edit: impl FnOnce(&Field, &ArrayRef) -> (Field, ArrayRef),
+) -> RecordBatch {
     let schema = record.schema();
     let at = schema.index_of(channel).unwrap();
     let (field, array) = edit(schema.field(at), record.column(at));
