@@ -106,6 +106,15 @@ impl Campaign {
         outcome
     }
 
+    /// Runs a stage after estimate to its end. So few maneuvers have no trend in most derivatives: the program may say so
+    /// by ending with 2.
+    pub fn finishes(&self, stage: &str) -> Outcome {
+        let outcome = self.harvest(stage);
+        assert!(matches!(outcome.code, Some(0 | 2)) && outcome.stderr.is_empty(), "{outcome:?}");
+        assert!(self.table("problems").iter().all(|p| p["stage"] == "trend"), "{:?}", self.table("problems"));
+        outcome
+    }
+
     /// Makes the campaign's pipeline a copy of the shipped one, to be edited.
     pub fn copy_pipeline(&self) {
         copy_tree(&Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv"), &self.path("pipeline"));
