@@ -64,15 +64,15 @@ pub(super) fn whole(config: &Config, files: &Files) -> Result<()> {
 fn aircraft(config: &Config, source: &Source) -> Result<()> {
     let a = &config.aircraft;
     let positive = [
-        ("wing_area_ft2", a.wing_area_ft2),
-        ("span_ft", a.span_ft),
-        ("chord_ft", a.chord_ft),
-        ("factor", a.sensors.alpha_vane.factor),
-        ("factor", a.sensors.beta_vane.factor),
+        ("aircraft", "wing_area_ft2", a.wing_area_ft2),
+        ("aircraft", "span_ft", a.span_ft),
+        ("aircraft", "chord_ft", a.chord_ft),
+        ("alpha_vane", "factor", a.sensors.alpha_vane.factor),
+        ("beta_vane", "factor", a.sensors.beta_vane.factor),
     ];
-    for (name, value) in positive {
+    for (key, name, value) in positive {
         if !(value.is_finite() && value > 0.0) {
-            return Err(source.error(name, format!("`{name}` must be greater than zero, not {value}")));
+            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
         }
     }
     if !(-90.0..=90.0).contains(&a.latitude_deg) {
@@ -84,24 +84,24 @@ fn aircraft(config: &Config, source: &Source) -> Result<()> {
 fn channels(config: &Config, source: &Source) -> Result<()> {
     let mut signals: Vec<&str> = config.constants.keys().map(String::as_str).collect();
     for (column, channel) in &config.channels {
-        let unit =
-            Unit::parse(&channel.unit).map_err(|what| source.error(column, format!("channel `{column}`: {what}")))?;
+        let error = |what: String| Err(source.error_under("channels", column, what));
+        let unit = match Unit::parse(&channel.unit) {
+            Ok(unit) => unit,
+            Err(what) => return error(format!("channel `{column}`: {what}")),
+        };
         let target = Unit::of_signal(&channel.signal);
         if unit.factor_to(target).is_none() {
-            let what =
-                format!("channel `{column}`: `{}` cannot become {} of `{}`", unit.name, target.name, channel.signal);
-            return Err(source.error(column, what));
+            let (unit, target, signal) = (unit.name, target.name, &channel.signal);
+            return error(format!("channel `{column}`: `{unit}` cannot become {target} of `{signal}`"));
         }
         if ![1.0, -1.0].contains(&channel.sign) {
-            return Err(source.error(column, format!("channel `{column}`: sign is 1 or -1, not {}", channel.sign)));
+            return error(format!("channel `{column}`: sign is 1 or -1, not {}", channel.sign));
         }
         if !(channel.scale.is_finite() && channel.scale > 0.0) {
-            return Err(
-                source.error(column, format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"))
-            );
+            return error(format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"));
         }
         if signals.contains(&channel.signal.as_str()) {
-            return Err(source.error(column, format!("signal `{}` has two sources", channel.signal)));
+            return error(format!("signal `{}` has two sources", channel.signal));
         }
         signals.push(&channel.signal);
     }
@@ -195,19 +195,29 @@ fn weights(class: &Class, source: &Source) -> Result<()> {
     let all = class.weights.iter().chain(class.overrides.iter().flat_map(|o| &o.weights));
     for (output, weight) in all {
         if !outputs.contains(output) {
-            let what = format!("class {}: {} is no {} output", class.name, word(*output), class.axis.name());
-            return Err(source.error("weights", what));
+            let outputs = outputs.map(word).join(", ");
+            let what = format!(
+                "class {}: {} is no {} output; they are {outputs}",
+                class.name,
+                word(*output),
+                class.axis.name()
+            );
+            return Err(source.error_under("weights", &name(*output), what));
         }
         if !(weight.is_finite() && *weight > 0.0) {
             let what = format!("class {}: the weight of {} must be greater than zero", class.name, word(*output));
-            return Err(source.error("weights", what));
+            return Err(source.error_under("weights", &name(*output), what));
         }
     }
     Ok(())
 }
 
+fn name(output: Output) -> String {
+    format!("{output:?}").to_lowercase()
+}
+
 fn word(output: Output) -> String {
-    format!("`{}`", format!("{output:?}").to_lowercase())
+    format!("`{}`", name(output))
 }
 
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
@@ -225,8 +235,12 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
             return Err(source.error(name, what));
         }
     }
-    if rule.lead_in_s < 0.0 || rule.decay_s < 0.0 {
-        return Err(source.error("lead_in_s", format!("class {}: lead_in_s and decay_s are not negative", class.name)));
+    for (name, time_s) in [("lead_in_s", rule.lead_in_s), ("decay_s", rule.decay_s)] {
+        if !(time_s.is_finite() && time_s >= 0.0) {
+            return Err(
+                source.error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name))
+            );
+        }
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 
 use super::written::{AircraftFile, ClassFile, ModelFile, PipelineFile};
 use crate::aero::Buildup;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
 use crate::store::files;
 
@@ -35,17 +35,45 @@ impl Source {
     fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
             let line = e.location().map(|l| l.line());
-            Error::config(&self.path, line, e.to_string())
+            Error::config(&self.path, line, said(&e.to_string()))
         })
     }
 
     /// An error about a name, at the first line on which it stands as a word of its own.
     pub fn error(&self, name: &str, what: impl Into<String>) -> Error {
-        let word = |c: char| c.is_alphanumeric() || c == '_';
-        let holds = |line: &str| line.split(|c| !word(c)).any(|w| w == name);
-        let line = self.text.lines().position(holds).map(|i| i + 1);
+        Error::config(&self.path, self.line_of(name, 0), what)
+    }
+
+    /// An error about a name in the section under a key: a word may stand elsewhere in another meaning.
+    pub fn error_under(&self, key: &str, name: &str, what: impl Into<String>) -> Error {
+        let begins = |line: &str| line.trim_start().strip_prefix(key).is_some_and(|rest| rest.starts_with(':'));
+        let section = self.text.lines().position(begins);
+        let line = self.line_of(name, section.unwrap_or(0)).or(section.map(|i| i + 1));
         Error::config(&self.path, line, what)
     }
+
+    /// The first line from number `first` (from 0) on that holds a word, counted from 1.
+    fn line_of(&self, name: &str, first: usize) -> Option<usize> {
+        let word = |c: char| c.is_alphanumeric() || c == '_';
+        let holds = |line: &str| without_comment(line).split(|c| !word(c)).any(|w| w == name);
+        self.text.lines().enumerate().skip(first).find(|(_, line)| holds(line)).map(|(i, _)| i + 1)
+    }
+}
+
+/// A line without what follows a `#` that begins a comment.
+fn without_comment(line: &str) -> &str {
+    if line.trim_start().starts_with('#') { "" } else { line.split(" #").next().unwrap_or_default() }
+}
+
+/// What the parser says, without the place (the error begins with it) and, for an unknown key or word, with the one that
+/// was probably meant.
+fn said(parser: &str) -> String {
+    let what = parser.rsplit_once(" at line ").map_or(parser, |(what, _)| what);
+    let Some((head, expected)) = what.split_once(", expected ").filter(|(head, _)| head.contains("unknown ")) else {
+        return what.to_owned();
+    };
+    let given = head.split('`').rev().nth(1).unwrap_or_default();
+    format!("{what}{}", did_you_mean(given, expected.split('`').skip(1).step_by(2)))
 }
 
 impl Files {
@@ -84,12 +112,15 @@ impl Files {
         let mut classes = Vec::<Class>::new();
         for source in &self.classes {
             let file: ClassFile = source.parse()?;
-            let lists = [&file.estimated, &file.held, &file.inactive];
-            let mut names: Vec<&String> = lists.into_iter().flatten().collect();
-            names.sort();
-            if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-                let name = twice[0];
-                return Err(source.error(name, format!("`{name}` stands twice among estimated, held and inactive")));
+            let own = [&file.estimated, &file.held, &file.inactive];
+            let overrides = file.overrides.iter().map(|o| [&o.estimated, &o.held, &o.inactive]);
+            for lists in std::iter::once(own).chain(overrides) {
+                let mut names: Vec<&String> = lists.into_iter().flatten().collect();
+                names.sort();
+                if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+                    let name = twice[0];
+                    return Err(source.error(name, format!("`{name}` stands twice among estimated, held and inactive")));
+                }
             }
             let class = Class::from(file);
             if classes.iter().any(|c| c.name == class.name) {

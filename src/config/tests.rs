@@ -1,1 +1,422 @@
+//! What a wrong configuration is answered with: each test copies the shipped pipeline, spoils one thing and reads the error.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{Config, Overrides};
+
+/// A copy of the shipped pipeline that can be spoiled.
+struct Copy {
+    folder: tempfile::TempDir,
+}
+
+impl Copy {
+    fn new() -> Copy {
+        let folder = tempfile::tempdir().unwrap();
+        let shipped = Path::new("pipelines/harv");
+        fs::create_dir(folder.path().join("maneuvers")).unwrap();
+        for sub in ["", "maneuvers"] {
+            for entry in fs::read_dir(shipped.join(sub)).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_file() {
+                    fs::copy(&path, folder.path().join(sub).join(path.file_name().unwrap())).unwrap();
+                }
+            }
+        }
+        Copy { folder }
+    }
+
+    fn path(&self, file: &str) -> PathBuf {
+        self.folder.path().join(file)
+    }
+
+    /// Replaces the one place where `from` stands; returns the line on which it begins.
+    fn spoil(&self, file: &str, from: &str, to: &str) -> usize {
+        let text = fs::read_to_string(self.path(file)).unwrap();
+        assert_eq!(text.matches(from).count(), 1, "`{from}` in {file}");
+        fs::write(self.path(file), text.replacen(from, to, 1)).unwrap();
+        text.split(from).next().unwrap().matches('\n').count() + 1
+    }
+
+    fn write(&self, file: &str, text: &str) -> PathBuf {
+        fs::write(self.path(file), text).unwrap();
+        self.path(file)
+    }
+
+    fn load(&self, overrides: Overrides) -> Result<Config, String> {
+        let folder = format!("{}/", self.folder.path().display());
+        Config::load(self.folder.path(), overrides).map_err(|e| e.to_string().replace(&folder, ""))
+    }
+
+    fn error(&self) -> String {
+        self.load(Overrides::default()).unwrap_err()
+    }
+
+    fn error_with_tunnel(&self, rows: &str) -> String {
+        let path = self.write("tunnel.csv", &format!("derivative,alpha_deg,value,unit\n{rows}"));
+        self.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap_err()
+    }
+
+    fn error_with_events(&self, rows: &str) -> String {
+        let path = self.write("events.csv", &format!("flight_id,class,start_s,end_s\n{rows}"));
+        self.load(Overrides { events: Some(path), ..Overrides::default() }).unwrap_err()
+    }
+}
+
+#[test]
+fn the_shipped_pipeline_is_right() {
+    let config = Copy::new().load(Overrides::default()).unwrap();
+    assert_eq!(config.classes.len(), 9);
+    assert_eq!(config.buildup.derivatives.len(), 48);
+}
+
+#[test]
+fn an_unknown_key_is_named_with_the_one_that_was_probably_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "wind_tunnel: data", "wind_tunel: data");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("pipeline.yaml:{line}: unknown field `wind_tunel`, expected one of ")), "{e}");
+    assert!(e.ends_with("did you mean `wind_tunnel`?"), "{e}");
+}
+
+#[test]
+fn an_unknown_key_deep_in_a_file_is_named_with_its_path() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "max_marked_share: 0.2", "max_marked: 0.2");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("pipeline.yaml:{line}: estimate: unknown field `max_marked`")), "{e}");
+    assert!(e.ends_with("did you mean `max_marked_share`?"), "{e}");
+}
+
+#[test]
+fn an_unknown_word_is_named_with_the_one_that_was_probably_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "axis: longitudinal", "axis: longitudnal");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("maneuvers/ppss.yaml:{line}: axis: unknown variant `longitudnal`")), "{e}");
+    assert!(e.ends_with("did you mean `longitudinal`?"), "{e}");
+}
+
+#[test]
+fn yaml_that_cannot_be_read_is_named_by_line() {
+    let copy = Copy::new();
+    let line = copy.spoil("model.yaml", "  - { name: CN_alpha,", "  - { name CN_alpha: [,");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("model.yaml:{line}: ")), "{e}");
+}
+
+#[test]
+fn a_missing_key_is_named_by_its_file() {
+    let copy = Copy::new();
+    copy.spoil("pipeline.yaml", "archive: data/demo/flights\n", "");
+    let e = copy.error();
+    assert!(e.starts_with("pipeline.yaml:"), "{e}");
+    assert!(e.ends_with("missing field `archive`"), "{e}");
+}
+
+#[test]
+fn a_typo_in_a_derivative_is_answered_with_its_name() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "CN_0, CN_alpha,", "CN_0, CN_alhpa,");
+    assert_eq!(
+        copy.error(),
+        format!(
+            "maneuvers/ppss.yaml:{line}: class PPSS: no longitudinal derivative `CN_alhpa` in the model; did you mean \
+             `CN_alpha`?"
+        )
+    );
+}
+
+#[test]
+fn a_derivative_of_the_other_axis_is_none_of_this_class() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "inactive: [\n", "inactive: [ Cl_beta,\n");
+    let e = copy.error();
+    let expected = format!("maneuvers/ppss.yaml:{line}: class PPSS: no longitudinal derivative `Cl_beta` in the model");
+    assert!(e.starts_with(&expected), "{e}");
+}
+
+#[test]
+fn a_derivative_in_no_list_is_named() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "CN_0, CN_alpha,", "CN_0,");
+    assert_eq!(copy.error(), "maneuvers/ppss.yaml:1: class PPSS: `CN_alpha` is neither estimated, held nor inactive");
+}
+
+#[test]
+fn a_derivative_in_two_lists_is_named() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "CN_dlef, CN_dtef,", "CN_dlef, CN_dtef, CN_de,");
+    let e = copy.error();
+    assert!(e.starts_with("maneuvers/ppss.yaml:"), "{e}");
+    assert!(e.ends_with(": `CN_de` stands twice among estimated, held and inactive"), "{e}");
+}
+
+#[test]
+fn a_derivative_twice_in_an_override_is_named() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/pyrs.yaml", "estimated: [CY_da, Cl_dr]", "estimated: [CY_da, Cl_dr]\n    held: [CY_da]");
+    let e = copy.error();
+    assert!(e.ends_with(": `CY_da` stands twice among estimated, held and inactive"), "{e}");
+}
+
+#[test]
+fn a_held_derivative_without_a_tunnel_table_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/olat.yaml", "CY_ddht, CY_dyv,", "CY_dyv,");
+    copy.spoil("maneuvers/olat.yaml", "inactive: [\n", "held: [CY_ddht]\ninactive: [\n");
+    let table: String = fs::read_to_string("data/demo/wt_tables.csv").unwrap();
+    let without: Vec<&str> =
+        table.lines().skip(1).filter(|l| !l.starts_with("CY_ddht") && !l.starts_with("CYddht")).collect();
+    let e = copy.error_with_tunnel(&without.join("\n"));
+    assert_eq!(
+        e,
+        format!(
+            "maneuvers/olat.yaml:{}: class OLAT: `CY_ddht` is held, and tunnel.csv has no value to hold it at",
+            line - 1
+        )
+    );
+}
+
+#[test]
+fn a_bias_is_never_held() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "an_bias, ax_bias, q_bias,", "ax_bias, q_bias,");
+    let line = copy.spoil("maneuvers/ppss.yaml", "held: [\n", "held: [ an_bias,\n");
+    assert_eq!(
+        copy.error(),
+        format!("maneuvers/ppss.yaml:{line}: class PPSS: a bias is estimated or inactive, not held")
+    );
+}
+
+#[test]
+fn an_unknown_unit_is_answered_with_the_known_ones() {
+    let copy = Copy::new();
+    let line = copy.spoil("aircraft.yaml", "alpha_vane_deg, unit: deg }", "alpha_vane_deg, unit: degrees }");
+    let e = copy.error();
+    let expected =
+        format!("aircraft.yaml:{line}: channel `alpha_vane`: unknown unit `degrees`; the units are deg, rad, ");
+    assert!(e.starts_with(&expected), "{e}");
+}
+
+#[test]
+fn a_unit_that_cannot_become_the_signal_s_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil("aircraft.yaml", "q: { signal: q_deg_s, unit: deg/s }", "q: { signal: q_deg_s, unit: deg }");
+    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: channel `q`: `deg` cannot become deg/s of `q_deg_s`"));
+}
+
+#[test]
+fn a_sign_is_one_or_minus_one() {
+    let copy = Copy::new();
+    let line = copy.spoil("aircraft.yaml", "q_deg_s, unit: deg/s }", "q_deg_s, unit: deg/s, sign: -2 }");
+    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: channel `q`: sign is 1 or -1, not -2"));
+}
+
+#[test]
+fn a_vane_factor_is_greater_than_zero() {
+    let copy = Copy::new();
+    let line = copy.spoil("aircraft.yaml", "factor: 0.98", "factor: 0");
+    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: `factor` must be greater than zero, not 0"));
+}
+
+#[test]
+fn a_decay_is_not_negative() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "decay_s: 2.4", "decay_s: -2.4");
+    assert_eq!(
+        copy.error(),
+        format!("maneuvers/ppss.yaml:{line}: class PPSS: `decay_s` must not be negative, not -2.4")
+    );
+}
+
+#[test]
+fn two_sources_of_a_signal_are_one_too_many() {
+    let copy = Copy::new();
+    let line = copy.spoil("aircraft.yaml", "r: { signal: r_deg_s,", "r: { signal: q_deg_s,");
+    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: signal `q_deg_s` has two sources"));
+}
+
+#[test]
+fn a_constant_is_a_source_too() {
+    let copy = Copy::new();
+    copy.spoil("aircraft.yaml", "constants: {}", "constants: { mass_slug: 1050 }");
+    let e = copy.error();
+    assert!(e.starts_with("aircraft.yaml:"), "{e}");
+    assert!(e.ends_with(": signal `mass_slug` has two sources"), "{e}");
+}
+
+#[test]
+fn a_required_signal_without_a_source_is_named() {
+    let copy = Copy::new();
+    copy.spoil("aircraft.yaml", "  q: { signal: q_deg_s, unit: deg/s }\n", "");
+    let text = fs::read_to_string(copy.path("aircraft.yaml")).unwrap();
+    let line = text.lines().position(|l| l == "channels:").unwrap() + 1;
+    let e = copy.error();
+    let expected = format!("aircraft.yaml:{line}: no channel or constant gives the signal `q_deg_s`");
+    assert!(e.starts_with(&expected), "{e}");
+}
+
+#[test]
+fn a_weight_that_is_missing_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "weights: { alpha: 5, q: 8,", "weights: { alpha: 5,");
+    assert_eq!(copy.error(), format!("maneuvers/ppss.yaml:{line}: class PPSS: `weights` lacks `q`"));
+}
+
+#[test]
+fn a_weight_of_the_other_axis_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "weights: { alpha: 5,", "weights: { alpha: 5, beta: 12,");
+    assert_eq!(
+        copy.error(),
+        format!(
+            "maneuvers/ppss.yaml:{line}: class PPSS: `beta` is no longitudinal output; they are `alpha`, `q`, `theta`, \
+             `an`, `ax`"
+        )
+    );
+}
+
+#[test]
+fn a_weight_is_greater_than_zero() {
+    for wrong in ["0", "-8", ".nan"] {
+        let copy = Copy::new();
+        let line = copy.spoil("maneuvers/ppss.yaml", "q: 8,", &format!("q: {wrong},"));
+        assert_eq!(
+            copy.error(),
+            format!("maneuvers/ppss.yaml:{line}: class PPSS: the weight of `q` must be greater than zero")
+        );
+    }
+}
+
+#[test]
+fn recognition_by_an_unknown_signal_is_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "stick_pitch_in: {", "stick_pich_in: {");
+    assert_eq!(
+        copy.error(),
+        format!(
+            "maneuvers/ppss.yaml:{line}: class PPSS: no channel gives the signal `stick_pich_in`; did you mean \
+             `stick_pitch_in`?"
+        )
+    );
+}
+
+#[test]
+fn recognition_by_steps_of_no_stated_size_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil("maneuvers/ppss.yaml", "pedal_in: {", "theta_deg: {");
+    assert_eq!(
+        copy.error(),
+        format!(
+            "maneuvers/ppss.yaml:{line}: class PPSS: `segment: steps:` of pipeline.yaml says no size for steps of \
+             `theta_deg`"
+        )
+    );
+}
+
+#[test]
+fn a_trend_group_of_an_unknown_derivative_is_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "derivatives: [CN_q, Cm_q]", "derivatives: [CN_q, Cm_qq]");
+    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: unknown derivative `Cm_qq`; did you mean `Cm_q`?"));
+}
+
+#[test]
+fn a_trend_group_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "classes: [PPSSTV]", "classes: [PPSTV]");
+    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: unknown class `PPSTV`; did you mean `PPSSTV`?"));
+}
+
+#[test]
+fn a_regressor_that_no_channel_gives_is_named() {
+    let copy = Copy::new();
+    let line = copy.spoil(
+        "model.yaml",
+        "name: CN_dlef,   coefficient: CN, regressor: dlef_deg",
+        "name: CN_dlef,   coefficient: CN, regressor: dlaf_deg",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("model.yaml:{line}: CN_dlef: no channel gives the signal `dlaf_deg`; did you mean `dlef_deg`?")
+    );
+}
+
+#[test]
+fn two_classes_of_one_name_are_one_too_many() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "class: PPSS\n", "class: PPSSTV\n");
+    assert_eq!(copy.error(), "maneuvers/ppsstv.yaml:1: class `PPSSTV` is defined twice");
+}
+
+#[test]
+fn an_event_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
+    assert_eq!(
+        Copy::new().error_with_events("flight_001,PPSS,118,132\nflight_001,PPS,233,246\n"),
+        "events.csv:3: unknown class `PPS`; did you mean `PPSS`?"
+    );
+}
+
+#[test]
+fn an_event_starts_before_it_ends() {
+    for times in ["132,118", "118,118", "NaN,132"] {
+        assert_eq!(
+            Copy::new().error_with_events(&format!("flight_001,PPSS,{times}\n")),
+            "events.csv:2: the event ends before it starts"
+        );
+    }
+}
+
+#[test]
+fn an_event_with_a_time_that_is_no_number_is_named_by_line_and_column() {
+    assert_eq!(
+        Copy::new().error_with_events("flight_001,PPSS,noon,132\n"),
+        "events.csv:2: column `start_s`: invalid float literal"
+    );
+}
+
+#[test]
+fn a_tunnel_table_in_another_unit_is_named() {
+    assert_eq!(
+        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,per_rad\n"),
+        "tunnel.csv:3: `CN_alpha` is in `per_rad`, the model's unit is `per_deg`"
+    );
+}
+
+#[test]
+fn a_tunnel_value_that_is_no_number_is_named_by_line_and_column() {
+    assert_eq!(
+        Copy::new().error_with_tunnel("CN_alpha,10,o.08,per_deg\n"),
+        "tunnel.csv:2: column `value`: invalid float literal"
+    );
+    assert_eq!(
+        Copy::new().error_with_tunnel("CN_alpha,10,NaN,per_deg\n"),
+        "tunnel.csv:2: `CN_alpha` has a value that is no number"
+    );
+}
+
+#[test]
+fn a_folder_without_a_pipeline_says_what_one_is() {
+    let copy = Copy::new();
+    fs::remove_file(copy.path("pipeline.yaml")).unwrap();
+    assert!(
+        copy.error().contains("a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/")
+    );
+}
+
+#[test]
+fn a_missing_file_of_a_pipeline_is_named() {
+    let copy = Copy::new();
+    fs::remove_file(copy.path("model.yaml")).unwrap();
+    assert!(copy.error().starts_with("model.yaml: cannot read it"), "{}", copy.error());
+}
+
+#[test]
+fn a_pipeline_without_classes_says_so() {
+    let copy = Copy::new();
+    for file in fs::read_dir(copy.path("maneuvers")).unwrap() {
+        fs::remove_file(file.unwrap().path()).unwrap();
+    }
+    assert_eq!(copy.error(), "maneuvers: no maneuver class: each is a file `<class>.yaml` here");
+}

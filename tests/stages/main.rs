@@ -1,0 +1,14 @@
+//! The program from outside, stage by stage: exit codes, messages, published tables.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on ends here")]
+
+mod check;
+mod compare;
+mod estimate;
+mod house;
+mod ingest;
+mod report;
+mod run;
+mod segment;
+mod support;
+mod trend;

@@ -1,0 +1,262 @@
+//! Run: stages bring their predecessors up to date, publish what was promised, and end the same however often, with
+//! however many threads and after whatever interruption they run.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::Stdio;
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_roll_steps};
+
+/// Tables and their columns that other programs rely on, with the stage that publishes them.
+const PUBLISHED: [(&str, &str, &str); 5] = [
+    (
+        "segment",
+        "maneuvers",
+        "maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s altitude_ft mass_slug \
+         x_cg_ft samples",
+    ),
+    ("estimate", "fits", "maneuver_id class outcome reason iterations initial_cost final_cost condition_number"),
+    (
+        "estimate",
+        "estimates",
+        "maneuver_id flight_id class alpha_deg mach derivative unit status value bound bound_corrected wind_tunnel",
+    ),
+    ("trend", "trends", "derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers"),
+    (
+        "compare",
+        "comparison",
+        "derivative unit alpha_deg flight standard_error wind_tunnel difference difference_pct z verdict",
+    ),
+];
+
+const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
+
+/// Two short flights, one maneuver of each axis.
+fn two_flights() -> Campaign {
+    let campaign = Campaign::new();
+    campaign.add("flight_001", &pitch_steps());
+    campaign.add("flight_004", &yaw_and_roll_steps());
+    campaign
+}
+
+#[test]
+fn each_stage_brings_its_predecessors_up_to_date_and_publishes_its_tables() {
+    for stage in STAGES {
+        let campaign = Campaign::of_pitch_steps();
+        campaign.finishes(stage);
+        let rank = |name: &str| STAGES.iter().position(|s| *s == name).unwrap();
+        for (of, table, _) in PUBLISHED {
+            for extension in ["csv", "parquet"] {
+                let path = campaign.path("reports").join(format!("{table}.{extension}"));
+                assert_eq!(path.is_file(), rank(of) <= rank(stage), "{table}.{extension} after {stage}");
+            }
+        }
+        assert!(campaign.path("reports/problems.csv").is_file(), "{stage}");
+        assert_eq!(campaign.path("reports/report.html").is_file(), stage == "report");
+    }
+}
+
+#[test]
+fn tables_have_their_fixed_columns_and_parquet_says_what_csv_says() {
+    let campaign = Campaign::on("data/demo/flights");
+    for (path, bytes) in &demo().bytes {
+        fs::create_dir_all(campaign.path("reports")).unwrap();
+        fs::write(campaign.path("reports").join(path), bytes).unwrap();
+    }
+    for (_, table, columns) in PUBLISHED {
+        let frame = campaign.frame(table);
+        let names: Vec<&str> = frame.get_column_names().iter().map(|n| n.as_str()).collect();
+        for column in columns.split_whitespace() {
+            assert!(names.contains(&column), "{table} lacks {column}");
+        }
+        let mut csv = csv::Reader::from_path(campaign.path("reports").join(format!("{table}.csv"))).unwrap();
+        assert_eq!(csv.headers().unwrap().iter().collect::<Vec<_>>(), names, "{table}");
+        let rows: Vec<csv::StringRecord> = csv.records().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), frame.height(), "{table}");
+        assert!(!rows.is_empty(), "{table}");
+        for (j, name) in names.iter().enumerate() {
+            let column = frame.column(name).unwrap();
+            let empty = rows.iter().filter(|r| r[j].is_empty()).count();
+            assert_eq!(empty, column.null_count(), "{table}: {name}");
+            if let Ok(numbers) = column.f64() {
+                let same = |(row, number): (&csv::StringRecord, Option<f64>)| {
+                    number.is_none_or(|number| row[j].parse::<f64>().unwrap().to_bits() == number.to_bits())
+                };
+                assert!(rows.iter().zip(numbers.iter()).all(same), "{table}: {name}");
+            }
+        }
+    }
+}
+
+/// Bytes and time of last change of every file of a campaign but its lock.
+fn state(campaign: &Campaign) -> BTreeMap<PathBuf, (Vec<u8>, SystemTime)> {
+    ["store", "reports"]
+        .iter()
+        .flat_map(|folder| files(&campaign.path(folder)))
+        .filter(|path| path.file_name().unwrap() != "lock")
+        .map(|path| {
+            let changed = fs::metadata(&path).unwrap().modified().unwrap();
+            (path.clone(), (fs::read(&path).unwrap(), changed))
+        })
+        .collect()
+}
+
+#[test]
+fn a_second_run_changes_nothing() {
+    let campaign = two_flights();
+    campaign.finishes("run");
+    let before = state(&campaign);
+    campaign.finishes("run");
+    assert!(state(&campaign) == before, "a file was written again");
+}
+
+#[test]
+fn a_second_run_of_a_campaign_with_a_refused_flight_changes_nothing_and_says_it_again() {
+    let campaign = Campaign::of_pitch_steps();
+    fs::write(campaign.flight("spoiled"), "text").unwrap();
+    campaign.ends("run", 2);
+    let before = state(&campaign);
+    let again = campaign.ends("run", 2);
+    assert!(again.stdout.contains("not a readable Parquet file"), "{again:?}");
+    assert!(state(&campaign) == before, "a file was written again");
+}
+
+#[test]
+fn tables_and_report_are_the_same_bytes_with_one_thread_and_with_two() {
+    // Five maneuvers, three of them enough for trends.
+    let with_threads = |threads: &str| {
+        let campaign = two_flights();
+        campaign.add("flight_003", &flight(3, 330));
+        let outcome = run(campaign.command("run").args(["--threads", threads]));
+        assert!(outcome.stdout.contains("5 of them converged"), "{outcome:?}");
+        assert!(!campaign.table("trends").is_empty());
+        campaign.bytes("reports")
+    };
+    let (one, two) = (with_threads("1"), with_threads("2"));
+    assert!(one.keys().eq(two.keys()));
+    for (path, bytes) in &one {
+        assert!(two[path] == *bytes, "{} differs", path.display());
+    }
+}
+
+#[test]
+fn a_killed_run_goes_on_where_it_was() {
+    let undisturbed = two_flights();
+    undisturbed.finishes("run");
+
+    let killed = two_flights();
+    let mut child =
+        killed.command("run").args(["--threads", "1"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let records = killed.path("store/records");
+    let patience = Instant::now() + Duration::from_secs(60);
+    while fs::read_dir(&records).map_or(0, Iterator::count) == 0 && Instant::now() < patience {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+
+    killed.finishes("run");
+    assert!(killed.bytes("store") == undisturbed.bytes("store"));
+    assert!(killed.bytes("reports") == undisturbed.bytes("reports"));
+}
+
+#[test]
+fn what_a_killed_run_leaves_is_swept_or_made_again() {
+    let campaign = two_flights();
+    campaign.finishes("run");
+    let (store, reports) = (campaign.bytes("store"), campaign.bytes("reports"));
+
+    // Half-written files beside their places, one artefact cut short, others and half of the tables not there yet.
+    for folder in ["store/estimate", "store/records", "store/ingest", "store/segment", "reports"] {
+        fs::write(campaign.path(folder).join(".harvest-xyz"), "half").unwrap();
+    }
+    let estimates = files(&campaign.path("store/estimate"));
+    let artefact = estimates.iter().find(|p| p.extension().is_some_and(|e| e == "json")).unwrap();
+    let whole = fs::read(artefact).unwrap();
+    fs::write(artefact, &whole[..whole.len() / 2]).unwrap();
+    fs::remove_file(&files(&campaign.path("store/ingest"))[1]).unwrap();
+    fs::remove_file(&files(&campaign.path("store/records"))[1]).unwrap();
+    for table in ["fits.csv", "estimates.parquet", "report.html"] {
+        fs::remove_file(campaign.path("reports").join(table)).unwrap();
+    }
+
+    campaign.finishes("run");
+    assert!(campaign.bytes("store") == store);
+    assert!(campaign.bytes("reports") == reports);
+}
+
+#[test]
+fn a_damaged_record_in_the_store_is_no_dead_end() {
+    let campaign = two_flights();
+    campaign.finishes("run");
+    let reports = campaign.bytes("reports");
+    fs::write(&files(&campaign.path("store/records"))[1], "damaged").unwrap();
+    for estimate in files(&campaign.path("store/estimate")) {
+        fs::remove_file(estimate).unwrap();
+    }
+    let outcome = campaign.harvest("run");
+    if outcome.stderr.is_empty() {
+        assert!(campaign.bytes("reports") == reports);
+    } else {
+        // Or the message names the file, which can then be removed.
+        assert_eq!(outcome.code, Some(1), "{outcome:?}");
+        assert!(outcome.stderr.contains("store/records/flight_"), "{outcome:?}");
+    }
+}
+
+#[test]
+fn a_flight_that_is_taken_out_of_the_archive_leaves_store_and_tables() {
+    let campaign = two_flights();
+    campaign.finishes("run");
+    fs::remove_file(campaign.flight("flight_004")).unwrap();
+    campaign.finishes("run");
+    let alone = Campaign::of_pitch_steps();
+    alone.finishes("run");
+    assert!(campaign.bytes("store") == alone.bytes("store"));
+    assert!(campaign.tables() == alone.tables());
+}
+
+#[test]
+fn a_flight_that_is_added_leaves_the_others_artefacts_untouched() {
+    let campaign = Campaign::of_pitch_steps();
+    campaign.ends("estimate", 0);
+    let before: BTreeMap<_, _> =
+        state(&campaign).into_iter().filter(|(p, _)| p.starts_with(campaign.path("store"))).collect();
+    campaign.add("flight_004", &yaw_and_roll_steps());
+    campaign.ends("estimate", 0);
+    let after = state(&campaign);
+    assert!(before.iter().all(|(path, state)| after.get(path) == Some(state)));
+    assert_eq!(campaign.table("fits").len(), 2);
+}
+
+#[test]
+fn a_store_that_another_run_uses_is_left_alone() {
+    let campaign = Campaign::of_pitch_steps();
+    fs::create_dir(campaign.path("store")).unwrap();
+    let lock = File::create(campaign.path("store/lock")).unwrap();
+    lock.try_lock().unwrap();
+    let outcome = campaign.ends("run", 1);
+    assert!(outcome.stderr.contains("another run is using this store"), "{outcome:?}");
+    assert!(!campaign.path("reports").exists());
+    drop(lock);
+    campaign.ends("ingest", 0);
+}
+
+#[test]
+fn a_reports_folder_that_cannot_be_written_is_named() {
+    // A file is in its place: a folder without permission would not stop a superuser.
+    let campaign = Campaign::of_pitch_steps();
+    fs::write(campaign.path("reports"), "a file").unwrap();
+    let outcome = campaign.ends("ingest", 1);
+    assert!(outcome.stderr.contains("reports"), "{outcome:?}");
+    assert!(outcome.stderr.contains("cannot create"), "{outcome:?}");
+}
+
+#[test]
+fn a_quiet_run_says_nothing() {
+    let campaign = Campaign::of_pitch_steps();
+    let outcome = run(campaign.command("segment").arg("--quiet"));
+    assert_eq!((outcome.code, outcome.stdout.as_str(), outcome.stderr.as_str()), (Some(0), "", ""));
+}

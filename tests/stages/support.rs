@@ -1,0 +1,309 @@
+//! What the tests of the stages share: the program on temporary folders, demonstration flights that can be spoiled, and
+//! tables read back.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Arc, OnceLock};
+
+use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use polars::prelude::{DataFrame, ParquetReader, SerReader};
+
+/// The recorder of the demonstration flights, Hz.
+const RATE_HZ: usize = 40;
+
+/// The program, run in the repository, so that a pipeline's relative paths hold.
+pub fn harvest() -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("harvest"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+/// How a run ended and what it said.
+#[derive(Debug)]
+pub struct Outcome {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+pub fn run(command: &mut Command) -> Outcome {
+    let output = command.output().unwrap();
+    Outcome {
+        code: output.status.code(),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// A campaign of its own: folders for the archive, the store and the reports, and a pipeline where it is not the shipped
+/// one.
+#[derive(Debug)]
+pub struct Campaign {
+    folder: tempfile::TempDir,
+    archive: Option<String>,
+}
+
+impl Campaign {
+    pub fn new() -> Campaign {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("flights")).unwrap();
+        Campaign { folder, archive: None }
+    }
+
+    /// A campaign of one short flight with one maneuver, pilot pitch stick steps.
+    pub fn of_pitch_steps() -> Campaign {
+        let campaign = Campaign::new();
+        campaign.add("flight_001", &pitch_steps());
+        campaign
+    }
+
+    /// On an archive that lies elsewhere.
+    pub fn on(archive: &str) -> Campaign {
+        Campaign { archive: Some(archive.to_owned()), ..Campaign::new() }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The file of a flight.
+    pub fn flight(&self, flight_id: &str) -> PathBuf {
+        self.path("flights").join(format!("{flight_id}.parquet"))
+    }
+
+    pub fn add(&self, flight_id: &str, record: &RecordBatch) {
+        write(record, &self.flight(flight_id));
+    }
+
+    /// The program with a subcommand and this campaign's folders.
+    pub fn command(&self, stage: &str) -> Command {
+        let mut command = harvest();
+        let own = self.path("pipeline");
+        command.arg(stage).arg(if own.is_dir() { own } else { "harv".into() });
+        match &self.archive {
+            Some(archive) => command.arg("--archive").arg(archive),
+            None => command.arg("--archive").arg(self.path("flights")),
+        };
+        command.arg("--store").arg(self.path("store")).arg("--reports").arg(self.path("reports"));
+        command.stdin(Stdio::null());
+        command
+    }
+
+    pub fn harvest(&self, stage: &str) -> Outcome {
+        run(&mut self.command(stage))
+    }
+
+    /// Runs a stage that must end with this exit code.
+    pub fn ends(&self, stage: &str, code: i32) -> Outcome {
+        let outcome = self.harvest(stage);
+        assert_eq!(outcome.code, Some(code), "{outcome:?}");
+        outcome
+    }
+
+    /// Runs a stage after estimate to its end. So few maneuvers have no trend in most derivatives: the program may say so
+    /// by ending with 2.
+    pub fn finishes(&self, stage: &str) -> Outcome {
+        let outcome = self.harvest(stage);
+        assert!(matches!(outcome.code, Some(0 | 2)) && outcome.stderr.is_empty(), "{outcome:?}");
+        assert!(self.table("problems").iter().all(|p| p["stage"] == "trend"), "{:?}", self.table("problems"));
+        outcome
+    }
+
+    /// Makes the campaign's pipeline a copy of the shipped one, to be edited.
+    pub fn copy_pipeline(&self) {
+        copy_tree(&Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv"), &self.path("pipeline"));
+    }
+
+    /// Replaces text of a pipeline's file wherever it stands; it must stand somewhere. Returns its first line.
+    pub fn edit(&self, file: &str, from: &str, to: &str) -> usize {
+        let path = self.path("pipeline").join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        let line = text.split(from).next().unwrap().matches('\n').count() + 1;
+        assert!(text.contains(from), "`{from}` is not in {file}");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        line
+    }
+
+    /// The files of the pipeline's classes, relative to its folder.
+    pub fn class_files(&self) -> Vec<String> {
+        let names = fs::read_dir(self.path("pipeline/maneuvers")).unwrap();
+        names.map(|e| format!("maneuvers/{}", e.unwrap().file_name().to_string_lossy())).collect()
+    }
+
+    pub fn table(&self, name: &str) -> Vec<Row> {
+        table(&self.path("reports").join(format!("{name}.csv")))
+    }
+
+    pub fn frame(&self, name: &str) -> DataFrame {
+        let file = File::open(self.path("reports").join(format!("{name}.parquet"))).unwrap();
+        ParquetReader::new(file).finish().unwrap()
+    }
+
+    /// Bytes of every file below a folder of the campaign, by relative path.
+    pub fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
+        let folder = self.path(folder);
+        let relative = |p: PathBuf| p.strip_prefix(&folder).unwrap().to_owned();
+        files(&folder).into_iter().map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
+    }
+
+    /// Bytes of the published tables.
+    pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        self.bytes("reports").into_iter().filter(|(p, _)| p.extension().is_none_or(|e| e != "html")).collect()
+    }
+}
+
+/// The whole demonstration campaign, run once with one thread for all tests that look at it.
+pub fn demo() -> &'static Demo {
+    static DEMO: OnceLock<Demo> = OnceLock::new();
+    DEMO.get_or_init(|| {
+        let campaign = Campaign::on("data/demo/flights");
+        let outcome = run(campaign.command("run").args(["--threads", "1"]));
+        let tables = ["maneuvers", "fits", "estimates", "trends", "comparison", "problems"];
+        Demo {
+            tables: tables.iter().map(|name| (*name, campaign.table(name))).collect(),
+            bytes: campaign.tables(),
+            report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
+            store: campaign.bytes("store"),
+            outcome,
+        }
+    })
+}
+
+/// What a run of the demonstration campaign left, in memory: nothing of it stays on the disk.
+#[derive(Debug)]
+pub struct Demo {
+    pub outcome: Outcome,
+    pub tables: BTreeMap<&'static str, Vec<Row>>,
+    pub bytes: BTreeMap<PathBuf, Vec<u8>>,
+    pub report: String,
+    store: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl Demo {
+    /// Puts what the run left in its store into a campaign's, so that only what differs is done.
+    pub fn fill_store(&self, campaign: &Campaign) {
+        for (path, bytes) in &self.store {
+            let path = campaign.path("store").join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, bytes).unwrap();
+        }
+    }
+}
+
+pub fn copy_tree(from: &Path, to: &Path) {
+    for path in files(from) {
+        let target = to.join(path.strip_prefix(from).unwrap());
+        fs::create_dir_all(target.parent().unwrap()).unwrap();
+        fs::copy(&path, target).unwrap();
+    }
+}
+
+/// All files below a folder, sorted.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() { found.extend(files(&path)) } else { found.push(path) }
+    }
+    found.sort();
+    found
+}
+
+/// A row of a table, by column.
+pub type Row = BTreeMap<String, String>;
+
+/// A CSV table.
+pub fn table(path: &Path) -> Vec<Row> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+/// The number in a column of a row.
+pub fn number(row: &Row, column: &str) -> f64 {
+    row[column].parse().unwrap()
+}
+
+/// The first seconds of a demonstration flight.
+pub fn flight(number: u32, seconds: usize) -> RecordBatch {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/demo/flights/flight_{number:03}.parquet"));
+    let rows = seconds * RATE_HZ;
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    let schema = reader.schema().clone();
+    let batches: Vec<RecordBatch> = reader.with_limit(rows).build().unwrap().map(Result::unwrap).collect();
+    concat_batches(&schema, &batches).unwrap()
+}
+
+/// Two and a half minutes of flight 1: pilot pitch stick steps from 118.8 s to 132.5 s.
+pub fn pitch_steps() -> RecordBatch {
+    static FLIGHT: OnceLock<RecordBatch> = OnceLock::new();
+    FLIGHT.get_or_init(|| flight(1, 150)).clone()
+}
+
+/// Two and a half minutes of flight 4: pilot yaw and roll steps from 124.6 s to 143.0 s.
+pub fn yaw_and_roll_steps() -> RecordBatch {
+    static FLIGHT: OnceLock<RecordBatch> = OnceLock::new();
+    FLIGHT.get_or_init(|| flight(4, 155)).clone()
+}
+
+pub fn write(record: &RecordBatch, path: &Path) {
+    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), record.schema(), None).unwrap();
+    writer.write(record).unwrap();
+    writer.close().unwrap();
+}
+
+/// The values of a channel.
+pub fn values(record: &RecordBatch, channel: &str) -> Vec<f64> {
+    let numbers = cast(record.column_by_name(channel).unwrap(), &DataType::Float64).unwrap();
+    numbers.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)).collect()
+}
+
+/// The record with a channel's field and values replaced.
+pub fn replaced(
+    record: &RecordBatch,
+    channel: &str,
+    edit: impl FnOnce(&Field, &ArrayRef) -> (Field, ArrayRef),
+) -> RecordBatch {
+    let schema = record.schema();
+    let at = schema.index_of(channel).unwrap();
+    let (field, array) = edit(schema.field(at), record.column(at));
+    let mut fields: Vec<Arc<Field>> = schema.fields().iter().cloned().collect();
+    let mut columns = record.columns().to_vec();
+    fields[at] = Arc::new(field);
+    columns[at] = array;
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap()
+}
+
+/// The record with other values in a channel, made from row and value.
+pub fn with_values(record: &RecordBatch, channel: &str, value: impl Fn(usize, f64) -> f64) -> RecordBatch {
+    let edited: Vec<f64> = values(record, channel).into_iter().enumerate().map(|(row, v)| value(row, v)).collect();
+    replaced(record, channel, |field, _| {
+        (field.clone().with_data_type(DataType::Float64), Arc::new(Float64Array::from(edited)))
+    })
+}
+
+/// The record with another unit stated for a channel.
+pub fn with_unit(record: &RecordBatch, channel: &str, unit: &str) -> RecordBatch {
+    replaced(record, channel, |field, array| {
+        let mut metadata = field.metadata().clone();
+        metadata.insert("unit".to_owned(), unit.to_owned());
+        (field.clone().with_metadata(metadata), array.clone())
+    })
+}
+
+/// The record with a channel under another name.
+pub fn renamed(record: &RecordBatch, channel: &str, name: &str) -> RecordBatch {
+    replaced(record, channel, |field, array| (field.clone().with_name(name), array.clone()))
+}
+
+/// The record without a channel.
+pub fn without(record: &RecordBatch, channel: &str) -> RecordBatch {
+    let at = record.schema().index_of(channel).unwrap();
+    let others: Vec<usize> = (0..record.num_columns()).filter(|&i| i != at).collect();
+    record.project(&others).unwrap()
+}
