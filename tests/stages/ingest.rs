@@ -125,7 +125,8 @@ fn a_unit_that_neither_file_nor_map_confesses_is_found_by_the_kinematics() {
 #[test]
 fn a_reversed_sign_is_found_by_the_kinematics() {
     let reversed = with_values(&yaw_and_roll_steps(), "r", |_, r| -r);
-    record_is_refused(&reversed, "channel `r`", &["sign"]);
+    // The heading's sign would explain it as well, and is said to.
+    record_is_refused(&reversed, "`r`", &["`r`: its sign is reversed"]);
 }
 
 #[test]

@@ -126,9 +126,10 @@ fn a_second_run_of_a_campaign_with_a_refused_flight_changes_nothing_and_says_it_
 #[test]
 fn tables_and_report_are_the_same_bytes_with_one_thread_and_with_two() {
     // Five maneuvers, three of them enough for trends.
+    let campaign = two_flights();
+    campaign.add("flight_003", &flight(3, 330));
     let with_threads = |threads: &str| {
-        let campaign = two_flights();
-        campaign.add("flight_003", &flight(3, 330));
+        campaign.forget();
         let outcome = run(campaign.command("run").args(["--threads", threads]));
         assert!(outcome.stdout.contains("5 of them converged"), "{outcome:?}");
         assert!(!campaign.table("trends").is_empty());
@@ -143,23 +144,25 @@ fn tables_and_report_are_the_same_bytes_with_one_thread_and_with_two() {
 
 #[test]
 fn a_killed_run_goes_on_where_it_was() {
-    let undisturbed = two_flights();
-    undisturbed.finishes("run");
+    let campaign = two_flights();
+    campaign.finishes("run");
+    let (store, reports) = (campaign.bytes("store"), campaign.bytes("reports"));
 
-    let killed = two_flights();
+    campaign.forget();
     let mut child =
-        killed.command("run").args(["--threads", "1"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let records = killed.path("store/records");
+        campaign.command("run").args(["--threads", "1"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let records = campaign.path("store/records");
     let patience = Instant::now() + Duration::from_secs(60);
     while fs::read_dir(&records).map_or(0, Iterator::count) == 0 && Instant::now() < patience {
         std::thread::sleep(Duration::from_millis(1));
     }
     child.kill().unwrap();
     child.wait().unwrap();
+    assert!(!campaign.path("reports/report.html").exists(), "it was killed before its end");
 
-    killed.finishes("run");
-    assert!(killed.bytes("store") == undisturbed.bytes("store"));
-    assert!(killed.bytes("reports") == undisturbed.bytes("reports"));
+    campaign.finishes("run");
+    assert!(campaign.bytes("store") == store);
+    assert!(campaign.bytes("reports") == reports);
 }
 
 #[test]

@@ -72,6 +72,16 @@ impl Campaign {
         self.folder.path().join(name)
     }
 
+    /// Removes all that runs have left.
+    pub fn forget(&self) {
+        for folder in ["store", "reports"] {
+            let folder = self.path(folder);
+            if folder.exists() {
+                fs::remove_dir_all(folder).unwrap();
+            }
+        }
+    }
+
     /// The file of a flight.
     pub fn flight(&self, flight_id: &str) -> PathBuf {
         self.path("flights").join(format!("{flight_id}.parquet"))
