@@ -208,7 +208,7 @@ impl Run<'_> {
         let path = self.store.path("ingest", id, &fingerprint, "json");
         let record = self.store.path("records", id, &fingerprint, "parquet");
         if let Some(ingested) = self.store.load::<Ingested>(&path)
-            && (!ingested.accepted || record.is_file())
+            && (!ingested.accepted || record_file::is_whole(&record))
         {
             return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], ingested });
         }

@@ -71,13 +71,22 @@ fn batch(record: &Record) -> Result<RecordBatch, arrow::error::ArrowError> {
     RecordBatch::try_new_with_options(schema, arrays, &RecordBatchOptions::new().with_row_count(Some(record.samples)))
 }
 
+/// Whether a record lies here whole, as far as its footer tells: one that was cut short or overwritten has none.
+#[must_use]
+pub fn is_whole(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| {
+        ParquetRecordBatchReaderBuilder::try_new(file).is_ok_and(|r| r.schema().metadata().contains_key(SAMPLES))
+    })
+}
+
 /// Reads a record back.
 ///
 /// # Errors
 /// The file cannot be opened, is no Parquet file, or is not a record.
 pub fn read(path: &Path) -> Result<Record, Error> {
     let file = File::open(path).map_err(Error::io(path, "cannot open the record"))?;
-    let bad = |what: &dyn std::fmt::Display| Error::store(path, &format!("not a record: {what}"));
+    let bad =
+        |what: &dyn std::fmt::Display| Error::store(path, &format!("not a record; remove it and run again: {what}"));
     let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| bad(&e))?;
     let metadata = reader.schema().metadata().clone();
     let text = |key: &str| metadata.get(key).ok_or_else(|| bad(&format!("its metadata has no `{key}`")));

@@ -42,14 +42,14 @@ fn derivatives_are_near_those_that_were_flown() {
         ("flight_003_t00103", "CN_alpha", 0.038_856),
         ("flight_001_t00233", "Cm_de", -0.016_084),
         ("flight_004_t00809", "Cm_de", -0.015_602),
-        ("flight_002_t00562", "Cm_dpv", -1529.765_50),
-        ("flight_004_t01299", "Cm_dpv", -1657.493_76),
+        ("flight_002_t00562", "Cm_dpv", -1529.765),
+        ("flight_004_t01299", "Cm_dpv", -1657.494),
         ("flight_001_t00397", "CY_beta", -0.011_486),
         ("flight_001_t01004", "Cl_beta", -0.003_435),
         ("flight_003_t00204", "Cn_beta", 0.001_423),
         ("flight_001_t00719", "Cl_da", 0.001_700),
         ("flight_003_t00204", "Cn_dr", -0.001_212),
-        ("flight_003_t00541", "Cn_dyv", 2127.180_20),
+        ("flight_003_t00541", "Cn_dyv", 2127.180),
         ("flight_004_t00124", "Cl_p", -0.227_934),
     ] {
         let ratio = estimate(maneuver, derivative) / truth;

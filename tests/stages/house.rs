@@ -24,8 +24,9 @@ fn sources() -> Vec<Source> {
     let mut found = Vec::new();
     for file in files(&src) {
         let path = file.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/");
-        let is_test = path.ends_with("tests.rs") || path.ends_with("samples.rs");
-        if !path.ends_with(".rs") || is_test || ["lib.rs", "main.rs"].contains(&path.as_str()) {
+        let name = file.file_name().unwrap().to_string_lossy();
+        let is_rust = file.extension().is_some_and(|e| e == "rs");
+        if !is_rust || ["tests.rs", "samples.rs"].contains(&&*name) || ["lib.rs", "main.rs"].contains(&&*path) {
             continue;
         }
         let module = path.split(['/', '.']).next().unwrap().to_owned();
@@ -66,8 +67,9 @@ fn used(text: &str) -> BTreeSet<String> {
                         '{' => depth += 1,
                         '}' => depth -= 1,
                         ',' if depth == 0 => {
-                            modules.extend(words(&std::mem::take(&mut head)).next().map(str::to_owned))
+                            modules.extend(words(&std::mem::take(&mut head)).next().map(str::to_owned));
                         }
+
                         _ => head.push(c),
                     }
                 }
@@ -95,7 +97,7 @@ fn a_module_uses_only_modules_listed_above_it() {
     let mut wrong = Vec::new();
     for source in sources() {
         let own = rank(&source.module).unwrap_or_else(|| panic!("lib.rs does not list {}", source.path));
-        let text: String = source.code.iter().map(|(_, line)| format!("{line}\n")).collect();
+        let text = source.code.iter().map(|(_, line)| line.as_str()).collect::<Vec<_>>().join("\n");
         for module in used(&text) {
             if rank(&module).is_none_or(|other| other > own) {
                 wrong.push(format!("{} uses `{module}`", source.path));
