@@ -108,7 +108,7 @@ fn yaml_that_cannot_be_read_is_named_by_line() {
 #[test]
 fn a_missing_key_is_named_by_its_file() {
     let copy = Copy::new();
-    copy.spoil("pipeline.yaml", "archive: data/demo/flights\n", "");
+    copy.spoil("pipeline.yaml", "\narchive: ", "\n# archive: ");
     let e = copy.error();
     assert!(e.starts_with("pipeline.yaml:"), "{e}");
     assert!(e.ends_with("missing field `archive`"), "{e}");
