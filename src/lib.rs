@@ -32,4 +32,5 @@ pub mod config;
 
 // Conductor: the stages in order, and the command line.
 pub mod pipeline;
+pub mod simulation;
 pub mod cli;

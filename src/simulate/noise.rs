@@ -9,6 +9,12 @@ pub struct Noise {
     state: u64,
 }
 
+/// A seed of its own for a part of what a seed decides.
+#[must_use]
+pub fn seed_of(seed: u64, name: &str) -> u64 {
+    Noise::new(seed, name).bits()
+}
+
 impl Noise {
     /// The stream of a name under a seed.
     #[must_use]
