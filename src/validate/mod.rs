@@ -1,0 +1,113 @@
+//! Is what the bounds say true? Maneuvers with known derivatives are recorded many times, each time with other noise, and
+//! estimated; how far the estimates scatter is held against what each of them said of itself.
+//!
+//! The maneuvers are the simulator's, whose equations of motion are not the estimator's. Instruments have noise only, on
+//! every channel, also those that the estimator takes as exact; held values are the true ones.
+
+mod coverage;
+mod page;
+mod starts;
+
+use serde::{Deserialize, Serialize};
+
+use crate::aero::{TunnelPoint, WindTunnel};
+use crate::estimate::{self, Basis, Estimated};
+use crate::maneuver::Class;
+use crate::output_error::newton_raphson::Weights;
+use crate::simulate::{Flown, Instrument, Instruments};
+
+pub use coverage::coverage;
+pub use page::page;
+pub use starts::starts;
+
+/// How the study is made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Study {
+    /// Records of each maneuver.
+    pub realisations: usize,
+    /// Time constant of the outputs' noise where it is coloured; its size is that of the white noise.
+    pub coloured_time_s: f64,
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        Study { realisations: 200, coloured_time_s: 0.5 }
+    }
+}
+
+/// The noise of the outputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    White,
+    Coloured,
+}
+
+impl Colour {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Colour::White => "white",
+            Colour::Coloured => "coloured",
+        }
+    }
+}
+
+/// A maneuver that is recorded again and again.
+#[derive(Clone, Debug)]
+pub struct Subject<'a> {
+    pub class: &'a Class,
+    pub flown: Flown,
+    /// What each signal's noise is.
+    pub instruments: &'a Instruments,
+    pub basis: Basis<'a>,
+}
+
+/// One way of recording and weighting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    pub colour: Colour,
+    pub coloured_time_s: f64,
+    pub weights: Weights,
+}
+
+/// A table that says everywhere what was true in a maneuver.
+#[must_use]
+pub fn tunnel_of_truth(flown: &Flown) -> WindTunnel {
+    let mut tunnel = WindTunnel::default();
+    for truth in &flown.truth {
+        for alpha_deg in [-180.0, 180.0] {
+            let point = TunnelPoint { alpha_deg, mach: None, value: truth.value, uncertainty: None, source: None };
+            tunnel.insert(&truth.derivative, point);
+        }
+    }
+    tunnel
+}
+
+impl Subject<'_> {
+    /// The estimate from one record.
+    fn estimate(&self, setting: Setting, seed: u64) -> Estimated {
+        let record = self.flown.recorded(&self.noise_only(setting), seed);
+        let settings = estimate::Settings { weights: setting.weights, ..self.basis.settings.clone() };
+        estimate::maneuver(&record, &self.flown.maneuver, self.class, &Basis { settings: &settings, ..self.basis })
+    }
+
+    /// Instruments with nothing but noise.
+    fn noise_only(&self, setting: Setting) -> Instruments {
+        let outputs = self.class.axis.outputs().map(|o| o.signal());
+        let only = |(signal, instrument): (&String, &Instrument)| {
+            let noise = instrument.noise;
+            let coloured = setting.colour == Colour::Coloured && outputs.contains(&signal.as_str());
+            let instrument = if coloured {
+                Instrument { coloured: noise, coloured_time_s: setting.coloured_time_s, ..Instrument::default() }
+            } else {
+                Instrument { noise, ..Instrument::default() }
+            };
+            (signal.clone(), instrument)
+        };
+        Instruments(self.instruments.0.iter().map(only).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests;

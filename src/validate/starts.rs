@@ -1,0 +1,96 @@
+//! Does the iteration find the same minimum from elsewhere? The same record is estimated from the true values, from values
+//! off by a factor of two, and from surfaces without effect.
+
+use rayon::prelude::*;
+
+use super::{Setting, Subject, tunnel_of_truth};
+use crate::aero::{Buildup, WindTunnel};
+use crate::estimate::{self, Basis, Estimated, Start};
+use crate::maneuver::Status;
+use crate::output_error::Outcome;
+use crate::simulate::noise::seed_of;
+use crate::simulate::{Flown, TrueDerivative};
+use crate::tables::StartRow;
+
+/// The minimum is the same when no derivative differs by more than this share of its bound.
+const SAME: f64 = 0.1;
+
+/// What the true values are changed to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum From {
+    Double,
+    Half,
+    NoSurfaces,
+}
+
+impl From {
+    fn name(self) -> &'static str {
+        match self {
+            From::Double => "twice the truth",
+            From::Half => "half the truth",
+            From::NoSurfaces => "surfaces without effect",
+        }
+    }
+
+    fn table(self, flown: &Flown, buildup: &Buildup) -> WindTunnel {
+        let surface = |name: &str| {
+            buildup.derivatives.iter().any(|d| d.name == name && d.regressor.surface().is_some())
+        };
+        let factor = |t: &TrueDerivative| match self {
+            From::Double => 2.0,
+            From::Half => 0.5,
+            From::NoSurfaces => f64::from(u8::from(!surface(&t.derivative))),
+        };
+        let truth = flown.truth.iter().map(|t| TrueDerivative { value: factor(t) * t.value, ..t.clone() }).collect();
+        tunnel_of_truth(&Flown { truth, ..flown.clone() })
+    }
+}
+
+/// A row per kind of start, over `realisations` records.
+#[must_use]
+pub fn starts(subject: &Subject, setting: Setting, realisations: usize, seed: u64) -> Vec<StartRow> {
+    let truth = tunnel_of_truth(&subject.flown);
+    let reached = |from: From| -> Vec<(bool, bool)> {
+        let elsewhere = from.table(&subject.flown, subject.basis.buildup);
+        let one = |i: usize| {
+            let seed = seed_of(seed, &format!("start {i}"));
+            let reference = subject.from(&truth, setting, seed);
+            let found = subject.from(&elsewhere, setting, seed);
+            let same = same(&reference, &found);
+            (same && found.fit.start == Start::WindTunnel.name(), same)
+        };
+        (0..realisations).into_par_iter().map(one).collect()
+    };
+    let row = |from: From| {
+        let reached = reached(from);
+        StartRow {
+            class: subject.class.name.clone(),
+            alpha_deg: subject.flown.maneuver.alpha_deg,
+            start: from.name().to_owned(),
+            records: realisations,
+            alone: reached.iter().filter(|r| r.0).count(),
+            reached: reached.iter().filter(|r| r.1).count(),
+        }
+    };
+    [From::Double, From::Half, From::NoSurfaces].map(row).into()
+}
+
+impl Subject<'_> {
+    /// The estimate from one record whose iteration starts from the values of a table.
+    fn from(&self, start: &WindTunnel, setting: Setting, seed: u64) -> Estimated {
+        let settings = estimate::Settings { start: Start::WindTunnel, ..self.basis.settings.clone() };
+        let basis = Basis { settings: &settings, start, ..self.basis };
+        Subject { basis, ..self.clone() }.estimate(setting, seed)
+    }
+}
+
+fn same(a: &Estimated, b: &Estimated) -> bool {
+    let converged = |e: &Estimated| e.fit.outcome == Outcome::Converged.name();
+    let estimated = |e: &Estimated| -> Vec<_> {
+        e.estimates.iter().filter(|r| r.status == Status::Estimated.name()).map(|r| (r.value, r.bound)).collect()
+    };
+    let near = |((a, bound), (b, _)): &((Option<f64>, Option<f64>), (Option<f64>, Option<f64>))| {
+        matches!((a, b, bound), (Some(a), Some(b), Some(bound)) if (a - b).abs() <= SAME * bound)
+    };
+    converged(a) && converged(b) && estimated(a).into_iter().zip(estimated(b)).all(|pair| near(&pair))
+}
