@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::cost::{add_square, residuals, sums};
+use super::evidence::Evidence;
 use super::outcome::Fit;
 use super::response::Response;
 use crate::dynamics::{Equations, OUTPUTS};
@@ -85,25 +86,55 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
+/// What noise does to the gradient: its covariance for white residuals, and what their correlation adds to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GradientCovariance {
+    /// Σ Sᵀ W R̂ W S.
+    pub white: DMatrix<f64>,
+    pub coloured: DMatrix<f64>,
+}
+
 /// Bounds of a fit whose information matrix has this inverse.
 #[must_use]
-pub fn bounds<const NX: usize, E: Equations<NX>>(inverse: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
-    let residuals = residuals(&case.measurements, &fit.response);
+pub fn bounds<D: Evidence>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
+    let GradientCovariance { white, coloured } = data.gradient_covariance(&fit.response, &fit.weights);
+    let covariance = inverse * &white * inverse;
+    let corrected = inverse * (&white + &coloured) * inverse;
+    Bounds { corrected: never_below(corrected, &covariance), covariance }
+}
+
+/// The gradient's covariance of one maneuver, from the residuals of its response.
+pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    response: &Response,
+    weights: &[f64; OUTPUTS],
+) -> GradientCovariance {
+    let residuals = residuals(&case.measurements, response);
     let variances = variances(&residuals, &case.used(), case.parameters());
     let n = case.parameters();
     let (mut white, mut extra) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
     for o in 0..OUTPUTS {
-        let w = fit.weights[o];
+        let w = weights[o];
         let correlation = autocorrelation(residuals.iter().map(|v| v[o]));
         for k in (0..case.samples()).filter(|&k| case.measurements.used[k][o]) {
-            add_square(&mut white, w * w * variances[o], fit.response.sensitivity(k, o));
+            add_square(&mut white, w * w * variances[o], response.sensitivity(k, o));
         }
-        extra += coloured(case, &fit.response, o, &correlation) * (w * w * variances[o]);
+        extra += coloured(case, response, o, &correlation) * (w * w * variances[o]);
     }
     white.fill_upper_triangle_with_lower_triangle();
-    let covariance = inverse * &white * inverse;
-    let corrected = inverse * (&white + &extra) * inverse;
-    Bounds { corrected: never_below(corrected, &covariance), covariance }
+    GradientCovariance { white, coloured: extra }
+}
+
+/// A maneuver with the held derivatives free as well, and the values at which their effect is wanted.
+#[derive(Debug)]
+pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
+    pub case: &'a Case<NX, E>,
+    /// The same maneuver with the held derivatives free as well.
+    pub wide: &'a Case<NX, E>,
+    /// Every parameter of `wide`, by name.
+    pub values: BTreeMap<&'a str, f64>,
+    /// The place of each parameter of `case` among those of the fit.
+    pub places: Vec<usize>,
 }
 
 /// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with
@@ -118,21 +149,45 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     uncertainties: &BTreeMap<&str, f64>,
     fit: &mut Fit,
 ) {
+    let places = (0..case.parameters()).collect();
+    consider_together(&[Considered { case, wide, values: values.clone(), places }], uncertainties, fit);
+}
+
+/// [`consider`] for maneuvers that share parameters: the error of a held value is common to all that hold it, so its
+/// effects on them add up before they are squared.
+pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
+    members: &[Considered<NX, E>],
+    uncertainties: &BTreeMap<&str, f64>,
+    fit: &mut Fit<R>,
+) {
     let (Some(covariance), Some(corrected)) = (&mut fit.covariance, &mut fit.covariance_corrected) else { return };
-    let start: Vec<f64> = wide.names.iter().map(|name| values.get(name.as_str()).copied().unwrap_or(0.0)).collect();
-    let mut response = wide.response();
-    if wide.respond(&start, &mut response).is_err() {
-        return;
+    let n = covariance.nrows();
+    let mut own = DMatrix::zeros(n, n);
+    let mut crosses = vec![DVector::zeros(n); uncertainties.len()];
+    for member in members {
+        let wide = member.wide;
+        let value = |name: &String| member.values.get(name.as_str()).copied().unwrap_or(0.0);
+        let start: Vec<f64> = wide.names.iter().map(value).collect();
+        let mut response = wide.response();
+        if wide.respond(&start, &mut response).is_err() {
+            return;
+        }
+        let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
+        let at = |name: &str| wide.names.iter().position(|n| n == name);
+        let names = member.case.names.iter().zip(&member.places);
+        let free: Vec<(usize, usize)> = names.filter_map(|(name, place)| Some((at(name)?, *place))).collect();
+        for &(i, row) in &free {
+            for &(j, column) in &free {
+                own[(row, column)] += information[(i, j)];
+            }
+            for (cross, name) in crosses.iter_mut().zip(uncertainties.keys()) {
+                cross[row] += at(name).map_or(0.0, |h| information[(i, h)]);
+            }
+        }
     }
-    let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
-    let at = |name: &str| wide.names.iter().position(|n| n == name);
-    let free: Vec<usize> = case.names.iter().filter_map(|name| at(name)).collect();
-    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
     let Identified::Determined { inverse, .. } = identified(&own, f64::INFINITY) else { return };
-    let mut held = DMatrix::zeros(free.len(), free.len());
-    for (name, uncertainty) in uncertainties {
-        let Some(h) = at(name) else { continue };
-        let cross = DVector::from_fn(free.len(), |i, _| information[(free[i], h)]);
+    let mut held = DMatrix::zeros(n, n);
+    for (cross, uncertainty) in crosses.into_iter().zip(uncertainties.values()) {
         let shift = &inverse * cross * *uncertainty;
         held += &shift * shift.transpose();
     }
