@@ -11,7 +11,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, WindTunnel};
+use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
@@ -250,6 +250,11 @@ impl<'a> Run<'a> {
 
     fn status(&self, name: &str) -> Option<Status> {
         self.class.status(name, self.maneuver.alpha_deg)
+    }
+
+    /// Whether a derivative is its coefficient's constant.
+    fn is_constant(&self, name: &str) -> bool {
+        self.basis.buildup.derivative(name).is_some_and(|d| d.regressor == Regressor::Constant)
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {

@@ -1,6 +1,9 @@
 //! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives, while each keeps its
 //! biases and initial states.
 //!
+//! Constants (`CN_0`) are biases as well: they take up the zero errors of vanes and surfaces, which are others in each
+//! flight, and the trim. Unless `share_constants` says otherwise each maneuver keeps its own.
+//!
 //! Which derivatives are free and what the outputs weigh is decided at the mean angle of attack of the maneuvers, or they
 //! could not share anything. A held derivative acts at the tunnel's value at each maneuver's own angle of attack and Mach
 //! number, as it does when the maneuver is estimated alone: the tunnel knows how it changes between them, and to hold one
@@ -13,10 +16,10 @@ use super::{Basis, Estimated, Ready, Run, covariance, values_of};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
-use crate::maneuver::{Class, Maneuver};
+use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::cramer_rao::{self, Considered};
-use crate::output_error::{Case, Fit, Joint, Outcome, Response, mean, newton_raphson};
-use crate::tables::JointRow;
+use crate::output_error::{Case, Evidence, Fit, Joint, Outcome, Response, mean, newton_raphson};
+use crate::tables::{EstimateRow, JointRow};
 
 /// Which maneuvers are estimated together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,11 +31,14 @@ pub struct Settings {
     /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`; where none are given they
     /// are parted at the widest gaps until no group is wider than `alpha_bin_deg`.
     pub centres_deg: Vec<f64>,
+    /// Whether constants are shared too. Default false: a vane's zero error of a few tenths of a degree, another one in
+    /// each flight, would otherwise be charged to the slopes.
+    pub share_constants: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { alpha_bin_deg: 2.5, centres_deg: vec![] }
+        Settings { alpha_bin_deg: 2.5, centres_deg: vec![], share_constants: false }
     }
 }
 
@@ -170,29 +176,30 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     parts: &[Part<'a, NX, E>],
 ) -> Result<(Estimated, Vec<f64>), String> {
     let cases = parts.iter().map(|p| (p.run.maneuver.maneuver_id.as_str(), &p.ready.case));
-    let joint = Joint::new(cases)?;
     let settings = run.basis.settings;
+    let share_constants = settings.joint.as_ref().is_some_and(|s| s.share_constants);
+    let joint = Joint::new(cases, |name| !share_constants && run.is_constant(name))?;
     let (weights, resolution) = (run.weights()?, run.resolution());
     let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
-    let from = |derivatives: &[f64]| {
-        let start = joint.assemble(derivatives, &own);
+    let from = |shared: &[f64]| {
+        let start = joint.assemble(shared, &own);
         newton_raphson::estimate(&joint, start, weights, settings.weights, resolution, &settings.iteration)
     };
-    let mut fit = from(&start(parts));
+    let mut fit = from(&start(parts, joint.shared()));
     if fit.outcome != Outcome::Converged {
         // From the derivatives of the maneuver that fits best alone.
         let cost = |p: &&Part<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
         let best = parts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        let other = best.map(|p| from(&p.alone.values[..p.ready.case.derivatives()]));
+        let other = best.map(|p| from(&joint.shared().iter().map(|&j| p.alone.values[j]).collect::<Vec<_>>()));
         fit = other.filter(|f| f.outcome == Outcome::Converged).unwrap_or(fit);
     }
     let costs = if fit.final_cost.is_some() { joint.costs(&fit.response, &fit.weights) } else { vec![] };
     consider(run, parts, &joint, &mut fit);
-    let names = newton_raphson_names(&joint);
+    let names = joint.names().to_vec();
     let (fit, _) = fit.with_response(Response::default());
-    let biases: Vec<&str> = run.basis.buildup.biases_of(run.class.axis).map(|b| b.name.as_str()).collect();
-    // Biases belong to the maneuvers, not to what they share.
-    let shared = run.rows(Some((&names, &fit))).into_iter().filter(|row| !biases.contains(&row.derivative.as_str()));
+    // What each maneuver keeps to itself is no row of what they share.
+    let is_shared = |row: &EstimateRow| row.status != Status::Estimated.name() || names.contains(&row.derivative);
+    let shared = run.rows(Some((&names, &fit))).into_iter().filter(is_shared);
     let left_out = parts.iter().map(|p| p.ready.left_out).sum::<f64>() / parts.len().max(1) as f64;
     let estimated = Estimated {
         estimates: shared.collect(),
@@ -204,23 +211,20 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     Ok((estimated, costs))
 }
 
-fn newton_raphson_names<const NX: usize, E: Equations<NX>>(joint: &Joint<NX, E>) -> Vec<String> {
-    crate::output_error::Evidence::names(joint).to_vec()
-}
-
 /// The mean of the maneuvers' own derivatives, weighted by their covariances; plain where these do not exist.
-fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>]) -> Vec<f64> {
-    let n = parts.first().map_or(0, |p| p.ready.case.derivatives());
+fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>], shared: &[usize]) -> Vec<f64> {
+    let n = shared.len();
+    let values = |p: &Part<NX, E>| DVector::from_iterator(n, shared.iter().map(|&j| p.alone.values[j]));
     let estimate = |p: &Part<NX, E>| {
         let covariance: &DMatrix<f64> = p.alone.covariance.as_ref()?;
         Some(mean::Estimate {
             places: (0..n).collect(),
-            values: DVector::from_column_slice(&p.alone.values[..n]),
-            covariance: covariance.view((0, 0), (n, n)).into_owned(),
+            values: values(p),
+            covariance: DMatrix::from_fn(n, n, |i, j| covariance[(shared[i], shared[j])]),
         })
     };
     let estimates: Vec<mean::Estimate> = parts.iter().filter_map(estimate).collect();
-    let plain = || parts.iter().map(|p| DVector::from_column_slice(&p.alone.values[..n])).sum::<DVector<f64>>();
+    let plain = || parts.iter().map(values).sum::<DVector<f64>>();
     let mean = mean::weighted(&estimates, n).unwrap_or_else(|| plain() / parts.len().max(1) as f64);
     mean.as_slice().to_vec()
 }
@@ -234,21 +238,16 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
 ) {
     let Some(first) = parts.first() else { return };
     let wide: Vec<Case<NX, E>> = parts.iter().map(|p| p.run.wide(&p.ready)).collect();
-    let member = |(i, part): (usize, &'_ Part<'a, NX, E>)| {
-        let places = joint.places(i).to_vec();
-        let values: Vec<f64> = places.iter().filter_map(|&p| fit.values.get(p)).copied().collect();
-        (i, places, values, part.ready.case.names.len())
-    };
-    let own: Vec<_> = parts.iter().enumerate().map(member).collect();
+    let own = |i: usize| joint.places(i).iter().filter_map(|&p| fit.values.get(p)).copied().collect::<Vec<f64>>();
     let considered: Vec<Considered<NX, E>> = parts
         .iter()
         .zip(&wide)
-        .zip(own)
-        .map(|((part, wide), (_, places, values, _))| Considered {
+        .enumerate()
+        .map(|(i, (part, wide))| Considered {
             case: &part.ready.case,
             wide,
-            values: values_of(&part.ready.model, &part.ready.case.names, &values),
-            places,
+            values: values_of(&part.ready.model, &part.ready.case.names, &own(i)),
+            places: joint.places(i).to_vec(),
         })
         .collect();
     cramer_rao::consider_together(&considered, &run.held_uncertainties(&first.ready.model), fit);

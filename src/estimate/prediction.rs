@@ -2,7 +2,9 @@
 //! of attack.
 //!
 //! The others' derivatives are averaged with their whole covariances as weights. The predicted maneuver keeps them fixed;
-//! its biases and initial states, which belong to it and to no other, are fitted by output error with its own weights.
+//! its biases and initial states, which belong to it and to no other, are fitted by output error with its own weights; so
+//! are, unless `share_constants` says otherwise, its constants (`CN_0`), which take up the zero errors of the flight's
+//! vanes and surfaces.
 //! What is left between measured and computed is then the derivatives' doing, and is told by Theil's coefficient and R².
 
 use std::collections::BTreeMap;
@@ -27,11 +29,13 @@ pub struct Settings {
     /// Largest difference of mean angles of attack. Default 2.5°: half the usual distance of test points, over which a
     /// fighter's derivatives change by less than they are known.
     pub alpha_distance_deg: f64,
+    /// Whether constants are the others' too. Default false.
+    pub share_constants: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { alpha_distance_deg: 2.5 }
+        Settings { alpha_distance_deg: 2.5, share_constants: false }
     }
 }
 
@@ -84,9 +88,15 @@ pub fn maneuver(
 
 fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) -> Result<Predicted, String> {
     let model = run.model()?;
-    let values = shared(run, &model.free, others)?;
-    let held = model.held.iter().copied().chain(model.free.iter().copied().zip(values));
-    let fixed = Model { free: vec![], held: held.collect(), ..model.clone() };
+    let settings = run.basis.settings;
+    let share_constants = settings.prediction.as_ref().is_some_and(|s| s.share_constants);
+    let values: BTreeMap<&str, f64> =
+        model.free.iter().map(|d| d.name.as_str()).zip(shared(run, &model.free, others)?).collect();
+    let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) =
+        model.free.iter().partition(|d| !share_constants && run.is_constant(&d.name));
+    let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
+    let held = model.held.iter().copied().chain(fixed.into_iter().map(|d| (d, value(&d.name))));
+    let fixed = Model { free: own, held: held.collect(), ..model.clone() };
     let ready = run.ready::<NX, E>(fixed)?;
     let (case, weights) = (&ready.case, run.weights()?);
     if case.parameters() == 0 {
@@ -99,8 +109,7 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
             Ok(rows(run, case, &response.outputs, &weights, cost, others.len()))
         };
     }
-    let settings = run.basis.settings;
-    let start = case.starting_values(|_| 0.0);
+    let start = case.starting_values(value);
     let fit: Fit =
         newton_raphson::estimate(case, start, weights, settings.weights, run.resolution(), &settings.iteration);
     match (fit.outcome, fit.final_cost) {

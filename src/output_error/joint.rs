@@ -1,5 +1,5 @@
-//! Several maneuvers that share their derivatives while each keeps its biases and initial states: one cost (1.2), the sum
-//! over the maneuvers.
+//! Several maneuvers that share derivatives while each keeps its biases and initial states, and those derivatives that
+//! stand for biases: one cost (1.2), the sum over the maneuvers.
 //!
 //! Parameters in order: the shared derivatives, then each maneuver's own. The information matrix (1.5) is an arrow: a
 //! block for the derivatives, one for each maneuver's own parameters, and what ties these to the derivatives. Residuals of
@@ -18,6 +18,7 @@ use crate::dynamics::{Equations, OUTPUTS};
 #[derive(Debug)]
 pub struct Joint<'a, const NX: usize, E: Equations<NX>> {
     members: Vec<Member<'a, NX, E>>,
+    shared: Vec<usize>,
     names: Vec<String>,
 }
 
@@ -44,28 +45,42 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Joins maneuvers, each with a label that tells its own parameters from those of the others.
+    /// Joins maneuvers, each with a label that tells its own parameters from those of the others. `is_own` names the
+    /// derivatives that each keeps to itself.
     ///
     /// # Errors
     /// A sentence that names the maneuver whose free derivatives are not those of the first.
-    pub fn new(cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>) -> Result<Self, String> {
-        let mut joint = Joint { members: Vec::new(), names: Vec::new() };
+    pub fn new(
+        cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>,
+        is_own: impl Fn(&str) -> bool,
+    ) -> Result<Self, String> {
+        let mut joint = Joint { members: Vec::new(), shared: Vec::new(), names: Vec::new() };
         for (label, case) in cases {
-            let shared = case.derivatives();
-            let own = case.names[shared..].iter().map(|name| format!("{name} of {label}"));
+            let derivatives = &case.names[..case.derivatives()];
             let first = joint.members.first().map_or(case, |m| m.case);
-            if case.names[..shared] != first.names[..first.derivatives()] {
+            if *derivatives != first.names[..first.derivatives()] {
                 return Err(format!("{label} has other free derivatives than the maneuvers it is joined with"));
             }
             if joint.members.is_empty() {
-                joint.names.extend_from_slice(&case.names[..shared]);
+                joint.shared = (0..derivatives.len()).filter(|&j| !is_own(&derivatives[j])).collect();
+                joint.names.extend(joint.shared.iter().map(|&j| derivatives[j].clone()));
             }
-            let from = joint.names.len();
-            joint.names.extend(own);
-            let places = (0..shared).chain(from..joint.names.len()).collect();
+            let mut places = Vec::with_capacity(case.names.len());
+            for (j, name) in case.names.iter().enumerate() {
+                places.push(joint.shared.iter().position(|&s| s == j).unwrap_or(joint.names.len()));
+                if !joint.shared.contains(&j) {
+                    joint.names.push(format!("{name} of {label}"));
+                }
+            }
             joint.members.push(Member { label, case, places });
         }
         Ok(joint)
+    }
+
+    /// The places of the shared derivatives among a member's parameters.
+    #[must_use]
+    pub fn shared(&self) -> &[usize] {
+        &self.shared
     }
 
     /// Where each parameter of a member stands among the joint ones.
@@ -76,9 +91,13 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 
     /// The joint parameters from the shared derivatives and each member's own full set (its own part is taken).
     #[must_use]
-    pub fn assemble(&self, derivatives: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
-        let own = self.members.iter().zip(members).flat_map(|(m, values)| values.iter().skip(m.case.derivatives()));
-        derivatives.iter().chain(own).copied().collect()
+    pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
+        let mut joint = shared.to_vec();
+        for values in members {
+            let own = values.iter().enumerate().filter(|(j, _)| !self.shared.contains(j));
+            joint.extend(own.map(|(_, v)| *v));
+        }
+        joint
     }
 
     /// J (1.2) of each member alone, at a joint response.

@@ -23,4 +23,4 @@ pub use outcome::{Fit, Outcome};
 pub use response::{Diverged, Response};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

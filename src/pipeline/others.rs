@@ -31,7 +31,7 @@ impl Run<'_> {
         let bins = settings.map_or_else(Vec::new, |s| joint::bins(&campaign.maneuvers, s));
         let path = |bin: &Bin| {
             let members: Vec<String> = bin.members.iter().filter_map(|&i| estimates.get(i)).map(|p| name(p)).collect();
-            let fingerprint = Fingerprint::of("joint", JOINT_VERSION).with(&bin.joint_id).with(&members).finish();
+            let fingerprint = Fingerprint::of("joint", JOINT_VERSION).with(&settings).with(bin).with(&members).finish();
             self.store.path("joint", &bin.joint_id, &fingerprint, "json")
         };
         let paths: Vec<PathBuf> = bins.iter().map(path).collect();
@@ -71,7 +71,8 @@ impl Run<'_> {
             let others = others.as_ref().filter(|o| !o.is_empty())?;
             let names: Vec<String> = others.iter().filter_map(|&j| paths.get(j)).map(|p| name(p)).collect();
             let own = name(paths.get(i)?);
-            let fingerprint = Fingerprint::of("predict", PREDICT_VERSION).with(&own).with(&names).finish();
+            let fingerprint =
+                Fingerprint::of("predict", PREDICT_VERSION).with(settings).with(&own).with(&names).finish();
             Some(self.store.path("predict", &campaign.maneuvers.get(i)?.maneuver_id, &fingerprint, "json"))
         };
         let artefacts: Vec<Option<PathBuf>> = others.iter().enumerate().map(path).collect();
