@@ -148,7 +148,7 @@ fn together<const NX: usize, E: Equations<NX>>(
     let fitted = if parts.len() > 1 { fit(&run, &parts) } else { Err("fewer than two maneuvers to join".to_owned()) };
     let (mut estimated, costs) = fitted.unwrap_or_else(|reason| (run.rejected(reason), vec![]));
     for (maneuver, reason) in &left_out {
-        estimated.fit.reason += &format!("; left out: {} ({reason})", maneuver.maneuver_id);
+        estimated.fit.reason = format!("{}; left out: {} ({reason})", estimated.fit.reason, maneuver.maneuver_id);
     }
     let row = |maneuver: &Maneuver, part: &str| row(&whole, parts.len(), maneuver, part);
     let joined = parts.iter().enumerate().map(|(i, p)| JointRow {
@@ -161,7 +161,7 @@ fn together<const NX: usize, E: Equations<NX>>(
 }
 
 /// Makes a maneuver ready and estimates it alone.
-fn part<'a, const NX: usize, E: Equations<NX>>(run: Run<'a>) -> Result<Part<'a, NX, E>, String> {
+fn part<const NX: usize, E: Equations<NX>>(run: Run) -> Result<Part<NX, E>, String> {
     let ready = run.ready::<NX, E>(run.model()?)?;
     let alone = run.fit(&ready.case)?;
     if alone.outcome == Outcome::NotConverged {

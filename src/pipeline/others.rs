@@ -37,7 +37,7 @@ impl Run<'_> {
         let paths: Vec<PathBuf> = bins.iter().map(path).collect();
         let present: Vec<Option<Joined>> = paths.iter().map(|p| self.store.load(p)).collect();
         let wanted = bins.iter().zip(&present).filter(|(_, p)| p.is_none()).flat_map(|(b, _)| b.members.clone());
-        let records = self.parts(campaign, &wanted.collect())?;
+        let records = parts(campaign, &wanted.collect())?;
         let items: Vec<_> = bins.iter().zip(&paths).zip(present).collect();
         let work = |((bin, path), present): ((&Bin, &PathBuf), Option<Joined>)| {
             if let Some(joined) = present {
@@ -79,7 +79,7 @@ impl Run<'_> {
         let present: Vec<Option<Predicted>> =
             artefacts.iter().map(|p| p.as_ref().and_then(|p| self.store.load(p))).collect();
         let wanted = (0..others.len()).filter(|&i| artefacts[i].is_some() && present[i].is_none());
-        let records = self.parts(campaign, &wanted.collect())?;
+        let records = parts(campaign, &wanted.collect())?;
         let maneuvers = &campaign.maneuvers;
         let work = |(i, present): (usize, Option<Predicted>)| match (present, &artefacts[i], &others[i]) {
             (Some(predicted), ..) => Ok(predicted),
@@ -113,27 +113,6 @@ impl Run<'_> {
         }
     }
 
-    /// The parts of the records that hold these maneuvers; each flight is read once.
-    fn parts(&self, campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize, Record>> {
-        let of_flight = |id: &str| -> Vec<usize> {
-            wanted.iter().copied().filter(|&i| campaign.maneuvers[i].flight_id == id).collect()
-        };
-        let flights: Vec<_> = campaign.flights.iter().map(|f| (f, of_flight(&f.flight_id))).collect();
-        let read = |(flight, wanted): &(&super::Flight, Vec<usize>)| -> Result<Vec<(usize, Record)>> {
-            if wanted.is_empty() {
-                return Ok(vec![]);
-            }
-            let record = record_file::read(&flight.record)?;
-            let part = |&i: &usize| {
-                let maneuver = &campaign.maneuvers[i];
-                (i, record.part(maneuver.start_s, maneuver.end_s))
-            };
-            Ok(wanted.iter().map(part).collect())
-        };
-        let parts: Result<Vec<Vec<(usize, Record)>>> = flights.par_iter().map(read).collect();
-        Ok(parts?.into_iter().flatten().collect())
-    }
-
     /// Publishes what was estimated: the maneuvers' rows, then those of maneuvers estimated together.
     pub(super) fn publish_estimates(&self, campaign: &Campaign) -> Result<()> {
         let joined = || campaign.joined.iter().map(|j| &j.estimated);
@@ -151,4 +130,25 @@ impl Run<'_> {
         table::publish(reports, &members)?;
         table::publish(reports, &campaign.predictions())
     }
+}
+
+/// The parts of the records that hold these maneuvers; each flight is read once.
+fn parts(campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize, Record>> {
+    let of_flight = |id: &str| -> Vec<usize> {
+        wanted.iter().copied().filter(|&i| campaign.maneuvers[i].flight_id == id).collect()
+    };
+    let flights: Vec<_> = campaign.flights.iter().map(|f| (f, of_flight(&f.flight_id))).collect();
+    let read = |(flight, wanted): &(&super::Flight, Vec<usize>)| -> Result<Vec<(usize, Record)>> {
+        if wanted.is_empty() {
+            return Ok(vec![]);
+        }
+        let record = record_file::read(&flight.record)?;
+        let part = |&i: &usize| {
+            let maneuver = &campaign.maneuvers[i];
+            (i, record.part(maneuver.start_s, maneuver.end_s))
+        };
+        Ok(wanted.iter().map(part).collect())
+    };
+    let parts: Result<Vec<Vec<(usize, Record)>>> = flights.par_iter().map(read).collect();
+    Ok(parts?.into_iter().flatten().collect())
 }
