@@ -1,12 +1,17 @@
 //! Estimate: the derivatives of one maneuver, by output error on its axis's equations.
 
+pub mod joint;
+pub mod prediction;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, WindTunnel};
+use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
@@ -59,6 +64,13 @@ pub struct Settings {
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
     pub iteration: newton_raphson::Settings,
+    /// Maneuvers of one class and angle of attack estimated together as well; none unless asked for. Neither this nor
+    /// `prediction` changes the estimate of a maneuver alone, so neither is among what decides it (fingerprints).
+    #[serde(skip_serializing)]
+    pub joint: Option<joint::Settings>,
+    /// Each maneuver predicted with the derivatives of others.
+    #[serde(skip_serializing)]
+    pub prediction: Option<prediction::Settings>,
 }
 
 impl Default for Settings {
@@ -73,6 +85,8 @@ impl Default for Settings {
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
+            joint: None,
+            prediction: Some(prediction::Settings::default()),
         }
     }
 }
@@ -146,10 +160,36 @@ struct Term<'a> {
     status: Status,
 }
 
+/// A maneuver made ready: everything that does not depend on the parameters.
+struct Ready<'a, const NX: usize, E: Equations<NX>> {
+    model: Model<'a>,
+    surfaces: Vec<&'a str>,
+    window: Window,
+    case: Case<NX, E>,
+    /// Share of the output samples that do not count.
+    left_out: f64,
+}
+
 impl<'a> Run<'a> {
     fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
+        let ready = self.ready::<NX, E>(self.model()?)?;
+        let case = &ready.case;
+        let mut fit = self.fit(case)?;
+        let wide = self.wide(&ready);
+        let values = values_of(&ready.model, &case.names, &fit.values);
+        cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
+        Ok(Estimated {
+            estimates: self.rows(Some((&case.names, &fit))),
+            combined: self.combined(&case.names, &fit),
+            covariance: covariance(&case.names, &fit),
+            history: Some(self.history(&case.measurements, &fit, &ready.window, &ready.surfaces)),
+            fit: self.fit_row(&fit, ready.left_out),
+        })
+    }
+
+    /// Cuts the maneuver out of the record and lays it out for this model.
+    fn ready<const NX: usize, E: Equations<NX>>(&self, model: Model<'a>) -> Result<Ready<'a, NX, E>, String> {
         let range = self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1;
-        let model = self.model()?;
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
@@ -164,15 +204,7 @@ impl<'a> Run<'a> {
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
-        let mut fit = self.fit(&case)?;
-        self.consider::<NX, E>(&case, &window, &model, &mut fit);
-        Ok(Estimated {
-            estimates: self.rows(Some((&case.names, &fit))),
-            combined: self.combined(&case.names, &fit),
-            covariance: covariance(&case.names, &fit),
-            history: Some(self.history(&case.measurements, &fit, &window, &surfaces)),
-            fit: self.fit_row(&fit, left_out),
-        })
+        Ok(Ready { model, surfaces, window, case, left_out })
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
@@ -184,7 +216,7 @@ impl<'a> Run<'a> {
             Start::EquationError => (implied, tunnel),
             Start::WindTunnel => (tunnel, implied),
         };
-        let resolution = self.class.axis.outputs().map(|o| settings.resolution.get(&o).copied().unwrap_or(1e-6));
+        let resolution = self.resolution();
         let weights = self.weights()?;
         let from =
             |start| newton_raphson::estimate(case, start, weights, settings.weights, resolution, &settings.iteration);
@@ -196,29 +228,16 @@ impl<'a> Run<'a> {
         Ok(if other.outcome == Outcome::Converged { other } else { fit })
     }
 
-    /// Adds to the bounds what the uncertainty of the held values does to the estimates (consider covariance).
-    fn consider<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        window: &Window,
-        model: &Model<'a>,
-        fit: &mut Fit,
-    ) {
-        let held: Vec<(&Derivative, f64)> = model.held.iter().map(|(d, _)| (*d, self.held_uncertainty(d))).collect();
-        let all = Model {
-            free: [model.free.clone(), held.iter().map(|(d, _)| *d).collect()].concat(),
-            held: vec![],
-            ..model.clone()
-        };
-        let values: BTreeMap<&str, f64> = model
-            .held
-            .iter()
-            .map(|(d, value)| (d.name.as_str(), *value))
-            .chain(case.names.iter().map(String::as_str).zip(fit.values.iter().copied()))
-            .collect();
-        let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
-        let uncertainties: BTreeMap<&str, f64> = held.iter().map(|(d, u)| (d.name.as_str(), *u)).collect();
-        cramer_rao::consider(case, &wide, &values, &uncertainties, fit);
+    /// The maneuver with the held derivatives free as well: what an error of theirs would do.
+    fn wide<const NX: usize, E: Equations<NX>>(&self, ready: &Ready<'a, NX, E>) -> Case<NX, E> {
+        let Ready { model, window, case, .. } = ready;
+        let held = model.held.iter().map(|(d, _)| *d);
+        let all = Model { free: model.free.iter().copied().chain(held).collect(), held: vec![], ..model.clone() };
+        Case::new(self.basis.aircraft, window, case.measurements.clone(), &all)
+    }
+
+    fn held_uncertainties(&self, model: &Model<'a>) -> BTreeMap<&'a str, f64> {
+        model.held.iter().map(|(d, _)| (d.name.as_str(), self.held_uncertainty(d))).collect()
     }
 
     /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
@@ -231,6 +250,11 @@ impl<'a> Run<'a> {
 
     fn status(&self, name: &str) -> Option<Status> {
         self.class.status(name, self.maneuver.alpha_deg)
+    }
+
+    /// Whether a derivative is its coefficient's constant.
+    fn is_constant(&self, name: &str) -> bool {
+        self.basis.buildup.derivative(name).is_some_and(|d| d.regressor == Regressor::Constant)
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {
@@ -271,6 +295,11 @@ impl<'a> Run<'a> {
                 .ok_or_else(|| format!("class {} has no weight for `{}`", self.class.name, output.signal()))?;
         }
         Ok(weights)
+    }
+
+    fn resolution(&self) -> [f64; OUTPUTS] {
+        let resolution = &self.basis.settings.resolution;
+        self.class.axis.outputs().map(|o| resolution.get(&o).copied().unwrap_or(1e-6))
     }
 
     fn measurements(&self, range: &Range<usize>) -> Result<Measurements, String> {
@@ -412,6 +441,12 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
         condition_number: None,
         left_out: None,
     }
+}
+
+/// Every parameter of a maneuver by name: the held ones' values, and the free ones'.
+fn values_of<'a>(model: &'a Model, names: &'a [String], values: &[f64]) -> BTreeMap<&'a str, f64> {
+    let held = model.held.iter().map(|(d, value)| (d.name.as_str(), *value));
+    held.chain(names.iter().map(String::as_str).zip(values.iter().copied())).collect()
 }
 
 fn covariance(names: &[String], fit: &Fit) -> Option<Covariance> {

@@ -23,6 +23,8 @@ const SETTLED: f64 = 0.1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub weight: f64,
+    /// Of the residuals, were they white.
+    pub variance: f64,
     /// Zero where a sample does not count.
     pub residuals: Vec<f64>,
     pub used: Vec<bool>,
@@ -161,6 +163,7 @@ mod tests {
         let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
         let series = Series {
             weight,
+            variance: 0.0,
             residuals: values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect(),
             used: used.to_vec(),
             sensitivities: used.iter().map(|used| of(*used, 1.0)).collect(),

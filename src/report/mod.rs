@@ -7,6 +7,7 @@ mod gallery;
 mod histories;
 mod marks;
 mod notation;
+mod predictions;
 #[cfg(test)]
 mod samples;
 mod scale;
@@ -25,7 +26,9 @@ use serde::Serialize;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, PredictionRow, TrendRow,
+};
 use failures::TableView;
 use notation::{Digits, NOTHING, angle, fixed, number};
 use subject::Subject;
@@ -43,6 +46,8 @@ pub struct Contents<'a> {
     pub maneuvers: &'a [Maneuver],
     pub fits: &'a [FitRow],
     pub estimates: &'a [EstimateRow],
+    /// Each maneuver's outputs predicted with the derivatives of others.
+    pub predictions: &'a [PredictionRow],
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
@@ -72,6 +77,7 @@ struct Page<'a> {
     never_estimated: Vec<&'a str>,
     comparison: Vec<TableView>,
     maneuvers: TableView,
+    predictions: Option<TableView>,
     failures: Vec<TableView>,
     histories: Vec<histories::HistoryView>,
     histories_of: usize,
@@ -108,6 +114,7 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         never_estimated: never_estimated(contents, &subjects),
         comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
+        predictions: predictions::table(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),
         histories_of: contents.histories.len(),

@@ -5,7 +5,7 @@ use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, HistoryOutput, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, HistoryOutput, PredictionRow, TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -14,6 +14,7 @@ pub struct Campaign {
     pub maneuvers: Vec<Maneuver>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
+    pub predictions: Vec<PredictionRow>,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub channels: Vec<ChannelRow>,
@@ -35,6 +36,7 @@ impl Campaign {
             maneuvers: &self.maneuvers,
             fits: &self.fits,
             estimates: &self.estimates,
+            predictions: &self.predictions,
             trends: &self.trends,
             comparison: &self.comparison,
             channels: &self.channels,
