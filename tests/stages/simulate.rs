@@ -118,17 +118,15 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
 
 #[test]
 fn the_simulator_s_equations_and_the_estimator_s_agree_to_twelve_digits() {
+    // 2e-15 where this was written.
     // No approximation is left between the two: sideslip, rotation about all axes, engines' momentum, I_xz and the arms of
     // the sensors are all in both.
     let simulation = simulation();
     let mut noise = Noise::new(5, "agreement");
-    let (mut rates, mut outputs): (f64, f64) = (0.0, 0.0);
     for _ in 0..500 {
         let (r, o) = disagreement(&simulation, &mut noise);
         assert!(r < 1e-12 && o < 1e-12, "rates {r:.1e}, outputs {o:.1e}");
-        (rates, outputs) = (rates.max(r), outputs.max(o));
     }
-    println!("largest disagreement: rates {rates:.1e} rad/s, rad/s2, outputs {outputs:.1e} deg, deg/s, g");
 }
 
 #[test]
@@ -207,8 +205,13 @@ fn estimated(simulation: &Simulation, flown: &Flown) -> Estimated {
 
 #[test]
 fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
-    // What is left, 0.1% in the median, is the motion of the surfaces between the recorder's samples.
-    let simulation = simulation();
+    // With surfaces that are linear between the recorder's samples, as the estimator takes them, all come back to 0.1%. At
+    // 80 control steps a second their motion between samples leaves 0.1% in the median and 1% at worst of these.
+    let campaign = Campaign::new();
+    let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
+    assert!(text.contains("control_hz: 80"));
+    fs::write(campaign.path("cards.yaml"), text.replace("control_hz: 80", "control_hz: 40")).unwrap();
+    let simulation = Simulation::load(&campaign.path("cards.yaml")).unwrap();
     for (class, alpha, derivatives) in [
         ("SSIMD_LON", 10.0, &["CN_alpha", "CN_de", "Cm_alpha", "Cm_q", "Cm_de", "Cm_dsa", "Cm_dpv"][..]),
         ("3211", 40.0, &["CN_q", "CN_de", "Cm_alpha", "Cm_q", "Cm_de"]),
@@ -222,8 +225,7 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
             let truth = flown.truth.iter().find(|t| t.derivative == *name).unwrap().value;
             let row = estimated.estimates.iter().find(|e| e.derivative == *name).unwrap();
             let off = row.value.unwrap() / truth - 1.0;
-            println!("{class} {alpha} {name} {:.3}%", 100.0 * off);
-            assert!(off.abs() < 0.02, "{class} at {alpha}°: {name} is off by {:.2}%", 100.0 * off);
+            assert!(off.abs() < 1e-3, "{class} at {alpha}°: {name} is off by {:.3}%", 100.0 * off);
         }
     }
 }
