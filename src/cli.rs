@@ -8,9 +8,10 @@ use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::config::{Config, Overrides};
+use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
 use crate::pipeline::{self, Campaign, Progress, Stage};
+use crate::simulation;
 use crate::store::archive;
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
@@ -34,6 +35,8 @@ Examples:
   harvest check my_campaign                      is pipelines/my_campaign right, and what would it do
   harvest run --archive flights/ --reports out/  the same analysis on another archive
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
+  harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
+                                                 a campaign whose derivatives are known
 
 Exit codes:
   0  all well
@@ -58,6 +61,23 @@ enum Command {
     Report(Options),
     /// Validate a pipeline's configuration and say what it would do
     Check(Options),
+    /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel database, and the truth
+    Simulate(SimulateOptions),
+}
+
+#[derive(Args, Debug)]
+struct SimulateOptions {
+    /// The test cards, YAML
+    cards: PathBuf,
+    /// Folder for flights/, wind_tunnel.csv and truth/
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// No progress bars and no summary
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Args, Debug)]
@@ -110,11 +130,9 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Trend(options) => (Stage::Trend, options),
         Command::Compare(options) => (Stage::Compare, options),
         Command::Check(options) => return check(&options),
+        Command::Simulate(options) => return simulate(&options),
     };
-    if let Some(threads) = options.threads {
-        anyhow::ensure!(threads > 0, "--threads must be at least 1");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
-    }
+    start_threads(options.threads)?;
     let config = options.load()?;
     let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
     let campaign = pipeline::run(&config, until, &bars)?;
@@ -122,6 +140,33 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         summary(&config, &campaign, until);
     }
     Ok(if campaign.rejected() { ExitCode::from(2) } else { ExitCode::SUCCESS })
+}
+
+fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        anyhow::ensure!(threads > 0, "--threads must be at least 1");
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+    }
+    Ok(())
+}
+
+/// Flies the cards and says what came of them.
+#[expect(clippy::print_stdout, reason = "what a simulation says")]
+fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.threads)?;
+    let simulation = Simulation::load(&options.cards)?;
+    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let flights = simulation::run(&simulation, &options.out, &bars)?;
+    let problems: Vec<_> = flights.iter().flat_map(|f| &f.problems).collect();
+    if !options.quiet {
+        let flown: usize = flights.iter().map(|f| f.flown.len()).sum();
+        println!("{} flights, {flown} maneuvers", flights.len());
+        for problem in &problems {
+            println!("  {}: {}: {}", problem.flight_id, problem.place, problem.reason);
+        }
+        println!("campaign in {}", options.out.display());
+    }
+    Ok(if problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
 }
 
 impl Options {

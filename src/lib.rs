@@ -16,6 +16,7 @@ pub mod dynamics;
 
 // Method: how derivatives follow from motion.
 pub mod output_error;
+pub mod simulate;
 
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;
@@ -31,4 +32,5 @@ pub mod config;
 
 // Conductor: the stages in order, and the command line.
 pub mod pipeline;
+pub mod simulation;
 pub mod cli;

@@ -3,6 +3,7 @@
 //! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages), `aircraft.yaml` (geometry,
 //! sensors, channel map), `model.yaml` (the build-up) and `maneuvers/*.yaml` (one class per file).
 
+mod cards;
 mod check;
 mod source;
 mod written;
@@ -17,6 +18,7 @@ use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
 use crate::{compare, estimate, ingest, segment, trend};
 
+pub use cards::Simulation;
 pub use written::ReportSettings;
 
 /// Everything that decides a campaign's results, checked.

@@ -27,12 +27,12 @@ pub(super) struct Files {
 }
 
 impl Source {
-    fn read(path: PathBuf) -> Result<Source> {
+    pub fn read(path: PathBuf) -> Result<Source> {
         let text = files::text(&path)?;
         Ok(Source { path, text })
     }
 
-    fn parse<T: DeserializeOwned>(&self) -> Result<T> {
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
             let line = e.location().map(|l| l.line());
             Error::config(&self.path, line, said(&e.to_string()))

@@ -32,7 +32,7 @@ const DEPTH: usize = 16;
 const BATCH_ROWS: usize = 16_384;
 
 /// The field metadata that states a column's unit.
-const UNIT: &str = "unit";
+pub(super) const UNIT: &str = "unit";
 
 /// The flights of an archive, sorted by flight: a folder (searched for `*.parquet`, sub-folders too), a glob or a single
 /// file. The files of one folder `flight=007` are one flight of that name; otherwise a file is a flight named by its stem.

@@ -1,10 +1,11 @@
-//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events.
+//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a simulation's truth.
 
 use std::path::Path;
 
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
+use super::atomic;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::error::{Error, Result};
 use crate::maneuver::Event;
@@ -30,7 +31,7 @@ pub fn with_extension(folder: &Path, extension: &str) -> Result<Vec<std::path::P
 }
 
 /// One line of a wind-tunnel table as written.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TunnelRow {
     pub derivative: String,
     pub alpha_deg: f64,
@@ -71,6 +72,19 @@ pub fn tunnel_rows(path: &Path) -> Result<Vec<(usize, TunnelRow)>> {
 /// [`Error::Config`] naming file, line and column of what cannot be read.
 pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
+}
+
+/// Places rows as CSV with a header, whole or not at all.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn place_rows<T: Serialize>(path: &Path, rows: &[T]) -> Result<()> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).map_err(|e| Error::store(path, &e))?;
+    }
+    let bytes = writer.into_inner().map_err(|e| Error::store(path, &e))?;
+    atomic::place(path, &bytes)
 }
 
 fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {

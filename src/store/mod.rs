@@ -6,6 +6,7 @@ pub mod atomic;
 pub mod files;
 pub mod fingerprint;
 pub mod record_file;
+pub mod recorder;
 pub mod table;
 
 pub use artefacts::Store;

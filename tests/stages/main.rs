@@ -11,5 +11,6 @@ mod ingest;
 mod report;
 mod run;
 mod segment;
+mod simulate;
 mod support;
 mod trend;

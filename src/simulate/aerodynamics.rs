@@ -1,0 +1,93 @@
+//! The build-up 2.10-2.13, 3.9-3.13 as forces and moments: coefficients from the true tables and what multiplies them.
+//!
+//! X = −q̄S CA, Y = q̄S CY, Z = −q̄S CN; L = q̄Sb Cl, M = q̄Sc̄ Cm, N = q̄Sb Cn, about the actual c.g. A vane's derivative is a
+//! force or a moment itself.
+
+use nalgebra::Vector3;
+
+use super::air_data::AirData;
+use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::units::DEG;
+
+/// The values of the build-up's derivatives, in its order.
+pub type Values = Vec<f64>;
+
+/// The build-up with its true tables.
+#[derive(Clone, Debug)]
+pub struct Aerodynamics {
+    buildup: Buildup,
+    /// For each derivative the place of its surface among the simulated ones.
+    surfaces: Vec<Option<usize>>,
+    truth: WindTunnel,
+}
+
+impl Aerodynamics {
+    /// # Errors
+    /// A derivative without a true value, or one of a surface that is not simulated.
+    pub fn new(buildup: &Buildup, truth: WindTunnel, surfaces: &[String]) -> Result<Aerodynamics, String> {
+        let place = |d: &Derivative| {
+            let Some(name) = d.regressor.surface() else { return Ok(None) };
+            let place = surfaces.iter().position(|s| s == name);
+            place.map(Some).ok_or_else(|| format!("{}: `surfaces` has no `{name}`", d.name))
+        };
+        if let Some(d) = buildup.derivatives.iter().find(|d| !truth.has(&d.name)) {
+            return Err(format!("the truth has no value of {}", d.name));
+        }
+        let surfaces = buildup.derivatives.iter().map(place).collect::<Result<_, _>>()?;
+        Ok(Aerodynamics { buildup: buildup.clone(), surfaces, truth })
+    }
+
+    /// The derivatives in the order of their values.
+    #[must_use]
+    pub fn derivatives(&self) -> &[Derivative] {
+        &self.buildup.derivatives
+    }
+
+    /// The tables read at an angle of attack, deg, and a Mach number.
+    #[must_use]
+    pub fn values(&self, alpha_deg: f64, mach: f64) -> Values {
+        let value = |d: &Derivative| self.truth.value(&d.name, alpha_deg, mach).map_or(0.0, |v| v.value);
+        self.buildup.derivatives.iter().map(value).collect()
+    }
+
+    /// Force, lbf, and moment, ft lbf, in body axes.
+    #[must_use]
+    pub fn loads(
+        &self,
+        aircraft: &Aircraft,
+        values: &[f64],
+        air: &AirData,
+        rates: &Vector3<f64>,
+        surfaces: &[f64],
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let area = air.qbar_psf * aircraft.wing_area_ft2;
+        let (span, chord) = (aircraft.span_ft, aircraft.chord_ft);
+        let per_speed = 0.5 / air.velocity_ft_s;
+        for ((derivative, value), surface) in self.buildup.derivatives.iter().zip(values).zip(&self.surfaces) {
+            let deflection = surface.and_then(|i| surfaces.get(i)).copied().unwrap_or(0.0);
+            let (regressor, vane) = match derivative.regressor {
+                Regressor::Constant => (1.0, false),
+                Regressor::Alpha => (air.alpha * DEG, false),
+                Regressor::Beta => (air.beta * DEG, false),
+                Regressor::RollRate => (rates.x * span * per_speed, false),
+                Regressor::PitchRate => (rates.y * chord * per_speed, false),
+                Regressor::YawRate => (rates.z * span * per_speed, false),
+                Regressor::Surface(_) => (deflection, false),
+                Regressor::Vane(_) => (deflection, true),
+            };
+            let term = value * regressor * if vane { 1.0 } else { area };
+            let arm = |length: f64| term * if vane { 1.0 } else { length };
+            match derivative.coefficient {
+                Coefficient::CA => force.x -= term,
+                Coefficient::CY => force.y += term,
+                Coefficient::CN => force.z -= term,
+                Coefficient::Cl => moment.x += arm(span),
+                Coefficient::Cm => moment.y += arm(chord),
+                Coefficient::Cn => moment.z += arm(span),
+            }
+        }
+        (force, moment)
+    }
+}

@@ -1,0 +1,39 @@
+//! Air data: the flow that the aircraft meets, from its velocity over the ground, the gusts and the atmosphere.
+//!
+//! With u v w the velocity relative to the air: V² = u² + v² + w², tan α = w/u, sin β = v/V, q̄ = ρV²/2.
+
+use nalgebra::Vector3;
+
+use super::atmosphere::air;
+
+/// The flow at the c.g.; angles in rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AirData {
+    pub velocity_ft_s: f64,
+    pub alpha: f64,
+    pub beta: f64,
+    pub mach: f64,
+    pub qbar_psf: f64,
+}
+
+impl AirData {
+    /// From the velocity relative to the air in body axes, ft/s.
+    #[must_use]
+    pub fn new(relative: &Vector3<f64>, altitude_ft: f64) -> AirData {
+        let air = air(altitude_ft);
+        let velocity_ft_s = relative.norm().max(1e-6);
+        AirData {
+            velocity_ft_s,
+            alpha: relative.z.atan2(relative.x),
+            beta: (relative.y / velocity_ft_s).asin(),
+            mach: velocity_ft_s / air.sound_ft_s,
+            qbar_psf: 0.5 * air.density_slug_ft3 * velocity_ft_s * velocity_ft_s,
+        }
+    }
+
+    /// The velocity relative to the air in body axes that has this speed and these angles, rad.
+    #[must_use]
+    pub fn velocity(speed_ft_s: f64, alpha: f64, beta: f64) -> Vector3<f64> {
+        Vector3::new(alpha.cos() * beta.cos(), beta.sin(), alpha.sin() * beta.cos()) * speed_ft_s
+    }
+}

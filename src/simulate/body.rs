@@ -1,0 +1,213 @@
+//! The rigid body: m (v̇ + ω × v) = F + m g and I ω̇ = M − ω × (I ω + h), with velocity u v w and rates p q r in body axes, the
+//! attitude as a quaternion, and the engines' angular momentum h along +x.
+//!
+//! Written from Newton's and Euler's laws in vector form, and not from the estimator's equations of α, β and V: each is a
+//! check of the other. The earth is flat and does not turn; gravity is that of [`crate::aircraft::gravity_ft_s2`].
+
+use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
+
+use super::loading::Loading;
+
+/// Velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude (body to earth: north, east, down) as scalar and
+/// vector part; position north, east and up, ft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    pub velocity: Vector3<f64>,
+    pub rates: Vector3<f64>,
+    pub attitude: Quaternion<f64>,
+    pub position: Vector3<f64>,
+}
+
+/// Rates of the state, in the same layout.
+pub type Slope = State;
+
+/// Angles of attitude, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Euler {
+    pub phi: f64,
+    pub theta: f64,
+    pub psi: f64,
+}
+
+impl Euler {
+    /// The attitude: yaw, then pitch, then roll.
+    #[must_use]
+    pub fn attitude(self) -> Quaternion<f64> {
+        *UnitQuaternion::from_euler_angles(self.phi, self.theta, self.psi)
+    }
+}
+
+impl State {
+    /// The sum of this state and `factor` times a slope.
+    #[must_use]
+    pub fn plus(&self, slope: &Slope, factor: f64) -> State {
+        State {
+            velocity: self.velocity + slope.velocity * factor,
+            rates: self.rates + slope.rates * factor,
+            attitude: self.attitude + slope.attitude * factor,
+            position: self.position + slope.position * factor,
+        }
+    }
+
+    /// The state with its attitude brought back to length one, from which rounding takes it.
+    #[must_use]
+    pub fn normalised(self) -> State {
+        State { attitude: self.attitude.normalize(), ..self }
+    }
+
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let values: SVector<f64, 6> = SVector::from_iterator(self.velocity.iter().chain(&self.rates).copied());
+        values.iter().all(|v| v.is_finite()) && self.attitude.norm().is_finite()
+    }
+
+    /// The rotation from body to earth axes.
+    #[must_use]
+    pub fn to_earth(&self) -> Matrix3<f64> {
+        UnitQuaternion::from_quaternion(self.attitude).to_rotation_matrix().into_inner()
+    }
+
+    /// Angles of attitude; ψ between −π and π.
+    #[must_use]
+    pub fn euler(&self) -> Euler {
+        let m = self.to_earth();
+        Euler {
+            phi: m[(2, 1)].atan2(m[(2, 2)]),
+            theta: (-m[(2, 0)]).clamp(-1.0, 1.0).asin(),
+            psi: m[(1, 0)].atan2(m[(0, 0)]),
+        }
+    }
+
+    /// Rates of φ and θ, rad/s, from the quaternion's rate.
+    #[must_use]
+    pub fn euler_rates(&self, slope: &Slope) -> (f64, f64) {
+        let (a, d) = (self.attitude, slope.attitude);
+        let (up, up_dot) = (2.0 * (a.w * a.j - a.k * a.i), 2.0 * (d.w * a.j + a.w * d.j - d.k * a.i - a.k * d.i));
+        let (y, x) = (2.0 * (a.w * a.i + a.j * a.k), 1.0 - 2.0 * (a.i * a.i + a.j * a.j));
+        let y_dot = 2.0 * (d.w * a.i + a.w * d.i + d.j * a.k + a.j * d.k);
+        let x_dot = -4.0 * (a.i * d.i + a.j * d.j);
+        ((x * y_dot - y * x_dot) / (x * x + y * y), up_dot / (1.0 - up * up).sqrt())
+    }
+}
+
+/// What acts on the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Action {
+    /// Forces but for gravity, lbf, and moments about the c.g., ft lbf, in body axes.
+    pub force: Vector3<f64>,
+    pub moment: Vector3<f64>,
+    /// Of the engines along +x, slug ft²/s.
+    pub engine_momentum: f64,
+    pub gravity_ft_s2: f64,
+}
+
+/// The rates of the state under an action.
+#[must_use]
+pub fn slope(state: &State, loading: &Loading, action: &Action) -> Slope {
+    let (v, w) = (state.velocity, state.rates);
+    let to_earth = state.to_earth();
+    let gravity = to_earth.transpose() * Vector3::new(0.0, 0.0, action.gravity_ft_s2);
+    let inertia = loading.inertia();
+    let momentum = inertia * w + Vector3::new(action.engine_momentum, 0.0, 0.0);
+    let turning = action.moment - w.cross(&momentum);
+    let over_ground = to_earth * v;
+    State {
+        velocity: action.force / loading.mass_slug + gravity - w.cross(&v),
+        rates: loading.inverse_inertia() * turning,
+        attitude: state.attitude * Quaternion::from_imag(w) * 0.5,
+        position: Vector3::new(over_ground.x, over_ground.y, -over_ground.z),
+    }
+}
+
+/// One fourth-order Runge-Kutta step; `at` gives the slope of a state at 0, 1/2 and 1 of the step.
+pub fn step(state: &State, step_s: f64, at: impl Fn(&State, f64) -> Slope) -> State {
+    let k1 = at(state, 0.0);
+    let k2 = at(&state.plus(&k1, step_s / 2.0), 0.5);
+    let k3 = at(&state.plus(&k2, step_s / 2.0), 0.5);
+    let k4 = at(&state.plus(&k3, step_s), 1.0);
+    state.plus(&k1, step_s / 6.0).plus(&k2, step_s / 3.0).plus(&k3, step_s / 3.0).plus(&k4, step_s / 6.0).normalised()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+
+    const LOADING: Loading = Loading {
+        mass_slug: 1025.0,
+        x_cg_ft: 38.2,
+        y_cg_ft: 0.0,
+        z_cg_ft: 8.7,
+        ix_slug_ft2: 22_300.0,
+        iy_slug_ft2: 172_900.0,
+        iz_slug_ft2: 187_600.0,
+        ixz_slug_ft2: -2073.0,
+    };
+    const FREE: Action = Action {
+        force: Vector3::new(0.0, 0.0, 0.0),
+        moment: Vector3::new(0.0, 0.0, 0.0),
+        engine_momentum: 0.0,
+        gravity_ft_s2: 0.0,
+    };
+
+    fn tumbling() -> State {
+        State {
+            velocity: Vector3::new(250.0, 10.0, 120.0),
+            rates: Vector3::new(1.2, 0.4, -0.3),
+            attitude: Euler { phi: 0.3, theta: -0.2, psi: 1.0 }.attitude(),
+            position: Vector3::new(0.0, 0.0, 25_000.0),
+        }
+    }
+
+    fn after(state: State, time_s: u32, action: &Action) -> State {
+        (0..time_s * 400).fold(state, |s, _| step(&s, 1.0 / 400.0, |at, _| slope(at, &LOADING, action)))
+    }
+
+    #[test]
+    fn free_of_moments_energy_and_the_angular_momentum_in_space_stay() {
+        let energy = |s: &State| 0.5 * s.rates.dot(&(LOADING.inertia() * s.rates));
+        let momentum = |s: &State| s.to_earth() * (LOADING.inertia() * s.rates);
+        let (start, end) = (tumbling(), after(tumbling(), 20, &FREE));
+        assert!((start.rates - end.rates).norm() > 0.1, "it does tumble");
+        assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-9);
+        assert!((momentum(&start) - momentum(&end)).norm() < 1e-8 * momentum(&start).norm());
+        // The path over the ground is straight although the body axes turn.
+        assert!((start.to_earth() * start.velocity - end.to_earth() * end.velocity).norm() < 1e-6);
+        assert_abs_diff_eq!(end.attitude.norm(), 1.0, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn falling_trades_height_for_speed() {
+        let action = Action { gravity_ft_s2: 32.1, ..FREE };
+        let energy = |s: &State| 0.5 * s.velocity.norm_squared() + 32.1 * s.position.z;
+        let (start, end) = (tumbling(), after(tumbling(), 5, &action));
+        assert!(end.position.z < start.position.z);
+        assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-10);
+    }
+
+    #[test]
+    fn engines_turning_with_their_momentum_forward_push_the_nose_down_in_a_right_turn() {
+        let action = Action { engine_momentum: 7500.0, ..FREE };
+        let state = State { rates: Vector3::new(0.0, 0.0, 0.2), ..tumbling() };
+        let with = slope(&state, &LOADING, &action).rates;
+        let without = slope(&state, &LOADING, &FREE).rates;
+        assert_relative_eq!((with - without).y, -0.2 * 7500.0 / LOADING.iy_slug_ft2, max_relative = 1e-9);
+        // And a pitch up turns it right.
+        let state = State { rates: Vector3::new(0.0, 0.2, 0.0), ..tumbling() };
+        assert!(slope(&state, &LOADING, &action).rates.z > 0.0);
+    }
+
+    #[test]
+    fn angles_and_their_rates_are_those_of_the_attitude() {
+        let (state, h) = (tumbling(), 1e-6);
+        let s = slope(&state, &LOADING, &FREE);
+        let (phi_dot, theta_dot) = state.euler_rates(&s);
+        let (up, down) = (state.plus(&s, h).euler(), state.plus(&s, -h).euler());
+        assert_abs_diff_eq!(phi_dot, (up.phi - down.phi) / (2.0 * h), epsilon = 1e-8);
+        assert_abs_diff_eq!(theta_dot, (up.theta - down.theta) / (2.0 * h), epsilon = 1e-8);
+        let angles = state.euler();
+        for (angle, expected) in [(angles.phi, 0.3), (angles.theta, -0.2), (angles.psi, 1.0)] {
+            assert_abs_diff_eq!(angle, expected, epsilon = 1e-12);
+        }
+    }
+}
