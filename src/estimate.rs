@@ -1,5 +1,8 @@
 //! Estimate: the derivatives of one maneuver, by output error on its axis's equations.
 
+mod evidence;
+mod measures;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -12,10 +15,11 @@ use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::identifiability;
 use crate::output_error::newton_raphson::{self, Weights};
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{cramer_rao, equation_error};
-use crate::tables::{EstimateRow, FitRow, History, HistoryOutput};
+use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
 /// What an inactive surface that moves a little all the same (feedback stays closed) does to the aircraft.
@@ -42,6 +46,17 @@ pub enum Start {
     WindTunnel,
 }
 
+/// Who says which derivatives are held at the tunnel's values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// The class (Tables 1 and 3).
+    #[default]
+    Table,
+    /// The maneuver: what the tunnel knows better than the maneuver can tell.
+    Evidence,
+}
+
 /// Choices of the estimation that hold for all classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -51,6 +66,7 @@ pub struct Settings {
     pub mass_properties: MassProperties,
     pub inactive_surfaces: InactiveSurfaces,
     pub start: Start,
+    pub hold: Hold,
     /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
     /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
     pub held_uncertainty_pct: f64,
@@ -59,6 +75,8 @@ pub struct Settings {
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
     pub iteration: newton_raphson::Settings,
+    /// When correlations, inflated variances and groups are worth a word.
+    pub identifiability: identifiability::Limits,
 }
 
 impl Default for Settings {
@@ -69,10 +87,12 @@ impl Default for Settings {
             mass_properties: MassProperties::default(),
             inactive_surfaces: InactiveSurfaces::default(),
             start: Start::default(),
+            hold: Hold::default(),
             held_uncertainty_pct: 20.0,
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
+            identifiability: identifiability::Limits::default(),
         }
     }
 }
@@ -103,6 +123,8 @@ pub struct Estimated {
     /// The sums that the tunnel tabulates, where both parts were estimated.
     pub combined: Vec<EstimateRow>,
     pub covariance: Option<Covariance>,
+    /// Among the regressors as flown and among the estimates.
+    pub correlations: Vec<CorrelationRow>,
     pub history: Option<History>,
 }
 
@@ -110,11 +132,27 @@ pub struct Estimated {
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
     let run = Run { record, maneuver, class, basis };
-    let estimated = match class.axis {
-        Axis::Longitudinal => run.estimate::<3, Longitudinal>(),
-        Axis::Lateral => run.estimate::<4, Lateral>(),
+    match basis.settings.hold {
+        Hold::Table => run.estimated(),
+        Hold::Evidence => by_evidence(&run),
+    }
+}
+
+/// Estimates with what the maneuver's own evidence says is to be held.
+fn by_evidence(run: &Run) -> Estimated {
+    let choice = match run.class.axis {
+        Axis::Longitudinal => run.choose::<3, Longitudinal>(),
+        Axis::Lateral => run.choose::<4, Lateral>(),
     };
-    estimated.unwrap_or_else(|reason| run.rejected(reason))
+    let choice = match choice {
+        Ok(choice) => choice,
+        Err(reason) => return run.rejected(reason),
+    };
+    let mut estimated = Run { class: &choice.applied_to(run.class), ..*run }.estimated();
+    for row in &mut estimated.estimates {
+        row.held_because = choice.held_because.get(&row.derivative).cloned();
+    }
+    estimated
 }
 
 impl Estimated {
@@ -127,11 +165,13 @@ impl Estimated {
             estimates: vec![],
             combined: vec![],
             covariance: None,
+            correlations: vec![],
             history: None,
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Run<'a> {
     record: &'a Record,
     maneuver: &'a Maneuver,
@@ -147,8 +187,21 @@ struct Term<'a> {
 }
 
 impl<'a> Run<'a> {
+    fn estimated(&self) -> Estimated {
+        let estimated = match self.class.axis {
+            Axis::Longitudinal => self.estimate::<3, Longitudinal>(),
+            Axis::Lateral => self.estimate::<4, Lateral>(),
+        };
+        estimated.unwrap_or_else(|reason| self.rejected(reason))
+    }
+
+    /// The maneuver's samples in the record.
+    fn range(&self) -> Range<usize> {
+        self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1
+    }
+
     fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
-        let range = self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1;
+        let range = self.range();
         let model = self.model()?;
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
@@ -166,13 +219,16 @@ impl<'a> Run<'a> {
         }
         let mut fit = self.fit(&case)?;
         self.consider::<NX, E>(&case, &window, &model, &mut fit);
-        Ok(Estimated {
+        let mut estimated = Estimated {
             estimates: self.rows(Some((&case.names, &fit))),
             combined: self.combined(&case.names, &fit),
             covariance: covariance(&case.names, &fit),
+            correlations: vec![],
             history: Some(self.history(&case.measurements, &fit, &window, &surfaces)),
             fit: self.fit_row(&fit, left_out),
-        })
+        };
+        self.measure(&case, &window, &model, &fit, &mut estimated);
+        Ok(estimated)
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
@@ -355,6 +411,11 @@ impl<'a> Run<'a> {
             bound_held: None,
             bound_corrected: None,
             wind_tunnel: self.tunnel(name),
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
         }
     }
 
@@ -369,12 +430,21 @@ impl<'a> Run<'a> {
             final_cost: fit.final_cost,
             condition_number: fit.condition_number,
             left_out: Some(left_out),
+            largest_condition_index: None,
+            confounded: None,
         }
     }
 
     fn rejected(&self, reason: String) -> Estimated {
         let fit = rejected(self.maneuver, reason);
-        Estimated { fit, estimates: self.rows(None), combined: vec![], covariance: None, history: None }
+        Estimated {
+            fit,
+            estimates: self.rows(None),
+            combined: vec![],
+            covariance: None,
+            correlations: vec![],
+            history: None,
+        }
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {
@@ -411,6 +481,8 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
         final_cost: None,
         condition_number: None,
         left_out: None,
+        largest_condition_index: None,
+        confounded: None,
     }
 }
 

@@ -19,13 +19,15 @@ use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, TrendRow,
+};
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
 const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 1;
+const ESTIMATE_VERSION: u32 = 2;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,6 +86,7 @@ pub struct Campaign {
     pub estimates: Vec<EstimateRow>,
     /// The sums that the tunnel tabulates, with the variance of the sum.
     pub combined: Vec<EstimateRow>,
+    pub correlations: Vec<CorrelationRow>,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub problems: Vec<Problem>,
@@ -303,9 +306,11 @@ impl Run<'_> {
             campaign.fits.push(fit);
             campaign.estimates.extend(estimated.estimates);
             campaign.combined.extend(estimated.combined);
+            campaign.correlations.extend(estimated.correlations);
         }
         table::publish(&self.config.reports, &campaign.fits)?;
         table::publish(&self.config.reports, &campaign.estimates)?;
+        table::publish(&self.config.reports, &campaign.correlations)?;
         table::publish_as(&self.config.reports, "combined", &campaign.combined)
     }
 

@@ -85,25 +85,43 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
+/// What noise does to the gradient: its covariance for white residuals, and what their correlation adds to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GradientCovariance {
+    /// Σ Sᵀ W R̂ W S.
+    pub white: DMatrix<f64>,
+    pub coloured: DMatrix<f64>,
+}
+
 /// Bounds of a fit whose information matrix has this inverse.
 #[must_use]
 pub fn bounds<const NX: usize, E: Equations<NX>>(inverse: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
-    let residuals = residuals(&case.measurements, &fit.response);
+    let GradientCovariance { white, coloured } = gradient_covariance(case, &fit.response, &fit.weights);
+    let covariance = inverse * &white * inverse;
+    let corrected = inverse * (&white + &coloured) * inverse;
+    Bounds { corrected: never_below(corrected, &covariance), covariance }
+}
+
+/// The gradient's covariance of one maneuver, from the residuals of its response.
+pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    response: &Response,
+    weights: &[f64; OUTPUTS],
+) -> GradientCovariance {
+    let residuals = residuals(&case.measurements, response);
     let variances = variances(&residuals, &case.used(), case.parameters());
     let n = case.parameters();
     let (mut white, mut extra) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
     for o in 0..OUTPUTS {
-        let w = fit.weights[o];
+        let w = weights[o];
         let correlation = autocorrelation(residuals.iter().map(|v| v[o]));
         for k in (0..case.samples()).filter(|&k| case.measurements.used[k][o]) {
-            add_square(&mut white, w * w * variances[o], fit.response.sensitivity(k, o));
+            add_square(&mut white, w * w * variances[o], response.sensitivity(k, o));
         }
-        extra += coloured(case, &fit.response, o, &correlation) * (w * w * variances[o]);
+        extra += coloured(case, response, o, &correlation) * (w * w * variances[o]);
     }
     white.fill_upper_triangle_with_lower_triangle();
-    let covariance = inverse * &white * inverse;
-    let corrected = inverse * (&white + &extra) * inverse;
-    Bounds { corrected: never_below(corrected, &covariance), covariance }
+    GradientCovariance { white, coloured: extra }
 }
 
 /// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with

@@ -7,6 +7,8 @@ mod case;
 pub mod cost;
 pub mod cramer_rao;
 pub mod equation_error;
+pub mod holding;
+pub mod identifiability;
 pub mod newton_raphson;
 mod outcome;
 mod response;

@@ -137,6 +137,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         final_cost: Some(0.4),
         condition_number: Some(150.0),
         left_out: Some(0.0),
+        largest_condition_index: Some(12.2),
+        confounded: None,
     });
     for (name, unit) in if axis == Axis::Longitudinal { LONGITUDINAL } else { LATERAL } {
         campaign.estimates.push(EstimateRow {
@@ -153,6 +155,11 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             bound_held: None,
             bound_corrected: Some(0.004),
             wind_tunnel: Some(0.05),
+            variance_inflation: Some(12.0),
+            excitation: Some(1.5),
+            contribution_pct: Some(40.0),
+            equation_error: Some(0.05),
+            held_because: None,
         });
     }
     campaign.histories.push(history(&maneuver_id, class, alpha_deg));
