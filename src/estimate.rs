@@ -2,6 +2,8 @@
 
 mod evidence;
 mod measures;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::ops::Range;

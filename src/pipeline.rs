@@ -396,6 +396,8 @@ impl Run<'_> {
             maneuvers: &campaign.maneuvers,
             fits: &campaign.fits,
             estimates: &estimates,
+            correlations: &campaign.correlations,
+            limits: &config.estimate.identifiability,
             trends: &campaign.trends,
             comparison: &campaign.comparison,
             channels: &campaign.channels,

@@ -3,7 +3,8 @@
 //!
 //! Candidates are all derivatives that the class estimates or holds, except constants: those take up trim and what errors
 //! of held values do there. All are free at first; [`holding`](crate::output_error::holding) says which are better held,
-//! the maneuver is fitted with these held, and asked again at that solution until the choice stands.
+//! the maneuver is fitted with these held, and asked again at that solution until the choice stands. What noise there is the
+//! least restricted fit that the data determine says.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,7 @@ pub(super) struct Choice {
     pub held_because: BTreeMap<String, String>,
 }
 
-/// Rounds of fitting and choosing. Three are the most that the sample campaigns need.
+/// Rounds of fitting and choosing; each but the last holds or frees a derivative, and none is freed twice.
 const ROUNDS: usize = 10;
 
 impl Choice {
@@ -66,12 +67,13 @@ impl<'a> Run<'a> {
         let uncertainty: Vec<Option<f64>> = wide.names.iter().map(|name| self.known_to(name)).collect();
         let mut held = vec![false; wide.parameters()];
         let mut released = held.clone();
+        let mut least_restricted = None;
         let mut because = None;
         for round in 0..ROUNDS {
             let is_held = |d: &Derivative| wide.names.iter().position(|n| *n == d.name).is_some_and(|j| held[j]);
             let narrow = case(&with(&is_held));
             let fit = self.fit(&narrow)?;
-            if fit.final_cost.is_none() || (round == 0 && fit.outcome == Outcome::NotConverged) {
+            if fit.outcome == Outcome::NotConverged {
                 if round > 0 {
                     break;
                 }
@@ -82,10 +84,18 @@ impl<'a> Run<'a> {
             let value = |name: &str| narrow.names.iter().position(|n| n == name).map(|j| fit.values[j]);
             let at = |name: &String| value(name).or_else(|| self.tunnel(name)).unwrap_or(0.0);
             let values: Vec<f64> = wide.names.iter().map(at).collect();
+            let outputs = least_restricted.as_ref().unwrap_or(&fit.response.outputs);
             let max = self.basis.settings.iteration.max_condition_number;
-            let gathered = Candidates::gather(&wide, &values, &fit.weights, uncertainty.clone(), max);
+            let gathered = Candidates::gather(&wide, &values, outputs, &fit.weights, uncertainty.clone(), max);
             let Some(candidates) = gathered else { break };
-            let next = candidates.settle(held.clone(), &mut released);
+            let determined = candidates.determined(held.clone());
+            let next = if determined == held {
+                least_restricted.get_or_insert_with(|| fit.response.outputs.clone());
+                candidates.settle(held.clone(), &mut released)
+            } else {
+                // A fit that the data do not determine says nothing of the noise: fit again before judging bounds.
+                determined
+            };
             let settled = next == held;
             held = next;
             because = Some(candidates);

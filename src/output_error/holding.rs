@@ -1,11 +1,14 @@
 //! Which parameters to hold at values known from elsewhere: those of which the wind tunnel knows more than the maneuver.
 //!
-//! Estimated, parameter j has the variance `V_j`; held, the variance `u_j²` of the value it is held at. Holding it changes
-//! the covariance of all others by `g (u_j² − V_j) gᵀ`: with weights that are the inverse of the noise's variances it
-//! lowers the mean square error of every one of them exactly where `u_j² < V_j`, and raises it everywhere else (Toro-
-//! Vizcarrondo and Wallace 1968). So the ratio `√V_j / u_j` decides, above one for hold. `V_j` is the corrected variance
-//! with the uncertainty of what is held already in it, `H_F⁻¹ M_F H_F⁻¹ + G P Gᵀ` for the free set F; information matrix H
-//! and scatter M of all parameters give it for every F without another fit.
+//! Estimated, parameter j has the variance `V_j` from noise; held, the variance `u_j²` of the value it is held at. Holding
+//! it changes the covariance of all others by `g (u_j² − V_j) gᵀ`: with weights that are the inverse of the noise's
+//! variances it lowers the mean square error of every one of them exactly where `u_j² < V_j`, and raises it everywhere
+//! else (Toro-Vizcarrondo and Wallace 1968). So the ratio `√V_j / u_j` decides, above one for hold. `V_j` is the corrected
+//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F; information matrix H and gradient covariance M of all parameters give it
+//! for every F without another fit.
+//!
+//! What the errors of values already held do to parameter j is no reason to hold it too: free, it takes those errors up
+//! and spares the others. Counted, they would make each held value hold the next.
 //!
 //! The worst is held first, until none is above one; then each held one that alone would be below one again is freed,
 //! at most once. So it ends.
@@ -54,10 +57,14 @@ enum Known {
 
 impl Candidates {
     /// What the data say of a case with all parameters free at `values`; none where its integration diverges.
+    ///
+    /// The noise is what `least_restricted`, the outputs of the fit that holds least, leaves of the measurements: with
+    /// more held, residuals are errors of the held values too, and would make the data look worse than they are.
     #[must_use]
     pub fn gather<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
         values: &[f64],
+        least_restricted: &[[f64; OUTPUTS]],
         weights: &[f64; OUTPUTS],
         uncertainty: Vec<Option<f64>>,
         max_condition_number: f64,
@@ -65,8 +72,18 @@ impl Candidates {
         let mut response = case.response();
         case.respond(values, &mut response).ok()?;
         let information = sums(&case.measurements, &response, weights, case.parameters()).information;
+        response.outputs = least_restricted.to_vec();
         let noise = gradient_covariance(case, &response, weights);
         Some(Candidates { information, noise, uncertainty, max_condition_number })
+    }
+
+    /// What must be held besides `held` for the data to determine the rest, as far as it may be held.
+    #[must_use]
+    pub fn determined(&self, mut held: Vec<bool>) -> Vec<bool> {
+        while let Some(lost) = self.undetermined(&held) {
+            held[lost] = true;
+        }
+        held
     }
 
     /// Which parameters to hold, from those `held` so far. `released` remembers which have been freed again: a second
@@ -97,7 +114,7 @@ impl Candidates {
         freed[parameter] = false;
         let free = indices(&freed, false);
         let at = free.iter().position(|&j| j == parameter)?;
-        match self.known(&free, &freed) {
+        match self.known(&free) {
             Known::Undetermined(direction) if direction[at] != 0.0 => {
                 let others = free.iter().enumerate().filter(|(i, _)| *i != at && direction[*i] != 0.0);
                 Some(Because::NotToldApart(others.map(|(_, &j)| j).collect()))
@@ -117,18 +134,30 @@ impl Candidates {
         }
     }
 
-    /// The free parameter that is best held: not felt, or in an undetermined direction, or the largest ratio above one.
+    /// The free parameter that is not felt, or of an undetermined direction the one that the tunnel knows best along it.
+    fn undetermined(&self, held: &[bool]) -> Option<usize> {
+        let free = indices(held, false);
+        let silent = |j: &usize| self.uncertainty[*j].is_some() && self.information[(*j, *j)] <= 0.0;
+        match free.iter().copied().find(silent) {
+            Some(j) => Some(j),
+            None => match self.known(&free) {
+                Known::Undetermined(direction) => self.largest_ratio(&free, &direction.abs(), 0.0),
+                Known::Determined { .. } => None,
+            },
+        }
+    }
+
+    /// The free parameter that is best held: an undetermined one, or that of the largest ratio above one.
     fn worst(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
-        let holdable = |j: usize| self.uncertainty[j].is_some();
-        let not_felt = free.iter().copied().find(|&j| holdable(j) && self.information[(j, j)] <= 0.0);
-        if not_felt.is_some() {
-            return not_felt;
-        }
-        let (sizes, limit) = match self.known(&free, held) {
-            Known::Undetermined(direction) => (direction.abs(), 0.0),
-            Known::Determined { bounds, .. } => (bounds, 1.0),
-        };
+        self.undetermined(held).or_else(|| match self.known(&free) {
+            Known::Determined { bounds, .. } => self.largest_ratio(&free, &bounds, 1.0),
+            Known::Undetermined(_) => None,
+        })
+    }
+
+    /// Of the parameters that may be held that of the largest size over the tunnel's uncertainty, above a limit.
+    fn largest_ratio(&self, free: &[usize], sizes: &DVector<f64>, limit: f64) -> Option<usize> {
         let ratios = free.iter().zip(sizes.iter()).filter_map(|(&j, size)| Some((j, size / self.uncertainty[j]?)));
         ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(j, _)| j)
     }
@@ -140,7 +169,7 @@ impl Candidates {
             freed[j] = false;
             let free = indices(&freed, false);
             let at = free.iter().position(|&i| i == j)?;
-            match self.known(&free, &freed) {
+            match self.known(&free) {
                 Known::Determined { bounds, .. } => Some(bounds[at] / self.uncertainty[j]?),
                 Known::Undetermined(_) => None,
             }
@@ -150,7 +179,7 @@ impl Candidates {
         ratios.filter(|(_, ratio)| *ratio < 1.0).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(j, _)| j)
     }
 
-    fn known(&self, free: &[usize], held: &[bool]) -> Known {
+    fn known(&self, free: &[usize]) -> Known {
         let part = |m: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i], free[j])]);
         let own = part(&self.information);
         if own.is_empty() {
@@ -170,11 +199,7 @@ impl Candidates {
         let inverse = scaled(&inverse, &unit);
         let white = &inverse * part(&self.noise.white) * &inverse;
         let coloured = &inverse * part(&self.noise.coloured) * &inverse;
-        let mut variances = white.diagonal() + coloured.diagonal().map(|v| v.max(0.0));
-        for (h, uncertainty) in indices(held, true).into_iter().filter_map(|h| Some((h, self.uncertainty[h]?))) {
-            let cross = DVector::from_fn(free.len(), |i, _| self.information[(free[i], h)]);
-            variances += (&inverse * cross * uncertainty).map(|v| v * v);
-        }
+        let variances = white.diagonal() + coloured.diagonal().map(|v| v.max(0.0));
         Known::Determined { bounds: variances.map(f64::sqrt), inverse }
     }
 }
@@ -212,7 +237,7 @@ mod tests {
 
     #[test]
     fn of_two_that_correlate_the_one_that_the_tunnel_knows_best_is_held_and_the_other_is_then_free() {
-        // The second's bound, with the first held at ±0.5, is √(1 + 0.9² 0.5²) = 1.10: below the tunnel's 1.2.
+        // The second's bound, with the first held, is 1: below the tunnel's 1.2.
         let e = pair(Some(0.5), Some(1.2));
         assert_eq!(settled(&e), [true, false]);
         let Some(Because::Bound { bound, uncertainty, partner }) = e.because(&[true, false], 0) else { panic!() };
@@ -224,9 +249,11 @@ mod tests {
     }
 
     #[test]
-    fn the_uncertainty_of_what_is_held_counts_in_the_bound_of_what_is_free() {
-        // With the first held at ±1.0 the second's bound is √(1 + 0.81) = 1.35: above 1.2, though it would be 1.0 alone.
-        assert_eq!(settled(&pair(Some(1.0), Some(1.2))), [true, true]);
+    fn the_error_of_what_is_held_is_no_reason_to_hold_the_next() {
+        // With the first held at ±1.0 the second is off by √(1 + 0.9²) = 1.35, more than the tunnel's 1.2, but from noise
+        // by 1 only: it takes up the error of the first.
+        assert_eq!(settled(&pair(Some(1.0), Some(1.2))), [true, false]);
+        assert_eq!(settled(&pair(Some(1.0), Some(0.9))), [true, true]);
     }
 
     #[test]

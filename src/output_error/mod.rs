@@ -18,4 +18,4 @@ pub use outcome::{Fit, Outcome};
 pub use response::{Diverged, Response};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -13,19 +13,19 @@ use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 
-const SAMPLES: usize = 320;
+pub(crate) const SAMPLES: usize = 320;
 const STEP_S: f64 = 0.025;
 
-fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
+pub(crate) fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
     Derivative { name: name.into(), coefficient, regressor }
 }
 
-fn surface(name: &str) -> Regressor {
+pub(crate) fn surface(name: &str) -> Regressor {
     Regressor::Surface(name.into())
 }
 
 /// A build-up with every kind of regressor, and true values of a stable fighter at α 20°.
-fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
+pub(crate) fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
     use Coefficient::{CA, CN, CY, Cl, Cm, Cn};
     let vane = |name: &str| Regressor::Vane(name.into());
     match axis {
@@ -61,7 +61,7 @@ fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
     }
 }
 
-fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
+pub(crate) fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
     match k {
         k if k >= start && k < start + half => size,
         k if k >= start + half && k < start + 2 * half => -size,
@@ -70,7 +70,7 @@ fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
 }
 
 /// A record of trimmed flight with doublets on every surface.
-fn record() -> Record {
+pub(crate) fn record() -> Record {
     let constant = |v: f64| vec![v; SAMPLES];
     let of = |f: &dyn Fn(usize) -> f64| (0..SAMPLES).map(f).collect::<Vec<_>>();
     let wave = |k: usize, size: f64| size * (0.11 * k as f64).sin();
@@ -121,7 +121,7 @@ fn window() -> Window {
     Window::cut(&record(), 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap()
 }
 
-fn nothing_measured() -> Measurements {
+pub(crate) fn nothing_measured() -> Measurements {
     Measurements { values: vec![[0.0; OUTPUTS]; SAMPLES], used: vec![[true; OUTPUTS]; SAMPLES] }
 }
 
@@ -174,16 +174,16 @@ fn sensitivities_are_those_of_finite_differences_for_every_parameter() {
 }
 
 /// Standard deviations of the noise, deg, deg/s, g, in the order of the outputs.
-const NOISE: [f64; OUTPUTS] = [0.08, 0.05, 0.05, 0.01, 0.005];
+pub(crate) const NOISE: [f64; OUTPUTS] = [0.08, 0.05, 0.05, 0.01, 0.005];
 
 /// Weights that are not the inverse of the noise's variances, as those of Tables 2 and 4 are not.
 const TABLE: [f64; OUTPUTS] = [12.0, 60.0, 30.0, 5000.0, 9000.0];
 
 /// Uniform numbers of a linear congruential generator, made Gaussian by the sum of twelve.
-struct Noise(u64);
+pub(crate) struct Noise(pub u64);
 
 impl Noise {
-    fn gaussian(&mut self) -> f64 {
+    pub(crate) fn gaussian(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 

@@ -14,6 +14,7 @@ mod subject;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod told_apart;
 mod verdict;
 
 use std::collections::BTreeSet;
@@ -25,7 +26,10 @@ use serde::Serialize;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::output_error::identifiability::Limits;
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, TrendRow,
+};
 use failures::TableView;
 use notation::{Digits, NOTHING, angle, fixed, number};
 use subject::Subject;
@@ -43,6 +47,9 @@ pub struct Contents<'a> {
     pub maneuvers: &'a [Maneuver],
     pub fits: &'a [FitRow],
     pub estimates: &'a [EstimateRow],
+    pub correlations: &'a [CorrelationRow],
+    /// When a correlation, an inflation or a group is flagged.
+    pub limits: &'a Limits,
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
@@ -72,6 +79,7 @@ struct Page<'a> {
     never_estimated: Vec<&'a str>,
     comparison: Vec<TableView>,
     maneuvers: TableView,
+    told_apart: Vec<TableView>,
     failures: Vec<TableView>,
     histories: Vec<histories::HistoryView>,
     histories_of: usize,
@@ -108,6 +116,7 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         never_estimated: never_estimated(contents, &subjects),
         comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
+        told_apart: told_apart::tables(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),
         histories_of: contents.histories.len(),

@@ -4,8 +4,10 @@ use super::Contents;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
+use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, HistoryOutput, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
+    TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -14,6 +16,8 @@ pub struct Campaign {
     pub maneuvers: Vec<Maneuver>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
+    pub correlations: Vec<CorrelationRow>,
+    pub limits: Limits,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub channels: Vec<ChannelRow>,
@@ -35,6 +39,8 @@ impl Campaign {
             maneuvers: &self.maneuvers,
             fits: &self.fits,
             estimates: &self.estimates,
+            correlations: &self.correlations,
+            limits: &self.limits,
             trends: &self.trends,
             comparison: &self.comparison,
             channels: &self.channels,
