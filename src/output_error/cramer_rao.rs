@@ -2,17 +2,16 @@
 //!
 //! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹; it is H⁻¹, the
 //! usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate weights that are not. Correlated residuals are
-//! counted by their autocorrelation (Morelli and Klein 1997), tapered so that every variance stays positive, and never
-//! below the bound for white ones.
+//! counted by their autocovariance ([`coloured`]), and the bound is never below the one for white ones.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
+use super::coloured;
 use super::cost::{add_square, residuals, sums};
 use super::outcome::Fit;
-use super::response::Response;
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// 1/√H_jj, one where the data say nothing of a parameter.
@@ -32,13 +31,12 @@ pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> 
 pub enum Identified {
     Determined {
         inverse: DMatrix<f64>,
+        /// T with T Tᵀ = H⁻¹.
+        root: DMatrix<f64>,
         condition_number: f64,
     },
     /// The parameters that take part in the least determined direction.
-    Undetermined {
-        condition_number: Option<f64>,
-        parameters: Vec<usize>,
-    },
+    Undetermined { condition_number: Option<f64>, parameters: Vec<usize> },
 }
 
 /// A parameter takes part in a direction when its share of the unit vector's square is at least this.
@@ -61,10 +59,10 @@ pub fn identified(information: &DMatrix<f64>, max_condition_number: f64) -> Iden
         let condition_number = (smallest > 0.0).then(|| most / smallest);
         return Identified::Undetermined { condition_number, parameters };
     }
-    let inverse = &eigen.eigenvectors
-        * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
-        * eigen.eigenvectors.transpose();
-    Identified::Determined { inverse: scaled(&inverse, &scale), condition_number: most / smallest }
+    let root = DMatrix::from_diagonal(&scale)
+        * &eigen.eigenvectors
+        * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l.sqrt()));
+    Identified::Determined { inverse: &root * root.transpose(), root, condition_number: most / smallest }
 }
 
 /// Variances of the residuals, with the parameters counted as spread evenly over the outputs.
@@ -85,43 +83,38 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
-/// What noise does to the gradient: its covariance for white residuals, and what their correlation adds to it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GradientCovariance {
-    /// Σ Sᵀ W R̂ W S.
-    pub white: DMatrix<f64>,
-    pub coloured: DMatrix<f64>,
-}
-
-/// Bounds of a fit whose information matrix has this inverse.
+/// Bounds of a fit whose information matrix has the inverse T Tᵀ.
 #[must_use]
-pub fn bounds<const NX: usize, E: Equations<NX>>(inverse: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
-    let GradientCovariance { white, coloured } = gradient_covariance(case, &fit.response, &fit.weights);
-    let covariance = inverse * &white * inverse;
-    let corrected = inverse * (&white + &coloured) * inverse;
-    Bounds { corrected: never_below(corrected, &covariance), covariance }
-}
-
-/// The gradient's covariance of one maneuver, from the residuals of its response.
-pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    response: &Response,
-    weights: &[f64; OUTPUTS],
-) -> GradientCovariance {
-    let residuals = residuals(&case.measurements, response);
+pub fn bounds<const NX: usize, E: Equations<NX>>(root: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
+    let residuals = residuals(&case.measurements, &fit.response);
     let variances = variances(&residuals, &case.used(), case.parameters());
     let n = case.parameters();
-    let (mut white, mut extra) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
-    for o in 0..OUTPUTS {
-        let w = weights[o];
-        let correlation = autocorrelation(residuals.iter().map(|v| v[o]));
+    let mut white = DMatrix::zeros(n, n);
+    for (o, (w, variance)) in fit.weights.iter().zip(variances).enumerate() {
         for k in (0..case.samples()).filter(|&k| case.measurements.used[k][o]) {
-            add_square(&mut white, w * w * variances[o], response.sensitivity(k, o));
+            add_square(&mut white, w * w * variance, fit.response.sensitivity(k, o));
         }
-        extra += coloured(case, response, o, &correlation) * (w * w * variances[o]);
     }
     white.fill_upper_triangle_with_lower_triangle();
-    GradientCovariance { white, coloured: extra }
+    let inverse = root * root.transpose();
+    let covariance = &inverse * white * &inverse;
+    let outputs = (0..OUTPUTS).map(|o| series(case, fit, &residuals, o)).collect();
+    Bounds { corrected: never_below(coloured::covariance(root, outputs), &covariance), covariance }
+}
+
+fn series<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    fit: &Fit,
+    residuals: &[[f64; OUTPUTS]],
+    output: usize,
+) -> coloured::Series {
+    let used: Vec<bool> = case.measurements.used.iter().map(|used| used[output]).collect();
+    let mut sensitivities = vec![0.0; case.samples() * case.parameters()];
+    for (k, row) in sensitivities.chunks_exact_mut(case.parameters()).enumerate().filter(|(k, _)| used[*k]) {
+        row.copy_from_slice(fit.response.sensitivity(k, output));
+    }
+    let residuals = residuals.iter().map(|v| v[output]).collect();
+    coloured::Series { weight: fit.weights[output], residuals, used, sensitivities }
 }
 
 /// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with
@@ -157,50 +150,6 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     *covariance += &held;
     *corrected += &held;
     fit.covariance_held = Some(held);
-}
-
-/// Autocorrelation of residuals at lags 1, 2, … with a Bartlett taper to a fifth of the record, so that the sequence
-/// stays positive semidefinite.
-fn autocorrelation(residuals: impl Iterator<Item = f64>) -> Vec<f64> {
-    let v: Vec<f64> = residuals.collect();
-    let square: f64 = v.iter().map(|x| x * x).sum();
-    let reach = v.len() / 5;
-    (1..=reach)
-        .map(|lag| {
-            let product: f64 = v.iter().zip(&v[lag..]).map(|(a, b)| a * b).sum();
-            let taper = 1.0 - lag as f64 / (reach + 1) as f64;
-            if square > 0.0 { taper * product / square } else { 0.0 }
-        })
-        .collect()
-}
-
-/// Σ_{k≠l} ρ(k−l) s_k s_lᵀ of one output: what correlation adds to Σ s_k s_kᵀ.
-fn coloured<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    response: &Response,
-    output: usize,
-    correlation: &[f64],
-) -> DMatrix<f64> {
-    let (n, samples) = (case.parameters(), case.samples());
-    let used = |k: usize| case.measurements.used[k][output];
-    let mut sum = DMatrix::zeros(n, n);
-    let mut later = vec![0.0; n];
-    for k in (0..samples).filter(|&k| used(k)) {
-        later.fill(0.0);
-        for (lag, rho) in (1..).zip(correlation).take_while(|(lag, _)| k + lag < samples) {
-            if used(k + lag) {
-                for (l, s) in later.iter_mut().zip(response.sensitivity(k + lag, output)) {
-                    *l += rho * s;
-                }
-            }
-        }
-        for (j, mut column) in sum.column_iter_mut().enumerate() {
-            for (m, s) in column.iter_mut().zip(response.sensitivity(k, output)) {
-                *m += s * later[j];
-            }
-        }
-    }
-    &sum + sum.transpose()
 }
 
 /// Raises variances that came out below the white ones to them, keeping the correlations.

@@ -17,7 +17,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::cost::sums;
-use super::cramer_rao::{GradientCovariance, gradient_covariance, scale, scaled};
+use super::cramer_rao::{scale, scaled};
+use super::gradient_noise::{GradientCovariance, gradient_covariance};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Parameters to be held or estimated: what the data say of all of them together, and how well some of them are known from elsewhere.

@@ -206,9 +206,9 @@ fn judge<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, fit: &mut Fit, s
     }
     let at = sums(&case.measurements, &fit.response, &fit.weights, case.parameters());
     match cramer_rao::identified(&at.information, settings.max_condition_number) {
-        Identified::Determined { inverse, condition_number } => {
+        Identified::Determined { root, condition_number, .. } => {
             fit.condition_number = Some(condition_number);
-            let bounds = cramer_rao::bounds(&inverse, case, fit);
+            let bounds = cramer_rao::bounds(&root, case, fit);
             fit.covariance = Some(bounds.covariance);
             fit.covariance_corrected = Some(bounds.corrected);
         }
