@@ -1,6 +1,8 @@
 //! Estimate: the derivatives of one maneuver, by output error on its axis's equations.
 
+mod evidence;
 pub mod joint;
+mod measures;
 pub mod prediction;
 #[cfg(test)]
 mod tests;
@@ -17,10 +19,11 @@ use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::identifiability;
 use crate::output_error::newton_raphson::{self, Weights};
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{cramer_rao, equation_error};
-use crate::tables::{EstimateRow, FitRow, History, HistoryOutput};
+use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
 /// What an inactive surface that moves a little all the same (feedback stays closed) does to the aircraft.
@@ -47,6 +50,17 @@ pub enum Start {
     WindTunnel,
 }
 
+/// Who says which derivatives are held at the tunnel's values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// The class (Tables 1 and 3).
+    #[default]
+    Table,
+    /// The maneuver: what the tunnel knows better than the maneuver can tell.
+    Evidence,
+}
+
 /// Choices of the estimation that hold for all classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -56,6 +70,7 @@ pub struct Settings {
     pub mass_properties: MassProperties,
     pub inactive_surfaces: InactiveSurfaces,
     pub start: Start,
+    pub hold: Hold,
     /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
     /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
     pub held_uncertainty_pct: f64,
@@ -71,6 +86,8 @@ pub struct Settings {
     /// Each maneuver predicted with the derivatives of others.
     #[serde(skip_serializing)]
     pub prediction: Option<prediction::Settings>,
+    /// When correlations, inflated variances and groups are worth a word.
+    pub identifiability: identifiability::Limits,
 }
 
 impl Default for Settings {
@@ -81,12 +98,14 @@ impl Default for Settings {
             mass_properties: MassProperties::default(),
             inactive_surfaces: InactiveSurfaces::default(),
             start: Start::default(),
+            hold: Hold::default(),
             held_uncertainty_pct: 20.0,
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
             joint: None,
             prediction: Some(prediction::Settings::default()),
+            identifiability: identifiability::Limits::default(),
         }
     }
 }
@@ -117,6 +136,8 @@ pub struct Estimated {
     /// The sums that the tunnel tabulates, where both parts were estimated.
     pub combined: Vec<EstimateRow>,
     pub covariance: Option<Covariance>,
+    /// Among the regressors as flown and among the estimates.
+    pub correlations: Vec<CorrelationRow>,
     pub history: Option<History>,
 }
 
@@ -124,11 +145,27 @@ pub struct Estimated {
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
     let run = Run { record, maneuver, class, basis };
-    let estimated = match class.axis {
-        Axis::Longitudinal => run.estimate::<3, Longitudinal>(),
-        Axis::Lateral => run.estimate::<4, Lateral>(),
+    match basis.settings.hold {
+        Hold::Table => run.estimated(),
+        Hold::Evidence => by_evidence(&run),
+    }
+}
+
+/// Estimates with what the maneuver's own evidence says is to be held.
+fn by_evidence(run: &Run) -> Estimated {
+    let choice = match run.class.axis {
+        Axis::Longitudinal => run.choose::<3, Longitudinal>(),
+        Axis::Lateral => run.choose::<4, Lateral>(),
     };
-    estimated.unwrap_or_else(|reason| run.rejected(reason))
+    let choice = match choice {
+        Ok(choice) => choice,
+        Err(reason) => return run.rejected(reason),
+    };
+    let mut estimated = Run { class: &choice.applied_to(run.class), ..*run }.estimated();
+    for row in &mut estimated.estimates {
+        row.held_because = choice.held_because.get(&row.derivative).cloned();
+    }
+    estimated
 }
 
 impl Estimated {
@@ -141,11 +178,13 @@ impl Estimated {
             estimates: vec![],
             combined: vec![],
             covariance: None,
+            correlations: vec![],
             history: None,
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Run<'a> {
     record: &'a Record,
     maneuver: &'a Maneuver,
@@ -171,6 +210,19 @@ struct Ready<'a, const NX: usize, E: Equations<NX>> {
 }
 
 impl<'a> Run<'a> {
+    fn estimated(&self) -> Estimated {
+        let estimated = match self.class.axis {
+            Axis::Longitudinal => self.estimate::<3, Longitudinal>(),
+            Axis::Lateral => self.estimate::<4, Lateral>(),
+        };
+        estimated.unwrap_or_else(|reason| self.rejected(reason))
+    }
+
+    /// The maneuver's samples in the record.
+    fn range(&self) -> Range<usize> {
+        self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1
+    }
+
     fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
         let ready = self.ready::<NX, E>(self.model()?)?;
         let case = &ready.case;
@@ -178,18 +230,21 @@ impl<'a> Run<'a> {
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
         cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
-        Ok(Estimated {
+        let mut estimated = Estimated {
             estimates: self.rows(Some((&case.names, &fit))),
             combined: self.combined(&case.names, &fit),
             covariance: covariance(&case.names, &fit),
+            correlations: vec![],
             history: Some(self.history(&case.measurements, &fit, &ready.window, &ready.surfaces)),
             fit: self.fit_row(&fit, ready.left_out),
-        })
+        };
+        self.measure(case, &ready.window, &ready.model, &fit, &mut estimated);
+        Ok(estimated)
     }
 
     /// Cuts the maneuver out of the record and lays it out for this model.
     fn ready<const NX: usize, E: Equations<NX>>(&self, model: Model<'a>) -> Result<Ready<'a, NX, E>, String> {
-        let range = self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1;
+        let range = self.range();
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
@@ -384,6 +439,11 @@ impl<'a> Run<'a> {
             bound_held: None,
             bound_corrected: None,
             wind_tunnel: self.tunnel(name),
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
         }
     }
 
@@ -398,12 +458,21 @@ impl<'a> Run<'a> {
             final_cost: fit.final_cost,
             condition_number: fit.condition_number,
             left_out: Some(left_out),
+            largest_condition_index: None,
+            confounded: None,
         }
     }
 
     fn rejected(&self, reason: String) -> Estimated {
         let fit = rejected(self.maneuver, reason);
-        Estimated { fit, estimates: self.rows(None), combined: vec![], covariance: None, history: None }
+        Estimated {
+            fit,
+            estimates: self.rows(None),
+            combined: vec![],
+            covariance: None,
+            correlations: vec![],
+            history: None,
+        }
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {
@@ -440,6 +509,8 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
         final_cost: None,
         condition_number: None,
         left_out: None,
+        largest_condition_index: None,
+        confounded: None,
     }
 }
 

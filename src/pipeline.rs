@@ -24,14 +24,15 @@ use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
+    TrendRow,
 };
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
 const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 2;
+const ESTIMATE_VERSION: u32 = 3;
 const JOINT_VERSION: u32 = 1;
 const PREDICT_VERSION: u32 = 1;
 
@@ -97,6 +98,7 @@ pub struct Campaign {
     pub joined: Vec<Joined>,
     /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
     pub predicted: Vec<Predicted>,
+    pub correlations: Vec<CorrelationRow>,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub problems: Vec<Problem>,
@@ -323,7 +325,9 @@ impl Run<'_> {
             campaign.fits.push(fit);
             campaign.estimates.extend(estimated.estimates);
             campaign.combined.extend(estimated.combined);
+            campaign.correlations.extend(estimated.correlations);
         }
+        table::publish(&self.config.reports, &campaign.correlations)?;
         self.publish_estimates(campaign)
     }
 
@@ -413,6 +417,8 @@ impl Run<'_> {
             fits: &campaign.fits,
             estimates: &estimates,
             predictions: &campaign.predictions(),
+            correlations: &campaign.correlations,
+            limits: &config.estimate.identifiability,
             trends: &campaign.trends,
             comparison: &campaign.comparison,
             channels: &campaign.channels,

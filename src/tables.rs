@@ -70,6 +70,10 @@ pub struct FitRow {
     pub condition_number: Option<f64>,
     /// Share of the output samples that were marked and left out of the cost.
     pub left_out: Option<f64>,
+    /// Ratio of the lengths of the best and the worst determined direction: the root of the condition number.
+    pub largest_condition_index: Option<f64>,
+    /// Groups of parameters that the data hardly tell apart, worst first: `CN_0 CN_alpha; Cm_de Cm_dpv`.
+    pub confounded: Option<String>,
 }
 
 /// Columns of `fits` beside those of [`FitRow`]: how well the derivatives of others predict the maneuver.
@@ -156,6 +160,28 @@ pub struct EstimateRow {
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.
     pub wind_tunnel: Option<f64>,
+    /// By what factor the other parameters raise the estimate's variance above what it would be if they were known.
+    pub variance_inflation: Option<f64>,
+    /// Root mean square of the regressor about its mean: deg, or rad of a reduced rate; none for a constant.
+    pub excitation: Option<f64>,
+    /// Root mean square of derivative × regressor about its mean, in percent of the coefficient's.
+    pub contribution_pct: Option<f64>,
+    /// The same derivative by least squares on the measured accelerations, as a check.
+    pub equation_error: Option<f64>,
+    /// Why the evidence of the maneuver holds it at the tunnel's value; none where a table decides.
+    pub held_because: Option<String>,
+}
+
+/// `correlations`: two regressors or two estimates of one maneuver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrelationRow {
+    pub maneuver_id: String,
+    pub class: String,
+    /// `regressors`: histories as flown; `estimates`: from the inverse of the information matrix.
+    pub kind: String,
+    pub first: String,
+    pub second: String,
+    pub correlation: f64,
 }
 
 /// `trends`: one derivative's least-squares trend across α for one group of classes.

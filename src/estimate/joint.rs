@@ -18,7 +18,7 @@ use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::cramer_rao::{self, Considered};
-use crate::output_error::{Case, Evidence, Fit, Joint, Outcome, Response, mean, newton_raphson};
+use crate::output_error::{Case, Fit, Joint, Likelihood, Outcome, Response, mean, newton_raphson};
 use crate::tables::{EstimateRow, JointRow};
 
 /// Which maneuvers are estimated together.
@@ -204,6 +204,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     let estimated = Estimated {
         estimates: shared.collect(),
         combined: run.combined(&names, &fit),
+        correlations: vec![],
         covariance: covariance(&names, &fit),
         history: None,
         fit: run.fit_row(&fit, left_out),
@@ -281,7 +282,8 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
 
 fn nothing(whole: &Maneuver) -> Joined {
     let fit = super::rejected(whole, "no maneuver to join".to_owned());
-    let estimated = Estimated { fit, estimates: vec![], combined: vec![], covariance: None, history: None };
+    let estimated =
+        Estimated { fit, estimates: vec![], combined: vec![], correlations: vec![], covariance: None, history: None };
     Joined { estimated, members: vec![] }
 }
 

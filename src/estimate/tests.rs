@@ -1,5 +1,7 @@
 //! Joint estimates and predictions on simulated maneuvers of known derivatives.
 
+mod evidence;
+
 use approx::assert_relative_eq;
 
 use super::joint::{self, bins};

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::case::Case;
 use super::coloured;
 use super::cost::{add_square, sums};
-use super::evidence::Evidence;
+use super::likelihood::Likelihood;
 use super::outcome::Fit;
 use crate::dynamics::{Equations, OUTPUTS};
 
@@ -86,7 +86,7 @@ pub struct Bounds {
 
 /// Bounds of a fit whose information matrix has the inverse T Tᵀ.
 #[must_use]
-pub fn bounds<D: Evidence>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
+pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
     let series = data.series(&fit.response, &fit.weights);
     let n = root.nrows();
     let mut white = DMatrix::zeros(n, n);
@@ -98,6 +98,16 @@ pub fn bounds<D: Evidence>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
     Bounds { corrected: never_below(coloured::covariance(root, series), &covariance), covariance }
+}
+
+/// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
+#[must_use]
+pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
+    let information = data.sums(&fit.response, &fit.weights).information;
+    match identified(&information, max_condition_number) {
+        Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
+        Identified::Undetermined { .. } => None,
+    }
 }
 
 /// A maneuver with the held derivatives free as well, and the values at which their effect is wanted.

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
-use super::evidence::Evidence;
+use super::likelihood::Likelihood;
 use super::response::{Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
@@ -114,11 +114,11 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     #[must_use]
     pub fn costs(&self, response: &[Response], weights: &[f64; OUTPUTS]) -> Vec<f64> {
         let members = self.members.iter().zip(response);
-        members.map(|(m, r)| Evidence::sums(m.case, r, weights).cost()).collect()
+        members.map(|(m, r)| Likelihood::sums(m.case, r, weights).cost()).collect()
     }
 }
 
-impl<const NX: usize, E: Equations<NX>> Evidence for Joint<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     type Response = Vec<Response>;
 
     fn names(&self) -> &[String] {
@@ -160,7 +160,7 @@ impl<const NX: usize, E: Equations<NX>> Evidence for Joint<'_, NX, E> {
     fn variances(&self, response: &Vec<Response>) -> [f64; OUTPUTS] {
         let (mut squares, mut counts) = ([0.0; OUTPUTS], [0.0; OUTPUTS]);
         for (member, response) in self.members.iter().zip(response) {
-            let (variances, used) = (Evidence::variances(member.case, response), member.case.used());
+            let (variances, used) = (Likelihood::variances(member.case, response), member.case.used());
             for o in 0..OUTPUTS {
                 squares[o] += variances[o] * used[o] as f64;
                 counts[o] += used[o] as f64;

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::cost::Sums;
 use super::cramer_rao::{self, Identified};
-use super::evidence::Evidence;
+use super::likelihood::Likelihood;
 use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 
@@ -50,7 +50,7 @@ const WEIGHTS_SETTLED: f64 = 1e-3;
 ///
 /// `resolution` is the smallest standard deviation of each output that is believed when weights are estimated.
 #[must_use]
-pub fn estimate<D: Evidence>(
+pub fn estimate<D: Likelihood>(
     data: &D,
     start: Vec<f64>,
     table: [f64; OUTPUTS],
@@ -79,13 +79,13 @@ pub fn estimate<D: Evidence>(
     fit
 }
 
-fn residual_weights<D: Evidence>(data: &D, fit: &Fit<D::Response>, resolution: [f64; OUTPUTS]) -> [f64; OUTPUTS] {
+fn residual_weights<D: Likelihood>(data: &D, fit: &Fit<D::Response>, resolution: [f64; OUTPUTS]) -> [f64; OUTPUTS] {
     let variances = data.variances(&fit.response);
     std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
 }
 
 /// The iteration from a start with fixed weights.
-fn iterate<D: Evidence>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], settings: &Settings) -> Fit<D::Response> {
+fn iterate<D: Likelihood>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], settings: &Settings) -> Fit<D::Response> {
     let (mut response, mut trial) = (data.response(), data.response());
     let mut fit = Fit {
         outcome: Outcome::NotConverged,
@@ -136,7 +136,7 @@ fn iterate<D: Evidence>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], sett
 }
 
 /// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
-fn lower<D: Evidence>(
+fn lower<D: Likelihood>(
     data: &D,
     values: &[f64],
     at: &Sums,
@@ -189,7 +189,7 @@ fn step(at: &Sums, damping: f64) -> Option<DVector<f64>> {
 }
 
 /// Bounds of a fit, and the verdict on directions that the data do not determine.
-fn judge<D: Evidence>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
+fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
     if fit.final_cost.is_none() {
         return;
     }

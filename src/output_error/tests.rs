@@ -18,11 +18,11 @@ use crate::flight::{Mark, Record, signal};
 pub(crate) const SAMPLES: usize = 320;
 const STEP_S: f64 = 0.025;
 
-fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
+pub(crate) fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
     Derivative { name: name.into(), coefficient, regressor }
 }
 
-fn surface(name: &str) -> Regressor {
+pub(crate) fn surface(name: &str) -> Regressor {
     Regressor::Surface(name.into())
 }
 
@@ -123,7 +123,7 @@ fn window() -> Window {
     Window::cut(&record(), 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap()
 }
 
-fn nothing_measured() -> Measurements {
+pub(crate) fn nothing_measured() -> Measurements {
     Measurements { values: vec![[0.0; OUTPUTS]; SAMPLES], used: vec![[true; OUTPUTS]; SAMPLES] }
 }
 

@@ -15,6 +15,7 @@ mod subject;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod told_apart;
 mod verdict;
 
 use std::collections::BTreeSet;
@@ -26,8 +27,10 @@ use serde::Serialize;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
+use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
+    TrendRow,
 };
 use failures::TableView;
 use notation::{Digits, NOTHING, angle, fixed, number};
@@ -48,6 +51,9 @@ pub struct Contents<'a> {
     pub estimates: &'a [EstimateRow],
     /// Each maneuver's outputs predicted with the derivatives of others.
     pub predictions: &'a [PredictionRow],
+    pub correlations: &'a [CorrelationRow],
+    /// When a correlation, an inflation or a group is flagged.
+    pub limits: &'a Limits,
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
@@ -78,6 +84,7 @@ struct Page<'a> {
     comparison: Vec<TableView>,
     maneuvers: TableView,
     predictions: Option<TableView>,
+    told_apart: Vec<TableView>,
     failures: Vec<TableView>,
     histories: Vec<histories::HistoryView>,
     histories_of: usize,
@@ -115,6 +122,7 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
         predictions: predictions::table(contents),
+        told_apart: told_apart::tables(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),
         histories_of: contents.histories.len(),

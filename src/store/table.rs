@@ -10,7 +10,8 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::Maneuver;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, JointRow, PredictedRow, PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, JointRow, PredictedRow,
+    PredictionRow, TrendRow,
 };
 
 /// A row type with the name of its table and its columns.
@@ -90,9 +91,11 @@ macro_rules! table {
 
 table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
     altitude_ft mass_slug x_cg_ft samples origin);
-table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out);
+table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out
+    largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
-    bound_held bound_corrected wind_tunnel);
+    bound_held bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error held_because);
+table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
 table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
     difference_pct z verdict);

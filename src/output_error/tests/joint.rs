@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::super::cramer_rao::Considered;
-use super::super::{Evidence, Joint};
+use super::super::{Joint, Likelihood};
 use super::*;
 
 type Longitudinals = Case<3, Longitudinal>;
@@ -21,7 +21,7 @@ fn precise() -> Settings {
     Settings { tolerance: 1e-13, ..Settings::default() }
 }
 
-fn fit_of<D: Evidence>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
+fn fit_of<D: Likelihood>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
     let fit = estimate(data, start, TABLE, Weights::Table, [1e-6; OUTPUTS], &precise());
     assert_eq!(fit.outcome, Outcome::Converged, "{}", fit.reason);
     fit
@@ -70,7 +70,7 @@ fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
     let mut response = joint.response();
     let mut sums = |parameters: &[f64]| {
         joint.respond(parameters, &mut response).unwrap();
-        Evidence::sums(&joint, &response, &TABLE)
+        Likelihood::sums(&joint, &response, &TABLE)
     };
     let gradient = sums(&at).gradient;
     for j in 0..at.len() {

@@ -8,7 +8,7 @@ use super::response::{Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Data that say something of parameters: cost, gradient and information at any values of them.
-pub trait Evidence {
+pub trait Likelihood {
     /// Computed outputs with their sensitivities, allocated once and written over at every iteration.
     type Response;
 
@@ -37,7 +37,7 @@ pub trait Evidence {
     fn place(&self, diverged: Diverged) -> String;
 }
 
-impl<const NX: usize, E: Equations<NX>> Evidence for Case<NX, E> {
+impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
     type Response = Response;
 
     fn names(&self) -> &[String] {
@@ -63,7 +63,7 @@ impl<const NX: usize, E: Equations<NX>> Evidence for Case<NX, E> {
 
     fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<Series> {
         let residuals = cost::residuals(&self.measurements, response);
-        let variances = Evidence::variances(self, response);
+        let variances = Likelihood::variances(self, response);
         let n = self.parameters();
         let series = |o: usize| {
             let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
