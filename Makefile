@@ -5,6 +5,9 @@
 #   make trend ARCHIVE='flights/*.parquet' THREADS=1
 
 PIPELINE ?= harv
+# Of make simulate.
+CARDS ?= pipelines/$(PIPELINE)/cards.yaml
+OUT ?= data/simulation/campaign
 
 # Handed to harvest where they are set; otherwise the pipeline's own settings hold.
 options = \
@@ -20,7 +23,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report nightly check build test bench lint clean help
+.PHONY: ingest segment estimate trend compare report nightly check simulate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest)
@@ -46,6 +49,9 @@ nightly: build ## the main job: every stage, to the report
 check: build ## is the pipeline's configuration right, and what would it do
 	$(call harvest,check)
 
+simulate: build ## fly the test cards CARDS into OUT: archive, wind-tunnel database and truth
+	cargo run --release --locked --quiet -- simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
+
 # By itself, so that the long first build shows its progress; the stages then only start the binary.
 build: ## build the binary (the first time takes minutes)
 	cargo build --release --locked
@@ -67,6 +73,9 @@ help: ## this list
 	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [STORE=] [REPORTS=] [THREADS=]'
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo
+	@echo 'make simulate takes [CARDS=$(CARDS)] [OUT=$(OUT)]; then for instance'
+	@echo '  make nightly ARCHIVE=$(OUT)/flights WIND_TUNNEL=$(OUT)/wind_tunnel.csv STORE=data/store/simulated REPORTS=reports/simulated'
 	@echo
 	@echo 'Every stage first brings its predecessors up to date; what is up to date is not done again.'
 	@echo 'make ends with "Error 2" when harvest ran and rejected something (a flight, a maneuver): the tables and'

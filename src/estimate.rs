@@ -1,21 +1,29 @@
 //! Estimate: the derivatives of one maneuver, by output error on its axis's equations.
 
+mod evidence;
+pub mod joint;
+mod measures;
+pub mod prediction;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, WindTunnel};
+use crate::aero::{Axis, Bias, Buildup, Combined, Derivative, Output, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::identifiability;
 use crate::output_error::newton_raphson::{self, Weights};
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{cramer_rao, equation_error};
-use crate::tables::{EstimateRow, FitRow, History, HistoryOutput};
+use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
 /// What an inactive surface that moves a little all the same (feedback stays closed) does to the aircraft.
@@ -42,6 +50,17 @@ pub enum Start {
     WindTunnel,
 }
 
+/// Who says which derivatives are held at the tunnel's values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// The class (Tables 1 and 3).
+    #[default]
+    Table,
+    /// The maneuver: what the tunnel knows better than the maneuver can tell.
+    Evidence,
+}
+
 /// Choices of the estimation that hold for all classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -51,6 +70,7 @@ pub struct Settings {
     pub mass_properties: MassProperties,
     pub inactive_surfaces: InactiveSurfaces,
     pub start: Start,
+    pub hold: Hold,
     /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
     /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
     pub held_uncertainty_pct: f64,
@@ -59,6 +79,15 @@ pub struct Settings {
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
     pub iteration: newton_raphson::Settings,
+    /// Maneuvers of one class and angle of attack estimated together as well; none unless asked for. Neither this nor
+    /// `prediction` changes the estimate of a maneuver alone, so neither is among what decides it (fingerprints).
+    #[serde(skip_serializing)]
+    pub joint: Option<joint::Settings>,
+    /// Each maneuver predicted with the derivatives of others.
+    #[serde(skip_serializing)]
+    pub prediction: Option<prediction::Settings>,
+    /// When correlations, inflated variances and groups are worth a word.
+    pub identifiability: identifiability::Limits,
 }
 
 impl Default for Settings {
@@ -69,10 +98,14 @@ impl Default for Settings {
             mass_properties: MassProperties::default(),
             inactive_surfaces: InactiveSurfaces::default(),
             start: Start::default(),
+            hold: Hold::default(),
             held_uncertainty_pct: 20.0,
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
+            joint: None,
+            prediction: Some(prediction::Settings::default()),
+            identifiability: identifiability::Limits::default(),
         }
     }
 }
@@ -103,6 +136,8 @@ pub struct Estimated {
     /// The sums that the tunnel tabulates, where both parts were estimated.
     pub combined: Vec<EstimateRow>,
     pub covariance: Option<Covariance>,
+    /// Among the regressors as flown and among the estimates.
+    pub correlations: Vec<CorrelationRow>,
     pub history: Option<History>,
 }
 
@@ -110,11 +145,27 @@ pub struct Estimated {
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
     let run = Run { record, maneuver, class, basis };
-    let estimated = match class.axis {
-        Axis::Longitudinal => run.estimate::<3, Longitudinal>(),
-        Axis::Lateral => run.estimate::<4, Lateral>(),
+    match basis.settings.hold {
+        Hold::Table => run.estimated(),
+        Hold::Evidence => by_evidence(&run),
+    }
+}
+
+/// Estimates with what the maneuver's own evidence says is to be held.
+fn by_evidence(run: &Run) -> Estimated {
+    let choice = match run.class.axis {
+        Axis::Longitudinal => run.choose::<3, Longitudinal>(),
+        Axis::Lateral => run.choose::<4, Lateral>(),
     };
-    estimated.unwrap_or_else(|reason| run.rejected(reason))
+    let choice = match choice {
+        Ok(choice) => choice,
+        Err(reason) => return run.rejected(reason),
+    };
+    let mut estimated = Run { class: &choice.applied_to(run.class), ..*run }.estimated();
+    for row in &mut estimated.estimates {
+        row.held_because = choice.held_because.get(&row.derivative).cloned();
+    }
+    estimated
 }
 
 impl Estimated {
@@ -127,11 +178,13 @@ impl Estimated {
             estimates: vec![],
             combined: vec![],
             covariance: None,
+            correlations: vec![],
             history: None,
         }
     }
 }
 
+#[derive(Clone, Copy)]
 struct Run<'a> {
     record: &'a Record,
     maneuver: &'a Maneuver,
@@ -146,10 +199,52 @@ struct Term<'a> {
     status: Status,
 }
 
+/// A maneuver made ready: everything that does not depend on the parameters.
+struct Ready<'a, const NX: usize, E: Equations<NX>> {
+    model: Model<'a>,
+    surfaces: Vec<&'a str>,
+    window: Window,
+    case: Case<NX, E>,
+    /// Share of the output samples that do not count.
+    left_out: f64,
+}
+
 impl<'a> Run<'a> {
+    fn estimated(&self) -> Estimated {
+        let estimated = match self.class.axis {
+            Axis::Longitudinal => self.estimate::<3, Longitudinal>(),
+            Axis::Lateral => self.estimate::<4, Lateral>(),
+        };
+        estimated.unwrap_or_else(|reason| self.rejected(reason))
+    }
+
+    /// The maneuver's samples in the record.
+    fn range(&self) -> Range<usize> {
+        self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1
+    }
+
     fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
-        let range = self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1;
-        let model = self.model()?;
+        let ready = self.ready::<NX, E>(self.model()?)?;
+        let case = &ready.case;
+        let mut fit = self.fit(case)?;
+        let wide = self.wide(&ready);
+        let values = values_of(&ready.model, &case.names, &fit.values);
+        cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
+        let mut estimated = Estimated {
+            estimates: self.rows(Some((&case.names, &fit))),
+            combined: self.combined(&case.names, &fit),
+            covariance: covariance(&case.names, &fit),
+            correlations: vec![],
+            history: Some(self.history(&case.measurements, &fit, &ready.window, &ready.surfaces)),
+            fit: self.fit_row(&fit, ready.left_out),
+        };
+        self.measure(case, &ready.window, &ready.model, &fit, &mut estimated);
+        Ok(estimated)
+    }
+
+    /// Cuts the maneuver out of the record and lays it out for this model.
+    fn ready<const NX: usize, E: Equations<NX>>(&self, model: Model<'a>) -> Result<Ready<'a, NX, E>, String> {
+        let range = self.range();
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
@@ -164,15 +259,7 @@ impl<'a> Run<'a> {
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
-        let mut fit = self.fit(&case)?;
-        self.consider::<NX, E>(&case, &window, &model, &mut fit);
-        Ok(Estimated {
-            estimates: self.rows(Some((&case.names, &fit))),
-            combined: self.combined(&case.names, &fit),
-            covariance: covariance(&case.names, &fit),
-            history: Some(self.history(&case.measurements, &fit, &window, &surfaces)),
-            fit: self.fit_row(&fit, left_out),
-        })
+        Ok(Ready { model, surfaces, window, case, left_out })
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
@@ -184,7 +271,7 @@ impl<'a> Run<'a> {
             Start::EquationError => (implied, tunnel),
             Start::WindTunnel => (tunnel, implied),
         };
-        let resolution = self.class.axis.outputs().map(|o| settings.resolution.get(&o).copied().unwrap_or(1e-6));
+        let resolution = self.resolution();
         let weights = self.weights()?;
         let from =
             |start| newton_raphson::estimate(case, start, weights, settings.weights, resolution, &settings.iteration);
@@ -196,29 +283,16 @@ impl<'a> Run<'a> {
         Ok(if other.outcome == Outcome::Converged { other } else { fit })
     }
 
-    /// Adds to the bounds what the uncertainty of the held values does to the estimates (consider covariance).
-    fn consider<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        window: &Window,
-        model: &Model<'a>,
-        fit: &mut Fit,
-    ) {
-        let held: Vec<(&Derivative, f64)> = model.held.iter().map(|(d, _)| (*d, self.held_uncertainty(d))).collect();
-        let all = Model {
-            free: [model.free.clone(), held.iter().map(|(d, _)| *d).collect()].concat(),
-            held: vec![],
-            ..model.clone()
-        };
-        let values: BTreeMap<&str, f64> = model
-            .held
-            .iter()
-            .map(|(d, value)| (d.name.as_str(), *value))
-            .chain(case.names.iter().map(String::as_str).zip(fit.values.iter().copied()))
-            .collect();
-        let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
-        let uncertainties: BTreeMap<&str, f64> = held.iter().map(|(d, u)| (d.name.as_str(), *u)).collect();
-        cramer_rao::consider(case, &wide, &values, &uncertainties, fit);
+    /// The maneuver with the held derivatives free as well: what an error of theirs would do.
+    fn wide<const NX: usize, E: Equations<NX>>(&self, ready: &Ready<'a, NX, E>) -> Case<NX, E> {
+        let Ready { model, window, case, .. } = ready;
+        let held = model.held.iter().map(|(d, _)| *d);
+        let all = Model { free: model.free.iter().copied().chain(held).collect(), held: vec![], ..model.clone() };
+        Case::new(self.basis.aircraft, window, case.measurements.clone(), &all)
+    }
+
+    fn held_uncertainties(&self, model: &Model<'a>) -> BTreeMap<&'a str, f64> {
+        model.held.iter().map(|(d, _)| (d.name.as_str(), self.held_uncertainty(d))).collect()
     }
 
     /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
@@ -231,6 +305,11 @@ impl<'a> Run<'a> {
 
     fn status(&self, name: &str) -> Option<Status> {
         self.class.status(name, self.maneuver.alpha_deg)
+    }
+
+    /// Whether a derivative is its coefficient's constant.
+    fn is_constant(&self, name: &str) -> bool {
+        self.basis.buildup.derivative(name).is_some_and(|d| d.regressor == Regressor::Constant)
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {
@@ -271,6 +350,11 @@ impl<'a> Run<'a> {
                 .ok_or_else(|| format!("class {} has no weight for `{}`", self.class.name, output.signal()))?;
         }
         Ok(weights)
+    }
+
+    fn resolution(&self) -> [f64; OUTPUTS] {
+        let resolution = &self.basis.settings.resolution;
+        self.class.axis.outputs().map(|o| resolution.get(&o).copied().unwrap_or(1e-6))
     }
 
     fn measurements(&self, range: &Range<usize>) -> Result<Measurements, String> {
@@ -355,6 +439,11 @@ impl<'a> Run<'a> {
             bound_held: None,
             bound_corrected: None,
             wind_tunnel: self.tunnel(name),
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
         }
     }
 
@@ -369,12 +458,21 @@ impl<'a> Run<'a> {
             final_cost: fit.final_cost,
             condition_number: fit.condition_number,
             left_out: Some(left_out),
+            largest_condition_index: None,
+            confounded: None,
         }
     }
 
     fn rejected(&self, reason: String) -> Estimated {
         let fit = rejected(self.maneuver, reason);
-        Estimated { fit, estimates: self.rows(None), combined: vec![], covariance: None, history: None }
+        Estimated {
+            fit,
+            estimates: self.rows(None),
+            combined: vec![],
+            covariance: None,
+            correlations: vec![],
+            history: None,
+        }
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {
@@ -411,7 +509,15 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
         final_cost: None,
         condition_number: None,
         left_out: None,
+        largest_condition_index: None,
+        confounded: None,
     }
+}
+
+/// Every parameter of a maneuver by name: the held ones' values, and the free ones'.
+fn values_of<'a>(model: &'a Model, names: &'a [String], values: &[f64]) -> BTreeMap<&'a str, f64> {
+    let held = model.held.iter().map(|(d, value)| (d.name.as_str(), *value));
+    held.chain(names.iter().map(String::as_str).zip(values.iter().copied())).collect()
 }
 
 fn covariance(names: &[String], fit: &Fit) -> Option<Covariance> {

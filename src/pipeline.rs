@@ -1,9 +1,11 @@
 //! The conductor: brings the stages of a campaign up to date in order, in parallel within each, and publishes their tables.
 //!
-//! Per flight: ingest, segment. Per maneuver: estimate. Their artefacts lie in the store under fingerprints of all that
+//! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts lie in the store under fingerprints of all that
 //! decides them, so what is up to date is not done again, and a killed run goes on where it was. Trend, compare and report
 //! are small and are made anew from the artefacts. Results are collected in the order of flights and maneuvers, whatever
 //! thread made them.
+
+mod others;
 
 use std::path::PathBuf;
 
@@ -12,6 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::Config;
 use crate::error::{Problem, Result};
+use crate::estimate::joint::Joined;
+use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
@@ -19,13 +23,18 @@ use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
+    TrendRow,
+};
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
 const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 2;
+const ESTIMATE_VERSION: u32 = 3;
+const JOINT_VERSION: u32 = 1;
+const PREDICT_VERSION: u32 = 1;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,6 +93,12 @@ pub struct Campaign {
     pub estimates: Vec<EstimateRow>,
     /// The sums that the tunnel tabulates, with the variance of the sum.
     pub combined: Vec<EstimateRow>,
+    /// Maneuvers estimated together: published with the others' rows, but in no trend, which would count the same data
+    /// twice.
+    pub joined: Vec<Joined>,
+    /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
+    pub predicted: Vec<Predicted>,
+    pub correlations: Vec<CorrelationRow>,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub problems: Vec<Problem>,
@@ -101,6 +116,11 @@ impl Campaign {
     /// The estimates and the combined sums.
     fn estimated(&self) -> impl Iterator<Item = &EstimateRow> {
         self.estimates.iter().chain(&self.combined)
+    }
+
+    /// The outputs of every predicted maneuver.
+    fn predictions(&self) -> Vec<PredictionRow> {
+        self.predicted.iter().flat_map(|p| &p.outputs).cloned().collect()
     }
 
     /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for a trend is among the
@@ -294,6 +314,8 @@ impl Run<'_> {
         self.progress.end();
         let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
         self.store.keep_only("estimate", &paths)?;
+        self.join(campaign, &paths)?;
+        self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
             let fit = estimated.fit;
             if fit.outcome != Outcome::Converged.name() {
@@ -303,10 +325,10 @@ impl Run<'_> {
             campaign.fits.push(fit);
             campaign.estimates.extend(estimated.estimates);
             campaign.combined.extend(estimated.combined);
+            campaign.correlations.extend(estimated.correlations);
         }
-        table::publish(&self.config.reports, &campaign.fits)?;
-        table::publish(&self.config.reports, &campaign.estimates)?;
-        table::publish_as(&self.config.reports, "combined", &campaign.combined)
+        table::publish(&self.config.reports, &campaign.correlations)?;
+        self.publish_estimates(campaign)
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
@@ -348,16 +370,19 @@ impl Run<'_> {
     }
 
     fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
+        match self.config.class(&maneuver.class) {
+            Some(class) => estimate::maneuver(record, maneuver, class, &self.basis()),
+            None => Estimated::unknown_class(maneuver),
+        }
+    }
+
+    fn basis(&self) -> Basis<'_> {
         let config = self.config;
-        let basis = Basis {
+        Basis {
             aircraft: &config.aircraft,
             buildup: &config.buildup,
             tunnel: &config.tunnel,
             settings: &config.estimate,
-        };
-        match config.class(&maneuver.class) {
-            Some(class) => estimate::maneuver(record, maneuver, class, &basis),
-            None => Estimated::unknown_class(maneuver),
         }
     }
 
@@ -391,6 +416,9 @@ impl Run<'_> {
             maneuvers: &campaign.maneuvers,
             fits: &campaign.fits,
             estimates: &estimates,
+            predictions: &campaign.predictions(),
+            correlations: &campaign.correlations,
+            limits: &config.estimate.identifiability,
             trends: &campaign.trends,
             comparison: &campaign.comparison,
             channels: &campaign.channels,

@@ -2,7 +2,11 @@
 //! `None` (a null in Parquet, an empty field in CSV). The `maneuvers` table's row is [`crate::maneuver::Maneuver`], the
 //! `problems` table's is [`crate::error::Problem`].
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
+
+use crate::aero::Output;
 
 /// `channels`: what ingest did to one channel of one flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -66,6 +70,71 @@ pub struct FitRow {
     pub condition_number: Option<f64>,
     /// Share of the output samples that were marked and left out of the cost.
     pub left_out: Option<f64>,
+    /// Ratio of the lengths of the best and the worst determined direction: the root of the condition number.
+    pub largest_condition_index: Option<f64>,
+    /// Groups of parameters that the data hardly tell apart, worst first: `CN_0 CN_alpha; Cm_de Cm_dpv`.
+    pub confounded: Option<String>,
+}
+
+/// Columns of `fits` beside those of [`FitRow`]: how well the derivatives of others predict the maneuver.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PredictedRow {
+    /// `predicted`, or why it was not; none for maneuvers joined.
+    pub prediction: Option<String>,
+    /// How many others it was predicted from.
+    pub predicted_from: Option<usize>,
+    /// J of eq. 1.2 of the prediction, to be held against `final_cost`.
+    pub predicted_cost: Option<f64>,
+    /// Theil's inequality coefficient over all outputs, weighted as in the cost, and the shares of its parts.
+    pub theil: Option<f64>,
+    pub theil_bias: Option<f64>,
+    pub theil_variance: Option<f64>,
+    pub theil_covariance: Option<f64>,
+    /// Columns `theil_alpha`, `theil_q` and so on; the other axis's outputs have none.
+    pub theil_of: BTreeMap<Output, f64>,
+    /// Columns `r_squared_alpha`, `r_squared_q` and so on.
+    pub r_squared_of: BTreeMap<Output, f64>,
+}
+
+/// `predictions`: one output of one maneuver, predicted with the derivatives of others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PredictionRow {
+    pub maneuver_id: String,
+    pub class: String,
+    pub alpha_deg: f64,
+    pub output: String,
+    pub unit: String,
+    /// That count.
+    pub samples: usize,
+    /// Root mean square of measured minus predicted, in the unit.
+    pub root_mean_square: f64,
+    pub theil: Option<f64>,
+    pub theil_bias: Option<f64>,
+    pub theil_variance: Option<f64>,
+    pub theil_covariance: Option<f64>,
+    pub r_squared: Option<f64>,
+}
+
+/// `joint`: one maneuver of those that were estimated together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointRow {
+    /// The `maneuver_id` of the joint rows of `fits`, `estimates` and `combined`.
+    pub joint_id: String,
+    pub class: String,
+    /// Means over the maneuvers that take part.
+    pub joint_alpha_deg: f64,
+    pub joint_mach: f64,
+    /// How many take part.
+    pub maneuvers: usize,
+    pub maneuver_id: String,
+    pub flight_id: String,
+    pub alpha_deg: f64,
+    pub mach: f64,
+    /// `joined`, or why it was left out.
+    pub part: String,
+    /// J of eq. 1.2 of this maneuver with its own derivatives, and with the shared ones.
+    pub cost_alone: Option<f64>,
+    pub cost_joint: Option<f64>,
 }
 
 /// `estimates`: one derivative of one maneuver.
@@ -91,6 +160,28 @@ pub struct EstimateRow {
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.
     pub wind_tunnel: Option<f64>,
+    /// By what factor the other parameters raise the estimate's variance above what it would be if they were known.
+    pub variance_inflation: Option<f64>,
+    /// Root mean square of the regressor about its mean: deg, or rad of a reduced rate; none for a constant.
+    pub excitation: Option<f64>,
+    /// Root mean square of derivative × regressor about its mean, in percent of the coefficient's.
+    pub contribution_pct: Option<f64>,
+    /// The same derivative by least squares on the measured accelerations, as a check.
+    pub equation_error: Option<f64>,
+    /// Why the evidence of the maneuver holds it at the tunnel's value; none where a table decides.
+    pub held_because: Option<String>,
+}
+
+/// `correlations`: two regressors or two estimates of one maneuver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrelationRow {
+    pub maneuver_id: String,
+    pub class: String,
+    /// `regressors`: histories as flown; `estimates`: from the inverse of the information matrix.
+    pub kind: String,
+    pub first: String,
+    pub second: String,
+    pub correlation: f64,
 }
 
 /// `trends`: one derivative's least-squares trend across α for one group of classes.

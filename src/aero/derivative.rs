@@ -106,6 +106,23 @@ impl Output {
         }
     }
 
+    /// As in the YAML and in the names of columns.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Output::Alpha => "alpha",
+            Output::Q => "q",
+            Output::Theta => "theta",
+            Output::An => "an",
+            Output::Ax => "ax",
+            Output::Beta => "beta",
+            Output::P => "p",
+            Output::R => "r",
+            Output::Phi => "phi",
+            Output::Ay => "ay",
+        }
+    }
+
     #[must_use]
     pub fn axis(self) -> Axis {
         if Axis::Longitudinal.outputs().contains(&self) { Axis::Longitudinal } else { Axis::Lateral }

@@ -202,22 +202,18 @@ fn weights(class: &Class, source: &Source) -> Result<()> {
                 word(*output),
                 class.axis.name()
             );
-            return Err(source.error_under("weights", &name(*output), what));
+            return Err(source.error_under("weights", output.name(), what));
         }
         if !(weight.is_finite() && *weight > 0.0) {
             let what = format!("class {}: the weight of {} must be greater than zero", class.name, word(*output));
-            return Err(source.error_under("weights", &name(*output), what));
+            return Err(source.error_under("weights", output.name(), what));
         }
     }
     Ok(())
 }
 
-fn name(output: Output) -> String {
-    format!("{output:?}").to_lowercase()
-}
-
 fn word(output: Output) -> String {
-    format!("`{}`", name(output))
+    format!("`{}`", output.name())
 }
 
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
@@ -249,6 +245,13 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
     let segment = std::iter::once(&config.segment.excitation_flag).chain(config.segment.steps.keys());
     for name in segment {
         known_signal(config, source, name, "segment")?;
+    }
+    let angles = config.estimate.joint.iter().map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
+    let distances = config.estimate.prediction.iter().map(|p| ("alpha_distance_deg", p.alpha_distance_deg));
+    for (name, angle_deg) in angles.chain(distances) {
+        if !(angle_deg.is_finite() && angle_deg > 0.0) {
+            return Err(source.error(name, format!("`{name}` must be greater than zero, not {angle_deg}")));
+        }
     }
     let names = config.derivative_names();
     let known = names.iter().map(String::as_str);

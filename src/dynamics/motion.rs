@@ -175,7 +175,7 @@ fn constant(values: &[f64]) -> Vec<f64> {
 
 /// Samples on each side of the local straight line whose slope stands for the derivative: 0.1 s at 40 Hz, short against
 /// the airframe's modes, long enough to hold the gyros' noise under the accelerometers' when it meets an arm.
-const SLOPE_REACH: usize = 4;
+pub const SLOPE_REACH: usize = 4;
 
 /// Slope per second of a signal over a range of the record, by local least squares on up to nine samples.
 fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {

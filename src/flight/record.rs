@@ -70,4 +70,24 @@ impl Record {
     pub fn values(&self, signal: &str) -> Option<&[f64]> {
         self.signals.get(signal).map(|s| s.values.as_slice())
     }
+
+    /// The part of the record from one time to another, with a few samples more on each side: slopes of signals at the
+    /// ends of the part are those of the whole. Sample times are unchanged.
+    #[must_use]
+    pub fn part(&self, start_s: f64, end_s: f64) -> Record {
+        const MARGIN: usize = 10;
+        let from = self.sample_at(start_s).saturating_sub(MARGIN);
+        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.samples);
+        let cut = |s: &Series| Series {
+            values: s.values.get(from..to).unwrap_or_default().to_vec(),
+            marks: s.marks.get(from..to).unwrap_or_default().to_vec(),
+        };
+        Record {
+            flight_id: self.flight_id.clone(),
+            start_s: self.time_s(from),
+            step_s: self.step_s,
+            samples: to.saturating_sub(from),
+            signals: self.signals.iter().map(|(name, series)| (name.clone(), cut(series))).collect(),
+        }
+    }
 }

@@ -102,6 +102,18 @@ impl Class {
             .copied()
     }
 
+    /// The class as it is at a mean angle of attack, and so at every other: for maneuvers that must agree.
+    #[must_use]
+    pub fn at(&self, alpha_deg: f64) -> Class {
+        let mut class = self.clone();
+        for over in self.overrides_at(alpha_deg) {
+            class.statuses.extend(over.statuses.clone());
+            class.weights.extend(over.weights.clone());
+        }
+        class.overrides.clear();
+        class
+    }
+
     fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &Overrides> {
         self.overrides.iter().filter(move |o| alpha_deg > o.above_alpha_deg)
     }
@@ -130,5 +142,8 @@ mod tests {
         assert_eq!(class.status("CY_da", 25.0), Some(Status::Estimated));
         assert_eq!(class.weight(Output::P, 22.5), Some(3.0));
         assert_eq!(class.weight(Output::P, 22.6), Some(6.0));
+        let above = class.at(25.0);
+        assert_eq!((above.status("CY_da", 10.0), above.weight(Output::P, 10.0)), (Some(Status::Estimated), Some(6.0)));
+        assert_eq!(class.at(20.0).status("CY_da", 25.0), Some(Status::Held));
     }
 }

@@ -137,6 +137,25 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         std::array::from_fn(|o| self.measurements.used.iter().filter(|used| used[o]).count())
     }
 
+    /// The history of a free derivative's regressor along the measured motion, in what the derivative multiplies: deg,
+    /// rad of a reduced rate, for a vane deg over q̄S (and the reference length).
+    #[must_use]
+    pub fn regressor_as_flown(&self, derivative: usize) -> Vec<f64> {
+        let n = self.derivatives();
+        let along = self.along_state.iter().find(|(j, _)| *j == derivative).map(|(_, state)| *state);
+        let at = |(sample, state): (usize, &SVector<f64, NX>)| {
+            let factor = self.regressors[2 * sample * n + derivative];
+            along.map_or(factor, |i| factor * state[i])
+        };
+        self.states.iter().enumerate().map(at).collect()
+    }
+
+    /// The free derivatives of the same coefficient as `derivative`, itself among them.
+    #[must_use]
+    pub fn of_same_coefficient(&self, derivative: usize) -> Range<usize> {
+        self.ranges.iter().find(|range| range.contains(&derivative)).cloned().unwrap_or_default()
+    }
+
     /// The parameters to start from: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
     #[must_use]
     pub fn starting_values(&self, derivative: impl Fn(&str) -> f64) -> Vec<f64> {

@@ -5,7 +5,7 @@
 //! covariance is (I − P) R (I − P)ᵀ, so what P took is added back, round after round until R settles. R of each output is
 //! that of an autoregressive process, by which the sensitivities are filtered: every variance is a sum of squares.
 //!
-//! Sensitivities are kept as S T with T Tᵀ = H⁻¹, which makes H the unit matrix.
+//! For this sensitivities are taken as S T with T Tᵀ = H⁻¹, which makes H the unit matrix.
 
 use nalgebra::DMatrix;
 
@@ -23,6 +23,8 @@ const SETTLED: f64 = 0.1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub weight: f64,
+    /// Of the residuals, were they white.
+    pub variance: f64,
     /// Zero where a sample does not count.
     pub residuals: Vec<f64>,
     pub used: Vec<bool>,
@@ -30,28 +32,58 @@ pub struct Series {
     pub sensitivities: Vec<f64>,
 }
 
+/// The noise of each output.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Noise(Vec<Autoregression>);
+
 /// Covariance of the parameters, where T Tᵀ = H⁻¹ and each output has independent noise.
 #[must_use]
-pub fn covariance(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> DMatrix<f64> {
+pub fn covariance(root: &DMatrix<f64>, outputs: Vec<Series>) -> DMatrix<f64> {
+    let outputs = transformed(root, outputs);
+    root * gradient_covariance(&outputs, &settled(&outputs)) * root.transpose()
+}
+
+/// The noise that residuals of a fit speak for, where T Tᵀ = H⁻¹.
+#[must_use]
+pub fn noise(root: &DMatrix<f64>, outputs: Vec<Series>) -> Noise {
+    settled(&transformed(root, outputs))
+}
+
+/// Σ Sᵀ W R W S: what noise does to the gradient.
+#[must_use]
+pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
+    let n = outputs.first().map_or(0, Series::parameters);
+    let mut scatter = DMatrix::zeros(n, n);
+    for (output, noise) in outputs.iter().zip(&noise.0) {
+        output.spread(noise, &mut scatter);
+    }
+    scatter.fill_upper_triangle_with_lower_triangle();
+    scatter
+}
+
+fn transformed(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> Vec<Series> {
     for output in &mut outputs {
         output.transform(root);
     }
+    outputs
+}
+
+/// The noise of outputs whose H is the unit matrix, when what the parameters took is added back.
+fn settled(outputs: &[Series]) -> Noise {
     let observed: Vec<Vec<f64>> = outputs.iter().map(Series::autocovariances).collect();
     let fitted = |o: &Series, covariances: &[f64]| Autoregression::fitted(covariances, o.count());
     let mut noise: Vec<_> = outputs.iter().zip(&observed).map(|(o, seen)| fitted(o, seen)).collect();
-    let mut scatter = DMatrix::zeros(root.ncols(), root.ncols());
+    let n = outputs.first().map_or(0, Series::parameters);
+    let mut scatter = DMatrix::zeros(n, n);
     for _ in 0..ROUNDS {
         scatter.fill(0.0);
         let spread: Vec<_> = outputs.iter().zip(&noise).map(|(o, noise)| o.spread(noise, &mut scatter)).collect();
-        let next: Vec<_> = outputs
-            .iter()
-            .zip(&observed)
-            .zip(&spread)
-            .map(|((o, seen), spread)| {
-                let whole: Vec<f64> = seen.iter().zip(o.taken(spread, &scatter)).map(|(s, t)| s + t).collect();
-                fitted(o, &whole)
-            })
-            .collect();
+        scatter.fill_upper_triangle_with_lower_triangle();
+        let whole = |(o, (seen, spread)): (&Series, (&Vec<f64>, &Vec<f64>))| {
+            let whole: Vec<f64> = seen.iter().zip(o.taken(spread, &scatter)).map(|(s, t)| s + t).collect();
+            fitted(o, &whole)
+        };
+        let next: Vec<_> = outputs.iter().zip(observed.iter().zip(&spread)).map(whole).collect();
         let settled = noise.iter().zip(&next).all(|(a, b)| {
             let (a, b) = (a.long_run_variance(), b.long_run_variance());
             (a - b).abs() <= SETTLED * b
@@ -61,9 +93,7 @@ pub fn covariance(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> DMatrix<f64>
             break;
         }
     }
-    scatter.fill(0.0);
-    outputs.iter().zip(&noise).for_each(|(o, noise)| drop(o.spread(noise, &mut scatter)));
-    root * scatter * root.transpose()
+    Noise(noise)
 }
 
 impl Series {
@@ -102,7 +132,7 @@ impl Series {
         self.per_pair(|k, l| self.residuals[k] * self.residuals[l])
     }
 
-    /// R S; adds Sᵀ W R W S to the scatter.
+    /// R S; adds Sᵀ W R W S to the lower triangle of the scatter.
     fn spread(&self, noise: &Autoregression, scatter: &mut DMatrix<f64>) -> Vec<f64> {
         let n = self.parameters();
         let mut series = self.sensitivities.clone();
@@ -110,7 +140,6 @@ impl Series {
         noise.filter(&mut series, n);
         let factor = self.weight * self.weight * noise.innovation;
         series.chunks_exact(n).for_each(|row| super::cost::add_square(scatter, factor, row));
-        scatter.fill_upper_triangle_with_lower_triangle();
         noise.filter_back(&mut series, n);
         series.truncate(self.sensitivities.len());
         for s in &mut series {
@@ -161,6 +190,7 @@ mod tests {
         let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
         let series = Series {
             weight,
+            variance: 0.0,
             residuals: values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect(),
             used: used.to_vec(),
             sensitivities: used.iter().map(|used| of(*used, 1.0)).collect(),

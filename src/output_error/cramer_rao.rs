@@ -10,7 +10,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::coloured;
-use super::cost::{add_square, residuals, sums};
+use super::cost::{add_square, sums};
+use super::likelihood::Likelihood;
 use super::outcome::Fit;
 use crate::dynamics::{Equations, OUTPUTS};
 
@@ -85,36 +86,40 @@ pub struct Bounds {
 
 /// Bounds of a fit whose information matrix has the inverse T Tᵀ.
 #[must_use]
-pub fn bounds<const NX: usize, E: Equations<NX>>(root: &DMatrix<f64>, case: &Case<NX, E>, fit: &Fit) -> Bounds {
-    let residuals = residuals(&case.measurements, &fit.response);
-    let variances = variances(&residuals, &case.used(), case.parameters());
-    let n = case.parameters();
+pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
+    let series = data.series(&fit.response, &fit.weights);
+    let n = root.nrows();
     let mut white = DMatrix::zeros(n, n);
-    for (o, (w, variance)) in fit.weights.iter().zip(variances).enumerate() {
-        for k in (0..case.samples()).filter(|&k| case.measurements.used[k][o]) {
-            add_square(&mut white, w * w * variance, fit.response.sensitivity(k, o));
-        }
+    for output in &series {
+        let factor = output.weight * output.weight * output.variance;
+        output.sensitivities.chunks_exact(n).for_each(|s| add_square(&mut white, factor, s));
     }
     white.fill_upper_triangle_with_lower_triangle();
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
-    let outputs = (0..OUTPUTS).map(|o| series(case, fit, &residuals, o)).collect();
-    Bounds { corrected: never_below(coloured::covariance(root, outputs), &covariance), covariance }
+    Bounds { corrected: never_below(coloured::covariance(root, series), &covariance), covariance }
 }
 
-fn series<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    fit: &Fit,
-    residuals: &[[f64; OUTPUTS]],
-    output: usize,
-) -> coloured::Series {
-    let used: Vec<bool> = case.measurements.used.iter().map(|used| used[output]).collect();
-    let mut sensitivities = vec![0.0; case.samples() * case.parameters()];
-    for (k, row) in sensitivities.chunks_exact_mut(case.parameters()).enumerate().filter(|(k, _)| used[*k]) {
-        row.copy_from_slice(fit.response.sensitivity(k, output));
+/// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
+#[must_use]
+pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
+    let information = data.sums(&fit.response, &fit.weights).information;
+    match identified(&information, max_condition_number) {
+        Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
+        Identified::Undetermined { .. } => None,
     }
-    let residuals = residuals.iter().map(|v| v[output]).collect();
-    coloured::Series { weight: fit.weights[output], residuals, used, sensitivities }
+}
+
+/// A maneuver with the held derivatives free as well, and the values at which their effect is wanted.
+#[derive(Debug)]
+pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
+    pub case: &'a Case<NX, E>,
+    /// The same maneuver with the held derivatives free as well.
+    pub wide: &'a Case<NX, E>,
+    /// Every parameter of `wide`, by name.
+    pub values: BTreeMap<&'a str, f64>,
+    /// The place of each parameter of `case` among those of the fit.
+    pub places: Vec<usize>,
 }
 
 /// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with
@@ -129,21 +134,45 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     uncertainties: &BTreeMap<&str, f64>,
     fit: &mut Fit,
 ) {
+    let places = (0..case.parameters()).collect();
+    consider_together(&[Considered { case, wide, values: values.clone(), places }], uncertainties, fit);
+}
+
+/// [`consider`] for maneuvers that share parameters: the error of a held value is common to all that hold it, so its
+/// effects on them add up before they are squared.
+pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
+    members: &[Considered<NX, E>],
+    uncertainties: &BTreeMap<&str, f64>,
+    fit: &mut Fit<R>,
+) {
     let (Some(covariance), Some(corrected)) = (&mut fit.covariance, &mut fit.covariance_corrected) else { return };
-    let start: Vec<f64> = wide.names.iter().map(|name| values.get(name.as_str()).copied().unwrap_or(0.0)).collect();
-    let mut response = wide.response();
-    if wide.respond(&start, &mut response).is_err() {
-        return;
+    let n = covariance.nrows();
+    let mut own = DMatrix::zeros(n, n);
+    let mut crosses = vec![DVector::zeros(n); uncertainties.len()];
+    for member in members {
+        let wide = member.wide;
+        let value = |name: &String| member.values.get(name.as_str()).copied().unwrap_or(0.0);
+        let start: Vec<f64> = wide.names.iter().map(value).collect();
+        let mut response = wide.response();
+        if wide.respond(&start, &mut response).is_err() {
+            return;
+        }
+        let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
+        let at = |name: &str| wide.names.iter().position(|n| n == name);
+        let names = member.case.names.iter().zip(&member.places);
+        let free: Vec<(usize, usize)> = names.filter_map(|(name, place)| Some((at(name)?, *place))).collect();
+        for &(i, row) in &free {
+            for &(j, column) in &free {
+                own[(row, column)] += information[(i, j)];
+            }
+            for (cross, name) in crosses.iter_mut().zip(uncertainties.keys()) {
+                cross[row] += at(name).map_or(0.0, |h| information[(i, h)]);
+            }
+        }
     }
-    let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
-    let at = |name: &str| wide.names.iter().position(|n| n == name);
-    let free: Vec<usize> = case.names.iter().filter_map(|name| at(name)).collect();
-    let own = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
     let Identified::Determined { inverse, .. } = identified(&own, f64::INFINITY) else { return };
-    let mut held = DMatrix::zeros(free.len(), free.len());
-    for (name, uncertainty) in uncertainties {
-        let Some(h) = at(name) else { continue };
-        let cross = DVector::from_fn(free.len(), |i, _| information[(free[i], h)]);
+    let mut held = DMatrix::zeros(n, n);
+    for (cross, uncertainty) in crosses.into_iter().zip(uncertainties.values()) {
         let shift = &inverse * cross * *uncertainty;
         held += &shift * shift.transpose();
     }

@@ -1,7 +1,8 @@
 //! Output error: maximum likelihood by matching the outputs of the integrated equations to the measured ones (eqs. 1.1-1.7).
 //!
-//! A [`Case`] is one maneuver made ready: what is known, what is held, what is free. [`newton_raphson::estimate`] finds the
-//! free parameters; [`cramer_rao`] says how well the data determine them.
+//! A [`Case`] is one maneuver made ready: what is known, what is held, what is free; a [`Joint`] is several that share
+//! their derivatives. Both are [`Likelihood`]: [`newton_raphson::estimate`] finds the free parameters of either,
+//! [`cramer_rao`] says how well the data determine them. [`theil`] says how well a response predicts what was measured.
 
 mod autoregression;
 mod case;
@@ -9,13 +10,21 @@ pub mod coloured;
 pub mod cost;
 pub mod cramer_rao;
 pub mod equation_error;
+mod likelihood;
+pub mod holding;
+pub mod identifiability;
+mod joint;
+pub mod mean;
 pub mod newton_raphson;
 mod outcome;
 mod response;
+pub mod theil;
 
 pub use case::{Case, InitialState, Measurements, Model};
+pub use joint::Joint;
+pub use likelihood::Likelihood;
 pub use outcome::{Fit, Outcome};
 pub use response::{Diverged, Response};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

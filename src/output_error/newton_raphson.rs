@@ -2,11 +2,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::case::Case;
-use super::cost::{Sums, residuals, sums};
+use super::cost::Sums;
 use super::cramer_rao::{self, Identified};
+use super::likelihood::Likelihood;
 use super::outcome::{Fit, Outcome};
-use crate::dynamics::{Equations, OUTPUTS};
+use crate::dynamics::OUTPUTS;
 
 /// When the iteration stops.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -45,58 +45,48 @@ const MOST_DAMPING: f64 = 1e9;
 const WEIGHT_ROUNDS: usize = 20;
 const WEIGHTS_SETTLED: f64 = 1e-3;
 
-/// Estimates the free parameters of a case from `start`, with the table's weights or those they settle to.
+/// Estimates the free parameters of a maneuver, or of several joined, from `start`, with the table's weights or those
+/// they settle to.
 ///
 /// `resolution` is the smallest standard deviation of each output that is believed when weights are estimated.
 #[must_use]
-pub fn estimate<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
+pub fn estimate<D: Likelihood>(
+    data: &D,
     start: Vec<f64>,
     table: [f64; OUTPUTS],
     weights: Weights,
     resolution: [f64; OUTPUTS],
     settings: &Settings,
-) -> Fit {
-    let mut fit = iterate(case, start, table, settings);
+) -> Fit<D::Response> {
+    let mut fit = iterate(data, start, table, settings);
     if weights == Weights::Estimated {
         for _ in 0..WEIGHT_ROUNDS {
             if fit.outcome != Outcome::Converged {
                 break;
             }
-            let next = residual_weights(case, &fit, resolution);
+            let next = residual_weights(data, &fit, resolution);
             let settled = next.iter().zip(fit.weights).all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED);
             if settled {
                 break;
             }
             let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
-            fit = iterate(case, fit.values, next, settings);
+            fit = iterate(data, fit.values, next, settings);
             fit.iterations += iterations;
             fit.initial_cost = initial_cost;
         }
     }
-    judge(case, &mut fit, settings);
+    judge(data, &mut fit, settings);
     fit
 }
 
-fn residual_weights<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    fit: &Fit,
-    resolution: [f64; OUTPUTS],
-) -> [f64; OUTPUTS] {
-    let variances =
-        cramer_rao::variances(&residuals(&case.measurements, &fit.response), &case.used(), case.parameters());
+fn residual_weights<D: Likelihood>(data: &D, fit: &Fit<D::Response>, resolution: [f64; OUTPUTS]) -> [f64; OUTPUTS] {
+    let variances = data.variances(&fit.response);
     std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
 }
 
 /// The iteration from a start with fixed weights.
-fn iterate<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    start: Vec<f64>,
-    weights: [f64; OUTPUTS],
-    settings: &Settings,
-) -> Fit {
-    let n = case.parameters();
-    let (mut response, mut trial) = (case.response(), case.response());
+fn iterate<D: Likelihood>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], settings: &Settings) -> Fit<D::Response> {
+    let (mut response, mut trial) = (data.response(), data.response());
     let mut fit = Fit {
         outcome: Outcome::NotConverged,
         reason: format!("not converged after {} iterations", settings.max_iterations),
@@ -105,18 +95,17 @@ fn iterate<const NX: usize, E: Equations<NX>>(
         final_cost: None,
         values: start,
         weights,
-        response: case.response(),
+        response: data.response(),
         condition_number: None,
         covariance: None,
         covariance_held: None,
         covariance_corrected: None,
     };
-    if let Err(diverged) = case.respond(&fit.values, &mut response) {
-        let after_s = diverged.sample as f64 * case.step_s;
-        fit.reason = format!("the integration diverges {after_s:.2} s into the maneuver with the starting values");
+    if let Err(diverged) = data.respond(&fit.values, &mut response) {
+        fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
         return fit;
     }
-    let mut at = sums(&case.measurements, &response, &weights, n);
+    let mut at = data.sums(&response, &weights);
     fit.initial_cost = Some(at.cost());
     // Where the model fits to the last digit, rounding is all that a further step could lower.
     let floor = f64::EPSILON * f64::EPSILON.sqrt() * at.weighted_square;
@@ -133,7 +122,7 @@ fn iterate<const NX: usize, E: Equations<NX>>(
             break;
         }
         fit.iterations += 1;
-        let Some(better) = lower(case, &fit.values, &at, &weights, &mut damping, &mut trial) else {
+        let Some(better) = lower(data, &fit.values, &at, &weights, &mut damping, &mut trial) else {
             fit.reason = "no step lowers the cost".into();
             break;
         };
@@ -147,19 +136,19 @@ fn iterate<const NX: usize, E: Equations<NX>>(
 }
 
 /// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
-fn lower<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
+fn lower<D: Likelihood>(
+    data: &D,
     values: &[f64],
     at: &Sums,
     weights: &[f64; OUTPUTS],
     damping: &mut f64,
-    trial: &mut super::Response,
+    trial: &mut D::Response,
 ) -> Option<(Vec<f64>, Sums)> {
     while *damping < MOST_DAMPING {
         if let Some(d) = step(at, *damping) {
             let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
-            if case.respond(&next, trial).is_ok() {
-                let sums = sums(&case.measurements, trial, weights, next.len());
+            if data.respond(&next, trial).is_ok() {
+                let sums = data.sums(trial, weights);
                 let gain = at.weighted_square - sums.weighted_square;
                 if gain > 0.0 {
                     *damping = next_damping(*damping, gain / predicted_gain(at, &d));
@@ -200,21 +189,21 @@ fn step(at: &Sums, damping: f64) -> Option<DVector<f64>> {
 }
 
 /// Bounds of a fit, and the verdict on directions that the data do not determine.
-fn judge<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, fit: &mut Fit, settings: &Settings) {
+fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
     if fit.final_cost.is_none() {
         return;
     }
-    let at = sums(&case.measurements, &fit.response, &fit.weights, case.parameters());
+    let at = data.sums(&fit.response, &fit.weights);
     match cramer_rao::identified(&at.information, settings.max_condition_number) {
         Identified::Determined { root, condition_number, .. } => {
             fit.condition_number = Some(condition_number);
-            let bounds = cramer_rao::bounds(&root, case, fit);
+            let bounds = cramer_rao::bounds(&root, data, fit);
             fit.covariance = Some(bounds.covariance);
             fit.covariance_corrected = Some(bounds.corrected);
         }
         Identified::Undetermined { condition_number, parameters } => {
             fit.condition_number = condition_number;
-            let names: Vec<&str> = parameters.iter().filter_map(|&j| case.names.get(j)).map(String::as_str).collect();
+            let names: Vec<&str> = parameters.iter().filter_map(|&j| data.names().get(j)).map(String::as_str).collect();
             fit.outcome = Outcome::Unidentifiable;
             fit.reason = format!("the data do not tell apart {}", names.join(", "));
         }

@@ -30,9 +30,9 @@ impl Outcome {
     }
 }
 
-/// The result of an estimation.
+/// The result of an estimation; `R` is the response of one maneuver, or of several joined.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub struct Fit<R = Response> {
     pub outcome: Outcome,
     pub reason: String,
     pub iterations: usize,
@@ -43,7 +43,7 @@ pub struct Fit {
     pub values: Vec<f64>,
     /// The weights in force at the end.
     pub weights: [f64; OUTPUTS],
-    pub response: Response,
+    pub response: R,
     /// Of the information matrix with unit diagonal.
     pub condition_number: Option<f64>,
     /// Sandwich covariance of the parameters, the held values' part in it; absent where the data determine none.
@@ -52,4 +52,26 @@ pub struct Fit {
     pub covariance_held: Option<DMatrix<f64>>,
     /// The covariance with the residuals' autocorrelation counted.
     pub covariance_corrected: Option<DMatrix<f64>>,
+}
+
+impl<R> Fit<R> {
+    /// The same result with another response in place of its own, and its own.
+    #[must_use]
+    pub fn with_response<S>(self, response: S) -> (Fit<S>, R) {
+        let fit = Fit {
+            outcome: self.outcome,
+            reason: self.reason,
+            iterations: self.iterations,
+            initial_cost: self.initial_cost,
+            final_cost: self.final_cost,
+            values: self.values,
+            weights: self.weights,
+            response,
+            condition_number: self.condition_number,
+            covariance: self.covariance,
+            covariance_held: self.covariance_held,
+            covariance_corrected: self.covariance_corrected,
+        };
+        (fit, self.response)
+    }
 }

@@ -1,5 +1,7 @@
 //! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for the bounds.
 
+mod joint;
+
 use std::collections::BTreeMap;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
@@ -13,19 +15,19 @@ use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 
-const SAMPLES: usize = 320;
+pub(crate) const SAMPLES: usize = 320;
 const STEP_S: f64 = 0.025;
 
-fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
+pub(crate) fn derivative(name: &str, coefficient: Coefficient, regressor: Regressor) -> Derivative {
     Derivative { name: name.into(), coefficient, regressor }
 }
 
-fn surface(name: &str) -> Regressor {
+pub(crate) fn surface(name: &str) -> Regressor {
     Regressor::Surface(name.into())
 }
 
 /// A build-up with every kind of regressor, and true values of a stable fighter at α 20°.
-fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
+pub(crate) fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
     use Coefficient::{CA, CN, CY, Cl, Cm, Cn};
     let vane = |name: &str| Regressor::Vane(name.into());
     match axis {
@@ -70,7 +72,7 @@ fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
 }
 
 /// A record of trimmed flight with doublets on every surface.
-fn record() -> Record {
+pub(crate) fn record() -> Record {
     let constant = |v: f64| vec![v; SAMPLES];
     let of = |f: &dyn Fn(usize) -> f64| (0..SAMPLES).map(f).collect::<Vec<_>>();
     let wave = |k: usize, size: f64| size * (0.11 * k as f64).sin();
@@ -121,7 +123,7 @@ fn window() -> Window {
     Window::cut(&record(), 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap()
 }
 
-fn nothing_measured() -> Measurements {
+pub(crate) fn nothing_measured() -> Measurements {
     Measurements { values: vec![[0.0; OUTPUTS]; SAMPLES], used: vec![[true; OUTPUTS]; SAMPLES] }
 }
 
@@ -174,13 +176,13 @@ fn sensitivities_are_those_of_finite_differences_for_every_parameter() {
 }
 
 /// Standard deviations of the noise, deg, deg/s, g, in the order of the outputs.
-const NOISE: [f64; OUTPUTS] = [0.08, 0.05, 0.05, 0.01, 0.005];
+pub(crate) const NOISE: [f64; OUTPUTS] = [0.08, 0.05, 0.05, 0.01, 0.005];
 
 /// Weights that are not the inverse of the noise's variances, as those of Tables 2 and 4 are not.
-const TABLE: [f64; OUTPUTS] = [12.0, 60.0, 30.0, 5000.0, 9000.0];
+pub(crate) const TABLE: [f64; OUTPUTS] = [12.0, 60.0, 30.0, 5000.0, 9000.0];
 
 /// Uniform numbers of a linear congruential generator, made Gaussian by the sum of twelve.
-pub(super) struct Noise(pub u64);
+pub(crate) struct Noise(pub u64);
 
 impl Noise {
     pub fn gaussian(&mut self) -> f64 {

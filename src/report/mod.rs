@@ -7,6 +7,7 @@ mod gallery;
 mod histories;
 mod marks;
 mod notation;
+mod predictions;
 #[cfg(test)]
 mod samples;
 mod scale;
@@ -14,6 +15,7 @@ mod subject;
 mod summary;
 #[cfg(test)]
 mod tests;
+mod told_apart;
 mod verdict;
 
 use std::collections::BTreeSet;
@@ -25,7 +27,11 @@ use serde::Serialize;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, TrendRow};
+use crate::output_error::identifiability::Limits;
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
+    TrendRow,
+};
 use failures::TableView;
 use notation::{Digits, NOTHING, angle, fixed, number};
 use subject::Subject;
@@ -43,6 +49,11 @@ pub struct Contents<'a> {
     pub maneuvers: &'a [Maneuver],
     pub fits: &'a [FitRow],
     pub estimates: &'a [EstimateRow],
+    /// Each maneuver's outputs predicted with the derivatives of others.
+    pub predictions: &'a [PredictionRow],
+    pub correlations: &'a [CorrelationRow],
+    /// When a correlation, an inflation or a group is flagged.
+    pub limits: &'a Limits,
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
@@ -72,6 +83,8 @@ struct Page<'a> {
     never_estimated: Vec<&'a str>,
     comparison: Vec<TableView>,
     maneuvers: TableView,
+    predictions: Option<TableView>,
+    told_apart: Vec<TableView>,
     failures: Vec<TableView>,
     histories: Vec<histories::HistoryView>,
     histories_of: usize,
@@ -108,6 +121,8 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         never_estimated: never_estimated(contents, &subjects),
         comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
+        predictions: predictions::table(contents),
+        told_apart: told_apart::tables(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),
         histories_of: contents.histories.len(),

@@ -4,8 +4,10 @@ use super::Contents;
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
+use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, History, HistoryOutput, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
+    PredictionRow, TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -14,6 +16,9 @@ pub struct Campaign {
     pub maneuvers: Vec<Maneuver>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
+    pub predictions: Vec<PredictionRow>,
+    pub correlations: Vec<CorrelationRow>,
+    pub limits: Limits,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub channels: Vec<ChannelRow>,
@@ -35,6 +40,9 @@ impl Campaign {
             maneuvers: &self.maneuvers,
             fits: &self.fits,
             estimates: &self.estimates,
+            predictions: &self.predictions,
+            correlations: &self.correlations,
+            limits: &self.limits,
             trends: &self.trends,
             comparison: &self.comparison,
             channels: &self.channels,
@@ -137,6 +145,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         final_cost: Some(0.4),
         condition_number: Some(150.0),
         left_out: Some(0.0),
+        largest_condition_index: Some(12.2),
+        confounded: None,
     });
     for (name, unit) in if axis == Axis::Longitudinal { LONGITUDINAL } else { LATERAL } {
         campaign.estimates.push(EstimateRow {
@@ -153,6 +163,11 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             bound_held: None,
             bound_corrected: Some(0.004),
             wind_tunnel: Some(0.05),
+            variance_inflation: Some(12.0),
+            excitation: Some(1.5),
+            contribution_pct: Some(40.0),
+            equation_error: Some(0.05),
+            held_because: None,
         });
     }
     campaign.histories.push(history(&maneuver_id, class, alpha_deg));

@@ -127,3 +127,87 @@ pub fn step(state: &State, step_s: f64, at: impl Fn(&State, f64) -> Slope) -> St
     let k4 = at(&state.plus(&k3, step_s), 1.0);
     state.plus(&k1, step_s / 6.0).plus(&k2, step_s / 3.0).plus(&k3, step_s / 3.0).plus(&k4, step_s / 6.0).normalised()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+
+    const LOADING: Loading = Loading {
+        mass_slug: 1025.0,
+        x_cg_ft: 38.2,
+        y_cg_ft: 0.0,
+        z_cg_ft: 8.7,
+        ix_slug_ft2: 22_300.0,
+        iy_slug_ft2: 172_900.0,
+        iz_slug_ft2: 187_600.0,
+        ixz_slug_ft2: -2073.0,
+    };
+    const FREE: Action = Action {
+        force: Vector3::new(0.0, 0.0, 0.0),
+        moment: Vector3::new(0.0, 0.0, 0.0),
+        engine_momentum: 0.0,
+        gravity_ft_s2: 0.0,
+    };
+
+    fn tumbling() -> State {
+        State {
+            velocity: Vector3::new(250.0, 10.0, 120.0),
+            rates: Vector3::new(1.2, 0.4, -0.3),
+            attitude: Euler { phi: 0.3, theta: -0.2, psi: 1.0 }.attitude(),
+            position: Vector3::new(0.0, 0.0, 25_000.0),
+        }
+    }
+
+    fn after(state: State, time_s: u32, action: &Action) -> State {
+        (0..time_s * 400).fold(state, |s, _| step(&s, 1.0 / 400.0, |at, _| slope(at, &LOADING, action)))
+    }
+
+    #[test]
+    fn free_of_moments_energy_and_the_angular_momentum_in_space_stay() {
+        let energy = |s: &State| 0.5 * s.rates.dot(&(LOADING.inertia() * s.rates));
+        let momentum = |s: &State| s.to_earth() * (LOADING.inertia() * s.rates);
+        let (start, end) = (tumbling(), after(tumbling(), 20, &FREE));
+        assert!((start.rates - end.rates).norm() > 0.1, "it does tumble");
+        assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-9);
+        assert!((momentum(&start) - momentum(&end)).norm() < 1e-8 * momentum(&start).norm());
+        // The path over the ground is straight although the body axes turn.
+        assert!((start.to_earth() * start.velocity - end.to_earth() * end.velocity).norm() < 1e-6);
+        assert_abs_diff_eq!(end.attitude.norm(), 1.0, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn falling_trades_height_for_speed() {
+        let action = Action { gravity_ft_s2: 32.1, ..FREE };
+        let energy = |s: &State| 0.5 * s.velocity.norm_squared() + 32.1 * s.position.z;
+        let (start, end) = (tumbling(), after(tumbling(), 5, &action));
+        assert!(end.position.z < start.position.z);
+        assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-10);
+    }
+
+    #[test]
+    fn engines_turning_with_their_momentum_forward_push_the_nose_down_in_a_right_turn() {
+        let action = Action { engine_momentum: 7500.0, ..FREE };
+        let state = State { rates: Vector3::new(0.0, 0.0, 0.2), ..tumbling() };
+        let with = slope(&state, &LOADING, &action).rates;
+        let without = slope(&state, &LOADING, &FREE).rates;
+        assert_relative_eq!((with - without).y, -0.2 * 7500.0 / LOADING.iy_slug_ft2, max_relative = 1e-9);
+        // And a pitch up turns it right.
+        let state = State { rates: Vector3::new(0.0, 0.2, 0.0), ..tumbling() };
+        assert!(slope(&state, &LOADING, &action).rates.z > 0.0);
+    }
+
+    #[test]
+    fn angles_and_their_rates_are_those_of_the_attitude() {
+        let (state, h) = (tumbling(), 1e-6);
+        let s = slope(&state, &LOADING, &FREE);
+        let (phi_dot, theta_dot) = state.euler_rates(&s);
+        let (up, down) = (state.plus(&s, h).euler(), state.plus(&s, -h).euler());
+        assert_abs_diff_eq!(phi_dot, (up.phi - down.phi) / (2.0 * h), epsilon = 1e-8);
+        assert_abs_diff_eq!(theta_dot, (up.theta - down.theta) / (2.0 * h), epsilon = 1e-8);
+        let angles = state.euler();
+        for (angle, expected) in [(angles.phi, 0.3), (angles.theta, -0.2), (angles.psi, 1.0)] {
+            assert_abs_diff_eq!(angle, expected, epsilon = 1e-12);
+        }
+    }
+}

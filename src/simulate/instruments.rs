@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn white_noise_bias_and_scale_have_their_sizes() {
         let values =
-            read(Instrument { noise: 0.2, bias: 0.5, scale: 0.1, ..Instrument::default() }, &[3.0; 40_000]).values;
+            read(Instrument { noise: 0.2, bias: 0.5, scale: 0.1, ..Instrument::default() }, &vec![3.0; 40_000]).values;
         assert_abs_diff_eq!(mean(&values), 3.8, epsilon = 0.005);
         assert_relative_eq!(covariance(&values, 0), 0.04, max_relative = 0.03);
         assert_abs_diff_eq!(covariance(&values, 1), 0.0, epsilon = 0.001);
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn coloured_noise_decays_with_its_time_constant() {
         let instrument = Instrument { coloured: 0.3, coloured_time_s: 0.25, ..Instrument::default() };
-        let values = read(instrument, &[0.0; 200_000]).values;
+        let values = read(instrument, &vec![0.0; 200_000]).values;
         assert_relative_eq!(covariance(&values, 0), 0.09, max_relative = 0.04);
         assert_relative_eq!(covariance(&values, 10) / covariance(&values, 0), (-1.0_f64).exp(), max_relative = 0.05);
     }
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn dropouts_are_missing_and_as_many_as_said() {
         let instrument = Instrument { dropouts_per_s: 0.2, dropout_s: 0.1, ..Instrument::default() };
-        let series = read(instrument, &[1.0; 40_000]);
+        let series = read(instrument, &vec![1.0; 40_000]);
         let lost = series.values.iter().filter(|v| v.is_nan()).count();
         // 200 dropouts of 4 samples in 1000 s, a few of them overlapping.
         assert!((650..950).contains(&lost), "{lost}");

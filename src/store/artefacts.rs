@@ -17,7 +17,7 @@ pub struct Store {
 }
 
 /// The folders of the store, one per kind of artefact.
-const KINDS: &[&str] = &["ingest", "records", "segment", "estimate"];
+const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "joint", "predict"];
 
 impl Store {
     /// Opens or creates a store and removes what a killed run left half written.

@@ -1,14 +1,18 @@
 //! The published tables: rows to a data frame, to Parquet and CSV.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use polars::prelude::{Column, CsvWriter, DataFrame, NamedFrom, ParquetCompression, ParquetWriter, SerWriter, Series};
 
 use super::atomic;
-use crate::aero::Axis;
+use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::Maneuver;
-use crate::tables::{ChannelRow, CheckRow, ComparisonRow, EstimateRow, EventRow, FitRow, TrendRow};
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, JointRow, PredictedRow,
+    PredictionRow, TrendRow,
+};
 
 /// A row type with the name of its table and its columns.
 pub trait Table: Sized {
@@ -60,6 +64,13 @@ impl Cell for usize {
     }
 }
 
+impl Cell for Option<usize> {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
+        let whole = |v: &Self| v.map(|v| i64::try_from(v).unwrap_or(i64::MAX));
+        column::<[Option<i64>], _>(name, cells.map(whole).collect::<Vec<_>>())
+    }
+}
+
 impl Cell for Axis {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
         column::<[&str], _>(name, cells.map(|a| a.name()).collect::<Vec<_>>())
@@ -80,9 +91,11 @@ macro_rules! table {
 
 table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
     altitude_ft mass_slug x_cg_ft samples origin);
-table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out);
+table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out
+    largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
-    bound_held bound_corrected wind_tunnel);
+    bound_held bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error held_because);
+table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
 table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
     difference_pct z verdict);
@@ -90,6 +103,44 @@ table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
 table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
 table!(Problem, "problems", stage flight_id place reason);
+
+table!(PredictionRow, "predictions", maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias
+    theil_variance theil_covariance r_squared);
+table!(JointRow, "joint", joint_id class joint_alpha_deg joint_mach maneuvers maneuver_id flight_id alpha_deg mach part
+    cost_alone cost_joint);
+
+/// Further columns of `fits`; the outputs of both axes have theirs.
+impl PredictedRow {
+    fn columns(rows: &[&Self]) -> Vec<Column> {
+        macro_rules! columns {
+            ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
+        }
+        let mut columns = columns!(prediction predicted_from predicted_cost theil theil_bias theil_variance
+            theil_covariance);
+        let outputs = || [Axis::Longitudinal, Axis::Lateral].into_iter().flat_map(Axis::outputs);
+        let mut of = |prefix: &str, values: fn(&Self) -> &BTreeMap<Output, f64>| {
+            for output in outputs() {
+                let cells: Vec<Option<f64>> = rows.iter().map(|row| values(row).get(&output).copied()).collect();
+                columns.push(Cell::column(&format!("{prefix}_{}", output.name()), cells.iter()));
+            }
+        };
+        of("theil", |row| &row.theil_of);
+        of("r_squared", |row| &row.r_squared_of);
+        columns
+    }
+}
+
+/// Publishes `fits`: each fit beside the prediction of the same maneuver, those without one at the end.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn publish_fits(folder: &Path, fits: &[FitRow], predicted: &[PredictedRow]) -> Result<()> {
+    let none = PredictedRow::default();
+    let beside: Vec<&PredictedRow> = (0..fits.len()).map(|i| predicted.get(i).unwrap_or(&none)).collect();
+    let mut columns = FitRow::columns(fits);
+    columns.extend(PredictedRow::columns(&beside));
+    place(folder, FitRow::NAME, fits.len(), columns)
+}
 
 /// Publishes rows as `<name>.parquet` and `<name>.csv` in a folder, each placed whole.
 ///
@@ -104,8 +155,12 @@ pub fn publish<T: Table>(folder: &Path, rows: &[T]) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn publish_as<T: Table>(folder: &Path, name: &str, rows: &[T]) -> Result<()> {
+    place(folder, name, rows.len(), T::columns(rows))
+}
+
+fn place(folder: &Path, name: &str, rows: usize, columns: Vec<Column>) -> Result<()> {
     let (parquet, csv) = (folder.join(format!("{name}.parquet")), folder.join(format!("{name}.csv")));
-    let mut frame = DataFrame::new(rows.len(), T::columns(rows)).map_err(|e| Error::store(&parquet, &e))?;
+    let mut frame = DataFrame::new(rows, columns).map_err(|e| Error::store(&parquet, &e))?;
     let mut bytes = Vec::new();
     ParquetWriter::new(&mut bytes)
         .with_compression(ParquetCompression::Zstd(None))

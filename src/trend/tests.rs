@@ -19,6 +19,11 @@ fn estimate(derivative: &str, class: &str, alpha_deg: f64, value: f64, bound: f6
         bound_held: None,
         bound_corrected: Some(bound),
         wind_tunnel: None,
+        variance_inflation: None,
+        excitation: None,
+        contribution_pct: None,
+        equation_error: None,
+        held_because: None,
     }
 }
 

@@ -26,7 +26,11 @@ fn sources() -> Vec<Source> {
         let path = file.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/");
         let name = file.file_name().unwrap().to_string_lossy();
         let is_rust = file.extension().is_some_and(|e| e == "rs");
-        if !is_rust || ["tests.rs", "samples.rs"].contains(&&*name) || ["lib.rs", "main.rs"].contains(&&*path) {
+        if !is_rust
+            || ["tests.rs", "samples.rs"].contains(&&*name)
+            || path.contains("/tests/")
+            || ["lib.rs", "main.rs"].contains(&&*path)
+        {
             continue;
         }
         let module = path.split(['/', '.']).next().unwrap().to_owned();

@@ -1,0 +1,209 @@
+//! Validation on data not used: a maneuver is predicted with derivatives estimated from the others of its class and angle
+//! of attack.
+//!
+//! The others' derivatives are averaged with their whole covariances as weights. The predicted maneuver keeps them fixed;
+//! its biases and initial states, which belong to it and to no other, are fitted by output error with its own weights; so
+//! are, unless `share_constants` says otherwise, its constants (`CN_0`), which take up the zero errors of the flight's
+//! vanes and surfaces.
+//! What is left between measured and computed is then the derivatives' doing, and is told by Theil's coefficient and R².
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::{Basis, Estimated, Run};
+use crate::aero::{Axis, Derivative, Output};
+use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
+use crate::flight::Record;
+use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::theil::{self, Agreement};
+use crate::output_error::{Case, Fit, Model, Outcome, mean, newton_raphson};
+use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow};
+use crate::units::Unit;
+
+/// From which others a maneuver is predicted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Largest difference of mean angles of attack. Default 2.5°: half the usual distance of test points, over which a
+    /// fighter's derivatives change by less than they are known.
+    pub alpha_distance_deg: f64,
+    /// Whether constants are the others' too. Default false.
+    pub share_constants: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { alpha_distance_deg: 2.5, share_constants: false }
+    }
+}
+
+/// A maneuver's prediction: its columns of `fits`, and a row for each output.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Predicted {
+    pub summary: PredictedRow,
+    pub outputs: Vec<PredictionRow>,
+}
+
+impl Predicted {
+    /// A maneuver that is not predicted, and why.
+    #[must_use]
+    pub fn none(reason: impl Into<String>, others: usize) -> Predicted {
+        let predicted_from = (others > 0).then_some(others);
+        let summary = PredictedRow { prediction: Some(reason.into()), predicted_from, ..PredictedRow::default() };
+        Predicted { summary, outputs: vec![] }
+    }
+}
+
+/// For each maneuver the others of its class and angle of attack whose fits converged; `None` for one that did not.
+#[must_use]
+pub fn others(maneuvers: &[Maneuver], fits: &[FitRow], settings: &Settings) -> Vec<Option<Vec<usize>>> {
+    let converged: Vec<bool> = fits.iter().map(|f| f.outcome == Outcome::Converged.name()).collect();
+    let is_sound = |i: usize| converged.get(i).copied().unwrap_or(false);
+    let near = |a: &Maneuver, b: &Maneuver| (a.alpha_deg - b.alpha_deg).abs() <= settings.alpha_distance_deg;
+    let of = |(i, m): (usize, &Maneuver)| {
+        let is_other = |&(j, o): &(usize, &Maneuver)| j != i && o.class == m.class && near(m, o) && is_sound(j);
+        is_sound(i).then(|| maneuvers.iter().enumerate().filter(is_other).map(|(j, _)| j).collect())
+    };
+    maneuvers.iter().enumerate().map(of).collect()
+}
+
+/// Predicts one maneuver from others. Whatever goes wrong is in `prediction`.
+#[must_use]
+pub fn maneuver(
+    record: &Record,
+    maneuver: &Maneuver,
+    class: &Class,
+    basis: &Basis,
+    others: &[&Estimated],
+) -> Predicted {
+    let run = Run { record, maneuver, class, basis };
+    let predicted = match class.axis {
+        Axis::Longitudinal => predict::<3, Longitudinal>(&run, others),
+        Axis::Lateral => predict::<4, Lateral>(&run, others),
+    };
+    predicted.unwrap_or_else(|reason| Predicted::none(reason, others.len()))
+}
+
+fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) -> Result<Predicted, String> {
+    let model = run.model()?;
+    let settings = run.basis.settings;
+    let share_constants = settings.prediction.as_ref().is_some_and(|s| s.share_constants);
+    let values: BTreeMap<&str, f64> =
+        model.free.iter().map(|d| d.name.as_str()).zip(shared(run, &model.free, others)?).collect();
+    let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) =
+        model.free.iter().partition(|d| !share_constants && run.is_constant(&d.name));
+    let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
+    let held = model.held.iter().copied().chain(fixed.into_iter().map(|d| (d, value(&d.name))));
+    let fixed = Model { free: own, held: held.collect(), ..model.clone() };
+    let ready = run.ready::<NX, E>(fixed)?;
+    let (case, weights) = (&ready.case, run.weights()?);
+    if case.parameters() == 0 {
+        let mut response = case.response();
+        let diverged = case.respond(&[], &mut response).is_err();
+        let cost = crate::output_error::cost::sums(&case.measurements, &response, &weights, 0).cost();
+        return if diverged {
+            Err("the integration diverges".into())
+        } else {
+            Ok(rows(run, case, &response.outputs, &weights, cost, others.len()))
+        };
+    }
+    let start = case.starting_values(value);
+    let fit: Fit =
+        newton_raphson::estimate(case, start, weights, settings.weights, run.resolution(), &settings.iteration);
+    match (fit.outcome, fit.final_cost) {
+        // Biases that cannot be told apart leave the response as it is.
+        (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => {
+            Ok(rows(run, case, &fit.response.outputs, &fit.weights, cost, others.len()))
+        }
+        _ => Err(fit.reason),
+    }
+}
+
+/// The derivatives that are free in the predicted maneuver, as the others have them; the tunnel's value where none of the
+/// others estimates one.
+fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<f64>, String> {
+    let covered = |d: &&&Derivative| others.iter().any(|o| value(o, &d.name).is_some());
+    let wanted: Vec<&str> = free.iter().filter(covered).map(|d| d.name.as_str()).collect();
+    let estimates: Vec<mean::Estimate> = others.iter().filter_map(|o| estimate(o, &wanted)).collect();
+    if estimates.is_empty() {
+        return Err("no other maneuver of its class and angle of attack".into());
+    }
+    let mean = mean::weighted(&estimates, wanted.len()).ok_or("the others' covariances have no inverse")?;
+    let mean: BTreeMap<&str, f64> = wanted.into_iter().zip(mean.iter().copied()).collect();
+    let value = |d: &&Derivative| mean.get(d.name.as_str()).copied().or_else(|| run.tunnel(&d.name));
+    free.iter().map(|d| value(d).ok_or_else(|| format!("none of the others estimates {}", d.name))).collect()
+}
+
+fn value(estimated: &Estimated, name: &str) -> Option<f64> {
+    let of_it = |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated.name();
+    estimated.estimates.iter().find(of_it)?.value
+}
+
+/// One maneuver's estimates of the wanted derivatives, with their part of its covariance.
+fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
+    let covariance = estimated.covariance.as_ref()?;
+    let (mut places, mut at, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    for (place, name) in wanted.iter().enumerate() {
+        let found = covariance.names.iter().position(|n| n == name).zip(value(estimated, name));
+        if let Some((i, value)) = found {
+            places.push(place);
+            at.push(i);
+            values.push(value);
+        }
+    }
+    let n = covariance.names.len();
+    let element = |i: usize, j: usize| covariance.corrected.get(at[i] * n + at[j]).copied().unwrap_or(0.0);
+    let covariance = DMatrix::from_fn(at.len(), at.len(), element);
+    (!places.is_empty()).then(|| mean::Estimate { places, values: DVector::from_vec(values), covariance })
+}
+
+fn rows<const NX: usize, E: Equations<NX>>(
+    run: &Run,
+    case: &Case<NX, E>,
+    computed: &[[f64; OUTPUTS]],
+    weights: &[f64; OUTPUTS],
+    cost: f64,
+    others: usize,
+) -> Predicted {
+    let measured = &case.measurements;
+    let agreement = |o: usize| {
+        let samples = measured.values.iter().zip(&measured.used).zip(computed);
+        Agreement::of(&samples.filter(|((_, used), _)| used[o]).map(|((z, _), y)| (z[o], y[o])).collect::<Vec<_>>())
+    };
+    let agreements: [Agreement; OUTPUTS] = std::array::from_fn(agreement);
+    let weighted: Vec<(Agreement, f64)> = agreements.iter().copied().zip(weights.iter().copied()).collect();
+    let named = || run.class.axis.outputs().into_iter().zip(&agreements);
+    let whole = theil::theil(&weighted);
+    let summary = PredictedRow {
+        prediction: Some("predicted".into()),
+        predicted_from: Some(others),
+        predicted_cost: Some(cost),
+        theil: whole.map(|t| t.coefficient),
+        theil_bias: whole.map(|t| t.bias),
+        theil_variance: whole.map(|t| t.variance),
+        theil_covariance: whole.map(|t| t.covariance),
+        theil_of: named().filter_map(|(o, a)| Some((o, a.theil()?.coefficient))).collect(),
+        r_squared_of: named().filter_map(|(o, a)| Some((o, a.r_squared()?))).collect(),
+    };
+    Predicted { summary, outputs: named().map(|(o, a)| row(run, o, a)).collect() }
+}
+
+fn row(run: &Run, output: Output, agreement: &Agreement) -> PredictionRow {
+    let theil = agreement.theil();
+    PredictionRow {
+        maneuver_id: run.maneuver.maneuver_id.clone(),
+        class: run.class.name.clone(),
+        alpha_deg: run.maneuver.alpha_deg,
+        output: output.name().to_owned(),
+        unit: Unit::of_signal(output.signal()).name.to_owned(),
+        samples: agreement.samples,
+        root_mean_square: agreement.root_mean_square(),
+        theil: theil.map(|t| t.coefficient),
+        theil_bias: theil.map(|t| t.bias),
+        theil_variance: theil.map(|t| t.variance),
+        theil_covariance: theil.map(|t| t.covariance),
+        r_squared: agreement.r_squared(),
+    }
+}

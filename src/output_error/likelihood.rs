@@ -1,0 +1,83 @@
+//! What Newton-Raphson (1.3) and the bounds (1.7) need of the data, whether of one maneuver or of several joined.
+
+use super::case::Case;
+use super::coloured::Series;
+use super::cost::{self, Sums};
+use super::cramer_rao;
+use super::response::{Diverged, Response};
+use crate::dynamics::{Equations, OUTPUTS};
+
+/// Data that say something of parameters: cost, gradient and information at any values of them.
+pub trait Likelihood {
+    /// Computed outputs with their sensitivities, allocated once and written over at every iteration.
+    type Response;
+
+    /// Names of the parameters in order.
+    fn names(&self) -> &[String];
+
+    /// A response of the right size to write into.
+    fn response(&self) -> Self::Response;
+
+    /// Computes the response to these parameters.
+    ///
+    /// # Errors
+    /// [`Diverged`] when an integration leaves the bounds of sense.
+    fn respond(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
+
+    /// Cost, gradient and information for weights on residuals in deg, deg/s and g.
+    fn sums(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Sums;
+
+    /// Variances of the residuals, output by output.
+    fn variances(&self, response: &Self::Response) -> [f64; OUTPUTS];
+
+    /// Residuals with their sensitivities, output by output; those of different series are independent.
+    fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
+
+    /// Where an integration diverged, in words.
+    fn place(&self, diverged: Diverged) -> String;
+}
+
+impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
+    type Response = Response;
+
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn response(&self) -> Response {
+        Case::response(self)
+    }
+
+    fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        Case::respond(self, parameters, response)
+    }
+
+    fn sums(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
+        cost::sums(&self.measurements, response, weights, self.parameters())
+    }
+
+    fn variances(&self, response: &Response) -> [f64; OUTPUTS] {
+        let residuals = cost::residuals(&self.measurements, response);
+        cramer_rao::variances(&residuals, &self.used(), self.parameters())
+    }
+
+    fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<Series> {
+        let residuals = cost::residuals(&self.measurements, response);
+        let variances = Likelihood::variances(self, response);
+        let n = self.parameters();
+        let series = |o: usize| {
+            let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
+            let mut sensitivities = vec![0.0; self.samples() * n];
+            for (k, row) in sensitivities.chunks_exact_mut(n).enumerate().filter(|(k, _)| used[*k]) {
+                row.copy_from_slice(response.sensitivity(k, o));
+            }
+            let residuals = residuals.iter().map(|v| v[o]).collect();
+            Series { weight: weights[o], variance: variances[o], residuals, used, sensitivities }
+        };
+        (0..OUTPUTS).map(series).collect()
+    }
+
+    fn place(&self, diverged: Diverged) -> String {
+        format!("{:.2} s into the maneuver", diverged.sample as f64 * self.step_s)
+    }
+}

@@ -1,0 +1,162 @@
+//! How well a computed response predicts what was measured: Theil's inequality coefficient with its parts, and R².
+//!
+//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean square in the numerator
+//! splits exactly into the square of the difference of the means (bias), the square of the difference of the standard
+//! deviations (variance) and 2 (1 − ρ) σ_y σ_z (covariance); each part is given as its share, and the shares add up to one
+//! (Theil 1966; Klein and Morelli 2006, section 11.3; Jategaonkar 2015, section 11.4). A good model leaves next to nothing
+//! to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and may be negative.
+
+/// Theil's inequality coefficient and the shares of its parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Theil {
+    pub coefficient: f64,
+    pub bias: f64,
+    pub variance: f64,
+    pub covariance: f64,
+}
+
+/// Sums over pairs of measured z and computed y of one output.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Agreement {
+    pub samples: usize,
+    mean_measured: f64,
+    mean_computed: f64,
+    /// Means of the squares about the means, and of the product.
+    square_measured: f64,
+    square_computed: f64,
+    product: f64,
+}
+
+impl Agreement {
+    /// Of pairs (measured, computed).
+    #[must_use]
+    pub fn of(pairs: &[(f64, f64)]) -> Agreement {
+        let n = pairs.len().max(1) as f64;
+        let mean = |value: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>() / n;
+        let (mean_measured, mean_computed) = (mean(&|z, _| z), mean(&|_, y| y));
+        Agreement {
+            samples: pairs.len(),
+            mean_measured,
+            mean_computed,
+            square_measured: mean(&|z, _| (z - mean_measured).powi(2)),
+            square_computed: mean(&|_, y| (y - mean_computed).powi(2)),
+            product: mean(&|z, y| (z - mean_measured) * (y - mean_computed)),
+        }
+    }
+
+    /// Mean squares of the difference's three parts: bias, variance, covariance.
+    fn parts(&self) -> [f64; 3] {
+        let (z, y) = (self.square_measured.sqrt(), self.square_computed.sqrt());
+        [
+            (self.mean_computed - self.mean_measured).powi(2),
+            (y - z).powi(2),
+            // Never below zero but for rounding.
+            (2.0 * (y * z - self.product)).max(0.0),
+        ]
+    }
+
+    /// Root mean square of measured minus computed.
+    #[must_use]
+    pub fn root_mean_square(&self) -> f64 {
+        self.parts().iter().sum::<f64>().sqrt()
+    }
+
+    /// Share of the measured variance that the computed response explains; none where nothing varies.
+    #[must_use]
+    pub fn r_squared(&self) -> Option<f64> {
+        let left: f64 = self.parts().iter().sum();
+        (self.square_measured > 0.0).then(|| 1.0 - left / self.square_measured)
+    }
+
+    /// Theil's coefficient of this output; none where there is nothing measured or computed.
+    #[must_use]
+    pub fn theil(&self) -> Option<Theil> {
+        theil(&[(*self, 1.0)])
+    }
+}
+
+/// Theil's coefficient of several outputs together, each with the weight that it has in the cost; none where there is
+/// nothing measured or computed. Where the prediction is exact there is no difference to share out: the parts are zero.
+#[must_use]
+pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
+    let (mut parts, mut measured, mut computed) = ([0.0; 3], 0.0, 0.0);
+    for (output, weight) in outputs {
+        let weight = weight * output.samples as f64;
+        for (sum, part) in parts.iter_mut().zip(output.parts()) {
+            *sum += weight * part;
+        }
+        measured += weight * (output.square_measured + output.mean_measured.powi(2));
+        computed += weight * (output.square_computed + output.mean_computed.powi(2));
+    }
+    let (difference, size) = (parts.iter().sum::<f64>(), measured.sqrt() + computed.sqrt());
+    let share = |part: f64| if difference > 0.0 { part / difference } else { 0.0 };
+    let [bias, variance, covariance] = parts.map(share);
+    (size > 0.0).then(|| Theil { coefficient: difference.sqrt() / size, bias, variance, covariance })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+
+    /// A sine over whole periods: mean 0, mean square 1/2.
+    fn sine(k: usize) -> f64 {
+        (std::f64::consts::TAU * k as f64 / 100.0).sin()
+    }
+
+    fn cosine(k: usize) -> f64 {
+        (std::f64::consts::TAU * k as f64 / 100.0).cos()
+    }
+
+    fn agreement(z: impl Fn(usize) -> f64, y: impl Fn(usize) -> f64) -> Agreement {
+        Agreement::of(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_pure_offset_is_all_bias() {
+        let a = agreement(sine, |k| sine(k) + 0.5);
+        let u = a.theil().unwrap();
+        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [1.0, 0.0, 0.0][..], epsilon = 1e-9);
+        assert_relative_eq!(u.coefficient, 0.5 / (0.5f64.sqrt() + 0.75f64.sqrt()), max_relative = 1e-12);
+        assert_relative_eq!(a.r_squared().unwrap(), 0.5, max_relative = 1e-12);
+        assert_relative_eq!(a.root_mean_square(), 0.5, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_pure_scale_is_all_variance() {
+        let a = agreement(sine, |k| 1.5 * sine(k));
+        let u = a.theil().unwrap();
+        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [0.0, 1.0, 0.0][..], epsilon = 1e-9);
+        assert_relative_eq!(u.coefficient, 0.2, max_relative = 1e-12);
+        assert_relative_eq!(a.r_squared().unwrap(), 0.75, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn another_shape_of_the_same_size_is_all_covariance() {
+        let a = agreement(sine, cosine);
+        let u = a.theil().unwrap();
+        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [0.0, 0.0, 1.0][..], epsilon = 1e-9);
+        assert_relative_eq!(u.coefficient, 0.5f64.sqrt(), max_relative = 1e-12);
+        assert_relative_eq!(a.r_squared().unwrap(), -1.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn the_shares_add_up_to_one_and_the_parts_to_the_mean_square() {
+        let pairs: Vec<(f64, f64)> = (0..57).map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k))).collect();
+        let a = Agreement::of(&pairs);
+        let u = a.theil().unwrap();
+        assert_relative_eq!(u.bias + u.variance + u.covariance, 1.0, max_relative = 1e-12);
+        let square = pairs.iter().map(|(z, y)| (z - y).powi(2)).sum::<f64>() / 57.0;
+        assert_relative_eq!(a.root_mean_square().powi(2), square, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn outputs_together_count_by_weight_and_nothing_is_no_number() {
+        let (good, bad) = (agreement(sine, sine), agreement(sine, |k| sine(k) + 1.0));
+        assert_abs_diff_eq!(theil(&[(good, 1.0), (bad, 0.0)]).unwrap().coefficient, 0.0, epsilon = 1e-9);
+        let both = theil(&[(good, 1.0), (bad, 1.0)]).unwrap();
+        assert!(both.coefficient < bad.theil().unwrap().coefficient && both.bias > 0.999);
+        assert_eq!(Agreement::of(&[]).theil(), None);
+        assert_eq!(agreement(|_| 2.0, sine).r_squared(), None);
+    }
+}
