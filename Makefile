@@ -23,7 +23,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report nightly check simulate build test bench lint clean help
+.PHONY: ingest segment estimate trend compare report nightly check simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest)
@@ -51,6 +51,10 @@ check: build ## is the pipeline's configuration right, and what would it do
 
 simulate: build ## fly the test cards CARDS into OUT: archive, wind-tunnel database and truth
 	cargo run --release --locked --quiet -- simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
+
+validate: build ## record simulated maneuvers many times and see what the bounds are worth: reports/coverage.md (takes long)
+	cargo run --release --locked --quiet -- validate '$(CARDS)' --out data/simulation/validation --page reports/coverage.md \
+		$(if $(REALISATIONS),--realisations '$(REALISATIONS)') $(if $(THREADS),--threads '$(THREADS)')
 
 # By itself, so that the long first build shows its progress; the stages then only start the binary.
 build: ## build the binary (the first time takes minutes)

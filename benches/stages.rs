@@ -113,12 +113,7 @@ fn stages(c: &mut Criterion) {
     c.bench_function("segment one flight", |b| {
         b.iter(|| segment::maneuvers(&bench.record, &config.classes, &config.aircraft, &config.segment));
     });
-    let basis = Basis {
-        aircraft: &config.aircraft,
-        buildup: &config.buildup,
-        tunnel: &config.tunnel,
-        settings: &config.estimate,
-    };
+    let basis = Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate);
     c.bench_function("estimate one maneuver", |b| {
         b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &basis));
     });

@@ -11,8 +11,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
 use crate::pipeline::{self, Campaign, Progress, Stage};
-use crate::simulation;
 use crate::store::archive;
+use crate::{simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
@@ -63,6 +63,8 @@ enum Command {
     Check(Options),
     /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel database, and the truth
     Simulate(SimulateOptions),
+    /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise, and estimated
+    Validate(ValidateOptions),
 }
 
 #[derive(Args, Debug)]
@@ -72,6 +74,27 @@ struct SimulateOptions {
     /// Folder for flights/, wind_tunnel.csv and truth/
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// No progress bars and no summary
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Args, Debug)]
+struct ValidateOptions {
+    /// The test cards, YAML; their `study` says how many records of how many test points
+    cards: PathBuf,
+    /// Folder for the tables `coverage` and `starts`
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// The page of the documentation to write, Markdown
+    #[arg(long, value_name = "FILE")]
+    page: PathBuf,
+    /// Records of each maneuver, instead of the cards' number
+    #[arg(long, value_name = "N")]
+    realisations: Option<usize>,
     /// Number of threads; results do not depend on it [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -131,6 +154,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Compare(options) => (Stage::Compare, options),
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
+        Command::Validate(options) => return validate(&options),
     };
     start_threads(options.threads)?;
     let config = options.load()?;
@@ -167,6 +191,28 @@ fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
         println!("campaign in {}", options.out.display());
     }
     Ok(if problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+}
+
+/// Studies the bounds and says where the findings are.
+#[expect(clippy::print_stdout, reason = "what a study says")]
+fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.threads)?;
+    let mut simulation = Simulation::load(&options.cards)?;
+    if let Some(realisations) = options.realisations {
+        simulation.cards.study.realisations = realisations;
+    }
+    anyhow::ensure!(simulation.cards.study.realisations > 1, "a scatter needs two realisations or more");
+    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let command =
+        format!("harvest validate {} --realisations {}", options.cards.display(), simulation.cards.study.realisations);
+    let found = validation::run(&simulation, &options.out, &options.page, &command, &bars)?;
+    if !options.quiet {
+        for problem in &found.problems {
+            println!("  {}: {}", problem.place, problem.reason);
+        }
+        println!("tables in {}\npage: {}", options.out.display(), options.page.display());
+    }
+    Ok(if found.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
 }
 
 impl Options {

@@ -61,6 +61,17 @@ pub enum Hold {
     Evidence,
 }
 
+impl Start {
+    /// As the table `fits` says it.
+    #[must_use]
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Start::EquationError => "equation error",
+            Start::WindTunnel => "wind tunnel",
+        }
+    }
+}
+
 /// Choices of the estimation that hold for all classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -116,7 +127,22 @@ pub struct Basis<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub tunnel: &'a WindTunnel,
+    /// The table that starting values are read from: the tunnel's, but for studies of the iteration.
+    pub start: &'a WindTunnel,
     pub settings: &'a Settings,
+}
+
+impl<'a> Basis<'a> {
+    /// The iteration starts from the tunnel's values where it starts from a table.
+    #[must_use]
+    pub fn new(
+        aircraft: &'a Aircraft,
+        buildup: &'a Buildup,
+        tunnel: &'a WindTunnel,
+        settings: &'a Settings,
+    ) -> Basis<'a> {
+        Basis { aircraft, buildup, tunnel, start: tunnel, settings }
+    }
 }
 
 /// The covariance of a maneuver's parameters in the units of the tables; initial states in rad and rad/s.
@@ -226,7 +252,7 @@ impl<'a> Run<'a> {
     fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
         let ready = self.ready::<NX, E>(self.model()?)?;
         let case = &ready.case;
-        let mut fit = self.fit(case)?;
+        let (mut fit, start) = self.fit(case)?;
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
         cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
@@ -236,7 +262,7 @@ impl<'a> Run<'a> {
             covariance: covariance(&case.names, &fit),
             correlations: vec![],
             history: Some(self.history(&case.measurements, &fit, &ready.window, &ready.surfaces)),
-            fit: self.fit_row(&fit, ready.left_out),
+            fit: self.fit_row(&fit, ready.left_out, start.in_words()),
         };
         self.measure(case, &ready.window, &ready.model, &fit, &mut estimated);
         Ok(estimated)
@@ -263,13 +289,15 @@ impl<'a> Run<'a> {
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
-    fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<Fit, String> {
+    fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<(Fit, Start), String> {
         let settings = self.basis.settings;
-        let tunnel = case.starting_values(|name| self.tunnel(name).unwrap_or(0.0));
+        let Maneuver { alpha_deg, mach, .. } = *self.maneuver;
+        let value = |name: &str| self.basis.start.value(name, alpha_deg, mach).map_or(0.0, |v| v.value);
+        let tunnel = case.starting_values(value);
         let implied = equation_error::start(case, &tunnel);
-        let (first, second) = match settings.start {
-            Start::EquationError => (implied, tunnel),
-            Start::WindTunnel => (tunnel, implied),
+        let (first, second, other_start) = match settings.start {
+            Start::EquationError => (implied, tunnel, Start::WindTunnel),
+            Start::WindTunnel => (tunnel, implied, Start::EquationError),
         };
         let resolution = self.resolution();
         let weights = self.weights()?;
@@ -277,10 +305,10 @@ impl<'a> Run<'a> {
             |start| newton_raphson::estimate(case, start, weights, settings.weights, resolution, &settings.iteration);
         let fit = from(first);
         if fit.outcome == Outcome::Converged {
-            return Ok(fit);
+            return Ok((fit, settings.start));
         }
         let other = from(second);
-        Ok(if other.outcome == Outcome::Converged { other } else { fit })
+        Ok(if other.outcome == Outcome::Converged { (other, other_start) } else { (fit, settings.start) })
     }
 
     /// The maneuver with the held derivatives free as well: what an error of theirs would do.
@@ -447,12 +475,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn fit_row(&self, fit: &Fit, left_out: f64) -> FitRow {
+    fn fit_row(&self, fit: &Fit, left_out: f64, start: &str) -> FitRow {
         FitRow {
             maneuver_id: self.maneuver.maneuver_id.clone(),
             class: self.class.name.clone(),
             outcome: fit.outcome.name().to_owned(),
             reason: fit.reason.clone(),
+            start: Some(start.to_owned()),
             iterations: fit.iterations,
             initial_cost: fit.initial_cost,
             final_cost: fit.final_cost,
@@ -504,6 +533,7 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
         class: maneuver.class.clone(),
         outcome: Outcome::Rejected.name().to_owned(),
         reason,
+        start: None,
         iterations: 0,
         initial_cost: None,
         final_cost: None,

@@ -26,6 +26,9 @@ pub mod trend;
 pub mod compare;
 pub mod report;
 
+// Studies: is what the stages say of themselves true?
+pub mod validate;
+
 // Outside: disk and configuration.
 pub mod store;
 pub mod config;
@@ -33,4 +36,5 @@ pub mod config;
 // Conductor: the stages in order, and the command line.
 pub mod pipeline;
 pub mod simulation;
+pub mod validation;
 pub mod cli;

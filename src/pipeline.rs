@@ -378,12 +378,7 @@ impl Run<'_> {
 
     fn basis(&self) -> Basis<'_> {
         let config = self.config;
-        Basis {
-            aircraft: &config.aircraft,
-            buildup: &config.buildup,
-            tunnel: &config.tunnel,
-            settings: &config.estimate,
-        }
+        Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate)
     }
 
     fn trend(&self, campaign: &mut Campaign) -> Result<()> {

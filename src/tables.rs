@@ -62,6 +62,8 @@ pub struct FitRow {
     pub outcome: String,
     /// Why it ended so, in words.
     pub reason: String,
+    /// Where the iteration that led to it began: `equation error`, `wind tunnel`, `single estimates`.
+    pub start: Option<String>,
     pub iterations: usize,
     /// J of eq. 1.2 at the start of the iteration and at the end.
     pub initial_cost: Option<f64>,
@@ -245,4 +247,46 @@ pub struct HistoryOutput {
     pub computed: Vec<f64>,
     /// Samples left out of the cost.
     pub marked: Vec<bool>,
+}
+
+/// `coverage`: what the bounds of one derivative are worth in one maneuver recorded many times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CoverageRow {
+    pub class: String,
+    pub alpha_deg: f64,
+    /// Noise of the outputs: `white` or `coloured`.
+    pub residuals: String,
+    /// `table` or `estimated`.
+    pub weights: String,
+    pub derivative: String,
+    pub unit: String,
+    pub truth: f64,
+    pub realisations: usize,
+    pub converged: usize,
+    /// Mean of the estimates less the truth, and their standard deviation.
+    pub bias: f64,
+    pub scatter: f64,
+    pub bias_over_scatter: f64,
+    /// Scatter over the root mean square of `bound`, and how often ±1 and ±1.96 of it hold the truth.
+    pub scatter_over_bound: f64,
+    pub coverage_68: f64,
+    pub coverage_95: f64,
+    /// The same of `bound_corrected`.
+    pub scatter_over_corrected: f64,
+    pub corrected_coverage_68: f64,
+    pub corrected_coverage_95: f64,
+}
+
+/// `starts`: how often the iteration reaches the minimum that it reaches from the truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StartRow {
+    pub class: String,
+    pub alpha_deg: f64,
+    /// Where it starts.
+    pub start: String,
+    pub records: usize,
+    /// Reached from there.
+    pub alone: usize,
+    /// Reached as the program does it: from the equation error's solution where it does not converge from there.
+    pub reached: usize,
 }

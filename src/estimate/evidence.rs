@@ -102,7 +102,7 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
         let mut because = None;
         for round in 0..ROUNDS {
             let narrow = self.narrow(&held);
-            let fit = self.run.fit(&narrow)?;
+            let (fit, _) = self.run.fit(&narrow)?;
             if fit.outcome == Outcome::NotConverged {
                 if round > 0 {
                     break;

@@ -163,7 +163,7 @@ fn together<const NX: usize, E: Equations<NX>>(
 /// Makes a maneuver ready and estimates it alone.
 fn part<const NX: usize, E: Equations<NX>>(run: Run) -> Result<Part<NX, E>, String> {
     let ready = run.ready::<NX, E>(run.model()?)?;
-    let alone = run.fit(&ready.case)?;
+    let (alone, _) = run.fit(&ready.case)?;
     if alone.outcome == Outcome::NotConverged {
         return Err(format!("alone: {}", alone.reason));
     }
@@ -207,7 +207,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
         correlations: vec![],
         covariance: covariance(&names, &fit),
         history: None,
-        fit: run.fit_row(&fit, left_out),
+        fit: run.fit_row(&fit, left_out, "single estimates"),
     };
     Ok((estimated, costs))
 }

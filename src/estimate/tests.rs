@@ -48,7 +48,7 @@ fn bench() -> Bench {
 impl Bench {
     fn basis(&self) -> Basis<'_> {
         let Bench { aircraft, buildup, tunnel, settings, .. } = self;
-        Basis { aircraft, buildup, tunnel, settings }
+        Basis::new(aircraft, buildup, tunnel, settings)
     }
 
     /// A record whose outputs are the response to the true derivatives times `factor`, with noise and a bias of an.

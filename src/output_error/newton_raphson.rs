@@ -37,6 +37,17 @@ pub enum Weights {
     Estimated,
 }
 
+impl Weights {
+    /// As the configuration says it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Weights::Table => "table",
+            Weights::Estimated => "estimated",
+        }
+    }
+}
+
 /// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled information matrix:
 /// about the smallest eigenvalue of a maneuver that determines its derivatives badly.
 const FIRST_DAMPING: f64 = 1e-8;

@@ -140,6 +140,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         class: class.into(),
         outcome: "converged".into(),
         reason: "steps below the tolerance".into(),
+        start: None,
         iterations: 6,
         initial_cost: Some(12.0),
         final_cost: Some(0.4),

@@ -28,6 +28,27 @@ pub struct Cards {
     pub programs: BTreeMap<String, Program>,
     /// Name of the flight → what it flies.
     pub flights: BTreeMap<String, FlightCard>,
+    /// How `harvest validate` records the test points.
+    #[serde(default)]
+    pub study: Study,
+}
+
+/// How the bounds are put to the test: maneuvers of the cards recorded many times.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Study {
+    /// Records of each maneuver.
+    pub realisations: usize,
+    /// Angles of attack of each class, spread over those that its cards have.
+    pub points: usize,
+    /// Time constant of the outputs' noise where it is coloured; its size is that of the white noise.
+    pub coloured_time_s: f64,
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        Study { realisations: 200, points: 3, coloured_time_s: 0.5 }
+    }
 }
 
 /// How the wind-tunnel database differs from the truth.

@@ -10,8 +10,8 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::Maneuver;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, JointRow, PredictedRow,
-    PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
+    PredictedRow, PredictionRow, StartRow, TrendRow,
 };
 
 /// A row type with the name of its table and its columns.
@@ -91,7 +91,7 @@ macro_rules! table {
 
 table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
     altitude_ft mass_slug x_cg_ft samples origin);
-table!(FitRow, "fits", maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out
+table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial_cost final_cost condition_number left_out
     largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
     bound_held bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error held_because);
@@ -102,6 +102,10 @@ table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight stand
 table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
 table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
+table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative unit truth realisations converged bias scatter
+    bias_over_scatter scatter_over_bound coverage_68 coverage_95 scatter_over_corrected corrected_coverage_68
+    corrected_coverage_95);
+table!(StartRow, "starts", class alpha_deg start records alone reached);
 table!(Problem, "problems", stage flight_id place reason);
 
 table!(PredictionRow, "predictions", maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias
@@ -182,7 +186,9 @@ mod tests {
         publish::<FitRow>(folder.path(), &[]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("fits.csv")).unwrap();
         assert!(
-            csv.starts_with("maneuver_id,class,outcome,reason,iterations,initial_cost,final_cost,condition_number")
+            csv.starts_with(
+                "maneuver_id,class,outcome,reason,start,iterations,initial_cost,final_cost,condition_number"
+            )
         );
     }
 

@@ -21,11 +21,9 @@ pub fn coverage(subject: &Subject, setting: Setting, realisations: usize, seed: 
         .into_par_iter()
         .map(|i| subject.estimate(setting, seed_of(seed, &format!("realisation {i}"))))
         .collect();
-    let converged: Vec<&Estimated> =
-        estimated.iter().filter(|e| e.fit.outcome == Outcome::Converged.name()).collect();
+    let converged: Vec<&Estimated> = estimated.iter().filter(|e| e.fit.outcome == Outcome::Converged.name()).collect();
     let row = |truth: &TrueDerivative| {
-        let rows: Vec<&EstimateRow> =
-            converged.iter().filter_map(|e| row_of(e, &truth.derivative)).collect();
+        let rows: Vec<&EstimateRow> = converged.iter().filter_map(|e| row_of(e, &truth.derivative)).collect();
         (!rows.is_empty()).then(|| {
             let errors: Vec<f64> = rows.iter().filter_map(|r| Some(r.value? - truth.value)).collect();
             let spread = Spread::of(&errors);

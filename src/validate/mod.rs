@@ -8,9 +8,8 @@ mod coverage;
 mod page;
 mod starts;
 
-use serde::{Deserialize, Serialize};
-
-use crate::aero::{TunnelPoint, WindTunnel};
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::aero::{Output, WindTunnel};
 use crate::estimate::{self, Basis, Estimated};
 use crate::maneuver::Class;
 use crate::output_error::newton_raphson::Weights;
@@ -19,22 +18,6 @@ use crate::simulate::{Flown, Instrument, Instruments};
 pub use coverage::coverage;
 pub use page::page;
 pub use starts::starts;
-
-/// How the study is made.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Study {
-    /// Records of each maneuver.
-    pub realisations: usize,
-    /// Time constant of the outputs' noise where it is coloured; its size is that of the white noise.
-    pub coloured_time_s: f64,
-}
-
-impl Default for Study {
-    fn default() -> Self {
-        Study { realisations: 200, coloured_time_s: 0.5 }
-    }
-}
 
 /// The noise of the outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +40,7 @@ impl Colour {
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {
     pub class: &'a Class,
-    pub flown: Flown,
+    pub flown: &'a Flown,
     /// What each signal's noise is.
     pub instruments: &'a Instruments,
     pub basis: Basis<'a>,
@@ -94,7 +77,7 @@ impl Subject<'_> {
 
     /// Instruments with nothing but noise.
     fn noise_only(&self, setting: Setting) -> Instruments {
-        let outputs = self.class.axis.outputs().map(|o| o.signal());
+        let outputs = self.class.axis.outputs().map(Output::signal);
         let only = |(signal, instrument): (&String, &Instrument)| {
             let noise = instrument.noise;
             let coloured = setting.colour == Colour::Coloured && outputs.contains(&signal.as_str());
@@ -108,6 +91,3 @@ impl Subject<'_> {
         Instruments(self.instruments.0.iter().map(only).collect())
     }
 }
-
-#[cfg(test)]
-mod tests;

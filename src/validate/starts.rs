@@ -6,11 +6,10 @@ use rayon::prelude::*;
 use super::{Setting, Subject, tunnel_of_truth};
 use crate::aero::{Buildup, WindTunnel};
 use crate::estimate::{self, Basis, Estimated, Start};
-use crate::maneuver::Status;
 use crate::output_error::Outcome;
 use crate::simulate::noise::seed_of;
 use crate::simulate::{Flown, TrueDerivative};
-use crate::tables::StartRow;
+use crate::tables::{EstimateRow, StartRow};
 
 /// The minimum is the same when no derivative differs by more than this share of its bound.
 const SAME: f64 = 0.1;
@@ -33,9 +32,8 @@ impl From {
     }
 
     fn table(self, flown: &Flown, buildup: &Buildup) -> WindTunnel {
-        let surface = |name: &str| {
-            buildup.derivatives.iter().any(|d| d.name == name && d.regressor.surface().is_some())
-        };
+        let surface =
+            |name: &str| buildup.derivatives.iter().any(|d| d.name == name && d.regressor.surface().is_some());
         let factor = |t: &TrueDerivative| match self {
             From::Double => 2.0,
             From::Half => 0.5,
@@ -49,15 +47,15 @@ impl From {
 /// A row per kind of start, over `realisations` records.
 #[must_use]
 pub fn starts(subject: &Subject, setting: Setting, realisations: usize, seed: u64) -> Vec<StartRow> {
-    let truth = tunnel_of_truth(&subject.flown);
+    let truth = tunnel_of_truth(subject.flown);
     let reached = |from: From| -> Vec<(bool, bool)> {
-        let elsewhere = from.table(&subject.flown, subject.basis.buildup);
+        let elsewhere = from.table(subject.flown, subject.basis.buildup);
         let one = |i: usize| {
             let seed = seed_of(seed, &format!("start {i}"));
             let reference = subject.from(&truth, setting, seed);
             let found = subject.from(&elsewhere, setting, seed);
             let same = same(&reference, &found);
-            (same && found.fit.start == Start::WindTunnel.name(), same)
+            (same && found.fit.start.as_deref() == Some(Start::WindTunnel.in_words()), same)
         };
         (0..realisations).into_par_iter().map(one).collect()
     };
@@ -86,11 +84,10 @@ impl Subject<'_> {
 
 fn same(a: &Estimated, b: &Estimated) -> bool {
     let converged = |e: &Estimated| e.fit.outcome == Outcome::Converged.name();
-    let estimated = |e: &Estimated| -> Vec<_> {
-        e.estimates.iter().filter(|r| r.status == Status::Estimated.name()).map(|r| (r.value, r.bound)).collect()
+    let near = |(a, b): (&EstimateRow, &EstimateRow)| match (a.value, b.value, a.bound) {
+        (Some(at), Some(found), Some(bound)) => (at - found).abs() <= SAME * bound,
+        // Held, or inactive.
+        (at, found, _) => at == found,
     };
-    let near = |((a, bound), (b, _)): &((Option<f64>, Option<f64>), (Option<f64>, Option<f64>))| {
-        matches!((a, b, bound), (Some(a), Some(b), Some(bound)) if (a - b).abs() <= SAME * bound)
-    };
-    converged(a) && converged(b) && estimated(a).into_iter().zip(estimated(b)).all(|pair| near(&pair))
+    converged(a) && converged(b) && a.estimates.iter().zip(&b.estimates).all(near)
 }

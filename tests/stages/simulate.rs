@@ -194,12 +194,7 @@ fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
 
 fn estimated(simulation: &Simulation, flown: &Flown) -> Estimated {
     let config = &simulation.config;
-    let basis = Basis {
-        aircraft: &config.aircraft,
-        buildup: &config.buildup,
-        tunnel: &config.tunnel,
-        settings: &config.estimate,
-    };
+    let basis = Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate);
     estimate::maneuver(&flown.record, &flown.maneuver, config.class(&flown.maneuver.class).unwrap(), &basis)
 }
 

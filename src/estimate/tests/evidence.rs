@@ -85,12 +85,9 @@ impl Flown {
             origin: "found".into(),
         };
         let derivatives = self.truth.iter().map(|(d, _)| d.clone()).collect();
-        let basis = Basis {
-            aircraft: &aircraft(),
-            buildup: &Buildup { derivatives, ..Buildup::default() },
-            tunnel: &tunnel(&self.truth, tunnel_share),
-            settings: &Settings { hold, ..Settings::default() },
-        };
+        let (aircraft, buildup) = (aircraft(), Buildup { derivatives, ..Buildup::default() });
+        let (tunnel, settings) = (tunnel(&self.truth, tunnel_share), Settings { hold, ..Settings::default() });
+        let basis = Basis::new(&aircraft, &buildup, &tunnel, &settings);
         super::super::maneuver(&self.record, &maneuver, &class, &basis)
     }
 }

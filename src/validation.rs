@@ -1,0 +1,115 @@
+//! The conductor of the study of bounds: flies the test points of the cards, records them many times, and writes the
+//! tables and the page that say what the bounds are worth.
+
+use std::path::Path;
+
+use crate::aero::WindTunnel;
+use crate::config::Simulation;
+use crate::error::{Problem, Result};
+use crate::estimate::{self, Basis};
+use crate::maneuver::Class;
+use crate::output_error::newton_raphson::Weights;
+use crate::pipeline::Progress;
+use crate::simulate::Flown;
+use crate::simulate::noise::seed_of;
+use crate::store::{atomic, table};
+use crate::tables::{CoverageRow, StartRow};
+use crate::validate::{self, Colour, Setting, Subject};
+
+/// What a study found.
+#[derive(Clone, Debug, Default)]
+pub struct Validation {
+    pub coverage: Vec<CoverageRow>,
+    pub starts: Vec<StartRow>,
+    /// Test points that could not be flown.
+    pub problems: Vec<Problem>,
+}
+
+/// The ways in which every maneuver is recorded and weighted.
+const SETTINGS: [(Colour, Weights); 4] = [
+    (Colour::White, Weights::Table),
+    (Colour::White, Weights::Estimated),
+    (Colour::Coloured, Weights::Table),
+    (Colour::Coloured, Weights::Estimated),
+];
+
+/// One in so many records serves for the study of starting values, which estimates each six times.
+const RECORDS_PER_START: usize = 10;
+
+/// Makes the study and writes `coverage` and `starts` into a folder, and the page.
+///
+/// # Errors
+/// A disk that says no.
+pub fn run(
+    simulation: &Simulation,
+    out: &Path,
+    page: &Path,
+    command: &str,
+    progress: &dyn Progress,
+) -> Result<Validation> {
+    let mut found = Validation::default();
+    let mut flown: Vec<(&Class, Flown)> = Vec::new();
+    for class in &simulation.config.classes {
+        for alpha_deg in angles(simulation, &class.name) {
+            let Some(card) = simulation.card(&class.name, alpha_deg) else { continue };
+            match simulation.simulator.fly(&card) {
+                Ok(maneuver) => flown.push((class, maneuver)),
+                Err(problem) => found.problems.push(problem),
+            }
+        }
+    }
+    // Held values are true, so their uncertainty is nothing that the scatter could show.
+    let settings = estimate::Settings { held_uncertainty_pct: 0.0, ..simulation.config.estimate.clone() };
+    let study = simulation.cards.study;
+    progress.begin("validate", flown.len() * (SETTINGS.len() + 1));
+    for (colour, weights) in SETTINGS {
+        for (class, maneuver) in &flown {
+            let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
+            let subject = subject(simulation, class, maneuver, &truth, &settings);
+            let setting = Setting { colour, coloured_time_s: study.coloured_time_s, weights };
+            found.coverage.extend(validate::coverage(&subject, setting, study.realisations, seed));
+            progress.advance(&name(maneuver));
+        }
+    }
+    for (class, maneuver) in &flown {
+        let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
+        let subject = subject(simulation, class, maneuver, &truth, &settings);
+        let setting = Setting { colour: Colour::White, coloured_time_s: 0.0, weights: Weights::Table };
+        let records = study.realisations.div_ceil(RECORDS_PER_START);
+        found.starts.extend(validate::starts(&subject, setting, records, seed));
+        progress.advance(&name(maneuver));
+    }
+    progress.end();
+    table::publish(out, &found.coverage)?;
+    table::publish(out, &found.starts)?;
+    atomic::place(page, validate::page(command, &found.coverage, &found.starts).as_bytes())?;
+    Ok(found)
+}
+
+fn name(maneuver: &Flown) -> String {
+    maneuver.maneuver.flight_id.clone()
+}
+
+fn subject<'a>(
+    simulation: &'a Simulation,
+    class: &'a Class,
+    flown: &'a Flown,
+    truth: &'a WindTunnel,
+    settings: &'a estimate::Settings,
+) -> Subject<'a> {
+    let config = &simulation.config;
+    let basis = Basis::new(&config.aircraft, &config.buildup, truth, settings);
+    Subject { class, flown, instruments: &simulation.cards.instruments, basis }
+}
+
+/// Angles of attack for a class's study, spread over those that its cards have.
+fn angles(simulation: &Simulation, class: &str) -> Vec<f64> {
+    let flights = simulation.cards.flights.values();
+    let points = flights.flat_map(|f| &f.points).filter(|p| p.class == class);
+    let mut angles: Vec<f64> = points.flat_map(|p| p.alpha_deg.iter().copied()).collect();
+    angles.sort_by(f64::total_cmp);
+    angles.dedup();
+    let wanted = simulation.cards.study.points.clamp(1, angles.len().max(1));
+    let place = |k: usize| k * angles.len().saturating_sub(1) / (wanted - 1).max(1);
+    (0..wanted.min(angles.len())).map(|k| angles[place(k)]).collect()
+}
