@@ -254,7 +254,7 @@ pub struct HistoryOutput {
 pub struct CoverageRow {
     pub class: String,
     pub alpha_deg: f64,
-    /// Noise of the outputs: `white` or `coloured`.
+    /// Noise: `white` or `coloured`, of the outputs; `noise on every channel`.
     pub residuals: String,
     /// `table` or `estimated`.
     pub weights: String,

@@ -14,7 +14,7 @@ use crate::simulate::Flown;
 use crate::simulate::noise::seed_of;
 use crate::store::{atomic, table};
 use crate::tables::{CoverageRow, StartRow};
-use crate::validate::{self, Colour, Setting, Subject};
+use crate::validate::{self, Residuals, Setting, Subject};
 
 /// What a study found.
 #[derive(Clone, Debug, Default)]
@@ -26,11 +26,12 @@ pub struct Validation {
 }
 
 /// The ways in which every maneuver is recorded and weighted.
-const SETTINGS: [(Colour, Weights); 4] = [
-    (Colour::White, Weights::Table),
-    (Colour::White, Weights::Estimated),
-    (Colour::Coloured, Weights::Table),
-    (Colour::Coloured, Weights::Estimated),
+const SETTINGS: [(Residuals, Weights); 5] = [
+    (Residuals::White, Weights::Table),
+    (Residuals::White, Weights::Estimated),
+    (Residuals::Coloured, Weights::Table),
+    (Residuals::Coloured, Weights::Estimated),
+    (Residuals::EveryChannel, Weights::Table),
 ];
 
 /// One in so many records serves for the study of starting values, which estimates each six times.
@@ -62,11 +63,11 @@ pub fn run(
     let settings = estimate::Settings { held_uncertainty_pct: 0.0, ..simulation.config.estimate.clone() };
     let study = simulation.cards.study;
     progress.begin("validate", flown.len() * (SETTINGS.len() + 1));
-    for (colour, weights) in SETTINGS {
+    for (residuals, weights) in SETTINGS {
         for (class, maneuver) in &flown {
             let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
             let subject = subject(simulation, class, maneuver, &truth, &settings);
-            let setting = Setting { colour, coloured_time_s: study.coloured_time_s, weights };
+            let setting = Setting { residuals, coloured_time_s: study.coloured_time_s, weights };
             found.coverage.extend(validate::coverage(&subject, setting, study.realisations, seed));
             progress.advance(&name(maneuver));
         }
@@ -74,7 +75,7 @@ pub fn run(
     for (class, maneuver) in &flown {
         let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
         let subject = subject(simulation, class, maneuver, &truth, &settings);
-        let setting = Setting { colour: Colour::White, coloured_time_s: 0.0, weights: Weights::Table };
+        let setting = Setting { residuals: Residuals::White, coloured_time_s: 0.0, weights: Weights::Table };
         let records = study.realisations.div_ceil(RECORDS_PER_START);
         found.starts.extend(validate::starts(&subject, setting, records, seed));
         progress.advance(&name(maneuver));

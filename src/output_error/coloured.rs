@@ -6,15 +6,22 @@
 //! that of an autoregressive process, by which the sensitivities are filtered: every variance is a sum of squares.
 //!
 //! For this sensitivities are taken as S T with T Tᵀ = H⁻¹, which makes H the unit matrix.
+//!
+//! Noise is seen through blocks of samples: what moves slower than a block is the autoregressive process, with few
+//! coefficients even where it is far slower; what moves faster is white within the blocks. Parameters act slower than a
+//! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
 
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
+use super::cost::add_square;
 
-/// Longest memory of a process, samples.
+/// Length of a block, s: the short period and the test inputs are several times longer.
+const BLOCK_S: f64 = 0.2;
+/// Longest memory of a process, blocks.
 const ORDER: usize = 12;
-/// A process has at most one coefficient per so many samples.
-const SAMPLES_PER_COEFFICIENT: usize = 20;
+/// A process has at most one coefficient per so many blocks.
+const BLOCKS_PER_COEFFICIENT: usize = 10;
 const ROUNDS: usize = 10;
 /// R is settled when no output's long-run variance changes by more than this share.
 const SETTLED: f64 = 0.1;
@@ -22,6 +29,7 @@ const SETTLED: f64 = 0.1;
 /// One output of one maneuver.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
+    pub step_s: f64,
     pub weight: f64,
     /// Of the residuals, were they white.
     pub variance: f64,
@@ -34,7 +42,15 @@ pub struct Series {
 
 /// The noise of each output.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Noise(Vec<Autoregression>);
+pub struct Noise(Vec<OutputNoise>);
+
+#[derive(Clone, Debug, PartialEq)]
+struct OutputNoise {
+    /// Of the blocks' means.
+    slow: Autoregression,
+    /// Variance of the samples about their block's mean.
+    fast: f64,
+}
 
 /// Covariance of the parameters, where T Tᵀ = H⁻¹ and each output has independent noise.
 #[must_use]
@@ -55,7 +71,8 @@ pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
     let n = outputs.first().map_or(0, Series::parameters);
     let mut scatter = DMatrix::zeros(n, n);
     for (output, noise) in outputs.iter().zip(&noise.0) {
-        output.spread(noise, &mut scatter);
+        output.add_fast(noise.fast, &mut scatter);
+        output.blocks().spread(&noise.slow, &mut scatter);
     }
     scatter.fill_upper_triangle_with_lower_triangle();
     scatter
@@ -70,30 +87,34 @@ fn transformed(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> Vec<Series> {
 
 /// The noise of outputs whose H is the unit matrix, when what the parameters took is added back.
 fn settled(outputs: &[Series]) -> Noise {
-    let observed: Vec<Vec<f64>> = outputs.iter().map(Series::autocovariances).collect();
+    let blocks: Vec<Series> = outputs.iter().map(Series::blocks).collect();
+    let observed: Vec<Vec<f64>> = blocks.iter().map(Series::autocovariances).collect();
     let fitted = |o: &Series, covariances: &[f64]| Autoregression::fitted(covariances, o.count());
-    let mut noise: Vec<_> = outputs.iter().zip(&observed).map(|(o, seen)| fitted(o, seen)).collect();
+    let mut slow: Vec<_> = blocks.iter().zip(&observed).map(|(o, seen)| fitted(o, seen)).collect();
     let n = outputs.first().map_or(0, Series::parameters);
-    let mut scatter = DMatrix::zeros(n, n);
+    let mut fast = DMatrix::zeros(n, n);
+    for output in outputs {
+        output.add_fast(output.fast_variance(), &mut fast);
+    }
     for _ in 0..ROUNDS {
-        scatter.fill(0.0);
-        let spread: Vec<_> = outputs.iter().zip(&noise).map(|(o, noise)| o.spread(noise, &mut scatter)).collect();
+        let mut scatter = fast.clone();
+        let spread: Vec<_> = blocks.iter().zip(&slow).map(|(o, noise)| o.spread(noise, &mut scatter)).collect();
         scatter.fill_upper_triangle_with_lower_triangle();
         let whole = |(o, (seen, spread)): (&Series, (&Vec<f64>, &Vec<f64>))| {
             let whole: Vec<f64> = seen.iter().zip(o.taken(spread, &scatter)).map(|(s, t)| s + t).collect();
             fitted(o, &whole)
         };
-        let next: Vec<_> = outputs.iter().zip(observed.iter().zip(&spread)).map(whole).collect();
-        let settled = noise.iter().zip(&next).all(|(a, b)| {
+        let next: Vec<_> = blocks.iter().zip(observed.iter().zip(&spread)).map(whole).collect();
+        let settled = slow.iter().zip(&next).all(|(a, b)| {
             let (a, b) = (a.long_run_variance(), b.long_run_variance());
             (a - b).abs() <= SETTLED * b
         });
-        noise = next;
+        slow = next;
         if settled {
             break;
         }
     }
-    Noise(noise)
+    Noise(outputs.iter().zip(slow).map(|(o, slow)| OutputNoise { slow, fast: o.fast_variance() }).collect())
 }
 
 impl Series {
@@ -105,6 +126,73 @@ impl Series {
             before.copy_from_slice(row);
             for (new, column) in row.iter_mut().zip(root.column_iter()) {
                 *new = dot(&before, column.as_slice());
+            }
+        }
+    }
+
+    /// Samples of a block.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    fn block(&self) -> usize {
+        (BLOCK_S / self.step_s).round().max(1.0) as usize
+    }
+
+    /// Means of residuals and sensitivities over blocks, with the weight that a block has. Of a block that does not count
+    /// whole the sensitivities are less.
+    fn blocks(&self) -> Series {
+        let (block, n) = (self.block(), self.parameters());
+        let mut blocks = Series {
+            step_s: self.step_s * block as f64,
+            weight: self.weight * block as f64,
+            variance: self.variance / block as f64,
+            residuals: Vec::new(),
+            used: Vec::new(),
+            sensitivities: Vec::new(),
+        };
+        for (k, used) in self.used.chunks(block).enumerate() {
+            let count = used.iter().filter(|used| **used).count();
+            let samples = k * block..k * block + used.len();
+            blocks.used.push(count > 0);
+            blocks.residuals.push(self.residuals[samples.clone()].iter().sum::<f64>() / count.max(1) as f64);
+            let first = blocks.sensitivities.len();
+            blocks.sensitivities.resize(first + n, 0.0);
+            for row in self.sensitivities[samples.start * n..samples.end * n].chunks_exact(n) {
+                for (mean, s) in blocks.sensitivities[first..].iter_mut().zip(row) {
+                    *mean += s / block as f64;
+                }
+            }
+        }
+        blocks
+    }
+
+    /// Variance of the residuals about their block's mean.
+    fn fast_variance(&self) -> f64 {
+        let (mut square, mut freedom) = (0.0, 0);
+        for (v, used) in self.residuals.chunks(self.block()).zip(self.used.chunks(self.block())) {
+            let counted = || v.iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| *v);
+            let count = counted().count();
+            let mean = counted().sum::<f64>() / count.max(1) as f64;
+            square += counted().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+            freedom += count.saturating_sub(1);
+        }
+        square / freedom.max(1) as f64
+    }
+
+    /// Adds to the lower triangle of the scatter what white noise within the blocks does.
+    fn add_fast(&self, variance: f64, scatter: &mut DMatrix<f64>) {
+        let (block, n) = (self.block(), self.parameters());
+        let factor = self.weight * self.weight * variance;
+        let mut deviation = vec![0.0; n];
+        for (rows, used) in self.sensitivities.chunks(block * n).zip(self.used.chunks(block)) {
+            let count = used.iter().filter(|used| **used).count().max(1) as f64;
+            let mut mean = vec![0.0; n];
+            for row in rows.chunks_exact(n) {
+                mean.iter_mut().zip(row).for_each(|(mean, s)| *mean += s / count);
+            }
+            for (row, _) in rows.chunks_exact(n).zip(used).filter(|(_, used)| **used) {
+                for (deviation, (s, mean)) in deviation.iter_mut().zip(row.iter().zip(&mean)) {
+                    *deviation = s - mean;
+                }
+                add_square(scatter, factor, &deviation);
             }
         }
     }
@@ -125,7 +213,7 @@ impl Series {
             let (sum, count) = pairs.fold((0.0, 0_usize), |(sum, count), (k, l)| (sum + f(k, l), count + 1));
             sum / count.max(1) as f64
         };
-        (0..=ORDER.min(samples / SAMPLES_PER_COEFFICIENT)).map(mean).collect()
+        (0..=ORDER.min(samples / BLOCKS_PER_COEFFICIENT)).map(mean).collect()
     }
 
     fn autocovariances(&self) -> Vec<f64> {
@@ -139,7 +227,7 @@ impl Series {
         series.resize(series.len() + n * noise.memory(self.used.len()), 0.0);
         noise.filter(&mut series, n);
         let factor = self.weight * self.weight * noise.innovation;
-        series.chunks_exact(n).for_each(|row| super::cost::add_square(scatter, factor, row));
+        series.chunks_exact(n).for_each(|row| add_square(scatter, factor, row));
         noise.filter_back(&mut series, n);
         series.truncate(self.sensitivities.len());
         for s in &mut series {
@@ -189,6 +277,7 @@ mod tests {
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
         let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
         let series = Series {
+            step_s: 0.1,
             weight,
             variance: 0.0,
             residuals: values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect(),
@@ -200,12 +289,13 @@ mod tests {
 
     #[test]
     fn the_variance_of_a_mean_of_white_values_has_n_minus_one_degrees_of_freedom() {
-        // Fewer than SAMPLES_PER_COEFFICIENT samples: white noise is all that is considered.
-        let values = [1.0, 3.0, 2.0, 5.0, 4.0, 1.0, 0.0, 2.0, 3.0, 1.0, 99.0];
-        let used: Vec<bool> = (0..values.len()).map(|k| k < 10).collect();
-        let square: f64 = values[..10].iter().map(|v| (v - 2.2) * (v - 2.2)).sum();
-        // Ten samples, so that a degree of freedom not counted would be 10%.
-        assert_relative_eq!(of_the_mean(&values, &used), square / 9.0 / 10.0, max_relative = 0.02);
+        // Fewer than BLOCKS_PER_COEFFICIENT blocks: white noise is all that is considered. The blocks' means speak alone.
+        let means = [1.0, 3.0, 2.0, 5.0, 4.0, 1.0, 0.0, 2.0, 3.0];
+        let values: Vec<f64> = means.iter().flat_map(|m| [m + 0.5, m - 0.5]).collect();
+        let mean = means.iter().sum::<f64>() / 9.0;
+        let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
+        // Nine blocks, so that a degree of freedom not counted would be 11%.
+        assert_relative_eq!(of_the_mean(&values, &[true; 18]), square / 8.0 / 9.0, max_relative = 0.02);
     }
 
     #[test]

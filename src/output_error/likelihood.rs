@@ -72,7 +72,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
                 row.copy_from_slice(response.sensitivity(k, o));
             }
             let residuals = residuals.iter().map(|v| v[o]).collect();
-            Series { weight: weights[o], variance: variances[o], residuals, used, sensitivities }
+            Series { step_s: self.step_s, weight: weights[o], variance: variances[o], residuals, used, sensitivities }
         };
         (0..OUTPUTS).map(series).collect()
     }

@@ -32,7 +32,7 @@ pub fn coverage(subject: &Subject, setting: Setting, realisations: usize, seed: 
             CoverageRow {
                 class: subject.class.name.clone(),
                 alpha_deg: subject.flown.maneuver.alpha_deg,
-                residuals: setting.colour.name().to_owned(),
+                residuals: setting.residuals.name().to_owned(),
                 weights: setting.weights.name().to_owned(),
                 derivative: truth.derivative.clone(),
                 unit: truth.unit.to_owned(),

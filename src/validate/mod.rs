@@ -1,8 +1,8 @@
 //! Is what the bounds say true? Maneuvers with known derivatives are recorded many times, each time with other noise, and
 //! estimated; how far the estimates scatter is held against what each of them said of itself.
 //!
-//! The maneuvers are the simulator's, whose equations of motion are not the estimator's. Instruments have noise only, on
-//! every channel, also those that the estimator takes as exact; held values are the true ones.
+//! The maneuvers are the simulator's, whose equations of motion are not the estimator's. Instruments have noise only; held
+//! values are the true ones.
 
 mod coverage;
 mod page;
@@ -19,19 +19,24 @@ pub use coverage::coverage;
 pub use page::page;
 pub use starts::starts;
 
-/// The noise of the outputs.
+/// What noise the records have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Colour {
+pub enum Residuals {
+    /// White noise of the outputs.
     White,
+    /// Coloured noise of the outputs, of the same size.
     Coloured,
+    /// White noise on every channel, also those that the estimator takes as exact: surfaces, airspeed, the other axis.
+    EveryChannel,
 }
 
-impl Colour {
+impl Residuals {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Colour::White => "white",
-            Colour::Coloured => "coloured",
+            Residuals::White => "white",
+            Residuals::Coloured => "coloured",
+            Residuals::EveryChannel => "noise on every channel",
         }
     }
 }
@@ -46,10 +51,10 @@ pub struct Subject<'a> {
     pub basis: Basis<'a>,
 }
 
-/// One way of recording and weighting.
+/// One way of recording and weighting; the time constant is that of coloured noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    pub colour: Colour,
+    pub residuals: Residuals,
     pub coloured_time_s: f64,
     pub weights: Weights,
 }
@@ -79,12 +84,15 @@ impl Subject<'_> {
     fn noise_only(&self, setting: Setting) -> Instruments {
         let outputs = self.class.axis.outputs().map(Output::signal);
         let only = |(signal, instrument): (&String, &Instrument)| {
-            let noise = instrument.noise;
-            let coloured = setting.colour == Colour::Coloured && outputs.contains(&signal.as_str());
-            let instrument = if coloured {
-                Instrument { coloured: noise, coloured_time_s: setting.coloured_time_s, ..Instrument::default() }
-            } else {
-                Instrument { noise, ..Instrument::default() }
+            let (noise, is_output) = (instrument.noise, outputs.contains(&signal.as_str()));
+            let perfect = Instrument::default();
+            let instrument = match setting.residuals {
+                Residuals::Coloured if is_output => {
+                    Instrument { coloured: noise, coloured_time_s: setting.coloured_time_s, ..perfect }
+                }
+                Residuals::White if is_output => Instrument { noise, ..perfect },
+                Residuals::EveryChannel => Instrument { noise, ..perfect },
+                Residuals::White | Residuals::Coloured => perfect,
             };
             (signal.clone(), instrument)
         };

@@ -16,8 +16,9 @@ pub fn page(command: &str, coverage: &[CoverageRow], starts: &[StartRow]) -> Str
     let mut page = format!(
         "# What the bounds are worth\n\n\
          Made by `{command}`. Simulated maneuvers are recorded many times, each time with other noise, and estimated; \
-         held values are the true ones. Sensors have noise only, on every channel, also those that the estimator takes \
-         as exact. Where the residuals are coloured, the outputs' noise is a first-order process of the same size.\n\n\
+         held values are the true ones. *White* and *coloured* are noise of the five outputs, as the theory has it; \
+         coloured noise is a first-order process of the same size. *Noise on every channel* is white, also on surfaces, \
+         airspeed and the other axis, which the estimator takes as exact.\n\n\
          *Scatter* is the standard deviation of the estimates, *bound* the root mean square of the bounds they state. \
          Coverage is how often an interval holds the truth; of {records} records it is known to \
          {error:.1} % (one standard error at 95 %), a bias over scatter to {bias:.2}.\n\n",
