@@ -20,6 +20,7 @@ use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::identifiability;
+use crate::output_error::input_noise::noisy_surfaces;
 use crate::output_error::newton_raphson::{self, Weights};
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{cramer_rao, equation_error};
@@ -276,7 +277,7 @@ impl<'a> Run<'a> {
         let settings = self.basis.settings;
         let window = Window::cut(self.record, range.clone(), surfaces.iter().copied(), settings.mass_properties)?;
         let measurements = self.measurements(&range)?;
-        let case = Case::<NX, E>::new(self.basis.aircraft, &window, measurements, &model);
+        let mut case = Case::<NX, E>::new(self.basis.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
         if left_out > settings.max_marked_share {
@@ -285,6 +286,9 @@ impl<'a> Run<'a> {
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
+        let mut free = model.free.clone();
+        free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
+        case.noisy_surfaces = noisy_surfaces(self.basis.aircraft, &window, &free, &model.held);
         Ok(Ready { model, surfaces, window, case, left_out })
     }
 

@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use nalgebra::SVector;
 
+use super::input_noise::NoisySurface;
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -67,6 +68,8 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     /// The measured states at every sample, and the coefficients that the measured motion implies.
     pub(super) states: Vec<SVector<f64, NX>>,
     pub(super) implied: Vec<[f64; COEFFICIENTS]>,
+    /// Surfaces whose noise the corrected bounds count; none unless asked for.
+    pub noisy_surfaces: Vec<NoisySurface>,
     pub measurements: Measurements,
     /// Names of the parameters in order; initial states are called `initial alpha` and so on.
     pub names: Vec<String>,
@@ -109,6 +112,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             initial_state: model.initial_state,
             states: motion.iter().step_by(2).map(E::measured_state).collect(),
             implied: motion.iter().step_by(2).map(|m| E::coefficients(aircraft, m)).collect(),
+            noisy_surfaces: vec![],
             measurements,
             names,
             equations: PhantomData,
@@ -181,10 +185,6 @@ fn regressor<const NX: usize, E: Equations<NX>>(
     }
     let [p, q, r] = motion.rates;
     let rate = |length: f64, rate: f64| rate * length / (2.0 * motion.velocity);
-    let length = match E::AXIS {
-        crate::aero::Axis::Longitudinal => aircraft.chord_ft,
-        crate::aero::Axis::Lateral => aircraft.span_ft,
-    };
     let value = match &derivative.regressor {
         Regressor::Constant => 1.0,
         Regressor::Alpha => motion.alpha * DEG,
@@ -192,14 +192,24 @@ fn regressor<const NX: usize, E: Equations<NX>>(
         Regressor::RollRate => rate(aircraft.span_ft, p),
         Regressor::PitchRate => rate(aircraft.chord_ft, q),
         Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(name) => window.signal(name)[point],
-        Regressor::Vane(name) => {
-            let force = motion.qbar * aircraft.wing_area_ft2;
-            let reference = if derivative.coefficient.is_moment() { force * length } else { force };
-            window.signal(name)[point] / reference
+        Regressor::Surface(name) | Regressor::Vane(name) => {
+            window.signal(name)[point] * surface_factor(aircraft, motion, derivative)
         }
     };
     (None, value)
+}
+
+/// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and moment are made coefficients.
+pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &Derivative) -> f64 {
+    if !matches!(derivative.regressor, Regressor::Vane(_)) {
+        return 1.0;
+    }
+    let force = motion.qbar * aircraft.wing_area_ft2;
+    let length = match derivative.coefficient.axis() {
+        crate::aero::Axis::Longitudinal => aircraft.chord_ft,
+        crate::aero::Axis::Lateral => aircraft.span_ft,
+    };
+    1.0 / if derivative.coefficient.is_moment() { force * length } else { force }
 }
 
 fn held_parts<const NX: usize>(

@@ -97,7 +97,9 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     white.fill_upper_triangle_with_lower_triangle();
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
-    Bounds { corrected: never_below(coloured::covariance(root, series), &covariance), covariance }
+    let inputs = data.input_covariance(&fit.values, &fit.response, &fit.weights);
+    let corrected = never_below(coloured::covariance(root, series), &covariance) + &inverse * inputs * &inverse;
+    Bounds { covariance, corrected }
 }
 
 /// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.

@@ -176,6 +176,14 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
             .collect()
     }
 
+    fn input_covariance(&self, parameters: &[f64], response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
+        for (member, response) in self.members.iter().zip(response) {
+            member.add(&member.case.input_covariance(&member.parameters(parameters), response, weights), &mut sum);
+        }
+        sum
+    }
+
     fn place(&self, diverged: Diverged) -> String {
         let mut sample = diverged.sample;
         for member in &self.members {

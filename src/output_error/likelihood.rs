@@ -1,9 +1,12 @@
 //! What Newton-Raphson (1.3) and the bounds (1.7) need of the data, whether of one maneuver or of several joined.
 
+use nalgebra::DMatrix;
+
 use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::cramer_rao;
+use super::input_noise;
 use super::response::{Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
@@ -32,6 +35,10 @@ pub trait Likelihood {
 
     /// Residuals with their sensitivities, output by output; those of different series are independent.
     fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
+
+    /// What noise of what is taken as exact does to the gradient.
+    fn input_covariance(&self, parameters: &[f64], response: &Self::Response, weights: &[f64; OUTPUTS])
+    -> DMatrix<f64>;
 
     /// Where an integration diverged, in words.
     fn place(&self, diverged: Diverged) -> String;
@@ -75,6 +82,10 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
             Series { step_s: self.step_s, weight: weights[o], variance: variances[o], residuals, used, sensitivities }
         };
         (0..OUTPUTS).map(series).collect()
+    }
+
+    fn input_covariance(&self, parameters: &[f64], response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        input_noise::gradient_covariance(self, parameters, response, weights)
     }
 
     fn place(&self, diverged: Diverged) -> String {

@@ -13,6 +13,7 @@ pub mod equation_error;
 mod likelihood;
 pub mod holding;
 pub mod identifiability;
+pub mod input_noise;
 mod joint;
 pub mod mean;
 pub mod newton_raphson;
