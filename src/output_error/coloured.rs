@@ -22,9 +22,9 @@ const BLOCK_S: f64 = 0.2;
 const ORDER: usize = 12;
 /// A process has at most one coefficient per so many blocks.
 const BLOCKS_PER_COEFFICIENT: usize = 10;
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 30;
 /// R is settled when no output's long-run variance changes by more than this share.
-const SETTLED: f64 = 0.1;
+const SETTLED: f64 = 0.01;
 
 /// One output of one maneuver.
 #[derive(Clone, Debug, PartialEq)]
