@@ -227,6 +227,9 @@ impl<'a> Run<'a> {
         let ready = self.ready::<NX, E>(self.model()?)?;
         let case = &ready.case;
         let mut fit = self.fit(case)?;
+        if self.basis.settings.hold == Hold::Evidence {
+            fit.reason.push_str(&self.without_tunnel(case, &fit));
+        }
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
         cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
@@ -333,6 +336,15 @@ impl<'a> Run<'a> {
         }
         let free = |bias: &&Bias| self.status(&bias.name) == Some(Status::Estimated);
         model.biases = basis.buildup.biases_of(self.class.axis).filter(free).collect();
+        Ok(model)
+    }
+
+    /// The model with everything free that the class estimates or holds.
+    fn model_without_held(&self) -> Result<Model<'a>, String> {
+        let active = |d: &Derivative| matches!(self.status(&d.name), Some(Status::Estimated | Status::Held));
+        let mut model = self.model()?;
+        model.free = self.basis.buildup.derivatives_of(self.class.axis).filter(|d| active(d)).collect();
+        model.held.retain(|(d, _)| !active(d));
         Ok(model)
     }
 

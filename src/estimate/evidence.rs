@@ -56,14 +56,7 @@ struct Choosing<'r, 'a, const NX: usize, E: Equations<NX>> {
 
 impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
     fn new(run: &'r Run<'a>) -> Result<Self, String> {
-        let (range, table) = (run.range(), run.model()?);
-        let active = |d: &Derivative| matches!(run.status(&d.name), Some(Status::Estimated | Status::Held));
-        let derivatives = run.basis.buildup.derivatives_of(run.class.axis);
-        let all = Model {
-            free: derivatives.filter(|d| active(d)).collect(),
-            held: table.held.iter().copied().filter(|(d, _)| !active(d)).collect(),
-            ..table
-        };
+        let (range, all) = (run.range(), run.model_without_held()?);
         let surfaces = all.free.iter().chain(all.held.iter().map(|(d, _)| d)).filter_map(|d| d.regressor.surface());
         let window = Window::cut(run.record, range.clone(), surfaces, run.basis.settings.mass_properties)?;
         let wide = Case::new(run.basis.aircraft, &window, run.measurements(&range)?, &all);
@@ -149,6 +142,19 @@ impl Run<'_> {
         let derivative = self.basis.buildup.derivative(name)?;
         let known = derivative.regressor != Regressor::Constant && self.tunnel(name).is_some();
         known.then(|| self.held_uncertainty(derivative)).filter(|u| *u > 0.0)
+    }
+
+    /// Why evidence could not mend a fit that the data do not determine: what has nothing to be held at.
+    pub(super) fn without_tunnel<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>, fit: &Fit) -> String {
+        let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
+        let is_derivative = |name: &&String| self.basis.buildup.derivative(name).is_some() && !self.is_constant(name);
+        let lacking: Vec<&str> =
+            names.filter(is_derivative).filter(|n| self.known_to(n).is_none()).map(String::as_str).collect();
+        match lacking.as_slice() {
+            [] => String::new(),
+            [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
+            many => format!("; none of {} has a wind-tunnel value with an uncertainty to be held at", many.join(", ")),
+        }
     }
 
     fn in_words(&self, names: &[String], parameter: usize, because: Option<Because>) -> String {
