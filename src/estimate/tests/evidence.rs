@@ -56,6 +56,10 @@ fn tunnel(truth: &[(Derivative, f64)], share: f64) -> WindTunnel {
 
 impl Flown {
     fn estimated(&self, hold: Hold, tunnel_share: f64) -> Estimated {
+        self.estimated_with(hold, &tunnel(&self.truth, tunnel_share))
+    }
+
+    fn estimated_with(&self, hold: Hold, tunnel: &WindTunnel) -> Estimated {
         let axis = Axis::Longitudinal;
         let weights = axis.outputs().into_iter().zip(NOISE.map(|sd| 1.0 / (0.01 * sd * sd))).collect();
         let class = Class {
@@ -88,7 +92,7 @@ impl Flown {
         let basis = Basis {
             aircraft: &aircraft(),
             buildup: &Buildup { derivatives, ..Buildup::default() },
-            tunnel: &tunnel(&self.truth, tunnel_share),
+            tunnel,
             settings: &Settings { hold, ..Settings::default() },
         };
         super::super::maneuver(&self.record, &maneuver, &class, &basis)
@@ -163,7 +167,8 @@ fn surfaces_that_move_in_proportion_are_unidentifiable_named_and_have_no_bound()
 
 #[test]
 fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_cannot_be_told_apart() {
-    let estimated = with_twin().estimated(Hold::Evidence, 0.5);
+    let flown = with_twin();
+    let estimated = flown.estimated(Hold::Evidence, 0.5);
     assert_eq!(estimated.fit.outcome, "converged", "{}", estimated.fit.reason);
     let held = held(&estimated);
     assert_eq!(held.len(), 1, "{held:?}");
@@ -171,6 +176,26 @@ fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_
     let other = if name == "Cm_de" { "Cm_twin" } else { "Cm_de" };
     assert!(["Cm_de", "Cm_twin"].contains(&name), "{held:?}");
     assert!(because.starts_with("the data do not tell it apart from") && because.contains(other), "{because}");
+    // The twin moves by twice the elevator: what is wrong with the one goes into the other, and its bound counts it.
+    let factor = if name == "Cm_twin" { 2.0 } else { 0.5 };
+    let wrong = 0.5 * flown.truth.iter().find(|(d, _)| d.name == name).map(|(_, value)| value.abs()).unwrap();
+    let free = row(&estimated, other);
+    assert_relative_eq!(free.bound_held.unwrap(), factor * wrong, max_relative = 1e-3);
+    assert!(free.bound_corrected.unwrap() >= free.bound_held.unwrap());
+}
+
+#[test]
+fn of_surfaces_that_move_in_proportion_neither_can_be_held_without_a_tunnel_and_the_reason_says_so() {
+    let flown = with_twin();
+    let known: Vec<(Derivative, f64)> =
+        flown.truth.iter().filter(|(d, _)| !["Cm_de", "Cm_twin"].contains(&d.name.as_str())).cloned().collect();
+    let estimated = flown.estimated_with(Hold::Evidence, &tunnel(&known, 0.5));
+    assert_eq!(estimated.fit.outcome, "unidentifiable");
+    let reason = &estimated.fit.reason;
+    assert!(
+        reason.ends_with("; none of Cm_de, Cm_twin has a wind-tunnel value with an uncertainty to be held at"),
+        "{reason}"
+    );
 }
 
 #[test]
