@@ -54,7 +54,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hold {
-    /// The class (Tables 1 and 3).
+    /// The class (Tables 1 and 3). Maneuvers that are to share derivatives (`joint`) need it: they must hold the same.
     #[default]
     Table,
     /// The maneuver: what the tunnel knows better than the maneuver can tell.
@@ -173,14 +173,12 @@ impl Estimated {
     #[must_use]
     pub fn unknown_class(maneuver: &Maneuver) -> Estimated {
         let reason = format!("the configuration has no class `{}`", maneuver.class);
-        Estimated {
-            fit: rejected(maneuver, reason),
-            estimates: vec![],
-            combined: vec![],
-            covariance: None,
-            correlations: vec![],
-            history: None,
-        }
+        Estimated::without_fit(rejected(maneuver, reason), vec![])
+    }
+
+    /// The rows of a maneuver that was not fitted.
+    fn without_fit(fit: FitRow, estimates: Vec<EstimateRow>) -> Estimated {
+        Estimated { fit, estimates, combined: vec![], covariance: None, correlations: vec![], history: None }
     }
 }
 
@@ -267,6 +265,9 @@ impl<'a> Run<'a> {
 
     /// Output error from the configured start, and from the other one if that does not converge.
     fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<Fit, String> {
+        if case.parameters() == 0 {
+            return Err("nothing is free to be estimated".to_owned());
+        }
         let settings = self.basis.settings;
         let tunnel = case.starting_values(|name| self.tunnel(name).unwrap_or(0.0));
         let implied = equation_error::start(case, &tunnel);
@@ -476,15 +477,7 @@ impl<'a> Run<'a> {
     }
 
     fn rejected(&self, reason: String) -> Estimated {
-        let fit = rejected(self.maneuver, reason);
-        Estimated {
-            fit,
-            estimates: self.rows(None),
-            combined: vec![],
-            covariance: None,
-            correlations: vec![],
-            history: None,
-        }
+        Estimated::without_fit(rejected(self.maneuver, reason), self.rows(None))
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {

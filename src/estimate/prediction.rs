@@ -18,7 +18,7 @@ use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
-use crate::output_error::{Case, Fit, Model, Outcome, mean, newton_raphson};
+use crate::output_error::{Case, Fit, Model, Outcome, cost, mean, newton_raphson};
 use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow};
 use crate::units::Unit;
 
@@ -106,7 +106,7 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
     if case.parameters() == 0 {
         let mut response = case.response();
         let diverged = case.respond(&[], &mut response).is_err();
-        let cost = crate::output_error::cost::sums(&case.measurements, &response, &weights, 0).cost();
+        let cost = cost::sums(&case.measurements, &response, &weights, 0).cost();
         return if diverged {
             Err("the integration diverges".into())
         } else {

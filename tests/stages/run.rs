@@ -64,8 +64,9 @@ const PUBLISHED: [(&str, &str, &str); 13] = [
     ),
 ];
 
-/// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, and no list of events.
-const WITHOUT_ROWS: [&str; 3] = ["events", "joint", "predictions"];
+/// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
+/// nothing fails.
+const WITHOUT_ROWS: [&str; 4] = ["events", "joint", "predictions", "problems"];
 
 const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
 
@@ -151,9 +152,10 @@ fn explained_columns(published: &BTreeMap<String, Vec<String>>) -> BTreeMap<Stri
         for cell in section.lines().filter_map(|line| line.strip_prefix("| `")?.split(" |").next()) {
             let words: Vec<&str> = cell.split(['`', ' ']).filter(|word| !word.is_empty()).collect();
             for range in words.windows(3).filter(|words| words[1] == "…") {
-                let at =
-                    |name: &str| columns.iter().position(|c| c == name).unwrap_or_else(|| panic!("{table}: {name}"));
-                names.extend(columns[at(range[0])..at(range[2])].iter().cloned());
+                let at = |name: &str| columns.iter().position(|c| c == name);
+                if let (Some(first), Some(last)) = (at(range[0]), at(range[2])) {
+                    names.extend(columns[first..last].iter().cloned());
+                }
             }
             names.extend(words.into_iter().filter(|word| *word != "…").map(str::to_owned));
         }

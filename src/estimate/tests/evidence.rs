@@ -63,7 +63,7 @@ impl Flown {
         let axis = Axis::Longitudinal;
         let weights = axis.outputs().into_iter().zip(NOISE.map(|sd| 1.0 / (0.01 * sd * sd))).collect();
         let class = Class {
-            name: "doublets".into(),
+            name: "steps".into(),
             title: String::new(),
             axis,
             recognition: Recognition::default(),
@@ -71,23 +71,7 @@ impl Flown {
             weights,
             overrides: vec![],
         };
-        let maneuver = Maneuver {
-            maneuver_id: "f_t0".into(),
-            flight_id: "f".into(),
-            class: class.name.clone(),
-            axis,
-            start_s: 0.0,
-            end_s: self.record.time_s(SAMPLES - 1),
-            alpha_deg: 20.0,
-            mach: 0.3,
-            qbar_psf: 52.0,
-            velocity_ft_s: 320.0,
-            altitude_ft: 25_000.0,
-            mass_slug: 1040.0,
-            x_cg_ft: 38.2,
-            samples: SAMPLES,
-            origin: "found".into(),
-        };
+        let maneuver = super::maneuver("f_t0", 20.0);
         let derivatives = self.truth.iter().map(|(d, _)| d.clone()).collect();
         let basis = Basis {
             aircraft: &aircraft(),
