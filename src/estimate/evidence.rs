@@ -175,10 +175,15 @@ impl Run<'_> {
                 let with = with.map_or_else(String::new, |(j, correlation)| {
                     format!("; it would correlate {correlation:.2} with {}", names[j])
                 });
-                format!(
-                    "estimated, its bound would be {bound:.3e}; the tunnel's uncertainty is {uncertainty:.3e}{with}"
-                )
+                let (bound, uncertainty) = (short(bound), short(uncertainty));
+                format!("estimated, its bound would be {bound}; the tunnel's uncertainty is {uncertainty}{with}")
             }
         }
     }
+}
+
+/// A number with three significant digits.
+fn short(value: f64) -> String {
+    let digits = format!("{value:.2e}");
+    digits.parse().map_or(digits, |rounded: f64| rounded.to_string())
 }

@@ -99,7 +99,7 @@ fn held(contents: &Contents) -> TableView {
         vec![class_name(contents, class), derivative.to_owned(), count.to_string(), because.to_owned()]
     };
     let heads = ["class", "derivative", "maneuvers", "why, in the first of them"];
-    let note = "By the evidence of each maneuver, not by a table.";
+    let note = "By the evidence of each maneuver, not by a table. Bounds and uncertainties in the derivative's unit.";
     TableView::new("Held at the wind tunnel's value", note, &heads, reasons.into_iter().map(row).collect())
 }
 

@@ -120,6 +120,7 @@ fn evidence_holds_what_a_tunnel_without_error_knows_better_but_no_constant() {
         estimated.estimates.iter().filter(|r| r.status == "estimated").map(|r| r.derivative.as_str()).collect();
     assert_eq!(free, ["CN_0", "Cm_0", "CA_0"]);
     assert!(held(&estimated).iter().all(|(_, because)| because.starts_with("estimated, its bound would be")));
+    assert!(held(&estimated).iter().all(|(_, because)| !because.contains("e-")), "numbers that a reader can read");
 }
 
 /// A second surface that moves in proportion to the first, as stabilator and pitch vane of pilot's steps nearly do.
