@@ -55,7 +55,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hold {
-    /// The class (Tables 1 and 3).
+    /// The class (Tables 1 and 3). Maneuvers that are to share derivatives (`joint`) need it: they must hold the same.
     #[default]
     Table,
     /// The maneuver: what the tunnel knows better than the maneuver can tell.
@@ -200,14 +200,12 @@ impl Estimated {
     #[must_use]
     pub fn unknown_class(maneuver: &Maneuver) -> Estimated {
         let reason = format!("the configuration has no class `{}`", maneuver.class);
-        Estimated {
-            fit: rejected(maneuver, reason),
-            estimates: vec![],
-            combined: vec![],
-            covariance: None,
-            correlations: vec![],
-            history: None,
-        }
+        Estimated::without_fit(rejected(maneuver, reason), vec![])
+    }
+
+    /// The rows of a maneuver that was not fitted.
+    fn without_fit(fit: FitRow, estimates: Vec<EstimateRow>) -> Estimated {
+        Estimated { fit, estimates, combined: vec![], covariance: None, correlations: vec![], history: None }
     }
 }
 
@@ -254,6 +252,9 @@ impl<'a> Run<'a> {
         let ready = self.ready::<NX, E>(self.model()?)?;
         let case = &ready.case;
         let (mut fit, start) = self.fit(case)?;
+        if self.basis.settings.hold == Hold::Evidence {
+            fit.reason.push_str(&self.without_tunnel(case, &fit));
+        }
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
         cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
@@ -294,6 +295,9 @@ impl<'a> Run<'a> {
 
     /// Output error from the configured start, and from the other one if that does not converge.
     fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<(Fit, Start), String> {
+        if case.parameters() == 0 {
+            return Err("nothing is free to be estimated".to_owned());
+        }
         let settings = self.basis.settings;
         let Maneuver { alpha_deg, mach, .. } = *self.maneuver;
         let value = |name: &str| self.basis.start.value(name, alpha_deg, mach).map_or(0.0, |v| v.value);
@@ -365,6 +369,15 @@ impl<'a> Run<'a> {
         }
         let free = |bias: &&Bias| self.status(&bias.name) == Some(Status::Estimated);
         model.biases = basis.buildup.biases_of(self.class.axis).filter(free).collect();
+        Ok(model)
+    }
+
+    /// The model with everything free that the class estimates or holds.
+    fn model_without_held(&self) -> Result<Model<'a>, String> {
+        let active = |d: &Derivative| matches!(self.status(&d.name), Some(Status::Estimated | Status::Held));
+        let mut model = self.model()?;
+        model.free = self.basis.buildup.derivatives_of(self.class.axis).filter(|d| active(d)).collect();
+        model.held.retain(|(d, _)| !active(d));
         Ok(model)
     }
 
@@ -497,15 +510,7 @@ impl<'a> Run<'a> {
     }
 
     fn rejected(&self, reason: String) -> Estimated {
-        let fit = rejected(self.maneuver, reason);
-        Estimated {
-            fit,
-            estimates: self.rows(None),
-            combined: vec![],
-            covariance: None,
-            correlations: vec![],
-            history: None,
-        }
+        Estimated::without_fit(rejected(self.maneuver, reason), self.rows(None))
     }
 
     fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {

@@ -1,9 +1,9 @@
 //! The conductor: brings the stages of a campaign up to date in order, in parallel within each, and publishes their tables.
 //!
-//! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts lie in the store under fingerprints of all that
-//! decides them, so what is up to date is not done again, and a killed run goes on where it was. Trend, compare and report
-//! are small and are made anew from the artefacts. Results are collected in the order of flights and maneuvers, whatever
-//! thread made them.
+//! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts
+//! lie in the store under fingerprints of all that decides them, so what is up to date is not done again, and a killed run
+//! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
+//! the order of flights and maneuvers, whatever thread made them.
 
 mod others;
 
@@ -32,9 +32,9 @@ use crate::{compare, estimate, ingest, report, segment, trend};
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
 const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 3;
-const JOINT_VERSION: u32 = 1;
-const PREDICT_VERSION: u32 = 1;
+const ESTIMATE_VERSION: u32 = 5;
+const JOINT_VERSION: u32 = 2;
+const PREDICT_VERSION: u32 = 2;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

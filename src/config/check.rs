@@ -6,6 +6,7 @@ use super::Config;
 use super::source::{Files, Source};
 use crate::aero::{Buildup, Output, WindTunnel};
 use crate::error::{Error, Result, did_you_mean};
+use crate::estimate::Hold;
 use crate::flight::signal;
 use crate::maneuver::{Class, Event, Status};
 use crate::store::files;
@@ -242,6 +243,11 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
 }
 
 fn stages(config: &Config, source: &Source) -> Result<()> {
+    if config.estimate.joint.is_some() && config.estimate.hold == Hold::Evidence {
+        let what = "`joint` needs `hold: table`: by evidence each maneuver chooses for itself what to hold, and \
+                    maneuvers that share derivatives must hold the same";
+        return Err(source.error_under("estimate", "joint", what));
+    }
     let segment = std::iter::once(&config.segment.excitation_flag).chain(config.segment.steps.keys());
     for name in segment {
         known_signal(config, source, name, "segment")?;

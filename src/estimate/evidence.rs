@@ -56,14 +56,7 @@ struct Choosing<'r, 'a, const NX: usize, E: Equations<NX>> {
 
 impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
     fn new(run: &'r Run<'a>) -> Result<Self, String> {
-        let (range, table) = (run.range(), run.model()?);
-        let active = |d: &Derivative| matches!(run.status(&d.name), Some(Status::Estimated | Status::Held));
-        let derivatives = run.basis.buildup.derivatives_of(run.class.axis);
-        let all = Model {
-            free: derivatives.filter(|d| active(d)).collect(),
-            held: table.held.iter().copied().filter(|(d, _)| !active(d)).collect(),
-            ..table
-        };
+        let (range, all) = (run.range(), run.model_without_held()?);
         let surfaces = all.free.iter().chain(all.held.iter().map(|(d, _)| d)).filter_map(|d| d.regressor.surface());
         let window = Window::cut(run.record, range.clone(), surfaces, run.basis.settings.mass_properties)?;
         let wide = Case::new(run.basis.aircraft, &window, run.measurements(&range)?, &all);
@@ -151,6 +144,19 @@ impl Run<'_> {
         known.then(|| self.held_uncertainty(derivative)).filter(|u| *u > 0.0)
     }
 
+    /// Why evidence could not mend a fit that the data do not determine: what has nothing to be held at.
+    pub(super) fn without_tunnel<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>, fit: &Fit) -> String {
+        let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
+        let is_derivative = |name: &&String| self.basis.buildup.derivative(name).is_some() && !self.is_constant(name);
+        let lacking: Vec<&str> =
+            names.filter(is_derivative).filter(|n| self.known_to(n).is_none()).map(String::as_str).collect();
+        match lacking.as_slice() {
+            [] => String::new(),
+            [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
+            many => format!("; none of {} has a wind-tunnel value with an uncertainty to be held at", many.join(", ")),
+        }
+    }
+
     fn in_words(&self, names: &[String], parameter: usize, because: Option<Because>) -> String {
         match because {
             None => "it was held beside others that are free now".to_owned(),
@@ -169,10 +175,15 @@ impl Run<'_> {
                 let with = with.map_or_else(String::new, |(j, correlation)| {
                     format!("; it would correlate {correlation:.2} with {}", names[j])
                 });
-                format!(
-                    "estimated, its bound would be {bound:.3e}; the tunnel's uncertainty is {uncertainty:.3e}{with}"
-                )
+                let (bound, uncertainty) = (short(bound), short(uncertainty));
+                format!("estimated, its bound would be {bound}; the tunnel's uncertainty is {uncertainty}{with}")
             }
         }
     }
+}
+
+/// A number with three significant digits.
+fn short(value: f64) -> String {
+    let digits = format!("{value:.2e}");
+    digits.parse().map_or(digits, |rounded: f64| rounded.to_string())
 }

@@ -282,9 +282,7 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
 
 fn nothing(whole: &Maneuver) -> Joined {
     let fit = super::rejected(whole, "no maneuver to join".to_owned());
-    let estimated =
-        Estimated { fit, estimates: vec![], combined: vec![], correlations: vec![], covariance: None, history: None };
-    Joined { estimated, members: vec![] }
+    Joined { estimated: Estimated::without_fit(fit, vec![]), members: vec![] }
 }
 
 fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: &str) -> JointRow {

@@ -68,8 +68,10 @@ impl Run<'_> {
         window: &Window,
         model: &Model<'m>,
     ) -> Vec<Flown<'m>> {
-        let acting: Vec<&'m Derivative> =
+        let mut acting: Vec<&'m Derivative> =
             model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d)).collect();
+        // In the order of the model, whatever is held: a pair has one name in all maneuvers.
+        acting.sort_by_key(|d| self.basis.buildup.derivatives.iter().position(|other| other.name == d.name));
         let all = Model { free: acting.clone(), held: vec![], ..model.clone() };
         let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
         let flown = acting.into_iter().filter_map(|derivative| {

@@ -12,13 +12,13 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Estimated, Run};
+use super::{Basis, Estimated, Hold, Run};
 use crate::aero::{Axis, Derivative, Output};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
-use crate::output_error::{Case, Fit, Model, Outcome, mean, newton_raphson};
+use crate::output_error::{Case, Fit, Model, Outcome, cost, mean, newton_raphson};
 use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow};
 use crate::units::Unit;
 
@@ -87,8 +87,12 @@ pub fn maneuver(
 }
 
 fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) -> Result<Predicted, String> {
-    let model = run.model()?;
     let settings = run.basis.settings;
+    // By evidence the others may estimate what a table would hold: all that they know is taken.
+    let model = match settings.hold {
+        Hold::Table => run.model()?,
+        Hold::Evidence => run.model_without_held()?,
+    };
     let share_constants = settings.prediction.as_ref().is_some_and(|s| s.share_constants);
     let values: BTreeMap<&str, f64> =
         model.free.iter().map(|d| d.name.as_str()).zip(shared(run, &model.free, others)?).collect();
@@ -102,7 +106,7 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
     if case.parameters() == 0 {
         let mut response = case.response();
         let diverged = case.respond(&[], &mut response).is_err();
-        let cost = crate::output_error::cost::sums(&case.measurements, &response, &weights, 0).cost();
+        let cost = cost::sums(&case.measurements, &response, &weights, 0).cost();
         return if diverged {
             Err("the integration diverges".into())
         } else {

@@ -161,6 +161,19 @@ fn with_one_sound_maneuver_there_is_nothing_to_join_and_the_row_says_so() {
     );
 }
 
+#[test]
+fn a_maneuver_of_which_nothing_is_free_is_rejected_and_no_panic() {
+    let mut bench = bench();
+    bench.class.statuses.values_mut().for_each(|status| *status = Status::Inactive);
+    bench.settings.initial_state = InitialState::Measured;
+    let record = bench.flown(1, 1.0, 0.0);
+    for hold in [Hold::Table, Hold::Evidence] {
+        bench.settings.hold = hold;
+        let fit = bench.estimate(&record, &maneuver("a", 20.0)).fit;
+        assert_eq!((fit.outcome.as_str(), fit.reason.as_str()), ("rejected", "nothing is free to be estimated"));
+    }
+}
+
 /// Prediction of a maneuver whose `Cm_de` is `factor` times the true one from two with the true one.
 fn predicted(factor: f64) -> prediction::Predicted {
     let bench = bench();

@@ -154,12 +154,6 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.states.iter().enumerate().map(at).collect()
     }
 
-    /// The free derivatives of the same coefficient as `derivative`, itself among them.
-    #[must_use]
-    pub fn of_same_coefficient(&self, derivative: usize) -> Range<usize> {
-        self.ranges.iter().find(|range| range.contains(&derivative)).cloned().unwrap_or_default()
-    }
-
     /// The parameters to start from: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
     #[must_use]
     pub fn starting_values(&self, derivative: impl Fn(&str) -> f64) -> Vec<f64> {

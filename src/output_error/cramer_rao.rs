@@ -40,7 +40,8 @@ pub enum Identified {
     Undetermined { condition_number: Option<f64>, parameters: Vec<usize> },
 }
 
-/// A parameter takes part in a direction when its share of the unit vector's square is at least this.
+/// A parameter takes part in a direction when its share of the unit vector's square is at least this: the few that a reader
+/// is to be told of.
 const TAKES_PART: f64 = 0.1;
 
 /// Inverts the information matrix, or names what it does not determine.

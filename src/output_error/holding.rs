@@ -22,7 +22,8 @@ use super::cramer_rao::{scale, scaled};
 use super::likelihood::Likelihood;
 use crate::dynamics::{Equations, OUTPUTS};
 
-/// Parameters to be held or estimated: what the data say of all of them together, and how well some of them are known from elsewhere.
+/// Parameters to be held or estimated: what the data say of all of them together, and how well some of them are known
+/// from elsewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidates {
     information: DMatrix<f64>,
@@ -45,7 +46,8 @@ pub enum Because {
     Bound { bound: f64, uncertainty: f64, partner: Option<(usize, f64)> },
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this.
+/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this: a
+/// smaller part would hardly be determined by holding it.
 const TAKES_PART: f64 = 0.01;
 
 /// What a set of free parameters knows of itself.

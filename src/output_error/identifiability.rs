@@ -100,7 +100,8 @@ pub fn collinearity(information: &DMatrix<f64>, max_condition_number: f64, limit
     })
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this.
+/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this: more
+/// than rounding, for however small its part, its variance has no bound.
 const TAKES_PART: f64 = 1e-6;
 
 struct Directions {

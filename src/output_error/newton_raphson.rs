@@ -108,6 +108,7 @@ fn iterate<D: Likelihood>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], se
         weights,
         response: data.response(),
         condition_number: None,
+        undetermined: vec![],
         covariance: None,
         covariance_held: None,
         covariance_corrected: None,
@@ -217,6 +218,7 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
             let names: Vec<&str> = parameters.iter().filter_map(|&j| data.names().get(j)).map(String::as_str).collect();
             fit.outcome = Outcome::Unidentifiable;
             fit.reason = format!("the data do not tell apart {}", names.join(", "));
+            fit.undetermined = parameters;
         }
     }
 }

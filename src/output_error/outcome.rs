@@ -46,6 +46,8 @@ pub struct Fit<R = Response> {
     pub response: R,
     /// Of the information matrix with unit diagonal.
     pub condition_number: Option<f64>,
+    /// The parameters that take part in the least determined direction, where the data do not determine it.
+    pub undetermined: Vec<usize>,
     /// Sandwich covariance of the parameters, the held values' part in it; absent where the data determine none.
     pub covariance: Option<DMatrix<f64>>,
     /// What the uncertainty of the held values contributes to both covariances.
@@ -68,6 +70,7 @@ impl<R> Fit<R> {
             weights: self.weights,
             response,
             condition_number: self.condition_number,
+            undetermined: self.undetermined,
             covariance: self.covariance,
             covariance_held: self.covariance_held,
             covariance_corrected: self.covariance_corrected,

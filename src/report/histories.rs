@@ -6,11 +6,10 @@ use super::Contents;
 use super::figure::{self, Panel, PanelLine};
 use super::gallery::{finite, label};
 use super::marks::{LegendView, key, line};
-use super::notation::angle;
+use super::notation::{angle, without_unit};
 use super::scale::{Scale, extent};
 use super::subject::by_name;
 use crate::tables::{History, HistoryOutput};
-use crate::units::Unit;
 
 /// So many samples are drawn of one signal at most: more cannot be told apart at half a page.
 const MOST_SAMPLES: usize = 300;
@@ -25,20 +24,18 @@ pub struct HistoryView {
     pub legend: Vec<LegendView>,
 }
 
-/// One maneuver of each class: the one whose angle of attack is in the middle of its class.
 #[must_use]
 pub fn views(contents: &Contents) -> Vec<HistoryView> {
+    shown(contents).into_iter().enumerate().map(|(i, history)| history_view(history, i + 1)).collect()
+}
+
+/// One maneuver of each class: the one whose angle of attack is in the middle of its class.
+#[must_use]
+pub fn shown<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
     let of_class = by_name(contents.histories, |h| &h.class);
     let configured: Vec<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
     let others = of_class.keys().copied().filter(|c| !configured.contains(c));
-    configured
-        .iter()
-        .copied()
-        .chain(others)
-        .filter_map(|class| middle(of_class.get(class)?))
-        .enumerate()
-        .map(|(i, history)| history_view(history, i + 1))
-        .collect()
+    configured.iter().copied().chain(others).filter_map(|class| middle(of_class.get(class)?)).collect()
 }
 
 fn middle<'a>(histories: &[&'a History]) -> Option<&'a History> {
@@ -109,11 +106,6 @@ fn output_panel(history: &History, output: &HistoryOutput, number: usize, i: usi
         dots: every(kept),
         left_out,
     })
-}
-
-/// A signal's name without the unit at its end, which the axis states anyway.
-fn without_unit(signal: &str) -> &str {
-    Unit::of_signal(signal).suffix.and_then(|suffix| signal.strip_suffix(suffix)).unwrap_or(signal)
 }
 
 fn lines_scale(lines: &[PanelLine], dots: &[(f64, f64)]) -> Scale {

@@ -1,6 +1,7 @@
 //! The report stage: one self-contained HTML page (inline SVG and style, no scripts, nothing loaded) that a flight-test
 //! review board reads. Words and numbers are put together here, the looks are the template's.
 
+mod as_flown;
 mod failures;
 mod figure;
 mod gallery;
@@ -84,6 +85,7 @@ struct Page<'a> {
     comparison: Vec<TableView>,
     maneuvers: TableView,
     predictions: Option<TableView>,
+    as_flown: Vec<as_flown::TriangleView>,
     told_apart: Vec<TableView>,
     failures: Vec<TableView>,
     histories: Vec<histories::HistoryView>,
@@ -122,6 +124,7 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
         maneuvers: maneuvers(contents),
         predictions: predictions::table(contents),
+        as_flown: as_flown::triangles(contents),
         told_apart: told_apart::tables(contents),
         failures: failures::tables(contents),
         histories: histories::views(contents),

@@ -3,6 +3,7 @@
 use minijinja::HtmlEscape;
 
 use crate::aero::{Axis, Coefficient};
+use crate::units::Unit;
 
 /// What stands where there is no value.
 pub const NOTHING: &str = "\u{2013}";
@@ -58,6 +59,12 @@ pub fn unit(name: &str) -> String {
         "deg_s" => "deg/s".to_owned(),
         other => other.to_owned(),
     }
+}
+
+/// A signal's name without the unit at its end, where that is said elsewhere or there is none.
+#[must_use]
+pub fn without_unit(signal: &str) -> &str {
+    Unit::of_signal(signal).suffix.and_then(|suffix| signal.strip_suffix(suffix)).unwrap_or(signal)
 }
 
 /// A number with so many significant digits, a proper minus, and a dash where it is missing or not finite.

@@ -7,9 +7,10 @@ use super::scale::quantile;
 use crate::tables::PredictionRow;
 
 const NOTE: &str = "Each maneuver is predicted with derivatives estimated from the others of its class and angle of attack; \
-    only its biases and initial states are its own. Theil's U is 0 for a perfect prediction and 1 for none; the shares of \
-    bias and variance are wanted small, what is left to covariance is noise. R² is the share of the measured variance that \
-    is predicted.";
+    its biases and initial states are its own, and so are, unless the configuration shares them, its constants. Theil's U is \
+    0 for a perfect prediction and 1 for none. Of the squared difference, bias is the share of a wrong mean and variance that \
+    of a wrong size; the rest is wrong in shape, or noise. R² is the share of the measured variance that is predicted: \
+    negative where a constant would have done better, and low where the maneuver hardly moved the output.";
 
 /// The table; none where nothing was predicted.
 #[must_use]

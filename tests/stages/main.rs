@@ -13,4 +13,5 @@ mod run;
 mod segment;
 mod simulate;
 mod support;
+mod together;
 mod trend;
