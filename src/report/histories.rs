@@ -112,7 +112,8 @@ fn output_panel(history: &History, output: &HistoryOutput, number: usize, i: usi
 }
 
 /// A signal's name without the unit at its end, which the axis states anyway.
-fn without_unit(signal: &str) -> &str {
+#[must_use]
+pub fn without_unit(signal: &str) -> &str {
     Unit::of_signal(signal).suffix.and_then(|suffix| signal.strip_suffix(suffix)).unwrap_or(signal)
 }
 

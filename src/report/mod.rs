@@ -1,6 +1,7 @@
 //! The report stage: one self-contained HTML page (inline SVG and style, no scripts, nothing loaded) that a flight-test
 //! review board reads. Words and numbers are put together here, the looks are the template's.
 
+pub mod chart;
 mod failures;
 mod figure;
 mod gallery;
@@ -8,6 +9,7 @@ mod histories;
 mod marks;
 mod notation;
 mod predictions;
+mod reduce;
 #[cfg(test)]
 mod samples;
 mod scale;
