@@ -156,7 +156,7 @@ fn groups(config: &Config) -> Groups {
     let stepping = config.segment.steps.keys().filter(|name| !surfaces.contains(name)).cloned();
     let in_classes = config.classes.iter().flat_map(|c| c.recognition.flags.keys().cloned());
     let flags = unique(std::iter::once(config.segment.excitation_flag.clone()).chain(in_classes));
-    Groups { controls: stepping.collect(), flags, surfaces }
+    Groups { controls: stepping.collect(), flags, surfaces, steps: config.segment.steps.clone() }
 }
 
 fn unique(names: impl Iterator<Item = String>) -> Vec<String> {

@@ -1,5 +1,8 @@
 //! Strip charts: a whole flight with its maneuvers, and one maneuver measured against computed, each as an SVG file.
 
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
 use super::figure::strips::{self, Chart, Key, Lane, LaneBox, Marks, PITCH, Strip, Trace, Window};
 use super::figure::{INK, MEASURED_COLOUR};
 use super::histories::without_unit;
@@ -11,20 +14,37 @@ use crate::error::Problem;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Class, Maneuver};
 use crate::tables::{EventRow, FitRow, History, HistoryOutput};
-use crate::units::{Quantity, Unit};
+use crate::units::Unit;
 
 /// So many columns a chart has at least and at most: pixels of a screen, dots of a page.
 const COLUMNS: (f64, f64) = (760.0, 1000.0);
-/// Heights of a strip of a flight, of an output of a maneuver, of its residuals and of a flag.
-const STRIP: f64 = 50.0;
-const OUTPUT: f64 = 72.0;
-const RESIDUAL: f64 = 40.0;
-const FLAG: f64 = 20.0;
+/// How a signal is drawn.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    height: f64,
+    /// About so many steps of its scale.
+    steps: f64,
+    colour: &'static str,
+    width: f64,
+}
+
+const OF_FLIGHT: Look = Look { height: 50.0, steps: 2.0, colour: INK, width: 0.9 };
+const INPUT: Look = Look { width: 1.1, ..OF_FLIGHT };
+const FLAG: Look = Look { height: 20.0, ..INPUT };
+const ALONE: Look = Look { height: 72.0, steps: 3.0, ..INPUT };
+/// Wide, so that it is seen behind what was computed.
+const MEASURED: Look = Look { colour: MEASURED_COLOUR, width: 2.6, ..ALONE };
+const RESIDUAL: Look = Look { height: 40.0, steps: 1.6, colour: INK, width: 0.8 };
+/// By what share of its range within the maneuver a scale grows for what lies before, after and in what was computed: the
+/// recovery from a maneuver, and a response that diverges, would flatten it.
+const STRETCH: f64 = 0.5;
 /// What is shown before and after a maneuver, s: the trimmed flight it starts from, and whether it was at rest when it was
 /// cut.
 const AROUND_S: f64 = 4.0;
-/// A control that moves less than this share of the one that moves most is not drawn beside it.
-const HARDLY: f64 = 0.1;
+/// An input that moves less than this share of its smallest step is not drawn.
+const HARDLY: f64 = 0.5;
+/// One without a smallest step: less than this share of what moves most in the same unit.
+const HARDLY_BESIDE: f64 = 0.1;
 /// More reasons than this are left to the table `problems`.
 const MOST_PROBLEMS: usize = 8;
 
@@ -35,6 +55,8 @@ pub struct Groups {
     /// Of the pilot.
     pub controls: Vec<String>,
     pub flags: Vec<String>,
+    /// The smallest change that counts as a step, in the signal's unit, where one is set.
+    pub steps: BTreeMap<String, f64>,
 }
 
 /// A flight with what was found in it.
@@ -70,10 +92,10 @@ pub fn flight(view: &FlightView) -> String {
     let record = view.record;
     let (from_s, to_s) = (record.time_s(0), record.time_s(record.samples.saturating_sub(1)));
     let room = PITCH * view.maneuvers.len() as f64;
-    let pen = Pen::new(record, (from_s, to_s), room.clamp(COLUMNS.0, COLUMNS.1));
+    let pen = Pen::new(record, (from_s, to_s), (from_s, to_s), room.clamp(COLUMNS.0, COLUMNS.1));
     let (recorded, lacking): (Vec<_>, Vec<_>) =
         flight_signals(view.groups).into_iter().partition(|(name, _)| record.values(name).is_some());
-    let strips: Vec<Strip> = recorded.iter().filter_map(|(name, height)| pen.strip(name, *height, INK, 0.9)).collect();
+    let strips: Vec<Strip> = recorded.iter().filter_map(|(name, look)| pen.strip(name, *look, &[])).collect();
     let lacking: Vec<&str> = lacking.iter().map(|l| l.0).collect();
     let mut notes = notes(&lacking, &[], &strips);
     notes.extend(problems(view.problems));
@@ -104,21 +126,29 @@ pub fn maneuver(view: &ManeuverView) -> String {
     let part = view.record.part(maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S);
     let first_s = (maneuver.start_s - AROUND_S).max(part.start_s);
     let last_s = (maneuver.end_s + AROUND_S).min(part.time_s(part.samples.saturating_sub(1)));
-    let pen = Pen::new(&part, (first_s, last_s), COLUMNS.0);
+    let pen = Pen::new(&part, (first_s, last_s), (maneuver.start_s, maneuver.end_s), COLUMNS.0);
     let (moved, still) = moved(&pen, view.groups);
-    let mut strips: Vec<Strip> = moved.iter().filter_map(|name| pen.strip(name, STRIP, INK, 1.1)).collect();
+    let mut strips: Vec<Strip> = moved.iter().filter_map(|name| pen.strip(name, INPUT, &[])).collect();
     for output in maneuver.axis.outputs() {
         let computed = view.history.and_then(|h| Some((h, h.outputs.iter().find(|o| o.label == output.signal())?)));
-        strips.extend(pen.output(output.signal(), maneuver.start_s, computed));
+        strips.extend(pen.output(output.signal(), computed));
     }
-    strips.extend(view.groups.flags.iter().filter_map(|name| pen.strip(name, FLAG, INK, 1.1)));
+    strips.extend(view.groups.flags.iter().filter_map(|name| pen.strip(name, FLAG, &[])));
+    let mut notes = notes(&[], &still, &strips);
+    notes.push("Scales fit the maneuver: a line that leaves its strip before or after it is cut there.".to_owned());
     let inside = |m: &&Maneuver| m.start_s < last_s && m.end_s > first_s;
     let windows = view.flight.iter().filter(inside).map(|m| window(m, &[]));
     strips::draw(&Chart {
         title: title(view),
         description: format!(
-            "Strip chart of maneuver {} of class {}: inputs, outputs measured and computed, residuals.",
-            maneuver.maneuver_id, maneuver.class
+            "Strip chart of maneuver {} of class {}: inputs, outputs {}.",
+            maneuver.maneuver_id,
+            maneuver.class,
+            if view.history.is_some() {
+                "measured and computed, residuals"
+            } else {
+                "as measured; it was not estimated"
+            }
         ),
         heading: heading(view),
         legend: legend(&strips, true, false, view.history.is_some()),
@@ -126,7 +156,7 @@ pub fn maneuver(view: &ManeuverView) -> String {
         width: pen.columns.count as f64,
         windows: windows.collect(),
         lanes: vec![],
-        notes: notes(&[], &still, &strips),
+        notes,
         strips,
     })
 }
@@ -155,20 +185,21 @@ fn heading(view: &ManeuverView) -> Vec<String> {
     let mut outcome = format!("{}: {}", outcome_in_words(&fit.outcome), fit.reason);
     if let (Some(first), Some(last)) = (fit.initial_cost, fit.final_cost) {
         let (first, last) = (number(Some(first), 4), number(Some(last), 4));
-        outcome += &format!("; {} iterations, J from {first} to {last}", fit.iterations);
+        // Writing into a String cannot fail.
+        let _ = write!(outcome, "; {} iterations, J from {first} to {last}", fit.iterations);
     }
     if let Some(share) = fit.left_out {
-        outcome += &format!("; {} % of the output samples left out", fixed(100.0 * share, 2));
+        let _ = write!(outcome, "; {} % of the output samples left out", fixed(100.0 * share, 2));
     }
     vec![condition, outcome]
 }
 
-/// The signals of a flight in the order of the chart, each with the height of its strip.
-fn flight_signals(groups: &Groups) -> Vec<(&str, f64)> {
+/// The signals of a flight in the order of the chart, each with its look.
+fn flight_signals(groups: &Groups) -> Vec<(&str, Look)> {
     use signal::{ALPHA_VANE, ALTITUDE, AN, AX, AY, BETA_VANE, MACH, P, PHI, PSI, Q, R, THETA, VELOCITY};
     let motion = [ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, PSI, AN, AX, AY];
     let named = groups.surfaces.iter().chain(&groups.controls).map(String::as_str);
-    let strips = motion.into_iter().chain(named).map(|name| (name, STRIP));
+    let strips = motion.into_iter().chain(named).map(|name| (name, OF_FLIGHT));
     strips.chain(groups.flags.iter().map(|name| (name.as_str(), FLAG))).collect()
 }
 
@@ -177,90 +208,105 @@ struct Pen<'a> {
     record: &'a Record,
     time: Scale,
     columns: Columns,
+    /// From when to when the scales must show everything, s.
+    core: (f64, f64),
 }
 
 impl Pen<'_> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between the limits of COLUMNS")]
-    fn new(record: &Record, (from_s, to_s): (f64, f64), columns: f64) -> Pen<'_> {
+    fn new(record: &Record, (from_s, to_s): (f64, f64), core: (f64, f64), columns: f64) -> Pen<'_> {
         let to_s = to_s.max(from_s + record.step_s);
         let time = Scale { min: from_s, max: to_s, ..Scale::in_steps(from_s, to_s, 10.0) };
-        Pen { record, time, columns: Columns { from_s, to_s, count: columns as usize } }
+        Pen { record, time, columns: Columns { from_s, to_s, count: columns as usize }, core }
     }
 
-    /// The values of a signal that lie on the time axis.
-    fn on_axis(&self, name: &str) -> impl Iterator<Item = f64> {
+    /// The values of a signal from one time to another.
+    fn between(&self, name: &str, (from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
         let values = self.record.values(name).unwrap_or_default().iter().enumerate();
         let slack = 0.5 * self.record.step_s;
-        let (from_s, to_s) = (self.columns.from_s - slack, self.columns.to_s + slack);
-        values.filter(move |(k, _)| (from_s..=to_s).contains(&self.record.time_s(*k))).map(|(_, v)| *v)
+        values.filter(move |(k, _)| (from_s - slack..=to_s + slack).contains(&self.record.time_s(*k))).map(|(_, v)| *v)
     }
 
-    /// One signal with its marks; none where the record has no such signal.
-    fn strip(&self, name: &str, height: f64, colour: &'static str, width: f64) -> Option<Strip> {
+    /// What a signal's scale covers: all of its core, and of the rest and of `more` what does not flatten that.
+    fn limits(&self, name: &str, more: &[f64]) -> (f64, f64) {
+        let all = || self.between(name, (self.columns.from_s, self.columns.to_s)).chain(more.iter().copied());
+        let core = extent(self.between(name, self.core)).or_else(|| extent(all()));
+        let Some((low, high)) = core else { return (0.0, 1.0) };
+        let room = STRETCH * (high - low);
+        let near = all().filter(|v| (low - room..=high + room).contains(v));
+        extent(near.chain([low, high])).unwrap_or((low, high))
+    }
+
+    /// One signal with its marks on a scale for it and for `more`; none where the record has no such signal.
+    fn strip(&self, name: &str, look: Look, more: &[f64]) -> Option<Strip> {
         let record = self.record;
         let series = record.signals.get(name)?;
-        let shown = Shown { start_s: record.start_s, step_s: record.step_s, values: &series.values };
         let of = |mark| runs(series, record.start_s, record.step_s, mark, self.columns);
-        let (low, high) = extent(self.on_axis(name)).unwrap_or((0.0, 1.0));
-        let is_flag = height <= FLAG;
+        let (low, high) = self.limits(name, more);
+        let is_flag = look.height <= FLAG.height;
         let flag = Scale { min: -0.25, max: high.max(1.0) + 0.25, step: high.max(1.0) };
+        let scale = if is_flag { flag } else { scale(low, high, look.steps) };
         Some(Strip {
             name: without_unit(name).to_owned(),
-            unit: if is_flag { String::new() } else { unit(name) },
-            height,
-            scale: if is_flag { flag } else { Scale::in_steps(low, high, 2.0) },
-            traces: vec![Trace { pieces: envelope(shown, self.columns), colour, width }],
+            unit: if is_flag { "0/1" } else { Unit::of_signal(name).name }.to_owned(),
+            height: look.height,
+            scale,
+            traces: vec![self.trace(record.start_s, &series.values, scale, look)],
             dots: vec![],
             marks: Marks { bridged: of(Mark::Bridged), despiked: of(Mark::Despiked), missing: of(Mark::Missing) },
         })
     }
 
+    /// The line through values from a time on, cut where it leaves the scale.
+    fn trace(&self, start_s: f64, values: &[f64], scale: Scale, look: Look) -> Trace {
+        let inside: Vec<f64> = values.iter().map(|v| if scale.contains(*v) { *v } else { f64::NAN }).collect();
+        let shown = Shown { start_s, step_s: self.record.step_s, values: &inside };
+        Trace { pieces: envelope(shown, self.columns), colour: look.colour, width: look.width }
+    }
+
     /// An output as measured, with what was computed over it and their difference under it.
-    fn output(&self, name: &str, start_s: f64, computed: Option<(&History, &HistoryOutput)>) -> Vec<Strip> {
-        let Some(measured) = self.strip(name, OUTPUT, MEASURED_COLOUR, 2.6) else { return vec![] };
+    fn output(&self, name: &str, computed: Option<(&History, &HistoryOutput)>) -> Vec<Strip> {
         let Some((history, output)) = computed else {
-            let traces = measured.traces.into_iter().map(|t| Trace { colour: INK, width: 1.1, ..t }).collect();
-            return vec![Strip { traces, ..measured }];
+            return self.strip(name, ALONE, &[]).into_iter().collect();
         };
-        let first_s = history.time_s.first().copied().unwrap_or(0.0);
-        let start_s = start_s + first_s;
-        let line = |values: &[f64]| envelope(Shown { start_s, step_s: self.record.step_s, values }, self.columns);
-        let values = self.on_axis(name).chain(output.computed.iter().copied());
-        let (low, high) = extent(values).unwrap_or((0.0, 1.0));
-        let mut traces = measured.traces;
-        traces.push(Trace { pieces: line(&output.computed), colour: INK, width: 1.1 });
-        let strip = Strip { scale: Scale::in_steps(low, high, 3.0), traces, ..measured };
+        let Some(mut measured) = self.strip(name, MEASURED, &output.computed) else { return vec![] };
+        let start_s = self.core.0 + history.time_s.first().copied().unwrap_or(0.0);
+        measured.traces.push(self.trace(start_s, &output.computed, measured.scale, INPUT));
         let residuals: Vec<f64> = output.measured.iter().zip(&output.computed).map(|(z, y)| z - y).collect();
+        let (low, high) = extent(residuals.iter().copied()).unwrap_or((-1.0, 1.0));
+        let scale = scale(low.min(0.0), high.max(0.0), RESIDUAL.steps);
         let left_out = residuals.iter().zip(&output.marked).enumerate().filter(|(_, (_, marked))| **marked);
         let dots = left_out.map(|(k, (r, _))| (start_s + k as f64 * self.record.step_s, *r));
-        let (low, high) = extent(residuals.iter().copied()).unwrap_or((-1.0, 1.0));
         let below = Strip {
             name: "residual".to_owned(),
-            unit: unit(name),
-            height: RESIDUAL,
-            scale: Scale::in_steps(low.min(0.0), high.max(0.0), 1.6),
-            traces: vec![Trace { pieces: line(&residuals), colour: INK, width: 0.8 }],
+            unit: Unit::of_signal(name).name.to_owned(),
+            height: RESIDUAL.height,
+            scale,
+            traces: vec![self.trace(start_s, &residuals, scale, RESIDUAL)],
             dots: dots.filter(|d| d.1.is_finite()).collect(),
             marks: Marks::default(),
         };
-        vec![strip, below]
+        vec![measured, below]
     }
 }
 
-fn unit(signal: &str) -> String {
-    let unit = Unit::of_signal(signal);
-    if unit.quantity == Quantity::Number { String::new() } else { unit.name.to_owned() }
+/// A round scale of about so many steps on which at least two numbers stand: one alone gives no scale.
+fn scale(low: f64, high: f64, steps: f64) -> Scale {
+    let scale = Scale::in_steps(low, high, steps);
+    let ticks = (scale.max / scale.step).floor() - (scale.min / scale.step).ceil() + 1.0;
+    if ticks < 2.0 { Scale::with_step(low, high, scale.step, scale.step) } else { scale }
 }
 
-/// Surfaces and pilot controls that moved, and those that hardly did beside others in the same unit.
+/// Surfaces and pilot controls that moved during the maneuver, and those that hardly did.
 fn moved<'a>(pen: &Pen, groups: &'a Groups) -> (Vec<&'a str>, Vec<&'a str>) {
-    let range = |name: &str| extent(pen.on_axis(name)).map_or(0.0, |(low, high)| high - low);
-    let ranges: Vec<(&str, f64)> =
-        groups.controls.iter().chain(&groups.surfaces).map(|name| (name.as_str(), range(name))).collect();
+    let range = |name: &str| extent(pen.between(name, pen.core)).map_or(0.0, |(low, high)| high - low);
+    let inputs = groups.controls.iter().chain(&groups.surfaces).map(String::as_str);
+    let recorded = inputs.filter(|name| pen.record.values(name).is_some());
+    let ranges: Vec<(&str, f64)> = recorded.map(|name| (name, range(name))).collect();
     let alike = |name: &str, other: &str| Unit::of_signal(name) == Unit::of_signal(other);
     let most = |name: &str| ranges.iter().filter(|(o, _)| alike(name, o)).map(|r| r.1).fold(0.0, f64::max);
-    let (moved, still): (Vec<_>, Vec<_>) =
-        ranges.iter().copied().partition(|(name, range)| *range > HARDLY * most(name));
+    let least = |name: &str| groups.steps.get(name).map_or_else(|| HARDLY_BESIDE * most(name), |step| HARDLY * step);
+    let (moved, still): (Vec<_>, Vec<_>) = ranges.iter().copied().partition(|(name, range)| *range > least(name));
     let names = |of: Vec<(&'a str, f64)>| of.into_iter().map(|m| m.0).collect();
     (names(moved), names(still))
 }
@@ -319,10 +365,12 @@ fn notes(lacking: &[&str], still: &[&str], strips: &[Strip]) -> Vec<String> {
             .to_owned(),
     ];
     if !lacking.is_empty() {
-        notes.push(format!("Not recorded: {}.", lacking.join(", ")));
+        let names: Vec<&str> = lacking.iter().map(|name| without_unit(name)).collect();
+        notes.push(format!("Not recorded: {}.", names.join(", ")));
     }
     if !still.is_empty() {
-        notes.push(format!("Not drawn, for they hardly moved: {}.", still.join(", ")));
+        let names: Vec<&str> = still.iter().map(|name| without_unit(name)).collect();
+        notes.push(format!("Not drawn, for they hardly moved: {}.", names.join(", ")));
     }
     let empty: Vec<&str> =
         strips.iter().filter(|s| s.traces.iter().all(|t| t.pieces.is_empty())).map(|s| s.name.as_str()).collect();

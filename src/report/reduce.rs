@@ -119,6 +119,7 @@ pub fn runs(series: &Series, start_s: f64, step_s: f64, mark: Mark, columns: Col
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::scale::extent;
     use proptest::prelude::*;
 
     const COLUMNS: Columns = Columns { from_s: 0.0, to_s: 1000.0, count: 50 };
@@ -181,7 +182,6 @@ mod tests {
                 let of_signal = (0..values.len()).filter(|k| inside(time(*k)) && values[*k].is_finite()).map(|k| values[k]);
                 let of_line: Vec<f64> = drawn.iter().filter(|p| inside(p.0)).map(|p| p.1).collect();
                 prop_assert!(of_line.len() <= 2);
-                let extent = crate::report::scale::extent;
                 prop_assert_eq!(extent(of_signal), extent(of_line));
             }
             prop_assert!(drawn.windows(2).all(|w| w[0].0 < w[1].0), "in the order of time");

@@ -140,7 +140,7 @@ pub fn draw(chart: &Chart) -> String {
         put_strip(&mut scene, chart, &place, strip, y, is_last);
         y += strip.height + 2.0 * ROOM;
     }
-    y += AXIS - ROOM;
+    y += AXIS;
     for line in wrapped(&chart.notes, scene.width) {
         scene.elements.push(text(EDGE, y, &line, FAINT, None));
         y += LINE;
