@@ -81,18 +81,20 @@ enum Show {
 }
 
 const FLIGHT_HELP: &str = "\
-What is needed is brought up to date first, as far as `segment`. Maneuvers are shaded through all strips and labelled with
-class and id; where a list of events is given, it and what was found stand under each other above the strips. Samples that
-were bridged, replaced or are missing are marked at their time. However long the flight, the smallest and the largest
-sample of each column of the picture is drawn: no spike is lost.
+What is needed is brought up to date first, as far as `segment`. Maneuvers are shaded through all strips and labelled \
+with class and id; where a list of events is given, it and what was found stand under each other above the strips. \
+Samples that were bridged, replaced or are missing are marked at their time. However long the flight, the smallest and \
+the largest sample of each column of the picture is drawn: no spike is lost.
 
 Examples:
   harvest show flight flight_001                        into reports/harv/show/flight_001.svg
-  harvest show flight flight_001 mine --out f1.svg      of the pipeline pipelines/mine, into f1.svg";
+  harvest show flight flight_001 mine --out f1.svg      of the pipeline pipelines/mine, into f1.svg
+
+Exit codes: 0 drawn; 1 not drawn, the message says why; 2 drawn, and something in the flight was rejected.";
 
 const MANEUVER_HELP: &str = "\
-What is needed is brought up to date first, as far as `estimate`. A maneuver that was rejected is shown as measured, with the
-reason in the heading. The ids are in the table `maneuvers` and over the windows of `harvest show flight`.
+What is needed is brought up to date first, as far as `estimate`. A maneuver that was rejected is shown as measured, \
+with the reason in the heading. The ids are in the table `maneuvers` and over the windows of `harvest show flight`.
 
 Examples:
   harvest show maneuver flight_001_t00118               into reports/harv/show/flight_001_t00118.svg

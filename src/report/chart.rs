@@ -272,18 +272,20 @@ impl Pen<'_> {
         let Some(mut measured) = self.strip(name, MEASURED, &output.computed) else { return vec![] };
         let start_s = self.core.0 + history.time_s.first().copied().unwrap_or(0.0);
         measured.traces.push(self.trace(start_s, &output.computed, measured.scale, INPUT));
-        let residuals: Vec<f64> = output.measured.iter().zip(&output.computed).map(|(z, y)| z - y).collect();
+        // What was left out of the cost may be no measurement at all: it has a place in time and no residual.
+        let samples = output.measured.iter().zip(&output.computed).zip(&output.marked);
+        let residuals: Vec<f64> = samples.map(|((z, y), marked)| if *marked { f64::NAN } else { z - y }).collect();
         let (low, high) = extent(residuals.iter().copied()).unwrap_or((-1.0, 1.0));
         let scale = scale(low.min(0.0), high.max(0.0), RESIDUAL.steps);
-        let left_out = residuals.iter().zip(&output.marked).enumerate().filter(|(_, (_, marked))| **marked);
-        let dots = left_out.map(|(k, (r, _))| (start_s + k as f64 * self.record.step_s, *r));
+        let left_out = output.marked.iter().enumerate().filter(|(_, marked)| **marked);
+        let dots = left_out.map(|(k, _)| (start_s + k as f64 * self.record.step_s, 0.0));
         let below = Strip {
             name: "residual".to_owned(),
             unit: Unit::of_signal(name).name.to_owned(),
             height: RESIDUAL.height,
             scale,
             traces: vec![self.trace(start_s, &residuals, scale, RESIDUAL)],
-            dots: dots.filter(|d| d.1.is_finite()).collect(),
+            dots: dots.collect(),
             marks: Marks::default(),
         };
         vec![measured, below]

@@ -85,7 +85,9 @@ fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> S
 fn history(record: &Record) -> History {
     let output = |o: crate::aero::Output| {
         let measured = record.values(o.signal()).expect("recorded")[800..=1200].to_vec();
-        let computed = measured.iter().map(|v| v - 0.1).collect();
+        let measured: Vec<f64> =
+            measured.into_iter().enumerate().map(|(k, v)| if k == 200 { -9e3 } else { v }).collect();
+        let computed = measured.iter().map(|v| if *v < -1e3 { 0.0 } else { v - 0.1 }).collect();
         let marked = (0..401).map(|k| k == 200).collect();
         HistoryOutput { label: o.signal().into(), unit: "deg".into(), measured, computed, marked }
     };
@@ -161,6 +163,7 @@ fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() 
     assert!(svg.contains("left out of the cost") && svg.contains("5 iterations"));
     assert_eq!(svg.matches("class=\"window\"").count(), 1, "the other maneuver is minutes away");
     assert!(svg.contains("hardly moved: dr."));
+    assert!(!svg.contains("000</text>"), "a sample that was left out has no residual and stretches no scale");
 
     let svg = drawn_maneuver(&record, &fit("rejected", "too many marked samples"), None);
     assert!(!svg.contains("residual") && svg.contains("too many marked samples"));
