@@ -8,6 +8,8 @@ PIPELINE ?= harv
 # Of make simulate.
 CARDS ?= pipelines/$(PIPELINE)/cards.yaml
 OUT ?= data/simulation/campaign
+# Of make show: FLIGHT or MANEUVER, an id as in the table maneuvers.
+shown = $(if $(MANEUVER),maneuver '$(MANEUVER)',$(if $(FLIGHT),flight '$(FLIGHT)'))
 
 # Handed to harvest where they are set; otherwise the pipeline's own settings hold.
 options = \
@@ -23,7 +25,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report nightly check simulate validate build test bench lint clean help
+.PHONY: ingest segment estimate trend compare report nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest)
@@ -49,12 +51,19 @@ nightly: build ## the main job: every stage, to the report
 check: build ## is the pipeline's configuration right, and what would it do
 	$(call harvest,check)
 
+show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder show of the reports
+	cargo run --release --locked --quiet -- show $(shown) '$(PIPELINE)' $(options)
+
 simulate: build ## fly the test cards CARDS into OUT: archive, wind-tunnel database and truth
 	cargo run --release --locked --quiet -- simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
 
 validate: build ## record simulated maneuvers many times and see what the bounds are worth: reports/coverage.md (takes long)
 	cargo run --release --locked --quiet -- validate '$(CARDS)' --out data/simulation/validation --page reports/coverage.md \
 		$(if $(REALISATIONS),--realisations '$(REALISATIONS)') $(if $(THREADS),--threads '$(THREADS)')
+
+# Before the build: that there is something to show.
+shown:
+	$(if $(shown),@:,$(error make show FLIGHT=<flight_id>, or make show MANEUVER=<maneuver_id>))
 
 # By itself, so that the long first build shows its progress; the stages then only start the binary.
 build: ## build the binary (the first time takes minutes)
@@ -78,6 +87,7 @@ help: ## this list
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
+	@echo 'make show takes FLIGHT= or MANEUVER=, an id as in the table maneuvers'
 	@echo 'make simulate takes [CARDS=$(CARDS)] [OUT=$(OUT)]; then for instance'
 	@echo '  make nightly ARCHIVE=$(OUT)/flights WIND_TUNNEL=$(OUT)/wind_tunnel.csv STORE=data/store/simulated REPORTS=reports/simulated'
 	@echo

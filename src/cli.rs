@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
+use crate::pipeline::show::{self, Subject};
 use crate::pipeline::{self, Campaign, Progress, Stage};
 use crate::store::archive;
 use crate::{simulation, validation};
@@ -35,6 +36,7 @@ Examples:
   harvest check my_campaign                      is pipelines/my_campaign right, and what would it do
   harvest run --archive flights/ --reports out/  the same analysis on another archive
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
+  harvest show flight flight_001                 a strip chart of the flight with its maneuvers drawn in
   harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
@@ -61,10 +63,56 @@ enum Command {
     Report(Options),
     /// Validate a pipeline's configuration and say what it would do
     Check(Options),
+    /// Draw a strip chart of a flight or a maneuver, SVG
+    #[command(subcommand)]
+    Show(Show),
     /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel database, and the truth
     Simulate(SimulateOptions),
     /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise, and estimated
     Validate(ValidateOptions),
+}
+
+#[derive(Debug, Subcommand)]
+enum Show {
+    /// A whole flight: motion, surfaces, pilot controls and flags, with maneuvers, repairs and the analyst's events
+    #[command(after_help = FLIGHT_HELP)]
+    Flight(ShowOptions),
+    /// One maneuver: inputs, outputs measured and computed, residuals, with a few seconds before and after
+    #[command(after_help = MANEUVER_HELP)]
+    Maneuver(ShowOptions),
+}
+
+const FLIGHT_HELP: &str = "\
+What is needed is brought up to date first, as far as `segment`. Maneuvers are shaded through all strips and labelled \
+with class and id; where a list of events is given, it and what was found stand under each other above the strips. \
+Samples that were bridged, replaced or are missing are marked at their time. However long the flight, the smallest and \
+the largest sample of each column of the picture is drawn: no spike is lost.
+
+Examples:
+  harvest show flight flight_001                        into reports/harv/show/flight_001.svg
+  harvest show flight flight_001 mine --out f1.svg      of the pipeline pipelines/mine, into f1.svg
+
+Exit codes: 0 drawn; 1 not drawn, the message says why; 2 drawn, and something in the flight was rejected.";
+
+const MANEUVER_HELP: &str = "\
+What is needed is brought up to date first, as far as `estimate`. A maneuver that was rejected is shown as measured, \
+with the reason in the heading. The ids are in the table `maneuvers` and over the windows of `harvest show flight`.
+
+Examples:
+  harvest show maneuver flight_001_t00118               into reports/harv/show/flight_001_t00118.svg
+
+Exit codes: 0 drawn; 1 not drawn, the message says why; 2 drawn, and what is shown was rejected.";
+
+#[derive(Args, Debug)]
+struct ShowOptions {
+    /// Its `flight_id` or `maneuver_id`, as in the tables
+    #[arg(value_name = "ID")]
+    id: String,
+    #[command(flatten)]
+    options: Options,
+    /// The file to write [default: show/<ID>.svg in the folder of the reports]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -155,6 +203,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
         Command::Validate(options) => return validate(&options),
+        Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
+        Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
     start_threads(options.threads)?;
     let config = options.load()?;
@@ -213,6 +263,22 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
         println!("tables in {}\npage: {}", options.out.display(), options.page.display());
     }
     Ok(if found.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+}
+
+/// Draws a flight or a maneuver and says where the picture is.
+#[expect(clippy::print_stdout, reason = "what a picture says")]
+fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.options.threads)?;
+    let config = options.options.load()?;
+    let bars = Bars { quiet: options.options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let picture = show::show(&config, &subject(options.id.clone()), options.out.as_deref(), &bars)?;
+    if !options.options.quiet {
+        for problem in &picture.problems {
+            println!("  {}: {}: {}", problem.stage, problem.place, problem.reason);
+        }
+        println!("picture: {}", picture.path.display());
+    }
+    Ok(if picture.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
 }
 
 impl Options {

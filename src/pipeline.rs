@@ -6,6 +6,7 @@
 //! the order of flights and maneuvers, whatever thread made them.
 
 mod others;
+pub mod show;
 
 use std::path::PathBuf;
 
@@ -142,10 +143,7 @@ impl Campaign {
 /// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
 /// the campaign's problems.
 pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
-    let files = archive::find(&config.archive)?;
-    let store = Store::open(&config.store)?;
-    atomic::sweep(&config.reports)?;
-    let run = Run { config, store, progress };
+    let (run, files) = begin(config, progress)?;
     let mut campaign = Campaign::default();
     run.ingest(&files, &mut campaign)?;
     if until >= Stage::Segment {
@@ -167,6 +165,14 @@ pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Cam
     }
     table::publish(&config.reports, &campaign.problems)?;
     Ok(campaign)
+}
+
+/// Opens the store; while the run lives no other can.
+fn begin<'a>(config: &'a Config, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
+    let files = archive::find(&config.archive)?;
+    let store = Store::open(&config.store)?;
+    atomic::sweep(&config.reports)?;
+    Ok((Run { config, store, progress }, files))
 }
 
 struct Run<'a> {

@@ -1,8 +1,11 @@
 //! The figures, as SVG to stand in the page: the only module that knows the plotting crate. A derivative over angle of
-//! attack in the manner of the paper's Figures 5-7 and 13-16, and a panel of a time history as in Figures 4 and 12.
+//! attack in the manner of the paper's Figures 5-7 and 13-16, a panel of a time history as in Figures 4 and 12, and the
+//! strip charts of flights and maneuvers ([`strips`]).
 //!
 //! The crate draws paper, axes, lines and band. The marks and bars of the estimates are one path per class in the
 //! crate's own scene: it draws bars over hollow marks otherwise, and each with an element of its own.
+
+pub mod strips;
 
 use std::fmt::Write;
 use std::sync::Arc;

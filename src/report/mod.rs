@@ -2,6 +2,7 @@
 //! review board reads. Words and numbers are put together here, the looks are the template's.
 
 mod as_flown;
+pub mod chart;
 mod failures;
 mod figure;
 mod gallery;
@@ -9,6 +10,7 @@ mod histories;
 mod marks;
 mod notation;
 mod predictions;
+mod reduce;
 #[cfg(test)]
 mod samples;
 mod scale;

@@ -21,8 +21,14 @@ impl Scale {
     /// The round scale that covers an interval; one of some width even where the interval has none.
     #[must_use]
     pub fn covering(low: f64, high: f64) -> Scale {
+        Scale::in_steps(low, high, STEPS)
+    }
+
+    /// The same with about so many steps: fewer where the axis is short.
+    #[must_use]
+    pub fn in_steps(low: f64, high: f64, steps: f64) -> Scale {
         let (low, high) = widened(low, high);
-        let step = round_step((high - low) / STEPS);
+        let step = round_step((high - low) / steps);
         Scale::with_step(low, high, 0.5 * step, step)
     }
 

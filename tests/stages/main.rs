@@ -11,6 +11,7 @@ mod ingest;
 mod report;
 mod run;
 mod segment;
+mod show;
 mod simulate;
 mod support;
 mod together;

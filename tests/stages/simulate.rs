@@ -18,7 +18,7 @@ use harvest::simulate::{Flown, Instrument, Instruments, Program, sensors};
 use harvest::units::DEG;
 use nalgebra::{SVector, Vector3};
 
-use crate::support::{Campaign, files, harvest, run};
+use crate::support::{Campaign, files, harvest, number, run, table};
 
 fn simulation() -> Simulation {
     Simulation::load(Path::new("pipelines/harv/cards.yaml")).unwrap()
@@ -300,4 +300,46 @@ fn a_wrong_card_is_named_with_its_line() {
         assert_eq!(outcome.code, Some(1), "{outcome:?}");
         assert!(outcome.stderr.contains(said) && outcome.stderr.contains("cards.yaml:"), "{}", outcome.stderr);
     }
+}
+
+#[test]
+fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
+    let campaign = Campaign::new();
+    let file = campaign.path("cards.yaml");
+    fs::write(
+        &file,
+        cards("  one: { altitude_ft: 25000, mass_slug: 1050, points: [ { class: PPSS, alpha_deg: [20] } ] }"),
+    )
+    .unwrap();
+    let validate = |name: &str, threads: &str| {
+        let (out, page) = (campaign.path(name), campaign.path(name).join("coverage.md"));
+        let mut command = harvest();
+        command.arg("validate").arg(&file).arg("--out").arg(&out).arg("--page").arg(&page);
+        let outcome = run(command.args(["--realisations", "8", "--threads", threads]));
+        assert_eq!(outcome.code, Some(0), "{outcome:?}");
+        out
+    };
+    let (once, again) = (validate("once", "1"), validate("again", "2"));
+    for written in files(&once) {
+        let other = again.join(written.strip_prefix(&once).unwrap());
+        assert!(fs::read(&written).unwrap() == fs::read(other).unwrap(), "{} differs", written.display());
+    }
+    let rows = table(&once.join("coverage.csv"));
+    let settings: std::collections::BTreeSet<(&str, &str)> =
+        rows.iter().map(|r| (r["residuals"].as_str(), r["weights"].as_str())).collect();
+    assert_eq!(settings.len(), 5);
+    assert!(rows.iter().all(|r| r["class"] == "PPSS" && r["converged"] == "8"));
+    // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far more.
+    let ratio = |residuals: &str, column: &str| {
+        let mut ratios: Vec<f64> =
+            rows.iter().filter(|r| r["residuals"] == residuals).map(|r| number(r, column)).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios[ratios.len() / 2]
+    };
+    assert!((0.6..1.5).contains(&ratio("white", "scatter_over_bound")));
+    assert!(ratio("coloured", "scatter_over_bound") > 2.5);
+    assert!((0.6..1.5).contains(&ratio("coloured", "scatter_over_corrected")));
+    assert!(table(&once.join("starts.csv")).iter().all(|r| r["reached"] == r["records"]));
+    let page = fs::read_to_string(once.join("coverage.md")).unwrap();
+    assert!(page.contains("--realisations 8`") && page.contains("| PPSS | Cm_alpha | 20 |"), "{page}");
 }
