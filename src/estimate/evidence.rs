@@ -93,17 +93,21 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
         // Of the least restricted fit that the data determine.
         let mut noise: Option<Noise> = None;
         let mut because = None;
+        let mut fitted: Option<Vec<bool>> = None;
         for round in 0..ROUNDS {
             let narrow = self.narrow(&held);
             let (fit, _) = self.run.fit(&narrow)?;
             if fit.outcome == Outcome::NotConverged {
                 if round > 0 {
+                    // A choice that cannot be fitted is none: back to the last that could.
+                    held = fitted.unwrap_or(held);
                     break;
                 }
                 // With everything free the maneuver cannot be fitted: begin with what the table holds.
                 held = self.wide.names.iter().map(|n| self.run.status(n) == Some(Status::Held)).collect();
                 continue;
             }
+            fitted = Some(held.clone());
             noise = noise.or_else(|| cramer_rao::noise(&narrow, &fit, self.max_condition_number()));
             let Some(candidates) = self.gather(&narrow, &fit, noise.as_ref().unwrap_or(&Noise::default())) else {
                 break;
