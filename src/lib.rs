@@ -10,6 +10,7 @@ pub mod aircraft;
 pub mod aero;
 pub mod maneuver;
 pub mod tables;
+pub mod lineage;
 
 // Physics: how the aircraft moves and what its sensors read.
 pub mod dynamics;
@@ -24,6 +25,7 @@ pub mod segment;
 pub mod estimate;
 pub mod trend;
 pub mod compare;
+pub mod changes;
 pub mod report;
 
 // Studies: is what the stages say of themselves true?

@@ -3,31 +3,44 @@
 //! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts
 //! lie in the store under fingerprints of all that decides them, so what is up to date is not done again, and a killed run
 //! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
-//! the order of flights and maneuvers, whatever thread made them.
+//! the order of flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
 
+pub mod diff;
+pub mod explain;
+pub mod gc;
+mod inputs;
+pub mod night;
 mod others;
 pub mod show;
+pub mod status;
+pub mod verify;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::changes::Changes;
 use crate::config::Config;
-use crate::error::{Problem, Result};
+use crate::error::{Error, Problem, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Event, Maneuver};
 use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
-use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
+use crate::store::table::Shelf;
+use crate::store::contents::digest;
+use crate::store::{Contents, Fingerprint, Nights, Store, archive, atomic, record_file, table};
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
     TrendRow,
 };
+use crate::lineage::Lineage;
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
@@ -36,17 +49,13 @@ const SEGMENT_VERSION: u32 = 1;
 const ESTIMATE_VERSION: u32 = 5;
 const JOINT_VERSION: u32 = 2;
 const PREDICT_VERSION: u32 = 2;
+/// The report's name among the published files.
+const REPORT: &str = "report.html";
 
-/// The stages in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Stage {
-    Ingest,
-    Segment,
-    Estimate,
-    Trend,
-    Compare,
-    Report,
-}
+const TREND_VERSION: u32 = 1;
+const COMPARE_VERSION: u32 = 1;
+
+pub use crate::lineage::Stage;
 
 /// Where the conductor says how far it is.
 pub trait Progress: Sync {
@@ -61,7 +70,8 @@ pub struct Flight {
     pub flight_id: String,
     fingerprint: String,
     record: PathBuf,
-    artefacts: Vec<PathBuf>,
+    /// None where nothing is kept of it: what was refused for now may be read the next time.
+    artefact: Option<PathBuf>,
     ingested: Ingested,
 }
 
@@ -69,6 +79,8 @@ pub struct Flight {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Ingested {
     accepted: bool,
+    /// Fingerprint of the record's bytes, where there is one.
+    record: Option<String>,
     channels: Vec<ChannelRow>,
     checks: Vec<CheckRow>,
     problems: Vec<Problem>,
@@ -103,8 +115,8 @@ pub struct Campaign {
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub problems: Vec<Problem>,
-    /// The report, where it was written.
-    pub report: Option<PathBuf>,
+    /// Since the last complete night; nothing before the report.
+    pub changes: Changes,
 }
 
 impl Campaign {
@@ -124,64 +136,89 @@ impl Campaign {
         self.predicted.iter().flat_map(|p| &p.outputs).cloned().collect()
     }
 
-    /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for a trend is among the
-    /// problems, but nothing of it was rejected.
-    #[must_use]
-    pub fn rejected(&self) -> bool {
-        self.problems.iter().any(|p| p.stage != "trend")
-    }
-
     #[must_use]
     pub fn converged(&self) -> usize {
         self.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).count()
     }
 }
 
-/// Brings the campaign up to date as far as `until`.
+/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait` for another run to
+/// leave store and reports.
 ///
 /// # Errors
 /// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
-/// the campaign's problems.
-pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
-    let (run, files) = begin(config, progress)?;
-    let mut campaign = Campaign::default();
-    run.ingest(&files, &mut campaign)?;
-    if until >= Stage::Segment {
-        run.segment(&mut campaign)?;
+/// the problems of the night's summary.
+pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progress) -> Result<night::Done> {
+    let (mut run, files) = begin(config, wait, progress)?;
+    let nights = Nights::open(&config.reports, wait)?;
+    if let Some(done) = run.is_published(&nights, until) {
+        return Ok(done);
     }
-    if until >= Stage::Estimate {
-        run.estimate(&mut campaign)?;
+    run.publish_into(nights.tonight()?);
+    let made = run.make(&files, until, &nights).and_then(|campaign| run.publish(&nights, &campaign, until));
+    if made.is_err() {
+        // What is left of tonight takes up room on a disk that may be full.
+        nights.forget_tonight();
     }
-    if until >= Stage::Trend {
-        run.trend(&mut campaign)?;
-    }
-    if until >= Stage::Compare {
-        campaign.comparison =
-            compare::comparison(&campaign.trends, &campaign.maneuvers, &config.tunnel, &config.trend, &config.compare);
-        table::publish(&config.reports, &campaign.comparison)?;
-    }
-    if until >= Stage::Report {
-        run.report(&mut campaign)?;
-    }
-    table::publish(&config.reports, &campaign.problems)?;
-    Ok(campaign)
+    made
 }
 
-/// Opens the store; while the run lives no other can.
-fn begin<'a>(config: &'a Config, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
+/// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
+fn begin<'a>(
+    config: &'a Config,
+    wait: Duration,
+    progress: &'a dyn Progress,
+) -> Result<(Run<'a>, Vec<FlightFiles>)> {
     let files = archive::find(&config.archive)?;
-    let store = Store::open(&config.store)?;
-    atomic::sweep(&config.reports)?;
-    Ok((Run { config, store, progress }, files))
+    let store = Store::open(&config.store, wait)?;
+    let contents = Contents::load(&config.store.join("contents.json"));
+    let run = Run::new(config, store, contents, &files, progress);
+    run.contents.save()?;
+    Ok((run, files))
 }
 
 struct Run<'a> {
     config: &'a Config,
     store: Store,
     progress: &'a dyn Progress,
+    contents: Contents,
+    inputs: inputs::Inputs,
+    lineage: Lineage,
+    /// Where each stage's tables go; nowhere unless a night is to be published.
+    shelves: BTreeMap<Stage, Shelf>,
+    /// Tonight's folder, where there is one.
+    tonight: Option<PathBuf>,
 }
 
 impl Run<'_> {
+    /// All stages as far as `until`, their tables in tonight's folder.
+    fn make(&self, files: &[FlightFiles], until: Stage, nights: &Nights) -> Result<Campaign> {
+        let config = self.config;
+        let mut campaign = Campaign::default();
+        self.ingest(files, &mut campaign)?;
+        if until >= Stage::Segment {
+            self.segment(&mut campaign)?;
+        }
+        if until >= Stage::Estimate {
+            self.estimate(&mut campaign)?;
+        }
+        if until >= Stage::Trend {
+            self.trend(&mut campaign)?;
+        }
+        if until >= Stage::Compare {
+            let (trends, maneuvers) = (&campaign.trends, &campaign.maneuvers);
+            campaign.comparison =
+                compare::comparison(trends, maneuvers, &config.tunnel, &config.trend, &config.compare);
+            table::publish(&self.shelf(Stage::Compare), &campaign.comparison)?;
+        }
+        if until >= Stage::Report {
+            campaign.changes = self.changes(nights, &campaign)?;
+            self.report(&campaign)?;
+        }
+        table::publish(&self.shelf(until), &campaign.problems)?;
+        Ok(campaign)
+    }
+
     /// Does `work` on every item in parallel with a progress bar; results in the order of the items.
     fn each<T: Sync, R: Send>(
         &self,
@@ -205,64 +242,97 @@ impl Run<'_> {
 
     fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
         campaign.flights = self.each("ingest", files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
+        campaign.problems.extend_from_slice(&self.inputs.problems);
         for flight in &campaign.flights {
             campaign.channels.extend_from_slice(&flight.ingested.channels);
             campaign.checks.extend_from_slice(&flight.ingested.checks);
             campaign.problems.extend_from_slice(&flight.ingested.problems);
         }
-        let records: Vec<PathBuf> = campaign.flights.iter().map(|f| f.record.clone()).collect();
-        let artefacts: Vec<PathBuf> = campaign.flights.iter().flat_map(|f| f.artefacts.clone()).collect();
-        self.store.keep_only("records", &records)?;
-        self.store.keep_only("ingest", &artefacts)?;
-        table::publish(&self.config.reports, &campaign.channels)?;
-        table::publish(&self.config.reports, &campaign.checks)
+        let accepted = campaign.flights.iter().filter(|f| f.ingested.accepted);
+        self.store.need(accepted.map(|f| &f.record));
+        self.store.need(campaign.flights.iter().filter_map(|f| f.artefact.as_ref()));
+        table::publish(&self.shelf(Stage::Ingest), &campaign.channels)?;
+        table::publish(&self.shelf(Stage::Ingest), &campaign.checks)
+    }
+
+    /// Where the result of a flight's ingest and its record lie, and the fingerprint that they share.
+    fn ingest_paths(&self, id: &str, content: &str) -> (String, PathBuf, PathBuf) {
+        let config = self.config;
+        let fingerprint = Fingerprint::of("ingest", INGEST_VERSION)
+            .with(&id)
+            .with(&content)
+            .with(&config.channels)
+            .with(&config.constants)
+            .with(&config.aircraft)
+            .with(&config.ingest)
+            .finish();
+        let path = self.store.path("ingest", id, &fingerprint, "json");
+        let record = self.store.path("records", id, &fingerprint, "parquet");
+        (fingerprint, path, record)
+    }
+
+    /// The flight as the store has it: none unless it is up to date and whole.
+    fn ingested(&self, id: &str, content: &str) -> Option<Flight> {
+        let (fingerprint, path, record) = self.ingest_paths(id, content);
+        let ingested: Ingested = self.store.load(&path)?;
+        // A record with other bytes than were written is made again.
+        let is_whole = match &ingested.record {
+            Some(digest) => self.contents.of(&record).is_ok_and(|found| found == *digest),
+            None => !ingested.accepted,
+        };
+        is_whole.then(|| Flight { flight_id: id.to_owned(), fingerprint, record, artefact: Some(path), ingested })
     }
 
     fn ingest_flight(&self, files: &FlightFiles) -> Result<Flight> {
         let config = self.config;
         let id = &files.flight_id;
-        let decides = Fingerprint::of("ingest", INGEST_VERSION)
-            .with(id)
-            .with(&config.channels)
-            .with(&config.constants)
-            .with(&config.aircraft)
-            .with(&config.ingest);
-        let fingerprint = match files.files.iter().try_fold(decides, |f, path| f.with_file(path)) {
-            Ok(fingerprint) => fingerprint.finish(),
-            Err(error) => return Ok(self.refused(id, "unreadable", problem("ingest", id, id, &error.to_string()))),
+        let content = match self.inputs.content(id) {
+            Ok(content) => content,
+            Err(reason) => return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason))),
         };
-        let path = self.store.path("ingest", id, &fingerprint, "json");
-        let record = self.store.path("records", id, &fingerprint, "parquet");
-        if let Some(ingested) = self.store.load::<Ingested>(&path)
-            && (!ingested.accepted || record_file::is_whole(&record))
-        {
-            return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], ingested });
+        if let Some(flight) = self.ingested(id, content) {
+            return Ok(flight);
         }
+        let (fingerprint, path, record) = self.ingest_paths(id, content);
         let done = archive::read(files, &config.channels).and_then(|raw| {
             ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
         });
+        // What was read must be what the fingerprint is of.
+        if let Some(changed) = files.files.iter().find(|file| !self.contents.is_unchanged(file)) {
+            let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
+            return Ok(self.refused(id, problem("ingest", id, &changed.display().to_string(), reason)));
+        }
         let flight = match done {
             Ok(done) => {
                 let mut bytes = Vec::new();
-                record_file::write(&done.record, &mut bytes).map_err(|e| crate::error::Error::store(&record, &e))?;
+                record_file::write(&done.record, &mut bytes).map_err(|e| Error::store(&record, &e))?;
                 atomic::place(&record, &bytes)?;
+                self.store.note(&record);
+                let digest = digest(&mut bytes.as_slice()).map_err(Error::io(&record, "cannot read it"))?;
                 let (channels, checks, problems) = (done.channels, done.checks, done.problems);
-                let ingested = Ingested { accepted: true, channels, checks, problems };
-                Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], ingested }
+                let ingested = Ingested { accepted: true, record: Some(digest), channels, checks, problems };
+                Flight { flight_id: id.clone(), fingerprint, record, artefact: Some(path.clone()), ingested }
             }
-            Err(problem) => self.refused(id, &fingerprint, problem),
+            Err(problem) => Flight { artefact: Some(path.clone()), fingerprint, ..self.refused(id, problem) },
         };
         self.store.save(&path, &flight.ingested)?;
         Ok(flight)
     }
 
-    fn refused(&self, id: &str, fingerprint: &str, problem: Problem) -> Flight {
+    /// A flight without a record, for a reason that is not kept.
+    fn refused(&self, id: &str, problem: Problem) -> Flight {
         Flight {
             flight_id: id.to_owned(),
-            fingerprint: fingerprint.to_owned(),
-            record: self.store.path("records", id, fingerprint, "parquet"),
-            artefacts: vec![self.store.path("ingest", id, fingerprint, "json")],
-            ingested: Ingested { accepted: false, channels: vec![], checks: vec![], problems: vec![problem] },
+            fingerprint: String::new(),
+            record: self.store.folder().join("records").join("none"),
+            artefact: None,
+            ingested: Ingested {
+                accepted: false,
+                record: None,
+                channels: vec![],
+                checks: vec![],
+                problems: vec![problem],
+            },
         }
     }
 
@@ -270,7 +340,7 @@ impl Run<'_> {
         let accepted: Vec<&Flight> = campaign.flights.iter().filter(|f| f.ingested.accepted).collect();
         let found = self.each("segment", &accepted, |f| &f.flight_id, |f| self.segment_flight(f))?;
         let (paths, found): (Vec<PathBuf>, Vec<Found>) = found.into_iter().unzip();
-        self.store.keep_only("segment", &paths)?;
+        self.store.need(&paths);
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
             campaign.events.extend(flight.events);
@@ -282,21 +352,28 @@ impl Run<'_> {
             let reason = "the archive has no such flight; the analyst's list names it";
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
-        table::publish(&self.config.reports, &campaign.maneuvers)?;
-        table::publish(&self.config.reports, &campaign.events)
+        table::publish(&self.shelf(Stage::Segment), &campaign.maneuvers)?;
+        table::publish(&self.shelf(Stage::Segment), &campaign.events)
     }
 
-    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+    fn events_of(&self, flight_id: &str) -> Vec<Event> {
+        self.config.events.iter().filter(|e| e.flight_id == flight_id).cloned().collect()
+    }
+
+    fn segment_path(&self, flight: &Flight) -> PathBuf {
         let config = self.config;
-        let events: Vec<_> = config.events.iter().filter(|e| e.flight_id == flight.flight_id).cloned().collect();
         let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
         let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
             .with(&flight.fingerprint)
             .with(&rules)
             .with(&config.segment)
-            .with(&events)
+            .with(&self.events_of(&flight.flight_id))
             .finish();
-        let path = self.store.path("segment", &flight.flight_id, &fingerprint, "json");
+        self.store.path("segment", &flight.flight_id, &fingerprint, "json")
+    }
+
+    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+        let (config, path, events) = (self.config, self.segment_path(flight), self.events_of(&flight.flight_id));
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
         }
@@ -319,7 +396,7 @@ impl Run<'_> {
         let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
         self.progress.end();
         let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
-        self.store.keep_only("estimate", &paths)?;
+        self.store.need(&paths);
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -333,7 +410,7 @@ impl Run<'_> {
             campaign.combined.extend(estimated.combined);
             campaign.correlations.extend(estimated.correlations);
         }
-        table::publish(&self.config.reports, &campaign.correlations)?;
+        table::publish(&self.shelf(Stage::Estimate), &campaign.correlations)?;
         self.publish_estimates(campaign)
     }
 
@@ -353,7 +430,7 @@ impl Run<'_> {
                         self.store.save(&path, &estimated)?;
                         estimated
                     }
-                    (None, None) => return Err(crate::error::Error::store(&path, &"its flight's record was not read")),
+                    (None, None) => return Err(Error::store(&path, &"its flight's record was not read")),
                 };
                 self.progress.advance(&maneuver.maneuver_id);
                 Ok((path, estimated))
@@ -400,12 +477,11 @@ impl Run<'_> {
         let (trends, problems) = trend::trends(&estimates, &self.config.trend);
         campaign.trends = trends;
         campaign.problems.extend(problems);
-        table::publish(&self.config.reports, &campaign.trends)
+        table::publish(&self.shelf(Stage::Trend), &campaign.trends)
     }
 
-    fn report(&self, campaign: &mut Campaign) -> Result<()> {
+    fn report(&self, campaign: &Campaign) -> Result<()> {
         let config = self.config;
-        let path = config.reports.join("report.html");
         let histories = self.histories(campaign)?;
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
@@ -429,12 +505,12 @@ impl Run<'_> {
             histories: &histories,
             order: &config.derivative_names(),
             classes: &classes,
+            changes: &campaign.changes,
+            lineage: &self.lineage,
         };
-        let html =
-            report::html(&contents, config.template.as_deref()).map_err(|e| crate::error::Error::store(&path, &e))?;
-        atomic::place(&path, html.as_bytes())?;
-        campaign.report = Some(path);
-        Ok(())
+        let named = |e| Error::store(&config.reports.join(REPORT), &e);
+        let html = report::html(&contents, config.template.as_deref()).map_err(named)?;
+        self.place_tonight(REPORT, html.as_bytes())
     }
 
     /// Time histories of one maneuver per class: the converged one nearest to the configured angle of attack. They are

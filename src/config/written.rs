@@ -47,12 +47,14 @@ pub struct ReportSettings {
     pub histories_at_alpha_deg: f64,
     /// A template of the analyst's own instead of the built-in one.
     pub template: Option<PathBuf>,
+    /// So many published nights stay; at least one. Default 7: a week to look back over.
+    pub keep_nights: usize,
 }
 
 impl Default for ReportSettings {
     fn default() -> Self {
         // The paper's Figures 4 and 12 are at 30 deg.
-        ReportSettings { histories_at_alpha_deg: 30.0, template: None }
+        ReportSettings { histories_at_alpha_deg: 30.0, template: None, keep_nights: 7 }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Pictures of one flight or one maneuver: what it takes is brought up to date, then drawn.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::{Campaign, Flight, Progress, Run, begin};
 use crate::aero::Regressor;
@@ -35,7 +36,7 @@ pub struct Picture {
 /// # Errors
 /// What stops a run, and a flight or maneuver that does not exist or was refused, with what was probably meant.
 pub fn show(config: &Config, subject: &Subject, out: Option<&Path>, progress: &dyn Progress) -> Result<Picture> {
-    let (run, files) = begin(config, progress)?;
+    let (run, files) = begin(config, Duration::ZERO, progress)?;
     let mut campaign = Campaign::default();
     if let Subject::Flight(id) = subject {
         known_flight(config, id, &files)?;

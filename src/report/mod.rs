@@ -2,6 +2,7 @@
 //! review board reads. Words and numbers are put together here, the looks are the template's.
 
 mod as_flown;
+mod changes;
 pub mod chart;
 mod failures;
 mod figure;
@@ -28,7 +29,9 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::aero::Axis;
+use crate::changes::Changes;
 use crate::error::Problem;
+use crate::lineage::Lineage;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
@@ -68,6 +71,9 @@ pub struct Contents<'a> {
     pub order: &'a [String],
     /// Name, title and axis of each configured class.
     pub classes: &'a [(String, String, Axis)],
+    /// Since the night that was published before.
+    pub changes: &'a Changes,
+    pub lineage: &'a Lineage,
 }
 
 /// What the template is given: see the first lines of `report.html` for what each part means.
@@ -78,6 +84,9 @@ struct Page<'a> {
     archive: &'a str,
     wind_tunnel: &'a str,
     counts: String,
+    changed: String,
+    changes: Vec<TableView>,
+    provenance: TableView,
     headlines: Vec<String>,
     outcome_heads: Vec<&'static str>,
     classes: Vec<ClassView>,
@@ -117,6 +126,9 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         archive: contents.archive,
         wind_tunnel: contents.wind_tunnel,
         counts: counts(contents, &subjects),
+        changed: changes::headline(contents),
+        changes: changes::tables(contents),
+        provenance: changes::provenance(contents),
         headlines: summary::headlines(contents, &subjects, &classes),
         outcome_heads: summary::outcome_heads(),
         classes,

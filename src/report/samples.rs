@@ -2,7 +2,9 @@
 
 use super::Contents;
 use crate::aero::Axis;
+use crate::changes::Changes;
 use crate::error::Problem;
+use crate::lineage::Lineage;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
@@ -28,6 +30,8 @@ pub struct Campaign {
     pub histories: Vec<History>,
     pub order: Vec<String>,
     pub classes: Vec<(String, String, Axis)>,
+    pub changes: Changes,
+    pub lineage: Lineage,
 }
 
 impl Campaign {
@@ -52,6 +56,8 @@ impl Campaign {
             histories: &self.histories,
             order: &self.order,
             classes: &self.classes,
+            changes: &self.changes,
+            lineage: &self.lineage,
         }
     }
 }

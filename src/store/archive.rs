@@ -23,6 +23,8 @@ use crate::units::Unit;
 pub struct FlightFiles {
     pub flight_id: String,
     pub files: Vec<PathBuf>,
+    /// Files of another place that would be the same flight.
+    pub rivals: Vec<PathBuf>,
 }
 
 /// A tree deeper than this is a loop of links.
@@ -38,7 +40,8 @@ pub(super) const UNIT: &str = "unit";
 /// file. The files of one folder `flight=007` are one flight of that name; otherwise a file is a flight named by its stem.
 ///
 /// # Errors
-/// No file is found, a folder cannot be read, or two files would be the same flight.
+/// No file is found, or the archive's own folder cannot be read. A folder below it that cannot be read stands among the
+/// files, as one that cannot be read.
 pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     let mut files = BTreeSet::new();
     if Path::new(archive).is_dir() {
@@ -49,7 +52,9 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
         for path in paths {
             let path = path.map_err(|e| nonsense(e.to_string()))?;
             if path.is_dir() {
-                walk(&path, DEPTH, &mut files)?;
+                if walk(&path, DEPTH, &mut files).is_err() {
+                    files.insert(path);
+                }
             } else {
                 files.insert(path);
             }
@@ -60,7 +65,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
             "no flight records here: looked for files *.parquet in this folder and below it, or matching this glob";
         return Err(Error::Archive { place: archive.into(), what: what.to_owned() });
     }
-    flights(files)
+    Ok(flights(files))
 }
 
 /// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other programs' own.
@@ -73,8 +78,8 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
             continue;
         }
         if path.is_dir() {
-            if depth > 0 {
-                walk(&path, depth - 1, files)?;
+            if depth > 0 && walk(&path, depth - 1, files).is_err() {
+                files.insert(path);
             }
         } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
             files.insert(path);
@@ -83,21 +88,18 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
     Ok(())
 }
 
-fn flights(files: BTreeSet<PathBuf>) -> Result<Vec<FlightFiles>, Error> {
-    let mut flights: BTreeMap<String, FlightFiles> = BTreeMap::new();
-    let mut folders: BTreeMap<String, PathBuf> = BTreeMap::new();
+fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
+    let mut flights: BTreeMap<String, (PathBuf, FlightFiles)> = BTreeMap::new();
     for file in files {
         let (flight_id, source) = identity(&file);
-        if let Some(other) = folders.insert(flight_id.clone(), source.clone())
-            && other != source
-        {
-            let what = format!("two records would be flight `{flight_id}`: {} is the other", other.display());
-            return Err(Error::Archive { place: source, what });
-        }
-        let flight = flights.entry(flight_id.clone());
-        flight.or_insert_with(|| FlightFiles { flight_id, files: Vec::new() }).files.push(file);
+        let new = || {
+            let flight = FlightFiles { flight_id: flight_id.clone(), files: Vec::new(), rivals: Vec::new() };
+            (source.clone(), flight)
+        };
+        let (first, flight) = flights.entry(flight_id.clone()).or_insert_with(new);
+        if *first == source { flight.files.push(file) } else { flight.rivals.push(file) }
     }
-    Ok(flights.into_values().collect())
+    flights.into_values().map(|(_, flight)| flight).collect()
 }
 
 /// The flight that a file belongs to, and the folder or file that all of it comes from.

@@ -74,6 +74,20 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
 }
 
+/// The rows of a table that was published as CSV; columns that the row type does not have are passed over.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Config`] naming the file, and the line where one cannot be read.
+pub fn published<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
+    let file = std::fs::File::open(path).map_err(Error::io(path, "cannot read it"))?;
+    let mut reader = csv::Reader::from_reader(std::io::BufReader::new(file));
+    let rows: std::result::Result<Vec<T>, csv::Error> = reader.deserialize().collect();
+    rows.map_err(|e| {
+        let line = e.position().and_then(|p| usize::try_from(p.line()).ok());
+        Error::config(path, line, e.to_string())
+    })
+}
+
 /// Places rows as CSV with a header, whole or not at all.
 ///
 /// # Errors
