@@ -19,37 +19,54 @@ options = \
 	$(if $(STORE),--store '$(STORE)') \
 	$(if $(REPORTS),--reports '$(REPORTS)') \
 	$(if $(THREADS),--threads '$(THREADS)')
+# Of the targets that run stages: make nightly WAIT=3600 LOG=nightly.jsonl
+running = $(if $(WAIT),--wait '$(WAIT)') $(if $(LOG),--log '$(LOG)')
 
 harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report nightly check show shown simulate validate build test bench lint clean help
+.PHONY: status explain diff verify gc torture fuzz ingest segment estimate trend compare report nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
-	$(call harvest,ingest)
+	$(call harvest,ingest) $(running)
 
 segment: build ## find the maneuvers and their classes
-	$(call harvest,segment)
+	$(call harvest,segment) $(running)
 
 estimate: build ## estimate the derivatives of every maneuver
-	$(call harvest,estimate)
+	$(call harvest,estimate) $(running)
 
 trend: build ## fit least-squares trends across angle of attack
-	$(call harvest,trend)
+	$(call harvest,trend) $(running)
 
 compare: build ## compare the trends with the wind-tunnel database
-	$(call harvest,compare)
+	$(call harvest,compare) $(running)
 
 report: build ## write the report
-	$(call harvest,report)
+	$(call harvest,report) $(running)
 
 nightly: build ## the main job: every stage, to the report
-	$(call harvest,run)
+	$(call harvest,run) $(running)
 
 check: build ## is the pipeline's configuration right, and what would it do
 	$(call harvest,check)
+
+status: build ## what is fresh, stale or failed, and why
+	$(call harvest,status)
+
+explain: shown build ## the whole story of MANEUVER
+	cargo run --release --locked --quiet -- explain '$(MANEUVER)' '$(PIPELINE)' $(options)
+
+diff: build ## what changed since the night before, and why
+	$(call harvest,diff)
+
+verify: build ## does what is published still hold
+	$(call harvest,verify)
+
+gc: build ## what nothing published needs; with YES=1 it is removed
+	$(call harvest,gc) $(if $(YES),--yes)
 
 show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder show of the reports
 	cargo run --release --locked --quiet -- show $(shown) '$(PIPELINE)' $(options)
@@ -72,6 +89,14 @@ build: ## build the binary (the first time takes minutes)
 test: ## run the tests
 	cargo test --locked
 
+KILLS ?= 200
+torture: ## kill runs at KILLS random moments, fill the disk, race; the bytes must be those of an undisturbed run
+	HARVEST_KILLS='$(KILLS)' cargo test --locked --test stages -- nights:: --nocapture
+
+FILES ?= 5000
+fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
+	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --locked --test stages -- fuzz:: --nocapture
+
 bench: ## run the benchmarks
 	cargo bench --locked
 
@@ -87,6 +112,7 @@ help: ## this list
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
+	@echo 'stages also take [WAIT=seconds for another run] [LOG=file]; make explain takes MANEUVER='
 	@echo 'make show takes FLIGHT= or MANEUVER=, an id as in the table maneuvers'
 	@echo 'make simulate takes [CARDS=$(CARDS)] [OUT=$(OUT)]; then for instance'
 	@echo '  make nightly ARCHIVE=$(OUT)/flights WIND_TUNNEL=$(OUT)/wind_tunnel.csv STORE=data/store/simulated REPORTS=reports/simulated'

@@ -133,13 +133,16 @@ pub fn between(since: &str, before: &Tables, now: &Tables) -> Changes {
 /// Why things differ.
 struct Reasons {
     causes: Vec<Cause>,
-    /// Why the maneuvers behind a derivative differ, by derivative, with their classes.
-    behind: BTreeMap<String, Vec<(String, String)>>,
+    /// Why the maneuvers behind a derivative differ, by derivative and class.
+    behind: BTreeMap<String, BTreeMap<String, BTreeSet<String>>>,
+    /// The classes that were flown: a trend's group that is none of them is of several.
+    classes: BTreeSet<String>,
 }
 
 impl Reasons {
     fn new(before: &Tables, now: &Tables) -> Reasons {
-        Reasons { causes: now.lineage.differences(before.lineage), behind: BTreeMap::new() }
+        let classes = before.maneuvers.iter().chain(now.maneuvers).map(|m| m.class.clone()).collect();
+        Reasons { causes: now.lineage.differences(before.lineage), behind: BTreeMap::new(), classes }
     }
 
     /// Why something of a maneuver differs: its flight, or what its stages read. Other classes' settings do not count.
@@ -163,29 +166,32 @@ impl Reasons {
     /// Adds what the maneuvers that changed have to say about the derivatives that they estimate.
     fn with_maneuvers(mut self, changed: &[ManeuverChange], moved: &[Moved], now: &Tables) -> Reasons {
         let why: BTreeMap<&str, &str> = changed.iter().map(|m| (m.maneuver_id.as_str(), m.because.as_str())).collect();
+        let mut add = |derivative: &str, class: &str, because: &str| {
+            let of_derivative = self.behind.entry(derivative.to_owned()).or_default();
+            of_derivative.entry(class.to_owned()).or_default().insert(because.to_owned());
+        };
         for row in now.estimates.iter().filter(|e| e.status == Status::Estimated.name()) {
             if let Some(because) = why.get(row.maneuver_id.as_str()) {
-                let behind = self.behind.entry(row.derivative.clone()).or_default();
-                behind.push((row.class.clone(), (*because).to_owned()));
+                add(&row.derivative, &row.class, because);
             }
         }
+        let class: BTreeMap<&str, &str> =
+            now.maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m.class.as_str())).collect();
         for row in moved {
-            self.behind.entry(row.derivative.clone()).or_default().push((String::new(), row.because.clone()));
+            add(&row.derivative, class.get(row.of.as_str()).copied().unwrap_or_default(), &row.because);
         }
         self
     }
 
     /// Why a trend differs: the maneuvers behind it, and what only trends and comparisons read. `group` may be a class.
     fn of_trend(&self, derivative: &str, group: &str, until: Stage) -> String {
-        let behind = self.behind.get(derivative).into_iter().flatten();
-        let is_class = self.behind.values().flatten().any(|(class, _)| class == group);
-        let behind = behind.filter(|(class, _)| !is_class || class.is_empty() || class == group);
+        let counts = |class: &str| class == group || !self.classes.contains(group);
+        let behind = self.behind.get(derivative).into_iter().flatten().filter(|(class, _)| counts(class));
+        let own: BTreeSet<&str> = behind.flat_map(|(_, because)| because).map(String::as_str).collect();
         let later = self.causes.iter().filter(|c| (Stage::Trend..=until).contains(&c.stage));
         let gone = self.causes.iter().filter(|c| c.origin == Origin::Flight && c.words.contains("gone"));
-        let own: BTreeSet<&str> = behind.map(|(_, because)| because.as_str()).collect();
         let settings = self.causes.iter().filter(|c| c.origin != Origin::Flight && c.stage == Stage::Estimate);
-        let all = own.into_iter().chain(gone.chain(settings).chain(later).map(|c| c.words.as_str()));
-        words(all)
+        words(own.into_iter().chain(gone.chain(settings).chain(later).map(|c| c.words.as_str())))
     }
 }
 

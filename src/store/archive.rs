@@ -3,9 +3,12 @@
 //! Only the columns of the channel map are read, row group by row group, into numbers; what a file cannot give is a
 //! problem of its flight, never a panic.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
+use std::panic::{self, UnwindSafe};
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
@@ -32,6 +35,10 @@ const DEPTH: usize = 16;
 
 /// Rows decoded at a time: a few MB, whatever the size of the file's row groups.
 const BATCH_ROWS: usize = 16_384;
+
+/// The most numbers that are read of a flight, rows times mapped columns: 4 GB, ten hours of sixty channels at 200 Hz. A
+/// file of a few kilobytes can claim any number of rows.
+const LARGEST_FLIGHT: u64 = 500_000_000;
 
 /// The field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
@@ -127,7 +134,7 @@ pub fn read(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
     let mut rows = 0;
     for file in &files.files {
         // The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too.
-        let appended = std::panic::catch_unwind(|| decode(file, channels)).unwrap_or_else(|_| {
+        let appended = caught(|| decode(file, channels)).unwrap_or_else(|_| {
             Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned())
         });
         let append = appended.and_then(|part| append(&mut flight, part, &mut rows));
@@ -139,6 +146,28 @@ pub fn read(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
         })?;
     }
     Ok(flight)
+}
+
+thread_local! {
+    /// Whether this thread is reading a file of which it need not be said that it made the reader panic.
+    static READING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `work` gives, or that it panicked: silently, for the reason goes into a table.
+fn caught<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !READING.get() {
+                before(info);
+            }
+        }));
+    });
+    READING.set(true);
+    let result = panic::catch_unwind(work);
+    READING.set(false);
+    result
 }
 
 /// The mapped columns of one file, and its number of rows.
@@ -181,6 +210,10 @@ fn decode(file: &Path, channels: &BTreeMap<String, Channel>) -> Result<Part, Str
         if columns.insert(field.name().clone(), RawColumn { unit, values: Vec::new() }).is_some() {
             return Err(format!("two columns are named `{}`", field.name()));
         }
+    }
+    let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
+    if rows.saturating_mul(wanted.len() as u64) > LARGEST_FLIGHT {
+        return Err(format!("claims {rows} rows of {} mapped columns, more than any flight has", wanted.len()));
     }
     let mask = ProjectionMask::roots(builder.parquet_schema(), wanted);
     let reader = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(|e| unreadable(&e))?;
