@@ -270,12 +270,8 @@ fn estimates(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
     let counts = |e: &&EstimateRow| {
         e.status == Status::Estimated.name() && a.contains(&e.maneuver_id) && b.contains(&e.maneuver_id)
     };
-    let old: BTreeMap<(&str, &str), &EstimateRow> = before
-        .estimates
-        .iter()
-        .filter(counts)
-        .map(|e| ((e.maneuver_id.as_str(), e.derivative.as_str()), e))
-        .collect();
+    let old: BTreeMap<(&str, &str), &EstimateRow> =
+        before.estimates.iter().filter(counts).map(|e| ((e.maneuver_id.as_str(), e.derivative.as_str()), e)).collect();
     let moved = |e: &EstimateRow| {
         let was = old.get(&(e.maneuver_id.as_str(), e.derivative.as_str()))?;
         let (before, now) = (was.value?, e.value?);

@@ -13,8 +13,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
-use crate::pipeline::show::{self, Subject};
 use crate::pipeline::night::Done;
+use crate::pipeline::show::{self, Subject};
 use crate::pipeline::{self, Progress, Stage};
 use crate::store::{Log, archive};
 use crate::{simulation, validation};

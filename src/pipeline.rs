@@ -29,18 +29,18 @@ use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
+use crate::lineage::Lineage;
 use crate::maneuver::{Event, Maneuver};
 use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
-use crate::store::table::Shelf;
 use crate::store::contents::digest;
+use crate::store::table::Shelf;
 use crate::store::{Contents, Fingerprint, Nights, Store, archive, atomic, record_file, table};
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
     TrendRow,
 };
-use crate::lineage::Lineage;
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
@@ -164,11 +164,7 @@ pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progres
 }
 
 /// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
-fn begin<'a>(
-    config: &'a Config,
-    wait: Duration,
-    progress: &'a dyn Progress,
-) -> Result<(Run<'a>, Vec<FlightFiles>)> {
+fn begin<'a>(config: &'a Config, wait: Duration, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
     let files = archive::find(&config.archive)?;
     let store = Store::open(&config.store, wait)?;
     let contents = Contents::load(&config.store.join("contents.json"));

@@ -41,6 +41,7 @@ impl Campaign {
             value: Some(value),
             bound: Some(0.05),
             bound_held: None,
+            bound_calibration: None,
             bound_corrected: Some(0.1),
             wind_tunnel: None,
             variance_inflation: None,

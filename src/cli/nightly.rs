@@ -160,7 +160,10 @@ fn say(night: &str, changes: &Changes) {
     });
     let moved = |m: &Moved| {
         let (of, alpha, because) = (&m.of, m.alpha_deg, &m.because);
-        format!("{} of {of} at {alpha:.1} deg: {} became {}, ±{} [{because}]", m.derivative, m.before, m.now, m.uncertainty)
+        format!(
+            "{} of {of} at {alpha:.1} deg: {} became {}, ±{} [{because}]",
+            m.derivative, m.before, m.now, m.uncertainty
+        )
     };
     list("estimates that moved by more than their uncertainty", &changes.estimates, moved);
     list("trends that moved by more than their uncertainty", &changes.trends, moved);
@@ -224,7 +227,11 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
         let bytes: u64 = litter.artefacts.values().sum();
         let (count, kept) = (litter.artefacts.len(), litter.kept);
         let verb = if options.yes { "removed" } else { "would be removed" };
-        println!("{count} artefacts ({} MB) and {} nights {verb}, {kept} artefacts stay", bytes / 1_000_000, litter.nights.len());
+        println!(
+            "{count} artefacts ({} MB) and {} nights {verb}, {kept} artefacts stay",
+            bytes / 1_000_000,
+            litter.nights.len()
+        );
         if !options.yes && (count > 0 || !litter.nights.is_empty()) {
             println!("harvest gc --yes removes them");
         }

@@ -31,9 +31,9 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     };
     let night = match to {
         Some(name) => named(name)?,
-        None => nights.complete().ok_or_else(|| {
-            unknown("no night has been published here yet; `harvest run` publishes one".to_owned())
-        })?,
+        None => nights
+            .complete()
+            .ok_or_else(|| unknown("no night has been published here yet; `harvest run` publishes one".to_owned()))?,
     };
     let before = match since.or(night.since.as_deref()) {
         Some(name) => named(name)?,

@@ -118,7 +118,8 @@ fn fitted(text: &mut String, estimated: &Estimated) {
     line(text, "iterations", &fit.iterations.to_string());
     line(text, "cost", &format!("{} at the start, {} at the end", number(fit.initial_cost), number(fit.final_cost)));
     line(text, "condition number", &number(fit.condition_number));
-    let share = fit.left_out.map_or_else(|| "-".to_owned(), |share| format!("{:.2} % of the output samples", 100.0 * share));
+    let share =
+        fit.left_out.map_or_else(|| "-".to_owned(), |share| format!("{:.2} % of the output samples", 100.0 * share));
     line(text, "left out", &share);
     line(text, "confounded", fit.confounded.as_deref().unwrap_or("nothing"));
 }

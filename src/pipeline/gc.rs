@@ -40,7 +40,8 @@ pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Litter> {
                 nights.prune(keep)?;
             }
         }
-        for name in nights.names().iter().filter(|name| !litter.nights.contains(name) || own.as_ref() != Some(reports)) {
+        for name in nights.names().iter().filter(|name| !litter.nights.contains(name) || own.as_ref() != Some(reports))
+        {
             let night = nights.night(name).ok_or_else(|| {
                 let what = "its manifest night.json cannot be read, so what it needs is unknown: nothing is removed; \
                             `harvest run` publishes the night again";

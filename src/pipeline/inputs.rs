@@ -168,7 +168,8 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
     let recognition: Value =
         config.classes.iter().map(|c| (c.name.clone(), json!({"axis": c.axis, "by": c.recognition}))).collect();
     let class = |c: &crate::maneuver::Class| {
-        let settings = json!({"title": c.title, "statuses": c.statuses, "weights": c.weights, "overrides": c.overrides});
+        let settings =
+            json!({"title": c.title, "statuses": c.statuses, "weights": c.weights, "overrides": c.overrides});
         (c.name.clone(), settings)
     };
     let classes: Value = config.classes.iter().map(class).collect();

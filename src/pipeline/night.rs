@@ -199,10 +199,11 @@ impl Run<'_> {
 
     /// What changed since the last complete night; also placed for machines to read.
     pub(super) fn changes(&self, nights: &Nights, campaign: &Campaign) -> Result<Changes> {
-        let changes = match self.before(nights) {
+        // Tables that an older program wrote may lack what this one reads: then there is nothing to compare with.
+        let before = self.before(nights).and_then(|night| Some((Published::read(nights, &night).ok()?, night)));
+        let changes = match before {
             None => Changes::default(),
-            Some(night) => {
-                let before = Published::read(nights, &night)?;
+            Some((before, night)) => {
                 let windows: Vec<Window> = campaign.maneuvers.iter().map(window).collect();
                 let now = changes::Tables {
                     lineage: &self.lineage,

@@ -145,7 +145,9 @@ impl Run<'_> {
             match self.store.load::<Found>(&self.segment_path(flight)) {
                 Some(found) => {
                     status.fresh += 1;
-                    status.failed.extend(found.problems.into_iter().map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason))));
+                    status.failed.extend(
+                        found.problems.into_iter().map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason))),
+                    );
                     maneuvers.extend(found.maneuvers.into_iter().map(|m| (flight.clone(), m)));
                 }
                 None => {

@@ -34,12 +34,14 @@ pub fn headline(contents: &Contents) -> String {
 pub fn tables(contents: &Contents) -> Vec<TableView> {
     let changes = contents.changes;
     let causes = changes.causes.iter().map(|c| vec![c.stage.name().to_owned(), c.words.clone()]).collect();
-    let maneuvers = changes.maneuvers.iter().map(|m| {
-        vec![m.what.clone(), m.maneuver_id.clone(), m.class.clone(), m.words.clone(), m.because.clone()]
-    });
-    let verdicts = changes.verdicts.iter().map(|v| {
-        vec![v.derivative.clone(), angle(v.alpha_deg), v.before.clone(), v.now.clone(), v.because.clone()]
-    });
+    let maneuvers = changes
+        .maneuvers
+        .iter()
+        .map(|m| vec![m.what.clone(), m.maneuver_id.clone(), m.class.clone(), m.words.clone(), m.because.clone()]);
+    let verdicts = changes
+        .verdicts
+        .iter()
+        .map(|v| vec![v.derivative.clone(), angle(v.alpha_deg), v.before.clone(), v.now.clone(), v.because.clone()]);
     let trends = |names: &[String], what: &str| -> Vec<Vec<String>> {
         names.iter().map(|name| vec![what.to_owned(), name.clone()]).collect()
     };
@@ -59,7 +61,8 @@ pub fn tables(contents: &Contents) -> Vec<TableView> {
 fn moved(title: &str, note: &str, of: &str, rows: &[Moved]) -> TableView {
     let row = |m: &Moved| {
         let numbers = [m.before, m.now, m.uncertainty].map(|v| number(Some(v), 4));
-        [vec![m.derivative.clone(), m.of.clone(), angle(m.alpha_deg)], numbers.to_vec(), vec![m.because.clone()]].concat()
+        [vec![m.derivative.clone(), m.of.clone(), angle(m.alpha_deg)], numbers.to_vec(), vec![m.because.clone()]]
+            .concat()
     };
     let heads = ["derivative", of, "α", "before", "now", "uncertainty", "because"];
     TableView::new(title, note, &heads, rows.iter().map(row).collect())
@@ -81,7 +84,9 @@ pub fn provenance(contents: &Contents) -> TableView {
         }
     }
     for (stage, tables) in &lineage.tables {
-        rows.extend(tables.iter().map(|(t, digest)| vec![format!("table, {}", stage.name()), t.clone(), digest.clone()]));
+        rows.extend(
+            tables.iter().map(|(t, digest)| vec![format!("table, {}", stage.name()), t.clone(), digest.clone()]),
+        );
     }
     rows.extend(lineage.flights.iter().map(|(f, digest)| vec!["flight".to_owned(), f.clone(), digest.clone()]));
     let note = "Fingerprints (BLAKE3). Each Parquet table carries the same, with its configuration written out, and \

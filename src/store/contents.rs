@@ -62,7 +62,8 @@ impl Contents {
         // Anything else may block for ever: a pipe that nobody writes into.
         if !metadata.is_file() {
             return Err(if metadata.is_dir() {
-                let why = std::fs::read_dir(path).err().map_or_else(String::new, |e| format!(" that cannot be read: {e}"));
+                let why =
+                    std::fs::read_dir(path).err().map_or_else(String::new, |e| format!(" that cannot be read: {e}"));
                 format!("is a folder{why}")
             } else {
                 "is no regular file".to_owned()

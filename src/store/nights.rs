@@ -180,7 +180,8 @@ impl Nights {
     /// # Errors
     /// [`Error::Io`] when the disk says no; then the night before still holds.
     pub fn publish(&self, night: Night, keep: usize) -> Result<Night> {
-        let (nights, tonight) = (self.reports.join(NIGHTS), self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
+        let (nights, tonight) =
+            (self.reports.join(NIGHTS), self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
         let last = self.names().last().and_then(|name| name.parse::<u32>().ok()).unwrap_or(0);
         let night = Night { name: format!("{:04}", last + 1), files: digests(&tonight)?, ..night }.sealed();
         write_manifest(&tonight, &night)?;

@@ -205,8 +205,7 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result
     let (parquet, csv) = (folder.join(format!("{name}.parquet")), folder.join(format!("{name}.csv")));
     let mut frame = DataFrame::new(rows, columns).map_err(|e| Error::store(&parquet, &e))?;
     let mut bytes = Vec::new();
-    let metadata =
-        (!shelf.provenance.is_empty()).then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
+    let metadata = (!shelf.provenance.is_empty()).then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
     ParquetWriter::new(&mut bytes)
         .with_compression(ParquetCompression::Zstd(None))
         .with_key_value_metadata(metadata)

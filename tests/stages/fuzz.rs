@@ -227,9 +227,8 @@ fn whatever_stands_in_the_yaml_it_is_read_or_refused_with_the_file_s_name() {
 
 #[test]
 fn yaml_that_is_none_or_unfolds_without_end_is_refused() {
-    let bomb = (1..30).fold("a0: &a0 [x, x]\n".to_owned(), |text, i| {
-        format!("{text}a{i}: &a{i} [*a{}, *a{}]\n", i - 1, i - 1)
-    });
+    let bomb = (1..30)
+        .fold("a0: &a0 [x, x]\n".to_owned(), |text, i| format!("{text}a{i}: &a{i} [*a{}, *a{}]\n", i - 1, i - 1));
     let deep = "[".repeat(100_000);
     let binary = String::from_utf8_lossy(&[0, 159, 146, 150]).into_owned();
     for text in [bomb, deep, binary, "title: [".to_owned(), String::new(), "- 1".to_owned()] {
@@ -264,15 +263,20 @@ fn whatever_stands_in_a_csv_it_is_read_or_refused_with_file_and_line() {
             lines[at] = fields.join(",");
         }
         fs::write(&path, lines.join("\n")).unwrap();
-        let overrides = Overrides {
-            wind_tunnel: Some(path.clone()),
-            archive: Some(String::new()),
-            ..Overrides::default()
-        };
+        let overrides =
+            Overrides { wind_tunnel: Some(path.clone()), archive: Some(String::new()), ..Overrides::default() };
         if let Err(error) = Config::load(&pipeline, overrides) {
             assert!(error.to_string().contains(".csv") || error.to_string().contains(".yaml"), "{error}");
         }
-        fs::write(&path, format!("flight_id,class,start_s,end_s\nf,PPSS,{},{}", cells[random.below(cells.len())], cells[random.below(cells.len())])).unwrap();
+        fs::write(
+            &path,
+            format!(
+                "flight_id,class,start_s,end_s\nf,PPSS,{},{}",
+                cells[random.below(cells.len())],
+                cells[random.below(cells.len())]
+            ),
+        )
+        .unwrap();
         let overrides = Overrides { events: Some(path.clone()), ..Overrides::default() };
         if let Err(error) = Config::load(&pipeline, overrides) {
             assert!(error.to_string().contains("table.csv"), "{error}");
