@@ -379,9 +379,12 @@ fn gc_removes_nothing_where_it_cannot_tell_what_a_night_needs() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     flip(&campaign.path("reports/nights/0001/night.json"));
+    fs::write(campaign.path("store/estimate/superseded.json"), "of a night before").unwrap();
     let before = campaign.bytes("store");
     let outcome = run(campaign.command("gc").arg("--yes"));
-    assert!(campaign.bytes("store") == before, "{outcome:?}");
+    assert_eq!(outcome.code, Some(1), "{outcome:?}");
+    assert!(outcome.stderr.contains("0001: its manifest night.json cannot be read"), "{outcome:?}");
+    assert!(campaign.bytes("store") == before && campaign.path("reports/nights/0001").exists());
 }
 
 #[test]
