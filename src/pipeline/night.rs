@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Deserializer};
+
 use super::{Campaign, REPORT, Run, Stage, inputs};
 use crate::changes::{self, Changes, Window};
 use crate::config::Config;
@@ -64,6 +66,68 @@ pub struct Published {
     comparison: Vec<ComparisonRow>,
 }
 
+/// A number of a published table; one that does not exist is an empty field there, and no number here.
+fn number<'de, D: Deserializer<'de>>(field: D) -> std::result::Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
+}
+
+/// What is compared of a row of `trends`.
+#[derive(Deserialize)]
+struct TrendPoint {
+    derivative: String,
+    group: String,
+    alpha_deg: f64,
+    #[serde(deserialize_with = "number")]
+    value: f64,
+    #[serde(deserialize_with = "number")]
+    standard_error: f64,
+}
+
+/// What is compared of a row of `comparison`.
+#[derive(Deserialize)]
+struct VerdictPoint {
+    derivative: String,
+    group: String,
+    alpha_deg: f64,
+    verdict: String,
+}
+
+impl From<TrendPoint> for TrendRow {
+    fn from(p: TrendPoint) -> TrendRow {
+        TrendRow {
+            derivative: p.derivative,
+            unit: String::new(),
+            group: p.group,
+            alpha_deg: p.alpha_deg,
+            value: p.value,
+            standard_error: p.standard_error,
+            lower_95: f64::NAN,
+            upper_95: f64::NAN,
+            maneuvers: 0,
+            order: 0,
+            scatter: f64::NAN,
+        }
+    }
+}
+
+impl From<VerdictPoint> for ComparisonRow {
+    fn from(p: VerdictPoint) -> ComparisonRow {
+        ComparisonRow {
+            derivative: p.derivative,
+            unit: String::new(),
+            group: p.group,
+            alpha_deg: p.alpha_deg,
+            flight: f64::NAN,
+            standard_error: f64::NAN,
+            wind_tunnel: None,
+            difference: None,
+            difference_pct: None,
+            z: None,
+            verdict: p.verdict,
+        }
+    }
+}
+
 impl Published {
     /// Reads a complete night.
     ///
@@ -81,8 +145,8 @@ impl Published {
             maneuvers: rows(&folder, "maneuvers")?,
             fits: rows(&folder, "fits")?,
             estimates,
-            trends: rows(&folder, "trends")?,
-            comparison: rows(&folder, "comparison")?,
+            trends: rows::<TrendPoint>(&folder, "trends")?.into_iter().map(TrendRow::from).collect(),
+            comparison: rows::<VerdictPoint>(&folder, "comparison")?.into_iter().map(ComparisonRow::from).collect(),
         })
     }
 
