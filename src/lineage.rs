@@ -175,7 +175,9 @@ fn compare(path: &str, before: Option<&Value>, now: Option<&Value>, found: &mut 
             let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
             keys.sort();
             keys.dedup();
-            keys.into_iter().for_each(|key| compare(&format!("{path}.{key}"), a.get(key), b.get(key), found));
+            for key in keys {
+                compare(&format!("{path}.{key}"), a.get(key), b.get(key), found);
+            }
         }
         (a, b) => {
             let (a, b) = (short(a), short(b));

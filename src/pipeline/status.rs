@@ -76,7 +76,9 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         match changed {
             None => status.stale("no night with it has been published", &config.name),
             Some(causes) if !causes.is_empty() => {
-                causes.iter().for_each(|cause| status.stale(&cause.words, &config.name));
+                for cause in &causes {
+                    status.stale(&cause.words, &config.name);
+                }
             }
             Some(_) if upstream => status.stale("an earlier stage is stale", &config.name),
             Some(_) => status.fresh = 1,
@@ -90,13 +92,13 @@ impl Run<'_> {
     /// Why something of a flight is not in the store.
     fn why(&self, stage: Stage, flight_id: &str, class: Option<&str>, before: Option<&Lineage>) -> String {
         let Some(before) = before else { return "not made yet".to_owned() };
-        let counts = |c: &&crate::lineage::Cause| match c.origin {
-            Origin::Flight => c.subject == flight_id,
-            _ => {
-                let mut path = c.subject.split('.');
-                let of_class = path.next() == Some("classes");
-                c.stage <= stage && (!of_class || class.is_none_or(|class| path.next() == Some(class)))
+        let counts = |c: &&crate::lineage::Cause| {
+            if c.origin == Origin::Flight {
+                return c.subject == flight_id;
             }
+            let mut path = c.subject.split('.');
+            let of_class = path.next() == Some("classes");
+            c.stage <= stage && (!of_class || class.is_none_or(|class| path.next() == Some(class)))
         };
         let causes = self.lineage.differences(before);
         let words: Vec<&str> = causes.iter().filter(counts).map(|c| c.words.as_str()).collect();
@@ -162,18 +164,15 @@ impl Run<'_> {
         let mut status = StageStatus::new(Stage::Estimate);
         for (flight, maneuver) in maneuvers {
             let id = &maneuver.maneuver_id;
-            match self.store.load::<Estimated>(&self.estimate_path(flight, maneuver)) {
-                Some(estimated) => {
-                    status.fresh += 1;
-                    if estimated.fit.outcome != Outcome::Converged.name() {
-                        let fit = estimated.fit;
-                        status.failed.push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
-                    }
+            if let Some(estimated) = self.store.load::<Estimated>(&self.estimate_path(flight, maneuver)) {
+                status.fresh += 1;
+                if estimated.fit.outcome != Outcome::Converged.name() {
+                    let fit = estimated.fit;
+                    status.failed.push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
                 }
-                None => {
-                    let why = self.why(Stage::Estimate, &maneuver.flight_id, Some(&maneuver.class), before);
-                    status.stale(&why, id);
-                }
+            } else {
+                let why = self.why(Stage::Estimate, &maneuver.flight_id, Some(&maneuver.class), before);
+                status.stale(&why, id);
             }
         }
         status

@@ -70,8 +70,7 @@ impl Night {
     fn sealed(mut self) -> Night {
         self.seal = String::new();
         let text = serde_json::to_vec(&self).unwrap_or_default();
-        self.seal = blake3::hash(&text).to_hex()[..16].to_owned();
-        self
+        Night { seal: blake3::hash(&text).to_hex()[..16].to_owned(), ..self }
     }
 }
 

@@ -223,18 +223,18 @@ fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
     let alert: Value = serde_json::from_slice(&fs::read(campaign.path("reports/alert.json")).unwrap()).unwrap();
     assert_eq!((&alert["since"], &alert["alert"]), (&"0001".into(), &false.into()));
 
-    // Other weights move the estimates of their class beyond their bounds, or at least the verdict says why.
+    // Coefficients are by wing area: a tenth more of it is more than any bound.
     campaign.copy_pipeline();
-    campaign.edit("pipeline.yaml", "initial_state: estimated", "initial_state: measured");
+    campaign.edit("aircraft.yaml", "wing_area_ft2: 400", "wing_area_ft2: 440");
     campaign.finishes("run");
     let outcome = campaign.harvest("diff");
     assert_eq!(outcome.code, Some(3), "{outcome:?}");
-    let why = "configuration estimate.initial_state: \"estimated\" became \"measured\"";
+    let why = "configuration aircraft.wing_area_ft2: 400.0 became 440.0";
     assert!(outcome.stdout.contains(why), "{outcome:?}");
     let json = run(campaign.command("diff").arg("--json")).stdout;
     let changes: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(changes["alert"], true);
-    assert!(changes["estimates"][0]["because"].as_str().unwrap().contains("initial_state"));
+    assert!(changes["estimates"][0]["because"].as_str().unwrap().contains("wing_area_ft2"));
 
     assert_eq!(run(campaign.command("diff").arg("--once")).code, Some(3));
     assert_eq!(run(campaign.command("diff").arg("--once")).code, Some(0));
