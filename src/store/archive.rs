@@ -211,7 +211,9 @@ fn decode(file: &Path, channels: &BTreeMap<String, Channel>) -> Result<Part, Str
             return Err(format!("two columns are named `{}`", field.name()));
         }
     }
-    let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
+    let claimed = |rows: i64| u64::try_from(rows).unwrap_or(u64::MAX);
+    let in_groups = builder.metadata().row_groups().iter().map(|g| claimed(g.num_rows()));
+    let rows = in_groups.fold(0, u64::saturating_add).max(claimed(builder.metadata().file_metadata().num_rows()));
     if rows.saturating_mul(wanted.len() as u64) > LARGEST_FLIGHT {
         return Err(format!("claims {rows} rows of {} mapped columns, more than any flight has", wanted.len()));
     }
@@ -230,6 +232,9 @@ fn fill(
     for batch in reader {
         let batch: RecordBatch = batch?;
         rows += batch.num_rows();
+        if (rows as u64).saturating_mul(columns.len() as u64) > LARGEST_FLIGHT {
+            return Err(arrow::error::ArrowError::ParquetError("it has more rows than it claims".to_owned()));
+        }
         let schema = batch.schema();
         for (field, array) in schema.fields().iter().zip(batch.columns()) {
             if let Some(column) = columns.get_mut(field.name()) {
