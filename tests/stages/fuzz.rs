@@ -124,16 +124,15 @@ fn whatever_bytes_a_flight_has_the_others_are_read() {
 #[cfg(unix)]
 #[test]
 fn a_parquet_bomb_is_refused_and_the_other_flights_are_read() {
-    use parquet::file::metadata::{FileMetaData, ParquetMetaData, ParquetMetaDataWriter};
+    use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataWriter};
     use parquet::file::reader::{FileReader, SerializedFileReader};
     let campaign = Campaign::of_pitch_steps();
     campaign.add("bomb", &flight(1, 1));
     let path = campaign.flight("bomb");
     let reader = SerializedFileReader::new(fs::File::open(&path).unwrap()).unwrap();
-    let honest = reader.metadata().file_metadata();
-    let keys = honest.key_value_metadata().cloned();
-    let claim = FileMetaData::new(honest.version(), 1_000_000_000_000, None, keys, honest.schema_descr_ptr(), None);
-    let metadata = ParquetMetaData::new(claim, reader.metadata().row_groups().to_vec());
+    let groups = reader.metadata().row_groups().iter();
+    let claims = groups.map(|g| g.clone().into_builder().set_num_rows(1_000_000_000_000).build().unwrap()).collect();
+    let metadata = ParquetMetaData::new(reader.metadata().file_metadata().clone(), claims);
     let mut bytes = fs::read(&path).unwrap();
     let end = bytes.len();
     let footer: [u8; 4] = bytes[end - 8..end - 4].try_into().unwrap();
