@@ -25,13 +25,13 @@ use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
-    TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
+    PredictionRow, TrendRow,
 };
 use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 1;
+const INGEST_VERSION: u32 = 2;
 const SEGMENT_VERSION: u32 = 1;
 const ESTIMATE_VERSION: u32 = 5;
 const JOINT_VERSION: u32 = 2;
@@ -71,6 +71,7 @@ struct Ingested {
     accepted: bool,
     channels: Vec<ChannelRow>,
     checks: Vec<CheckRow>,
+    instruments: Vec<InstrumentRow>,
     problems: Vec<Problem>,
 }
 
@@ -88,6 +89,7 @@ pub struct Campaign {
     pub flights: Vec<Flight>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
     pub maneuvers: Vec<Maneuver>,
     pub events: Vec<EventRow>,
     pub fits: Vec<FitRow>,
@@ -208,6 +210,7 @@ impl Run<'_> {
         for flight in &campaign.flights {
             campaign.channels.extend_from_slice(&flight.ingested.channels);
             campaign.checks.extend_from_slice(&flight.ingested.checks);
+            campaign.instruments.extend_from_slice(&flight.ingested.instruments);
             campaign.problems.extend_from_slice(&flight.ingested.problems);
         }
         let records: Vec<PathBuf> = campaign.flights.iter().map(|f| f.record.clone()).collect();
@@ -215,7 +218,8 @@ impl Run<'_> {
         self.store.keep_only("records", &records)?;
         self.store.keep_only("ingest", &artefacts)?;
         table::publish(&self.config.reports, &campaign.channels)?;
-        table::publish(&self.config.reports, &campaign.checks)
+        table::publish(&self.config.reports, &campaign.checks)?;
+        table::publish(&self.config.reports, &campaign.instruments)
     }
 
     fn ingest_flight(&self, files: &FlightFiles) -> Result<Flight> {
@@ -246,8 +250,13 @@ impl Run<'_> {
                 let mut bytes = Vec::new();
                 record_file::write(&done.record, &mut bytes).map_err(|e| crate::error::Error::store(&record, &e))?;
                 atomic::place(&record, &bytes)?;
-                let (channels, checks, problems) = (done.channels, done.checks, done.problems);
-                let ingested = Ingested { accepted: true, channels, checks, problems };
+                let ingested = Ingested {
+                    accepted: true,
+                    channels: done.channels,
+                    checks: done.checks,
+                    instruments: done.instruments,
+                    problems: done.problems,
+                };
                 Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], ingested }
             }
             Err(problem) => self.refused(id, &fingerprint, problem),
@@ -262,7 +271,13 @@ impl Run<'_> {
             fingerprint: fingerprint.to_owned(),
             record: self.store.path("records", id, fingerprint, "parquet"),
             artefacts: vec![self.store.path("ingest", id, fingerprint, "json")],
-            ingested: Ingested { accepted: false, channels: vec![], checks: vec![], problems: vec![problem] },
+            ingested: Ingested {
+                accepted: false,
+                channels: vec![],
+                checks: vec![],
+                instruments: vec![],
+                problems: vec![problem],
+            },
         }
     }
 

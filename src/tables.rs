@@ -39,6 +39,29 @@ pub struct CheckRow {
     pub verdict: String,
 }
 
+/// `instruments`: what the kinematic equations say of one instrument of one flight, y = (scale) x(t − delay) + bias. Empty
+/// where the flight does not tell it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InstrumentRow {
+    pub flight_id: String,
+    pub channel: String,
+    pub signal: String,
+    /// Of the bias and its bound.
+    pub unit: String,
+    pub bias: Option<f64>,
+    /// Standard deviations.
+    pub bias_bound: Option<f64>,
+    pub scale: Option<f64>,
+    pub scale_bound: Option<f64>,
+    /// Against the other channels.
+    pub delay_s: Option<f64>,
+    pub delay_bound_s: Option<f64>,
+    /// What the record was corrected by: `bias scale delay`, some of them or none.
+    pub applied: String,
+    /// `ok`, `not excited`, or what is wrong in words.
+    pub verdict: String,
+}
+
 /// `events`: the analyst's events against what segment found in the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EventRow {

@@ -13,6 +13,7 @@ mod longitudinal;
 pub mod motion;
 pub mod runge_kutta;
 
+pub(crate) use lever::lever;
 pub use lateral::Lateral;
 pub use longitudinal::Longitudinal;
 pub use motion::Motion;

@@ -4,6 +4,7 @@
 mod channels;
 mod checks;
 mod clock;
+pub mod compatibility;
 mod gaps;
 mod guilt;
 mod motion;
@@ -22,7 +23,8 @@ use crate::aircraft::Aircraft;
 use crate::error::Problem;
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark, RawFlight, Record, signal};
-use crate::tables::{ChannelRow, CheckRow};
+use crate::tables::{ChannelRow, CheckRow, InstrumentRow};
+use compatibility::{Findings, OnFault};
 use guilt::Guilty;
 
 /// The signal of the channel that is the recorder's clock.
@@ -36,6 +38,8 @@ pub struct Ingested {
     pub channels: Vec<ChannelRow>,
     /// How each kinematic relation came out.
     pub checks: Vec<CheckRow>,
+    /// What the kinematic equations say of each instrument.
+    pub instruments: Vec<InstrumentRow>,
     /// What is wrong with the flight without spoiling it.
     pub problems: Vec<Problem>,
 }
@@ -76,23 +80,80 @@ pub fn record(
     if let Some(absent) = signal::REQUIRED.iter().find(|s| !signals.contains_key(**s)) {
         return Err(refused(channels::nobody_gives(absent)));
     }
-    let record = Record {
+    let mut record = Record {
         flight_id: raw.flight_id.clone(),
         start_s: clock.start_s,
         step_s: clock.step_s,
         samples: clock.samples,
         signals,
     };
-    let judged = Judged::of(&record, channels, &recorded, aircraft, &settings.checks);
+    let judge = |record: &Record| Judged::of(record, channels, &recorded, aircraft, &settings.checks);
+    let examine = |record: &Record| {
+        compatibility::examine(record, channels, &recorded, aircraft, &settings.compatibility)
+    };
+    let (judged, findings) = reconciled(&mut record, judge, examine);
     if let Some(accusation) = &judged.accusation {
-        let spoilt = problem(&raw.flight_id, accusation.place.clone(), accusation.reason.clone());
+        let besides = findings.accusations().map(|a| format!(". Besides, {a}")).unwrap_or_default();
+        let reason = format!("{}{besides}", accusation.reason);
+        let spoilt = problem(&raw.flight_id, accusation.place.clone(), reason);
         if settings.on_failed_check == OnFailedCheck::Refuse && accusation.required {
             return Err(spoilt);
         }
         problems.push(spoilt);
     }
-    let rows = channel_rows(&record, channels, &judged);
-    Ok(Ingested { record, channels: rows, checks: judged.checks, problems })
+    let faults = findings.problems(&raw.flight_id);
+    if settings.compatibility.fault == OnFault::Refuse && findings.required_faulty() {
+        return Err(together(faults));
+    }
+    problems.extend(faults);
+    let rows = channel_rows(&record, channels, &judged, &findings);
+    let instruments = findings.rows(&record.flight_id);
+    Ok(Ingested { record, channels: rows, checks: judged.checks, instruments, problems })
+}
+
+/// Gross faults and instrument errors brought together; the record is corrected by what is to be applied.
+///
+/// Where a sign or a unit is wrong the errors of the others are looked for with that set right, and the record is left as
+/// it is. A check that no sign and no unit explains may fail for a delay: where it does not fail any more without it, the
+/// delay is the fault.
+fn reconciled(
+    record: &mut Record,
+    judge: impl Fn(&Record) -> Judged,
+    examine: impl Fn(&Record) -> Findings,
+) -> (Judged, Findings) {
+    let judged = judge(record);
+    if judged.guilty.iter().any(|g| g.factor.is_some()) {
+        let mut right = record.clone();
+        judged.set_right(&mut right);
+        return (judged, examine(&right).reported());
+    }
+    if judged.guilty.iter().any(|g| g.cause.is_some()) {
+        return (judged, Findings::default());
+    }
+    let findings = examine(record);
+    if judged.accusation.is_none() {
+        findings.correct(record);
+        return (judged, findings);
+    }
+    if findings.faulty() {
+        let mut right = record.clone();
+        findings.freed().correct(&mut right);
+        let again = judge(&right);
+        if again.accusation.is_none() {
+            findings.correct(record);
+            return (again, findings);
+        }
+    }
+    (judged, findings.reported())
+}
+
+/// Several problems of one flight as the one that refuses it.
+fn together(problems: Vec<Problem>) -> Problem {
+    let places: Vec<String> = problems.iter().map(|p| p.place.clone()).collect();
+    let reasons: Vec<String> = problems.iter().map(|p| p.reason.clone()).collect();
+    let first = problems.into_iter().next();
+    let flight_id = first.map(|p| p.flight_id).unwrap_or_default();
+    problem(&flight_id, places.join(", "), reasons.join(". "))
 }
 
 /// Where something is wrong and what: the place and the reason of a [`Problem`].
@@ -141,6 +202,16 @@ impl Judged {
         }
     }
 
+    /// Multiplies the guilty signals by what sets them right; of several that explain the same, the first.
+    fn set_right(&self, record: &mut Record) {
+        let first = self.guilty.iter().find(|g| !g.alone);
+        for guilty in self.guilty.iter().filter(|g| g.alone).chain(first) {
+            if let (Some(factor), Some(series)) = (guilty.factor, record.signals.get_mut(&guilty.signal)) {
+                series.values.iter_mut().for_each(|v| *v *= factor);
+            }
+        }
+    }
+
     fn verdict(&self, signal: &str) -> String {
         match self.guilty.iter().find(|g| g.signal == signal) {
             Some(guilty) => guilty.verdict(),
@@ -150,7 +221,12 @@ impl Judged {
     }
 }
 
-fn channel_rows(record: &Record, channels: &BTreeMap<String, Channel>, judged: &Judged) -> Vec<ChannelRow> {
+fn channel_rows(
+    record: &Record,
+    channels: &BTreeMap<String, Channel>,
+    judged: &Judged,
+    findings: &Findings,
+) -> Vec<ChannelRow> {
     let row = |(name, channel): (&String, &Channel)| {
         let series = record.signals.get(&channel.signal)?;
         let count = |mark: Mark| series.marks.iter().filter(|m| **m == mark).count();
@@ -162,7 +238,7 @@ fn channel_rows(record: &Record, channels: &BTreeMap<String, Channel>, judged: &
             bridged: count(Mark::Bridged),
             despiked: count(Mark::Despiked),
             missing: count(Mark::Missing),
-            verdict: judged.verdict(&channel.signal),
+            verdict: findings.verdict(&channel.signal).unwrap_or_else(|| judged.verdict(&channel.signal)),
         })
     };
     channels.iter().filter_map(row).collect()

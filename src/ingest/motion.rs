@@ -183,7 +183,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
-fn atmosphere(altitude_ft: f64) -> (f64, f64) {
+pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
     const FT: f64 = 0.304_8;
     const KG_M3: f64 = 515.378_818;
     const GAS: f64 = 287.052_87;

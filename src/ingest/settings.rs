@@ -1,5 +1,6 @@
 //! What the analyst may decide about ingest, with defaults reasoned from recorders and flight mechanics.
 
+use super::compatibility::Compatibility;
 use serde::{Deserialize, Serialize};
 
 /// The settings of ingest.
@@ -17,6 +18,8 @@ pub struct Settings {
     /// What happens to a flight when a required channel fails its checks.
     pub on_failed_check: OnFailedCheck,
     pub checks: Checks,
+    /// Biases, scale errors and delays of the instruments from the kinematic equations.
+    pub compatibility: Compatibility,
 }
 
 impl Default for Settings {
@@ -28,6 +31,7 @@ impl Default for Settings {
             spikes: Spikes::default(),
             on_failed_check: OnFailedCheck::Refuse,
             checks: Checks::default(),
+            compatibility: Compatibility::default(),
         }
     }
 }

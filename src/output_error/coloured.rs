@@ -65,6 +65,21 @@ pub fn noise(root: &DMatrix<f64>, outputs: Vec<Series>) -> Noise {
     settled(&transformed(root, outputs))
 }
 
+/// The variance of white noise that is as strong as the slowest part of these values, NaN where one does not count, and
+/// never weaker than the values are.
+#[must_use]
+pub fn level(values: &[f64], step_s: f64) -> f64 {
+    let used: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
+    let count = used.iter().filter(|used| **used).count().max(1) as f64;
+    let residuals: Vec<f64> = values.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
+    let variance = residuals.iter().map(|v| v * v).sum::<f64>() / count;
+    let sensitivities = vec![0.0; values.len()];
+    let series = Series { step_s, weight: 1.0, variance, residuals, used, sensitivities };
+    let blocks = series.blocks();
+    let slow = Autoregression::fitted(&blocks.autocovariances(), blocks.count()).long_run_variance();
+    (slow * series.block() as f64).max(variance)
+}
+
 /// Σ Sᵀ W R W S: what noise does to the gradient.
 #[must_use]
 pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {

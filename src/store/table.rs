@@ -10,8 +10,8 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::Maneuver;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
-    PredictedRow, PredictionRow, StartRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, InstrumentRow,
+    JointRow, PredictedRow, PredictionRow, StartRow, TrendRow,
 };
 
 /// A row type with the name of its table and its columns.
@@ -101,6 +101,8 @@ table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight stand
     difference_pct z verdict);
 table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
+table!(InstrumentRow, "instruments", flight_id channel signal unit bias bias_bound scale scale_bound delay_s delay_bound_s
+    applied verdict);
 table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
 table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative unit truth realisations converged bias scatter
     bias_over_scatter scatter_over_bound coverage_68 coverage_95 scatter_over_corrected corrected_coverage_68
