@@ -439,6 +439,7 @@ impl Run<'_> {
             comparison: &campaign.comparison,
             channels: &campaign.channels,
             checks: &campaign.checks,
+            instruments: &campaign.instruments,
             events: &campaign.events,
             problems: &campaign.problems,
             histories: &histories,

@@ -13,8 +13,8 @@ mod longitudinal;
 pub mod motion;
 pub mod runge_kutta;
 
-pub(crate) use lever::lever;
 pub use lateral::Lateral;
+pub(crate) use lever::lever;
 pub use longitudinal::Longitudinal;
 pub use motion::Motion;
 

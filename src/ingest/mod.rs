@@ -88,9 +88,8 @@ pub fn record(
         signals,
     };
     let judge = |record: &Record| Judged::of(record, channels, &recorded, aircraft, &settings.checks);
-    let examine = |record: &Record| {
-        compatibility::examine(record, channels, &recorded, aircraft, &settings.compatibility)
-    };
+    let examine =
+        |record: &Record| compatibility::examine(record, channels, &recorded, aircraft, &settings.compatibility);
     let (judged, findings) = reconciled(&mut record, judge, examine);
     if let Some(accusation) = &judged.accusation {
         let besides = findings.accusations().map(|a| format!(". Besides, {a}")).unwrap_or_default();
@@ -122,11 +121,12 @@ fn reconciled(
     examine: impl Fn(&Record) -> Findings,
 ) -> (Judged, Findings) {
     let judged = judge(record);
-    if judged.guilty.iter().any(|g| g.factor.is_some()) {
+    if !judged.guilty.is_empty() && judged.guilty.iter().all(|g| g.alone && g.factor.is_some()) {
         let mut right = record.clone();
         judged.set_right(&mut right);
         return (judged, examine(&right).reported());
     }
+    // A dead channel, or one of several: there is nothing to go by.
     if judged.guilty.iter().any(|g| g.cause.is_some()) {
         return (judged, Findings::default());
     }
@@ -144,7 +144,7 @@ fn reconciled(
             return (again, findings);
         }
     }
-    (judged, findings.reported())
+    (judged, Findings::default())
 }
 
 /// Several problems of one flight as the one that refuses it.
@@ -202,10 +202,9 @@ impl Judged {
         }
     }
 
-    /// Multiplies the guilty signals by what sets them right; of several that explain the same, the first.
+    /// Multiplies the guilty signals by what sets them right.
     fn set_right(&self, record: &mut Record) {
-        let first = self.guilty.iter().find(|g| !g.alone);
-        for guilty in self.guilty.iter().filter(|g| g.alone).chain(first) {
+        for guilty in &self.guilty {
             if let (Some(factor), Some(series)) = (guilty.factor, record.signals.get_mut(&guilty.signal)) {
                 series.values.iter_mut().for_each(|v| *v *= factor);
             }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Contents;
 use super::notation::{NOTHING, angle, fixed, number};
 use super::summary::{fits_by_maneuver, outcome_in_words};
-use crate::tables::ChannelRow;
+use crate::tables::{ChannelRow, InstrumentRow};
 
 /// A table of the page: a title that says how much is in it, the heads, and cells of plain text.
 #[derive(Clone, Debug, Serialize)]
@@ -34,7 +34,14 @@ pub fn is_check_passed(verdict: &str) -> bool {
 /// The tables of what went wrong; those without rows are left out.
 #[must_use]
 pub fn tables(contents: &Contents) -> Vec<TableView> {
-    let tables = [problems(contents), fits(contents), events(contents), checks(contents), channels(contents)];
+    let tables = [
+        problems(contents),
+        fits(contents),
+        events(contents),
+        checks(contents),
+        instruments(contents),
+        channels(contents),
+    ];
     tables.into_iter().filter(|t| !t.rows.is_empty()).collect()
 }
 
@@ -89,6 +96,43 @@ fn checks(contents: &Contents) -> TableView {
     let heads = ["flight", "relation", "signals", "slope", "correlation", "verdict"];
     let note = "Slope of what is measured on what the other signals predict: 1 when units and signs are right.";
     TableView::new("Checks between channels that failed", note, &heads, rows)
+}
+
+/// What the instruments were found to be off by, over the flights.
+fn instruments(contents: &Contents) -> TableView {
+    let mut of: BTreeMap<(&str, &str), Vec<&InstrumentRow>> = BTreeMap::new();
+    let told = |r: &&InstrumentRow| r.verdict != "not excited";
+    for row in contents.instruments.iter().filter(told) {
+        of.entry((&row.channel, &row.unit)).or_default().push(row);
+    }
+    let rows = of
+        .into_iter()
+        .map(|((channel, unit), rows)| {
+            let range = |value: fn(&InstrumentRow) -> Option<f64>, digits: usize| {
+                let values = || rows.iter().filter_map(|r| value(r));
+                match (values().reduce(f64::min), values().reduce(f64::max)) {
+                    (Some(least), Some(most)) => format!("{} \u{2026} {}", fixed(least, digits), fixed(most, digits)),
+                    _ => NOTHING.to_owned(),
+                }
+            };
+            let corrected = rows.iter().filter(|r| !r.applied.is_empty()).count();
+            let faults = rows.iter().filter(|r| !is_check_passed(&r.verdict)).count();
+            vec![
+                channel.to_owned(),
+                unit.to_owned(),
+                rows.len().to_string(),
+                corrected.to_string(),
+                faults.to_string(),
+                range(|r| r.bias, 3),
+                range(|r| r.scale, 4),
+                range(|r| r.delay_s.map(|d| 1e3 * d), 0),
+            ]
+        })
+        .collect();
+    let heads = ["channel", "unit", "flights", "corrected", "faults", "bias", "scale", "delay, ms"];
+    let note = "From the kinematic equations alone, least and most over the flights; each with its bound is in the table \
+                `instruments`.";
+    TableView::new("Instruments", note, &heads, rows)
 }
 
 /// Channels that were repaired or are not as they should be, summed over the flights with the same verdict.

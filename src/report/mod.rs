@@ -32,8 +32,8 @@ use crate::error::Problem;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
-    TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
+    PredictionRow, TrendRow,
 };
 use failures::TableView;
 use notation::{Digits, NOTHING, angle, fixed, number};
@@ -61,6 +61,7 @@ pub struct Contents<'a> {
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
     pub checks: &'a [CheckRow],
+    pub instruments: &'a [InstrumentRow],
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
     pub histories: &'a [History],

@@ -7,7 +7,7 @@ use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
-    PredictionRow, TrendRow,
+    InstrumentRow, PredictionRow, TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -23,6 +23,7 @@ pub struct Campaign {
     pub comparison: Vec<ComparisonRow>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
     pub histories: Vec<History>,
@@ -47,6 +48,7 @@ impl Campaign {
             comparison: &self.comparison,
             channels: &self.channels,
             checks: &self.checks,
+            instruments: &self.instruments,
             events: &self.events,
             problems: &self.problems,
             histories: &self.histories,

@@ -81,11 +81,7 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Rates {
     let ((sp, cp), (st, ct)) = (x[3].sin_cos(), x[4].sin_cos());
     let g = known.gravity;
     let turning = omega + known.earth;
-    let mut out = Rates {
-        rates: State::zeros(),
-        by_state: SMatrix::zeros(),
-        by_input: SMatrix::zeros(),
-    };
+    let mut out = Rates { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
     let gravity = Vector3::new(-g * st, g * ct * sp, g * ct * cp);
     let turned = turning.cross(&velocity);
     let cross = turning.cross_matrix();
@@ -122,20 +118,20 @@ fn attitude(out: &mut Rates, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f
     out.by_state[(5, 3)] = across / ct;
     out.by_state[(5, 4)] = along * tan / ct;
     out.by_input.fixed_view_mut::<3, 3>(3, 0).copy_from(&Matrix3::new(
-        1.0, tan * sp, tan * cp, //
-        0.0, cp, -sp, //
-        0.0, sp / ct, cp / ct,
+        1.0,
+        tan * sp,
+        tan * cp, //
+        0.0,
+        cp,
+        -sp, //
+        0.0,
+        sp / ct,
+        cp / ct,
     ));
 }
 
 /// Rate of climb.
-fn climb(
-    out: &mut Rates,
-    v: Vector3<f64>,
-    v_by_rates: Matrix3<f64>,
-    (sp, cp): (f64, f64),
-    (st, ct): (f64, f64),
-) {
+fn climb(out: &mut Rates, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
     out.rates[6] = up.dot(&v);
     for i in 0..3 {
@@ -204,11 +200,8 @@ struct Air {
 impl Air {
     fn at(altitude_ft: f64) -> Air {
         const REACH_FT: f64 = 5.0;
-        let ((density, sound), up, down) = (
-            atmosphere(altitude_ft),
-            atmosphere(altitude_ft + REACH_FT),
-            atmosphere(altitude_ft - REACH_FT),
-        );
+        let ((density, sound), up, down) =
+            (atmosphere(altitude_ft), atmosphere(altitude_ft + REACH_FT), atmosphere(altitude_ft - REACH_FT));
         let slope = |up: f64, down: f64| (up - down) / (2.0 * REACH_FT);
         Air { density, density_slope: slope(up.0, down.0), sound, sound_slope: slope(up.1, down.1) }
     }

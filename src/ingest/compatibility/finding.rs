@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::fit::Errors;
+use super::fit::{Errors, MODEL_SCALE};
 use super::instruments::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, observable, place, size};
 use super::settings::{Action, Compatibility, OnFault};
 use super::taps::Taps;
@@ -12,9 +12,8 @@ use crate::flight::{Channel, Mark, Record, signal};
 use crate::tables::InstrumentRow;
 use crate::units::Unit;
 
-/// The equations themselves are held to be no better than this: gravity, arms and the clock are not known more closely.
+/// The equations themselves are held to be no better than this, nor the clock.
 const MODEL_BIAS: f64 = 0.01; // of an ordinary bias
-const MODEL_SCALE: f64 = 0.002;
 const MODEL_DELAY_S: f64 = 0.001;
 
 /// A parameter is told by the flight when its bound is at most this share of what was thought before.
@@ -55,8 +54,7 @@ impl Findings {
         let finding = |i: usize| {
             let signal = SIGNALS[i];
             let (channel, _) = channels.iter().find(|(_, c)| c.signal == signal)?;
-            let mut estimates =
-                ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
+            let mut estimates = ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
             correct_together(&mut estimates, settings);
             recorded.iter().any(|s| s == signal).then(|| Finding { signal, channel: channel.clone(), estimates })
         };
@@ -234,7 +232,8 @@ impl Finding {
         let of = |kind: Kind| self.estimates[kind as usize];
         let value = |kind: Kind| of(kind).map(|e| e.value);
         let bound = |kind: Kind| of(kind).map(|e| e.bound);
-        let applied: Vec<&str> = ALL_KINDS.into_iter().filter(|k| of(*k).is_some_and(|e| e.applied)).map(name).collect();
+        let applied: Vec<&str> =
+            ALL_KINDS.into_iter().filter(|k| of(*k).is_some_and(|e| e.applied)).map(name).collect();
         let faults = self.faults();
         let told = self.estimates.iter().any(Option::is_some);
         let verdict = match (faults.is_empty(), told) {

@@ -13,16 +13,18 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::Compatibility;
 use super::instruments::{ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size};
 use super::response::{LOCAL, Local, ROW, Response, respond, shared_place};
-use super::window::{Window, margin};
+use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
 use crate::output_error::coloured;
 
 /// Rounds of re-estimating R and P, and steps within each.
 const ROUNDS: usize = 6;
-const STEPS: usize = 3;
+const STEPS: usize = 2;
 const HALVINGS: usize = 5;
 /// Settled when no parameter moves by more than this share of its bound.
 const SETTLED: f64 = 0.05;
+/// The equations themselves are held to be no better than this: gravity, arms and positions are not known more closely.
+pub const MODEL_SCALE: f64 = 0.002;
 /// A parameter is surely larger than ordinary when it is this many times its bound; one that is to be freed at the end is
 /// so by itself, and needs more.
 const SURELY: f64 = 3.0;
@@ -85,8 +87,7 @@ struct Problem<'a> {
 /// Fits the windows; none where there are too few that can be followed.
 pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) -> Option<Errors> {
     let step_s = windows.first()?.step_s;
-    let problem =
-        Problem { aircraft, margin: margin(settings, step_s), settings, present: present(windows) };
+    let problem = Problem { aircraft, margin: margin(settings, step_s), settings, present: present(windows) };
     let mut shared = [0.0; PARAMETERS];
     let begin = |window| Member::begin(window, &problem, &shared);
     let mut members: Vec<Member> = windows.iter().filter_map(begin).collect();
@@ -110,8 +111,30 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
     }
     let inverse = problem.inverse(&total(&members), &prior)?;
     let jackknife = problem.jackknife(&members, &shared, &prior);
-    let bounds = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]).sqrt());
+    let mut bounds = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]).sqrt());
+    for (i, outweighed) in outweighed(windows).into_iter().enumerate() {
+        let j = place(3 + i, Kind::Scale);
+        bounds[j] = bounds[j].hypot(MODEL_SCALE * outweighed);
+    }
     Some(Errors { values: shared, bounds, prior })
+}
+
+/// How many times larger than the swings of each accelerometer (forward, right, up) those of ω × v are which they are
+/// balanced against: a share of these that the model does not know is so much more of the accelerometer's scale.
+fn outweighed(windows: &[Window]) -> [f64; 3] {
+    let swings = |values: &dyn Fn(&Window, usize) -> f64| {
+        let of = |window: &Window| {
+            let values: Vec<f64> = (0..window.samples).map(|k| values(window, k)).filter(|v| v.is_finite()).collect();
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+        };
+        windows.iter().map(of).sum::<f64>()
+    };
+    std::array::from_fn(|i| {
+        let turning = swings(&|w, k| w.turning(k)[i]);
+        let felt = swings(&|w, k| factor(3 + i) * w.inputs[3 + i][w.margin + k]);
+        if felt > 0.0 { (turning / felt).sqrt() } else { 0.0 }
+    })
 }
 
 /// The parameters of instruments that are recorded and that the equations say something of.
@@ -174,7 +197,12 @@ impl Problem<'_> {
     }
 
     /// √P: what is thought of each parameter, seeing what it has come out as.
-    fn prior(&self, members: &[Member], shared: &[f64; PARAMETERS], before: &[f64; PARAMETERS]) -> Option<[f64; PARAMETERS]> {
+    fn prior(
+        &self,
+        members: &[Member],
+        shared: &[f64; PARAMETERS],
+        before: &[f64; PARAMETERS],
+    ) -> Option<[f64; PARAMETERS]> {
         let inverse = self.inverse(&total(members), before)?;
         Some(std::array::from_fn(|j| {
             let ordinary = self.size(&self.settings.ordinary, j);
@@ -259,7 +287,12 @@ impl Problem<'_> {
     }
 
     /// Variances of the shared parameters from the scatter between windows: each left out in turn.
-    fn jackknife(&self, members: &[Member], shared: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> [f64; PARAMETERS] {
+    fn jackknife(
+        &self,
+        members: &[Member],
+        shared: &[f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+    ) -> [f64; PARAMETERS] {
         let (whole, all) = (total(members), self.gradient(members, shared, prior));
         let without = |m: &Member| Some(self.inverse(&(&whole - &m.reduced.0), prior)? * (&all - &m.reduced.1));
         let left_out: Vec<DVector<f64>> = members.iter().filter_map(without).collect();

@@ -46,7 +46,7 @@ impl Default for Compatibility {
             standard_errors: 3.0,
             fault_standard_errors: 4.0,
             window_s: 20.0,
-            windows: 16,
+            windows: 20,
             least_windows: 3,
             longest_delay_s: 0.3,
             wind_change_ft_s2: 0.1,

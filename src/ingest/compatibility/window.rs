@@ -79,7 +79,9 @@ pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
 
 /// Stretches of a window's length, or of half of it at least, through which the equations can be driven.
 fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
-    let (length, margin) = (samples(settings.window_s, record.step_s).max(2), margin(settings, record.step_s));
+    let pace = pace(record.step_s);
+    let length = samples(settings.window_s, record.step_s).max(2 * pace);
+    let margin = pace * margin(settings, pace as f64 * record.step_s);
     let mut found = Vec::new();
     for run in runs(record) {
         let mut first = run.start + margin;
@@ -133,23 +135,50 @@ fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
 }
 
 impl Window {
-    /// What a stretch of the record holds.
+    /// What a stretch of the record holds, at the pace of the windows.
     pub fn of(record: &Record, range: Range<usize>, aircraft: &Aircraft, settings: &Compatibility) -> Window {
-        let margin = margin(settings, record.step_s);
-        let wide = range.start.saturating_sub(margin)..range.end + margin;
-        let input = |i: usize| record.values(SIGNALS[i]).and_then(|v| v.get(wide.clone())).unwrap_or_default().to_vec();
-        let output = |o: usize| measured(record, SIGNALS[INPUTS + o], &range);
-        let known: Vec<Known> = range.clone().map(|k| known(record, k, aircraft)).collect();
+        let pace = pace(record.step_s);
+        let step_s = pace as f64 * record.step_s;
+        let (margin, samples) = (margin(settings, step_s), range.len() / pace);
+        let first = range.start.saturating_sub(margin * pace);
+        let wide = first..first + (samples + 2 * margin) * pace;
+        let range = range.start..range.start + samples * pace;
+        let input =
+            |i: usize| paced(record.values(SIGNALS[i]).and_then(|v| v.get(wide.clone())).unwrap_or_default(), pace);
+        let output = |o: usize| paced(&measured(record, SIGNALS[INPUTS + o], &range), pace);
+        let centres: Vec<usize> = range.clone().step_by(pace).map(|k| k + pace / 2).collect();
+        let known: Vec<Known> = centres.iter().map(|k| known(record, *k, aircraft)).collect();
         Window {
-            step_s: record.step_s,
-            samples: range.len(),
+            step_s,
+            samples,
             margin,
-            start: start(record, &range, aircraft, known.first()),
+            start: start(record, centres.first().copied().unwrap_or(range.start), aircraft, known.first()),
             known,
             inputs: std::array::from_fn(input),
             outputs: std::array::from_fn(output),
         }
     }
+
+    /// ω × v as measured at a sample, ft/s².
+    pub fn turning(&self, k: usize) -> Vector3<f64> {
+        let omega = Vector3::from_fn(|i, _| factor(i) * self.inputs[i][self.margin + k]);
+        let [alpha, beta, speed] = [0, 1, 2].map(|o| self.outputs[o][k]);
+        let ((sa, ca), (sb, cb)) = ((alpha / DEG).sin_cos(), (beta / DEG).sin_cos());
+        omega.cross(&(Vector3::new(ca * cb, sb, sa * cb) * speed))
+    }
+}
+
+/// Samples of the record that are one of a window: a faster recorder's are averaged, all channels' alike. The motion of an
+/// aircraft has no more to say than 25 samples a second tell.
+fn pace(step_s: f64) -> usize {
+    const SLOWEST_STEP_S: f64 = 0.04;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    let pace = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
+    pace
+}
+
+fn paced(values: &[f64], pace: usize) -> Vec<f64> {
+    values.chunks_exact(pace).map(|v| v.iter().sum::<f64>() / pace as f64).collect()
 }
 
 /// A signal over a stretch; NaN where it is marked or was not recorded.
@@ -216,27 +245,17 @@ fn to_body(phi: f64, theta: f64, psi: f64) -> Matrix3<f64> {
 }
 
 /// The state that the first sample measures.
-fn start(record: &Record, range: &Range<usize>, aircraft: &Aircraft, known: Option<&Known>) -> State {
-    let k = range.start;
+fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) -> State {
     let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied().unwrap_or(0.0);
     let Some(known) = known else { return State::zeros() };
     let rates = [at(s::P) / DEG, at(s::Q) / DEG, at(s::R) / DEG];
-    let read =
-        Flow { alpha: at(s::ALPHA_VANE) / DEG, beta: at(s::BETA_VANE) / DEG, velocity: at(s::VELOCITY), rates };
+    let read = Flow { alpha: at(s::ALPHA_VANE) / DEG, beta: at(s::BETA_VANE) / DEG, velocity: at(s::VELOCITY), rates };
     let flow = aircraft.sensors.flow_at_cg(&read, known.cg);
     let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
     let velocity = [flow.velocity * ca * cb, flow.velocity * sb, flow.velocity * sa * cb];
     let omega = Vector3::from(rates);
     let swung = |i: usize| velocity[i] + omega.cross(&Vector3::from(known.arms[i]))[i];
-    State::from([
-        swung(0),
-        swung(1),
-        swung(2),
-        at(s::PHI) / DEG,
-        at(s::THETA) / DEG,
-        at(s::PSI) / DEG,
-        at(s::ALTITUDE),
-    ])
+    State::from([swung(0), swung(1), swung(2), at(s::PHI) / DEG, at(s::THETA) / DEG, at(s::PSI) / DEG, at(s::ALTITUDE)])
 }
 
 /// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).
