@@ -121,8 +121,8 @@ fn a_refused_flight_names_channel_relation_and_cause() {
 }
 
 /// Fewer windows than by default, for speed.
-fn few_windows(compatibility: Compatibility) -> Settings {
-    Settings { compatibility: Compatibility { windows: 8, ..compatibility }, ..Settings::default() }
+fn few_windows(fault: OnFault) -> Settings {
+    Settings { compatibility: Compatibility { windows: 8, fault, ..Compatibility::default() }, ..Settings::default() }
 }
 
 /// A channel recorded so many samples late; each is 25 ms.
@@ -144,7 +144,7 @@ fn delayed(ingested: &Ingested) -> Vec<(&str, f64)> {
 fn a_delay_of_a_tenth_of_a_second_is_named_and_the_record_corrected_by_it() {
     let config = config();
     let exact = ten_minutes(&config);
-    let settings = few_windows(Compatibility::default());
+    let settings = few_windows(OnFault::Apply);
     let healthy = ingest(&config, &exact, &settings).unwrap();
     // A late yaw rate alone would make the gross checks accuse the lateral accelerometer.
     for channel in ["r", "alpha_vane"] {
@@ -172,7 +172,7 @@ fn delays_of_two_channels_are_both_named() {
     let mut raw = ten_minutes(&config);
     delay(&mut raw, "theta", 3);
     delay(&mut raw, "beta_vane", 4);
-    let ingested = ingest(&config, &raw, &few_windows(Compatibility::default())).unwrap();
+    let ingested = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap();
     let named: Vec<&str> = delayed(&ingested).into_iter().map(|d| d.0).collect();
     assert_eq!(named, ["beta_vane", "theta"]);
 }
@@ -183,7 +183,7 @@ fn a_reversed_sign_and_a_delay_in_one_flight_are_both_named() {
     let mut raw = ten_minutes(&config);
     raw.columns.get_mut("an").unwrap().values.iter_mut().for_each(|v| *v = -*v);
     delay(&mut raw, "q", 4);
-    let problem = ingest(&config, &raw, &few_windows(Compatibility::default())).unwrap_err();
+    let problem = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap_err();
     assert_eq!(problem.place, "channel `an`");
     assert!(problem.reason.contains("its sign is reversed"), "{}", problem.reason);
     assert!(problem.reason.contains("`q` is delayed by"), "{}", problem.reason);
@@ -194,10 +194,10 @@ fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
     let config = config();
     let mut raw = ten_minutes(&config);
     delay(&mut raw, "q", 4);
-    let refuse = few_windows(Compatibility { fault: OnFault::Refuse, ..Compatibility::default() });
+    let refuse = few_windows(OnFault::Refuse);
     let problem = ingest(&config, &raw, &refuse).unwrap_err();
     assert_eq!(problem.place, "channel `q`");
-    let report = few_windows(Compatibility { fault: OnFault::Report, ..Compatibility::default() });
+    let report = few_windows(OnFault::Report);
     let ingested = ingest(&config, &raw, &report).unwrap();
     assert_eq!(ingested.problems.len(), 1);
     let q = ingested.instruments.iter().find(|r| r.channel == "q").unwrap();
@@ -207,7 +207,7 @@ fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
 #[test]
 fn of_a_healthy_flight_with_known_errors_the_table_tells_them() {
     let config = config();
-    let settings = few_windows(Compatibility::default());
+    let settings = few_windows(OnFault::Apply);
     let mut raw = ten_minutes(&config);
     let before = ingest(&config, &raw, &settings).unwrap().instruments;
     raw.columns.get_mut("q").unwrap().values.iter_mut().for_each(|v| *v += 0.08);

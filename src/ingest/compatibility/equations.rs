@@ -42,7 +42,7 @@ pub type Driven = [f64; INPUTS];
 
 /// Rates of the states with their slopes along states and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rates {
+pub struct Motion {
     pub rates: State,
     pub by_state: SMatrix<f64, STATES, STATES>,
     pub by_input: SMatrix<f64, STATES, INPUTS>,
@@ -75,13 +75,13 @@ fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix
 }
 
 /// The rates of the states.
-pub fn rates(x: &State, input: &Driven, known: &Known) -> Rates {
+pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
     let omega = vector(input);
     let (velocity, velocity_by_rates) = at_cg(x, omega, known);
     let ((sp, cp), (st, ct)) = (x[3].sin_cos(), x[4].sin_cos());
     let g = known.gravity;
     let turning = omega + known.earth;
-    let mut out = Rates { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
+    let mut out = Motion { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
     let gravity = Vector3::new(-g * st, g * ct * sp, g * ct * cp);
     let turned = turning.cross(&velocity);
     let cross = turning.cross_matrix();
@@ -106,7 +106,7 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Rates {
 }
 
 /// Rates of φ, θ, ψ for body rates relative to the horizon.
-fn attitude(out: &mut Rates, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
     let tan = st / ct;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
     out.rates[3] = w.x + tan * along;
@@ -131,7 +131,7 @@ fn attitude(out: &mut Rates, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f
 }
 
 /// Rate of climb.
-fn climb(out: &mut Rates, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+fn climb(out: &mut Motion, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
     out.rates[6] = up.dot(&v);
     for i in 0..3 {

@@ -45,6 +45,7 @@ pub struct Findings(pub Vec<Finding>);
 
 impl Findings {
     /// One for each recorded instrument.
+    #[must_use]
     pub fn of(
         errors: Option<&Errors>,
         channels: &BTreeMap<String, Channel>,
@@ -62,11 +63,13 @@ impl Findings {
     }
 
     /// Whether an instrument has a fault.
+    #[must_use]
     pub fn faulty(&self) -> bool {
         self.0.iter().any(|f| !f.faults().is_empty())
     }
 
     /// Whether one has that the equations cannot do without.
+    #[must_use]
     pub fn required_faulty(&self) -> bool {
         self.0.iter().any(|f| signal::REQUIRED.contains(&f.signal) && !f.faults().is_empty())
     }
@@ -105,11 +108,13 @@ impl Findings {
     }
 
     /// Rows of the table `instruments`.
+    #[must_use]
     pub fn rows(&self, flight_id: &str) -> Vec<InstrumentRow> {
         self.0.iter().map(|f| f.row(flight_id)).collect()
     }
 
     /// A problem for each instrument with a fault.
+    #[must_use]
     pub fn problems(&self, flight_id: &str) -> Vec<Problem> {
         let faulty = self.0.iter().filter(|f| !f.faults().is_empty());
         faulty
@@ -123,12 +128,14 @@ impl Findings {
     }
 
     /// All faults in one sentence; none where there is none.
+    #[must_use]
     pub fn accusations(&self) -> Option<String> {
         let all: Vec<String> = self.0.iter().filter(|f| !f.faults().is_empty()).map(Finding::accusation).collect();
         (!all.is_empty()).then(|| all.join("; "))
     }
 
     /// What is wrong with the channel of a signal, in words.
+    #[must_use]
     pub fn verdict(&self, signal: &str) -> Option<String> {
         let finding = self.0.iter().find(|f| f.signal == signal)?;
         let faults = finding.faults();

@@ -94,7 +94,7 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
     if members.len() < settings.least_windows {
         return None;
     }
-    let mut prior = std::array::from_fn(|j| BROAD * problem.size(&settings.faulty, j));
+    let mut prior = std::array::from_fn(|j| BROAD * size_of(&settings.faulty, j));
     for round in 0..ROUNDS {
         let steps = problem.settle(&mut members, &mut shared, &prior)?;
         if round > 2 && steps == 1 {
@@ -105,7 +105,7 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         }
     }
     for _ in 0..MOST_FREED {
-        let Some((j, size)) = problem.surest(&members, &shared, &prior)? else { break };
+        let Some((j, size)) = problem.surest(&members, &shared, &prior) else { break };
         prior[j] = size;
         problem.settle(&mut members, &mut shared, &prior)?;
     }
@@ -149,15 +149,15 @@ fn present(windows: &[Window]) -> [bool; PARAMETERS] {
     present
 }
 
+fn size_of(errors: &super::settings::Errors, j: usize) -> f64 {
+    size(errors, j / KINDS, ALL_KINDS[j % KINDS])
+}
+
 fn total(members: &[Member]) -> DMatrix<f64> {
     members.iter().fold(DMatrix::zeros(PARAMETERS, PARAMETERS), |sum, m| sum + &m.reduced.0)
 }
 
 impl Problem<'_> {
-    fn size(&self, errors: &super::settings::Errors, j: usize) -> f64 {
-        size(errors, j / KINDS, ALL_KINDS[j % KINDS])
-    }
-
     /// Steps until the parameters settle, then R anew; how many steps.
     fn settle(
         &self,
@@ -172,7 +172,9 @@ impl Problem<'_> {
                 break;
             }
         }
-        members.iter_mut().for_each(|m| m.reweigh(self));
+        for member in members {
+            member.reweigh(self);
+        }
         Some(steps)
     }
 
@@ -183,17 +185,17 @@ impl Problem<'_> {
         members: &[Member],
         shared: &[f64; PARAMETERS],
         prior: &[f64; PARAMETERS],
-    ) -> Option<Option<(usize, f64)>> {
+    ) -> Option<(usize, f64)> {
         let inverse = self.inverse(&total(members), prior)?;
         let alone = |j: usize| {
-            let (variance, ordinary) = (inverse[(j, j)], self.size(&self.settings.ordinary, j));
+            let (variance, ordinary) = (inverse[(j, j)], size_of(&self.settings.ordinary, j));
             let told = 1.0 - variance / (prior[j] * prior[j]);
             let (value, bound) = (shared[j] / told, (variance / told).sqrt());
             let beyond = self.present[j] && told > 1e-6 && prior[j] <= ordinary && value.abs() > 2.0 * ordinary;
             (beyond && value.abs() > FREED * bound).then(|| (j, ordinary.hypot(value), value.abs() / bound))
         };
         let surest = (0..PARAMETERS).filter_map(alone).max_by(|a, b| a.2.total_cmp(&b.2));
-        Some(surest.map(|(j, size, _)| (j, size)))
+        surest.map(|(j, size, _)| (j, size))
     }
 
     /// √P: what is thought of each parameter, seeing what it has come out as.
@@ -205,7 +207,7 @@ impl Problem<'_> {
     ) -> Option<[f64; PARAMETERS]> {
         let inverse = self.inverse(&total(members), before)?;
         Some(std::array::from_fn(|j| {
-            let ordinary = self.size(&self.settings.ordinary, j);
+            let ordinary = size_of(&self.settings.ordinary, j);
             let surely = shared[j].abs() > SURELY * inverse[(j, j)].sqrt();
             if surely { ordinary.hypot(shared[j]) } else { ordinary }
         }))

@@ -3,7 +3,8 @@
 //!
 //! The rates and accelerations drive the equations of motion through windows of the flight in which much moves; what comes
 //! out is matched to the vanes, the airspeed, the attitudes, the altitude and the pressures by output error. Biases, scale
-//! errors and delays of all of them are shared by the windows.
+//! errors and delays of all of them are shared by the windows. Surfaces, thrust and mass are in no kinematic equation: a
+//! fault of theirs is not found here.
 
 mod equations;
 mod finding;

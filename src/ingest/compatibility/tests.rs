@@ -145,7 +145,7 @@ fn flight(seconds: f64) -> Record {
     let aircraft = aircraft();
     // φ, θ and the velocity are steered back to what they were, so that the flight goes on for long.
     let mut x = State::from([450.0, 0.0, 90.0, 0.0, 0.2, 1.0, 24_000.0]);
-    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(samples); INSTRUMENTS];
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); INSTRUMENTS];
     let sensors = &aircraft.sensors;
     let arms = [sensors.ax.arm(CG), sensors.ay.arm(CG), sensors.an.arm(CG)];
     let at = |t: f64, x: &State| {
