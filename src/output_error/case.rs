@@ -119,6 +119,11 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
     }
 
+    /// Starts the integration at the measured state averaged over the first samples.
+    pub fn start_from_mean_of(&mut self, samples: usize) {
+        self.start = mean(self.states.iter().take(samples));
+    }
+
     #[must_use]
     pub fn samples(&self) -> usize {
         self.measurements.values.len()
@@ -225,6 +230,10 @@ fn held_parts<const NX: usize>(
 fn start_state<const NX: usize, E: Equations<NX>>(motion: &[Motion]) -> SVector<f64, NX> {
     const TRIMMED: usize = 10;
     let states: Vec<SVector<f64, NX>> = motion.iter().step_by(2).take(TRIMMED).map(E::measured_state).collect();
-    let sum = states.iter().fold(SVector::zeros(), |sum: SVector<f64, NX>, x| sum + x);
-    sum / states.len().max(1) as f64
+    mean(states.iter())
+}
+
+fn mean<'a, const NX: usize>(states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>) -> SVector<f64, NX> {
+    let count = states.len().max(1) as f64;
+    states.fold(SVector::zeros(), |sum: SVector<f64, NX>, x| sum + x) / count
 }
