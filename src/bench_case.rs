@@ -210,7 +210,7 @@ impl Estimated {
         let information = self.case.sums(&self.fit.response, &self.fit.weights).information;
         match cramer_rao::identified(&information, self.settings.max_condition_number) {
             cramer_rao::Identified::Determined { root, .. } => {
-                let bounds = cramer_rao::bounds(&root, &self.case, &self.fit);
+                let bounds = cramer_rao::bounds(&root, &self.case, &self.fit)?;
                 Some(bounds.corrected.diagonal().iter().map(|v| v.sqrt()).collect())
             }
             cramer_rao::Identified::Undetermined { .. } => None,

@@ -4,10 +4,12 @@
 //! V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S CA)/m. The paper's 2.1 with
 //! C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y for a symmetric airframe (I_xy = I_yz = 0) with
 //! the engines' momentum H along +x, whose moment is −r H.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
 
 use super::lever::lever;
+use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Sensors};
@@ -17,11 +19,9 @@ use crate::units::{DEG, G0_FT_S2};
 #[derive(Clone, Copy, Debug)]
 pub struct Longitudinal;
 
-/// What is known at one instant.
+/// What the rates know at one instant.
 #[derive(Clone, Debug)]
 pub struct Known {
-    velocity: f64,
-    beta: f64,
     /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
     slip_cos: f64,
     slip_sin: f64,
@@ -31,16 +31,27 @@ pub struct Known {
     force: f64,
     thrust: f64,
     gravity: f64,
-    sin_phi: f64,
     cos_phi: f64,
-    r: f64,
-    p: f64,
+    /// r sin φ.
+    turn: f64,
     /// Pitch acceleration that is known, rad/s², and q̄Sc̄/I_y.
     pitch: f64,
     moment: f64,
+}
+
+/// What the sensors know besides.
+#[derive(Clone, Debug)]
+pub struct Sensed {
+    velocity: f64,
+    beta: f64,
+    r: f64,
+    p: f64,
     /// ṗ and ṙ as measured.
     p_dot: f64,
     r_dot: f64,
+    /// Arms of the accelerometers from the c.g., ft forward, right, down.
+    an: [f64; 3],
+    ax: [f64; 3],
     cg: Position,
     sensors: Sensors,
 }
@@ -54,33 +65,51 @@ const CA: usize = 2;
 
 impl Equations<3> for Longitudinal {
     type Known = Known;
+    type Sensed = Sensed;
 
     const AXIS: Axis = Axis::Longitudinal;
     const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
 
+    const FOLLOWED: &'static [usize] = &[ALPHA, Q];
+    const RATES_BY_STATE: &'static [(usize, usize)] =
+        &[(ALPHA, ALPHA), (ALPHA, Q), (ALPHA, THETA), (Q, ALPHA), (Q, Q), (THETA, Q)];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(ALPHA, CN), (ALPHA, CA), (Q, CM)];
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)] =
+        &[(0, ALPHA), (0, Q), (1, Q), (2, THETA), (3, ALPHA), (3, Q), (4, ALPHA), (4, Q)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(3, CN), (3, CM), (4, CM), (4, CA)];
+
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
+        let ((sin_beta, cos_beta), (sin_phi, cos_phi)) = (sin_cos(m.beta), sin_cos(m.phi));
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
         Known {
-            velocity: m.velocity,
-            beta: m.beta,
-            slip_cos: m.beta.tan() * p,
-            slip_sin: m.beta.tan() * r,
-            per_speed: 1.0 / (m.velocity * m.beta.cos()),
+            slip_cos: sin_beta / cos_beta * p,
+            slip_sin: sin_beta / cos_beta * r,
+            per_speed: 1.0 / (m.velocity * cos_beta),
             force: m.qbar * aircraft.wing_area_ft2 / m.mass,
             thrust: m.thrust / m.mass,
             gravity: m.gravity,
-            sin_phi: m.phi.sin(),
-            cos_phi: m.phi.cos(),
-            r,
-            p,
+            cos_phi,
+            turn: r * sin_phi,
             pitch: (coupling + gyroscopic) / m.iy,
             moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft / m.iy,
+        }
+    }
+
+    fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
+        let sensors = &aircraft.sensors;
+        Sensed {
+            velocity: m.velocity,
+            beta: m.beta,
+            r: m.rates[2],
+            p: m.rates[0],
             p_dot: m.accelerations[0],
             r_dot: m.accelerations[2],
+            an: sensors.an.arm(m.cg),
+            ax: sensors.ax.arm(m.cg),
             cg: m.cg,
-            sensors: aircraft.sensors.clone(),
+            sensors: sensors.clone(),
         }
     }
 
@@ -101,8 +130,9 @@ impl Equations<3> for Longitudinal {
         [-m.force_z / k.force, (m.accelerations[1] - k.pitch) / k.moment, (k.thrust - m.force_x) / k.force]
     }
 
+    #[inline(always)]
     fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
-        let ((sa, ca), (st, ct)) = (x[ALPHA].sin_cos(), x[THETA].sin_cos());
+        let ((sa, ca), (st, ct)) = (sin_cos(x[ALPHA]), sin_cos(x[THETA]));
         let (normal, axial) = (k.force * c[CN], k.thrust - k.force * c[CA]);
         let weight = k.gravity * (ct * k.cos_phi * ca + st * sa);
         let alpha_dot = x[Q] - k.slip_cos * ca - k.slip_sin * sa + k.per_speed * (-normal * ca - axial * sa + weight);
@@ -110,7 +140,7 @@ impl Equations<3> for Longitudinal {
             + k.per_speed * (normal * sa - axial * ca + k.gravity * (-ct * k.cos_phi * sa + st * ca));
         let by_theta = k.per_speed * k.gravity * (-st * k.cos_phi * ca + ct * sa);
         Rates {
-            rates: SVector::from([alpha_dot, k.pitch + k.moment * c[CM], x[Q] * k.cos_phi - k.r * k.sin_phi]),
+            rates: SVector::from([alpha_dot, k.pitch + k.moment * c[CM], x[Q] * k.cos_phi - k.turn]),
             by_state: SMatrix::from_row_slice(&[by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0]),
             by_coefficient: SMatrix::from_row_slice(&[
                 -k.per_speed * k.force * ca,
@@ -126,14 +156,15 @@ impl Equations<3> for Longitudinal {
         }
     }
 
-    fn outputs(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
-        let rates = [k.p, x[Q], k.r];
-        let accelerations = [k.p_dot, k.pitch + k.moment * c[CM], k.r_dot];
-        let flow = Flow { alpha: x[ALPHA], beta: k.beta, velocity: k.velocity, rates };
-        let vane = k.sensors.alpha_reading(&flow, k.cg);
-        let down = lever(2, k.sensors.an.arm(k.cg), rates, accelerations);
-        let forward = lever(0, k.sensors.ax.arm(k.cg), rates, accelerations);
-        let thrust = if k.sensors.thrust_in_ax { k.thrust } else { 0.0 };
+    #[inline(always)]
+    fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
+        let rates = [sensed.p, x[Q], sensed.r];
+        let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
+        let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
+        let vane = sensed.sensors.alpha_reading(&flow, sensed.cg);
+        let down = lever(2, sensed.an, rates, accelerations);
+        let forward = lever(0, sensed.ax, rates, accelerations);
+        let thrust = if sensed.sensors.thrust_in_ax { k.thrust } else { 0.0 };
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([

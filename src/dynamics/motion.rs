@@ -109,46 +109,75 @@ impl Window {
     /// The motion at every point.
     #[must_use]
     pub fn motion(&self, aircraft: &Aircraft) -> Vec<Motion> {
-        (0..self.len()).map(|i| self.at(aircraft, i)).collect()
-    }
-
-    fn at(&self, aircraft: &Aircraft, i: usize) -> Motion {
-        let value = |name: &str| self.signal(name)[i];
-        let radians = |name: &str| value(name) / DEG;
-        let rates = [signal::P, signal::Q, signal::R].map(radians);
-        let accelerations = [signal::P, signal::Q, signal::R].map(|name| radians(&slope_name(name)));
-        let cg = Position { x_ft: value(signal::X_CG), y_ft: value(signal::Y_CG), z_ft: value(signal::Z_CG) };
-        let read = Flow {
-            alpha: radians(signal::ALPHA_VANE),
-            beta: radians(signal::BETA_VANE),
-            velocity: value(signal::VELOCITY),
-            rates,
+        let signals = Signals {
+            flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY].map(|name| self.signal(name)),
+            rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
+            slopes: [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name))),
+            attitude: [signal::THETA, signal::PHI].map(|name| self.signal(name)),
+            forces: [signal::AX, signal::AY, signal::AN].map(|name| self.signal(name)),
+            air: [signal::ALTITUDE, signal::QBAR].map(|name| self.signal(name)),
+            engines: [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT].map(|name| self.signal(name)),
+            mass: self.signal(signal::MASS),
+            cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
+            inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(|name| self.signal(name)),
         };
+        (0..self.len()).map(|i| signals.at(aircraft, i)).collect()
+    }
+}
+
+/// The signals of a window by what they are for.
+struct Signals<'a> {
+    flow: [&'a [f64]; 3],
+    rates: [&'a [f64]; 3],
+    slopes: [&'a [f64]; 3],
+    attitude: [&'a [f64]; 2],
+    forces: [&'a [f64]; 3],
+    air: [&'a [f64]; 2],
+    engines: [&'a [f64]; 3],
+    mass: &'a [f64],
+    cg: [&'a [f64]; 3],
+    inertia: [&'a [f64]; 4],
+}
+
+impl Signals<'_> {
+    fn at(&self, aircraft: &Aircraft, i: usize) -> Motion {
+        let rates = self.rates.map(|s| s[i] / DEG);
+        let accelerations = self.slopes.map(|s| s[i] / DEG);
+        let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
+        let cg = Position { x_ft, y_ft, z_ft };
+        let [alpha, beta, velocity] = self.flow.map(|s| s[i]);
+        let read = Flow { alpha: alpha / DEG, beta: beta / DEG, velocity, rates };
         let flow = aircraft.sensors.flow_at_cg(&read, cg);
         let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
-        let rpm = value(signal::RPM_LEFT) + value(signal::RPM_RIGHT);
+        let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
+        let [altitude, qbar] = self.air.map(|s| s[i]);
+        let [ix, iy, iz, ixz] = self.inertia.map(|s| s[i]);
+        let [ax, ay, an] = self.forces.map(|s| s[i]);
+        let mass = self.mass[i];
         // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
-        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { value(signal::THRUST) / value(signal::MASS) };
+        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { thrust / mass };
         Motion {
             alpha: flow.alpha,
             beta: flow.beta,
             velocity: flow.velocity,
             rates,
             accelerations,
-            theta: radians(signal::THETA),
-            phi: radians(signal::PHI),
-            force_x: G0_FT_S2 * value(signal::AX) - felt(0, aircraft.sensors.ax) + unfelt,
-            force_y: G0_FT_S2 * value(signal::AY) - felt(1, aircraft.sensors.ay),
-            force_z: -G0_FT_S2 * value(signal::AN) - felt(2, aircraft.sensors.an),
-            gravity: gravity_ft_s2(aircraft.latitude_deg, value(signal::ALTITUDE)),
-            qbar: value(signal::QBAR),
-            mass: value(signal::MASS),
-            thrust: value(signal::THRUST),
-            ix: value(signal::IX),
-            iy: value(signal::IY),
-            iz: value(signal::IZ),
-            ixz: value(signal::IXZ),
-            engine_momentum: aircraft.engine_inertia_slug_ft2 * rpm * (2.0 * std::f64::consts::PI / 60.0),
+            theta: self.attitude[0][i] / DEG,
+            phi: self.attitude[1][i] / DEG,
+            force_x: G0_FT_S2 * ax - felt(0, aircraft.sensors.ax) + unfelt,
+            force_y: G0_FT_S2 * ay - felt(1, aircraft.sensors.ay),
+            force_z: -G0_FT_S2 * an - felt(2, aircraft.sensors.an),
+            gravity: gravity_ft_s2(aircraft.latitude_deg, altitude),
+            qbar,
+            mass,
+            thrust,
+            ix,
+            iy,
+            iz,
+            ixz,
+            engine_momentum: aircraft.engine_inertia_slug_ft2
+                * (rpm_left + rpm_right)
+                * (2.0 * std::f64::consts::PI / 60.0),
             cg,
         }
     }

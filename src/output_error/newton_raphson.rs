@@ -216,8 +216,7 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
         Identified::Determined { root, condition_number, .. } => {
             fit.condition_number = Some(condition_number);
             let bounds = cramer_rao::bounds(&root, data, fit);
-            fit.covariance = Some(bounds.covariance);
-            fit.covariance_corrected = Some(bounds.corrected);
+            (fit.covariance, fit.covariance_corrected) = bounds.map(|b| (b.covariance, b.corrected)).unzip();
         }
         Identified::Undetermined { condition_number, parameters } => {
             fit.condition_number = condition_number;
