@@ -51,13 +51,13 @@ impl Flow {
 /// An error of a reading that is rounding, rad.
 const ROUNDING: f64 = 1e-15;
 
-impl Sensors {
-    /// What the α vane reads, rad, with the c.g. at `cg`.
-    #[must_use]
+impl Vane {
+    /// What an α vane reads, rad, with the c.g. at `cg`.
     #[inline(always)]
-    pub fn alpha_reading(&self, flow: &Flow, cg: Position) -> Reading {
-        let arm = self.alpha_vane.position().arm(cg);
-        let exact = match self.vane_model {
+    #[must_use]
+    pub fn alpha_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
+        let arm = self.position().arm(cg);
+        let exact = match model {
             VaneModel::Exact => {
                 let local = flow.at(arm);
                 let [u, _, w] = local.velocity;
@@ -71,15 +71,15 @@ impl Sensors {
                 Reading { angle: flow.alpha + dot(by_rates, flow.rates), by_alpha: 1.0, by_beta: 0.0, by_rates }
             }
         };
-        scaled(exact, self.alpha_vane)
+        scaled(exact, self)
     }
 
-    /// What the β vane reads, rad, with the c.g. at `cg`.
-    #[must_use]
+    /// What a β vane reads, rad, with the c.g. at `cg`.
     #[inline(always)]
-    pub fn beta_reading(&self, flow: &Flow, cg: Position) -> Reading {
-        let arm = self.beta_vane.position().arm(cg);
-        let exact = match self.vane_model {
+    #[must_use]
+    pub fn beta_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
+        let arm = self.position().arm(cg);
+        let exact = match model {
             VaneModel::Exact => {
                 let local = flow.at(arm);
                 let [u, v, w] = local.velocity;
@@ -94,9 +94,11 @@ impl Sensors {
                 Reading { angle: flow.beta + dot(by_rates, flow.rates), by_alpha: 0.0, by_beta: 1.0, by_rates }
             }
         };
-        scaled(exact, self.beta_vane)
+        scaled(exact, self)
     }
+}
 
+impl Sensors {
     /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the readings inverted by
     /// fixed-point iteration, which contracts by the ratio of arm times rate to velocity.
     #[must_use]
@@ -104,8 +106,8 @@ impl Sensors {
         let mut flow =
             Flow { alpha: read.alpha / self.alpha_vane.factor, beta: read.beta / self.beta_vane.factor, ..*read };
         for _ in 0..8 {
-            let alpha_error = read.alpha - self.alpha_reading(&flow, cg).angle;
-            let beta_error = read.beta - self.beta_reading(&flow, cg).angle;
+            let alpha_error = read.alpha - self.alpha_vane.alpha_reading(self.vane_model, &flow, cg).angle;
+            let beta_error = read.beta - self.beta_vane.beta_reading(self.vane_model, &flow, cg).angle;
             flow.alpha += alpha_error / self.alpha_vane.factor;
             flow.beta += beta_error / self.beta_vane.factor;
             if alpha_error.abs().max(beta_error.abs()) < ROUNDING {

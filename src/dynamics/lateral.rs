@@ -12,7 +12,7 @@ use super::lever::lever;
 use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
 /// The lateral-directional axis.
@@ -51,7 +51,8 @@ pub struct Sensed {
     /// Arm of the accelerometer from the c.g., ft forward, right, down.
     ay: [f64; 3],
     cg: Position,
-    sensors: Sensors,
+    vane: Vane,
+    model: VaneModel,
 }
 
 const BETA: usize = 0;
@@ -111,7 +112,7 @@ impl Equations<4> for Lateral {
         let turning = [[q * m.ixz, q * (m.iy - m.iz)], [q * (m.ix - m.iy), -q * m.ixz]];
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
         let times = |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
-        let ((sin_alpha, cos_alpha), (sin_theta, cos_theta)) = (sin_cos(m.alpha), sin_cos(m.theta));
+        let ((sin_alpha, cos_alpha), (sin_theta, cos_theta)) = (m.alpha.sin_cos(), m.theta.sin_cos());
         Known {
             per_speed: 1.0 / m.velocity,
             sin_alpha,
@@ -137,12 +138,22 @@ impl Equations<4> for Lateral {
             q_dot: m.accelerations[1],
             ay: sensors.ay.arm(m.cg),
             cg: m.cg,
-            sensors: sensors.clone(),
+            vane: sensors.beta_vane,
+            model: sensors.vane_model,
         }
     }
 
     fn measured_state(m: &Motion) -> SVector<f64, 4> {
         SVector::from([m.beta, m.rates[0], m.rates[2], m.phi])
+    }
+
+    fn state_of(regressor: &Regressor) -> Option<usize> {
+        match regressor {
+            Regressor::Beta => Some(BETA),
+            Regressor::RollRate => Some(P),
+            Regressor::YawRate => Some(R),
+            _ => None,
+        }
     }
 
     fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
@@ -167,11 +178,13 @@ impl Equations<4> for Lateral {
 
     #[inline(always)]
     fn rates(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
-        let ((sb, cb), (sp, cp)) = (sin_cos(x[BETA]), sin_cos(x[PHI]));
-        let (side, per_speed) = (k.force * c[CY], k.per_speed);
+        let [(sb, cb), (sp, cp)] = sin_cos([x[BETA], x[PHI]]);
+        let per_speed = k.per_speed;
         let weight = k.cos_theta * cp * k.sin_alpha - k.sin_theta * k.cos_alpha;
-        let beta_dot = x[P] * k.sin_alpha - x[R] * k.cos_alpha
-            + per_speed * (side * cb - k.along * sb + k.gravity * (cb * k.cos_theta * sp - sb * weight));
+        // 3.1 sorted by what cos β and sin β multiply.
+        let by_cos = per_speed * (k.force * c[CY] + k.gravity * k.cos_theta * sp);
+        let by_sin = -per_speed * (k.along + k.gravity * weight);
+        let beta_dot = sb.mul_add(by_sin, cb.mul_add(by_cos, x[P] * k.sin_alpha - x[R] * k.cos_alpha));
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
         let tan_theta = k.tan_theta;
         let mut out = Rates {
@@ -179,8 +192,7 @@ impl Equations<4> for Lateral {
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::zeros(),
         };
-        out.by_state[(BETA, BETA)] =
-            per_speed * (-side * sb - k.along * cb + k.gravity * (-sb * k.cos_theta * sp - cb * weight));
+        out.by_state[(BETA, BETA)] = cb * by_sin - sb * by_cos;
         out.by_state[(BETA, P)] = k.sin_alpha;
         out.by_state[(BETA, R)] = -k.cos_alpha;
         out.by_state[(BETA, PHI)] = per_speed * k.gravity * k.cos_theta * (cb * cp + sb * sp * k.sin_alpha);
@@ -202,7 +214,7 @@ impl Equations<4> for Lateral {
         let rates = [x[P], k.q, x[R]];
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
         let flow = Flow { alpha: sensed.alpha, beta: x[BETA], velocity: sensed.velocity, rates };
-        let vane = sensed.sensors.beta_reading(&flow, sensed.cg);
+        let vane = sensed.vane.beta_reading(sensed.model, &flow, sensed.cg);
         let right = lever(1, sensed.ay, rates, [p_dot, sensed.q_dot, r_dot]);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {

@@ -12,7 +12,7 @@ use super::lever::lever;
 use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
 /// The longitudinal axis.
@@ -25,12 +25,10 @@ pub struct Known {
     /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
     slip_cos: f64,
     slip_sin: f64,
-    /// 1/(V cos β).
-    per_speed: f64,
-    /// q̄S/m and T/m, ft/s².
+    /// q̄S/m, T/m and g over V cos β, 1/s.
     force: f64,
     thrust: f64,
-    gravity: f64,
+    weight: f64,
     cos_phi: f64,
     /// r sin φ.
     turn: f64,
@@ -52,8 +50,12 @@ pub struct Sensed {
     /// Arms of the accelerometers from the c.g., ft forward, right, down.
     an: [f64; 3],
     ax: [f64; 3],
+    /// q̄S/m, and T/m where the accelerometer feels it, ft/s².
+    force: f64,
+    thrust: f64,
     cg: Position,
-    sensors: Sensors,
+    vane: Vane,
+    model: VaneModel,
 }
 
 const ALPHA: usize = 0;
@@ -80,16 +82,16 @@ impl Equations<3> for Longitudinal {
 
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
-        let ((sin_beta, cos_beta), (sin_phi, cos_phi)) = (sin_cos(m.beta), sin_cos(m.phi));
+        let ((sin_beta, cos_beta), (sin_phi, cos_phi)) = (m.beta.sin_cos(), m.phi.sin_cos());
+        let per_speed = 1.0 / (m.velocity * cos_beta);
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
         Known {
             slip_cos: sin_beta / cos_beta * p,
             slip_sin: sin_beta / cos_beta * r,
-            per_speed: 1.0 / (m.velocity * cos_beta),
-            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
-            thrust: m.thrust / m.mass,
-            gravity: m.gravity,
+            force: per_speed * m.qbar * aircraft.wing_area_ft2 / m.mass,
+            thrust: per_speed * m.thrust / m.mass,
+            weight: per_speed * m.gravity,
             cos_phi,
             turn: r * sin_phi,
             pitch: (coupling + gyroscopic) / m.iy,
@@ -108,13 +110,24 @@ impl Equations<3> for Longitudinal {
             r_dot: m.accelerations[2],
             an: sensors.an.arm(m.cg),
             ax: sensors.ax.arm(m.cg),
+            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
+            thrust: if sensors.thrust_in_ax { m.thrust / m.mass } else { 0.0 },
             cg: m.cg,
-            sensors: sensors.clone(),
+            vane: sensors.alpha_vane,
+            model: sensors.vane_model,
         }
     }
 
     fn measured_state(m: &Motion) -> SVector<f64, 3> {
         SVector::from([m.alpha, m.rates[1], m.theta])
+    }
+
+    fn state_of(regressor: &Regressor) -> Option<usize> {
+        match regressor {
+            Regressor::Alpha => Some(ALPHA),
+            Regressor::PitchRate => Some(Q),
+            _ => None,
+        }
     }
 
     fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
@@ -127,25 +140,28 @@ impl Equations<3> for Longitudinal {
 
     fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
         let k = Self::known(aircraft, m);
-        [-m.force_z / k.force, (m.accelerations[1] - k.pitch) / k.moment, (k.thrust - m.force_x) / k.force]
+        let (force, thrust) = (m.qbar * aircraft.wing_area_ft2 / m.mass, m.thrust / m.mass);
+        [-m.force_z / force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) / force]
     }
 
     #[inline(always)]
     fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
-        let ((sa, ca), (st, ct)) = (sin_cos(x[ALPHA]), sin_cos(x[THETA]));
-        let (normal, axial) = (k.force * c[CN], k.thrust - k.force * c[CA]);
-        let weight = k.gravity * (ct * k.cos_phi * ca + st * sa);
-        let alpha_dot = x[Q] - k.slip_cos * ca - k.slip_sin * sa + k.per_speed * (-normal * ca - axial * sa + weight);
-        let by_alpha = k.slip_cos * sa - k.slip_sin * ca
-            + k.per_speed * (normal * sa - axial * ca + k.gravity * (-ct * k.cos_phi * sa + st * ca));
-        let by_theta = k.per_speed * k.gravity * (-st * k.cos_phi * ca + ct * sa);
+        let [(sa, ca), (st, ct)] = sin_cos([x[ALPHA], x[THETA]]);
+        // 2.1 sorted by what cos α and sin α multiply, the latter's forces along the body's x axis.
+        let by_cos = ct.mul_add(k.weight * k.cos_phi, (-k.force).mul_add(c[CN], -k.slip_cos));
+        let by_sin = st.mul_add(k.weight, k.force.mul_add(c[CA], -k.thrust - k.slip_sin));
+        let alpha_dot = sa.mul_add(by_sin, ca.mul_add(by_cos, x[Q]));
+        let by_alpha = ca * by_sin - sa * by_cos;
+        let by_theta = k.weight * (ct * sa - st * k.cos_phi * ca);
+        let q_dot = k.moment.mul_add(c[CM], k.pitch);
+        let theta_dot = k.cos_phi.mul_add(x[Q], -k.turn);
         Rates {
-            rates: SVector::from([alpha_dot, k.pitch + k.moment * c[CM], x[Q] * k.cos_phi - k.turn]),
+            rates: SVector::from([alpha_dot, q_dot, theta_dot]),
             by_state: SMatrix::from_row_slice(&[by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0]),
             by_coefficient: SMatrix::from_row_slice(&[
-                -k.per_speed * k.force * ca,
+                -k.force * ca,
                 0.0,
-                k.per_speed * k.force * sa,
+                k.force * sa,
                 0.0,
                 k.moment,
                 0.0,
@@ -161,18 +177,17 @@ impl Equations<3> for Longitudinal {
         let rates = [sensed.p, x[Q], sensed.r];
         let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
         let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
-        let vane = sensed.sensors.alpha_reading(&flow, sensed.cg);
+        let vane = sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg);
         let down = lever(2, sensed.an, rates, accelerations);
         let forward = lever(0, sensed.ax, rates, accelerations);
-        let thrust = if sensed.sensors.thrust_in_ax { k.thrust } else { 0.0 };
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([
                 DEG * vane.angle,
                 DEG * x[Q],
                 DEG * x[THETA],
-                g * (k.force * c[CN] - down.value),
-                g * (thrust - k.force * c[CA] + forward.value),
+                g * (sensed.force * c[CN] - down.value),
+                g * (sensed.thrust - sensed.force * c[CA] + forward.value),
             ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),
@@ -183,9 +198,9 @@ impl Equations<3> for Longitudinal {
         out.by_state[(2, THETA)] = DEG;
         out.by_state[(3, Q)] = -g * down.by_rates[1];
         out.by_state[(4, Q)] = g * forward.by_rates[1];
-        out.by_coefficient[(3, CN)] = g * k.force;
+        out.by_coefficient[(3, CN)] = g * sensed.force;
         out.by_coefficient[(3, CM)] = -g * down.by_accelerations[1] * k.moment;
-        out.by_coefficient[(4, CA)] = -g * k.force;
+        out.by_coefficient[(4, CA)] = -g * sensed.force;
         out.by_coefficient[(4, CM)] = g * forward.by_accelerations[1] * k.moment;
         out
     }

@@ -73,8 +73,10 @@ pub trait Equations<const NX: usize> {
     /// The state as measured, from which an integration may start.
     fn measured_state(motion: &Motion) -> SVector<f64, NX>;
 
-    /// The state that a regressor is proportional to and the factor of proportion, or none when it is not a state of this
-    /// axis.
+    /// The state that a regressor is proportional to, or none when it is not a state of this axis.
+    fn state_of(regressor: &Regressor) -> Option<usize>;
+
+    /// That state and the factor of proportion.
     fn state_regressor(aircraft: &Aircraft, motion: &Motion, regressor: &Regressor) -> Option<(usize, f64)>;
 
     /// The coefficients that the measured motion implies: its accelerations put into the equations.

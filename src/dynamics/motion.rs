@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::lever::lever;
-use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
 use crate::flight::{Record, signal};
 use crate::units::{DEG, G0_FT_S2};
 
@@ -106,9 +106,8 @@ impl Window {
         self.points.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// The motion at every point.
-    #[must_use]
-    pub fn motion(&self, aircraft: &Aircraft) -> Vec<Motion> {
+    /// The motion at every point in order.
+    pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> impl Iterator<Item = Motion> + 'a {
         let signals = Signals {
             flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY].map(|name| self.signal(name)),
             rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
@@ -121,7 +120,8 @@ impl Window {
             cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
             inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(|name| self.signal(name)),
         };
-        (0..self.len()).map(|i| signals.at(aircraft, i)).collect()
+        let gravity = gravity_at(aircraft.latitude_deg);
+        (0..self.len()).map(move |i| signals.at(aircraft, &gravity, i))
     }
 }
 
@@ -140,7 +140,7 @@ struct Signals<'a> {
 }
 
 impl Signals<'_> {
-    fn at(&self, aircraft: &Aircraft, i: usize) -> Motion {
+    fn at(&self, aircraft: &Aircraft, gravity: impl Fn(f64) -> f64, i: usize) -> Motion {
         let rates = self.rates.map(|s| s[i] / DEG);
         let accelerations = self.slopes.map(|s| s[i] / DEG);
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
@@ -167,7 +167,7 @@ impl Signals<'_> {
             force_x: G0_FT_S2 * ax - felt(0, aircraft.sensors.ax) + unfelt,
             force_y: G0_FT_S2 * ay - felt(1, aircraft.sensors.ay),
             force_z: -G0_FT_S2 * an - felt(2, aircraft.sensors.an),
-            gravity: gravity_ft_s2(aircraft.latitude_deg, altitude),
+            gravity: gravity(altitude),
             qbar,
             mass,
             thrust,

@@ -29,18 +29,31 @@ const COSINE: [f64; 6] = [
 /// π/2 in two parts, the first exact in products with small whole numbers.
 const HALF_PI: [f64; 2] = [1.570_796_326_794_896_6, 6.123_233_995_736_766e-17];
 
-/// (sin x, cos x) for x in rad.
+/// (sin x, cos x) of two angles in rad, which the processor computes side by side.
 #[inline(always)]
 #[must_use]
-pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
-    if x.abs() <= FRAC_PI_4 {
+pub(crate) fn sin_cos(x: [f64; 2]) -> [(f64, f64); 2] {
+    if x[0].abs() <= FRAC_PI_4 && x[1].abs() <= FRAC_PI_4 {
         return near_zero(x);
     }
-    let turns = (x * FRAC_2_PI).round_ties_even();
-    let r = (-turns).mul_add(HALF_PI[1], (-turns).mul_add(HALF_PI[0], x));
-    let (s, c) = near_zero(r);
-    #[expect(clippy::cast_possible_truncation, reason = "a whole number")]
-    match turns as i64 & 3 {
+    let mut r = x;
+    let mut quarters = [0; 2];
+    for i in 0..2 {
+        let turns = (x[i] * FRAC_2_PI).round_ties_even();
+        r[i] = (-turns).mul_add(HALF_PI[1], (-turns).mul_add(HALF_PI[0], x[i]));
+        #[expect(clippy::cast_possible_truncation, reason = "a whole number")]
+        {
+            quarters[i] = turns as i64 & 3;
+        }
+    }
+    let [first, second] = near_zero(r);
+    [turned(first, quarters[0]), turned(second, quarters[1])]
+}
+
+/// Sine and cosine of an angle some quarters of a turn further.
+#[inline(always)]
+fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
+    match quarters {
         0 => (s, c),
         1 => (c, -s),
         2 => (-s, -c),
@@ -49,12 +62,16 @@ pub(crate) fn sin_cos(x: f64) -> (f64, f64) {
 }
 
 #[inline(always)]
-fn near_zero(r: f64) -> (f64, f64) {
-    let z = r * r;
-    let zz = z * z;
-    let sine = (z * r).mul_add(polynomial(&SINE, z, zz), r);
-    let cosine = zz.mul_add(polynomial(&COSINE, z, zz), (-0.5_f64).mul_add(z, 1.0));
-    (sine, cosine)
+fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
+    let mut both = [(0.0, 0.0); 2];
+    for i in 0..2 {
+        let z = r[i] * r[i];
+        let zz = z * z;
+        let sine = (z * r[i]).mul_add(polynomial(&SINE, z, zz), r[i]);
+        let cosine = zz.mul_add(polynomial(&COSINE, z, zz), (-0.5_f64).mul_add(z, 1.0));
+        both[i] = (sine, cosine);
+    }
+    both
 }
 
 /// The polynomial of order five, in pairs so that the processor need not wait for each term.
@@ -72,15 +89,17 @@ mod tests {
     fn sine_and_cosine_are_those_of_the_platform_to_two_in_the_last_place() {
         for k in -50_000..=50_000 {
             let x = f64::from(k) * 1.001e-3;
-            let (s, c) = sin_cos(x);
+            let [(s, c), other] = sin_cos([x, -0.5 * x]);
+            assert_eq!(other, sin_cos([-0.5 * x, 1.0])[0]);
             assert!((s - x.sin()).abs() <= 3e-16, "sin {x}");
             assert!((c - x.cos()).abs() <= 3e-16, "cos {x}");
         }
-        assert_eq!(sin_cos(0.0), (0.0, 1.0));
+        assert_eq!(sin_cos([0.0; 2])[0], (0.0, 1.0));
     }
 
     #[test]
     fn what_is_no_number_stays_none() {
-        assert!(sin_cos(f64::NAN).0.is_nan() && sin_cos(f64::INFINITY).1.is_nan());
+        let [nan, infinite] = sin_cos([f64::NAN, f64::INFINITY]);
+        assert!(nan.0.is_nan() && infinite.1.is_nan());
     }
 }

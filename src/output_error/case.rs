@@ -12,7 +12,7 @@ use std::ops::Range;
 use nalgebra::SVector;
 
 use super::input_noise::NoisySurface;
-use super::lanes::Lanes;
+use super::lanes::{Aligned, Lanes};
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -111,7 +111,7 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     /// How each free derivative acts.
     pub(super) acting: Vec<Acting>,
     /// The same columns point by point in the order of the lanes ([`Lanes`]).
-    pub(super) regressors: Vec<f64>,
+    pub(super) regressors: Aligned,
     pub(super) lanes: Lanes,
     /// The free derivatives of each coefficient.
     pub(super) ranges: [Range<usize>; COEFFICIENTS],
@@ -134,17 +134,24 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Makes a maneuver ready. `window` must contain the surfaces of the model's derivatives.
     #[must_use]
     pub fn new(aircraft: &Aircraft, window: &Window, measurements: Measurements, model: &Model) -> Self {
-        let motion = window.motion(aircraft);
         let mut free = model.free.clone();
         free.sort_by_key(|d| d.coefficient.index());
-        let mut columns = Columns::<NX, E>::new(aircraft, window, &motion);
+        let mut columns = Columns::<NX, E>::new(aircraft, window);
         let acting: Vec<Acting> = free.iter().map(|d| columns.acting(d)).collect();
-        let mut held = Coefficients::zero(motion.len());
-        for (derivative, value) in &model.held {
-            let acting = columns.acting(derivative);
-            held.add(*value, acting, &columns.values[acting.column]);
+        let held: Vec<(Acting, f64)> = model.held.iter().map(|(d, value)| (columns.acting(d), *value)).collect();
+        let mut along = Along::<NX, E>::default();
+        for (point, motion) in window.motion(aircraft).enumerate() {
+            along.known.push(E::known(aircraft, &motion));
+            columns.take(point, &motion);
+            if point % 2 == 0 {
+                along.sensed.push(E::sensed(aircraft, &motion));
+                along.states.push(E::measured_state(&motion));
+                along.implied.push(E::coefficients(aircraft, &motion));
+            }
         }
         let columns = columns.values;
+        let mut held_part = Coefficients::zero(window.len());
+        held.into_iter().for_each(|(acting, value)| held_part.add(value, acting, &columns[acting.column]));
         let before = |k: usize| free.iter().filter(|d| d.coefficient.index() < k).count();
         let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
         names.extend(model.biases.iter().map(|b| b.name.clone()));
@@ -154,22 +161,22 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         let outputs = E::AXIS.outputs();
         let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
         let initial = if model.initial_state == InitialState::Estimated { NX } else { 0 };
-        let mut lanes = Lanes::new(&ranges, initial);
+        let lanes = Lanes::new(&acting, E::FOLLOWED, initial);
         Case {
             step_s: window.step_s,
-            known: motion.iter().map(|m| E::known(aircraft, m)).collect(),
-            sensed: motion.iter().step_by(2).map(|m| E::sensed(aircraft, m)).collect(),
-            held,
-            regressors: lanes.spread(&acting, &columns, motion.len(), NX),
+            known: along.known,
+            sensed: along.sensed,
+            held: held_part,
+            regressors: lanes.spread(&acting, &columns, window.len()),
             columns,
             acting,
             lanes,
             ranges,
             biased: model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect(),
-            start: start_state::<NX, E>(&motion),
+            start: mean(along.states.iter().take(TRIMMED)),
             initial_state: model.initial_state,
-            states: motion.iter().step_by(2).map(E::measured_state).collect(),
-            implied: motion.iter().step_by(2).map(|m| E::coefficients(aircraft, m)).collect(),
+            states: along.states,
+            implied: along.implied,
             noisy_surfaces: vec![],
             measurements,
             names,
@@ -244,60 +251,77 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     }
 }
 
-/// Distinct columns as they are asked for.
+/// What a case keeps of the motion.
+struct Along<const NX: usize, E: Equations<NX>> {
+    known: Vec<E::Known>,
+    sensed: Vec<E::Sensed>,
+    states: Vec<SVector<f64, NX>>,
+    implied: Vec<[f64; COEFFICIENTS]>,
+}
+
+impl<const NX: usize, E: Equations<NX>> Default for Along<NX, E> {
+    fn default() -> Self {
+        Along { known: vec![], sensed: vec![], states: vec![], implied: vec![] }
+    }
+}
+
+/// Distinct columns of regressors.
 struct Columns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
-    motion: &'a [Motion],
-    /// Of each column its regressor, and whether it is a moment's: a vane's is another then.
-    known: Vec<(Regressor, bool)>,
+    /// Of each column a derivative that has it, and its surface's deflections.
+    asked: Vec<(&'a Derivative, &'a [f64])>,
     values: Vec<Vec<f64>>,
     equations: PhantomData<E>,
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
-    fn new(aircraft: &'a Aircraft, window: &'a Window, motion: &'a [Motion]) -> Self {
-        Columns { aircraft, window, motion, known: vec![], values: vec![], equations: PhantomData }
+    fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
+        Columns { aircraft, window, asked: vec![], values: vec![], equations: PhantomData }
     }
 
-    fn acting(&mut self, derivative: &Derivative) -> Acting {
-        let is_vane = matches!(derivative.regressor, Regressor::Vane(_));
-        let key = (derivative.regressor.clone(), is_vane && derivative.coefficient.is_moment());
-        let column = self.known.iter().position(|k| *k == key).unwrap_or_else(|| {
-            self.known.push(key);
-            self.values.push(self.column(derivative));
+    /// How a derivative acts. Two share a column when they have the same regressor, but a vane's moment is not its force.
+    fn acting(&mut self, derivative: &'a Derivative) -> Acting {
+        let moment = |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
+        let same = |d: &Derivative| d.regressor == derivative.regressor && moment(d) == moment(derivative);
+        let column = self.asked.iter().position(|(d, _)| same(d)).unwrap_or_else(|| {
+            let deflections = derivative.regressor.surface().map_or::<&[f64], _>(&[], |name| self.window.signal(name));
+            self.asked.push((derivative, deflections));
+            self.values.push(Vec::with_capacity(self.window.len()));
             self.values.len() - 1
         });
-        let along = |m: &Motion| E::state_regressor(self.aircraft, m, &derivative.regressor).map(|(state, _)| state);
-        let along = self.motion.first().and_then(along);
-        Acting { coefficient: derivative.coefficient.index(), along, column }
+        Acting { coefficient: derivative.coefficient.index(), along: E::state_of(&derivative.regressor), column }
     }
 
-    /// A derivative's regressor at every point; where it is a state the factor of proportion.
-    fn column(&self, derivative: &Derivative) -> Vec<f64> {
-        let values = match &derivative.regressor {
-            Regressor::Surface(name) | Regressor::Vane(name) => self.window.signal(name),
-            _ => &[],
-        };
-        let at = |(point, m): (usize, &Motion)| {
-            if let Some((_, factor)) = E::state_regressor(self.aircraft, m, &derivative.regressor) {
-                return factor;
-            }
-            let [p, q, r] = m.rates;
-            let rate = |length: f64, rate: f64| rate * length / (2.0 * m.velocity);
-            match &derivative.regressor {
-                Regressor::Constant => 1.0,
-                Regressor::Alpha => m.alpha * DEG,
-                Regressor::Beta => m.beta * DEG,
-                Regressor::RollRate => rate(self.aircraft.span_ft, p),
-                Regressor::PitchRate => rate(self.aircraft.chord_ft, q),
-                Regressor::YawRate => rate(self.aircraft.span_ft, r),
-                Regressor::Surface(_) | Regressor::Vane(_) => {
-                    values[point] * surface_factor(self.aircraft, m, derivative)
-                }
-            }
-        };
-        self.motion.iter().enumerate().map(at).collect()
+    /// Adds a point to every column.
+    fn take(&mut self, point: usize, motion: &Motion) {
+        for ((derivative, deflections), values) in self.asked.iter().zip(&mut self.values) {
+            values.push(regressor::<NX, E>(self.aircraft, motion, derivative, deflections, point));
+        }
+    }
+}
+
+/// A derivative's regressor at a point; where it is a state the factor of proportion.
+fn regressor<const NX: usize, E: Equations<NX>>(
+    aircraft: &Aircraft,
+    motion: &Motion,
+    derivative: &Derivative,
+    deflections: &[f64],
+    point: usize,
+) -> f64 {
+    if let Some((_, factor)) = E::state_regressor(aircraft, motion, &derivative.regressor) {
+        return factor;
+    }
+    let [p, q, r] = motion.rates;
+    let rate = |length: f64, rate: f64| rate * length / (2.0 * motion.velocity);
+    match &derivative.regressor {
+        Regressor::Constant => 1.0,
+        Regressor::Alpha => motion.alpha * DEG,
+        Regressor::Beta => motion.beta * DEG,
+        Regressor::RollRate => rate(aircraft.span_ft, p),
+        Regressor::PitchRate => rate(aircraft.chord_ft, q),
+        Regressor::YawRate => rate(aircraft.span_ft, r),
+        Regressor::Surface(_) | Regressor::Vane(_) => deflections[point] * surface_factor(aircraft, motion, derivative),
     }
 }
 
@@ -314,12 +338,8 @@ pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &
     1.0 / if derivative.coefficient.is_moment() { force * length } else { force }
 }
 
-/// The measured state averaged over the first samples, where the maneuver is still trimmed.
-fn start_state<const NX: usize, E: Equations<NX>>(motion: &[Motion]) -> SVector<f64, NX> {
-    const TRIMMED: usize = 10;
-    let states: Vec<SVector<f64, NX>> = motion.iter().step_by(2).take(TRIMMED).map(E::measured_state).collect();
-    mean(states.iter())
-}
+/// Samples from which the initial state is averaged: there the maneuver is still trimmed.
+const TRIMMED: usize = 10;
 
 fn mean<'a, const NX: usize>(states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>) -> SVector<f64, NX> {
     let count = states.len().max(1) as f64;

@@ -38,12 +38,11 @@ pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; 
 #[must_use]
 pub fn sums(response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
     let normal = &response.normal;
-    let squares = normal.outputs.iter().zip(weights).map(|(sums, w)| w * sums.square);
     Sums {
-        weighted_square: squares.sum(),
+        weighted_square: (0..OUTPUTS).map(|o| weights[o] * normal.square(o)).sum(),
         gradient: normal.gradient(weights),
         information: normal.information(weights),
-        count: normal.outputs.iter().map(|sums| sums.count).sum(),
+        count: (0..OUTPUTS).map(|o| normal.count(o)).sum(),
     }
 }
 

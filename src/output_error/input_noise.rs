@@ -14,7 +14,7 @@ use super::response::Sensitivities;
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::dynamics::{COEFFICIENTS, Equations, Motion, OUTPUTS};
 
 /// A surface with noise: how much, and what it acts on.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ pub fn noisy_surfaces(
     free: &[&Derivative],
     held: &[(&Derivative, f64)],
 ) -> Vec<NoisySurface> {
-    let motion = window.motion(aircraft);
+    let motion: Vec<Motion> = window.motion(aircraft).step_by(2).collect();
     let free = free.iter().enumerate().map(|(j, d)| (*d, Value::Free(j)));
     let all: Vec<(&Derivative, Value)> = free.chain(held.iter().map(|(d, v)| (*d, Value::Held(*v)))).collect();
     let mut names: Vec<&str> = all.iter().filter_map(|(d, _)| d.regressor.surface()).collect();
@@ -60,7 +60,7 @@ pub fn noisy_surfaces(
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
-            factors: motion.iter().step_by(2).map(|m| surface_factor(aircraft, m, d)).collect(),
+            factors: motion.iter().map(|m| surface_factor(aircraft, m, d)).collect(),
         };
         (variance > 0.0).then(|| NoisySurface { variance, effects: acting.map(effect).collect() })
     };

@@ -13,7 +13,7 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::case::{Case, Coefficients, InitialState};
-use super::lanes::Lanes;
+use super::lanes::{Aligned, Lanes, VECTOR};
 use super::response::Diverged;
 use crate::dynamics::runge_kutta::{self, STAGES};
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
@@ -27,15 +27,26 @@ const BEYOND_SENSE: f64 = 50.0;
 /// What becomes of the sensitivities of the outputs.
 pub(super) trait Sink {
     /// Takes the outputs of some samples from `first` on and their sensitivities: sample by sample, output by output one
-    /// row of packed lanes. Nobody needs the rows afterwards.
+    /// row of lanes. Nobody needs the rows afterwards.
     fn take<S: Simd>(&mut self, simd: S, first: usize, outputs: &[[f64; OUTPUTS]], rows: &mut [f64]);
+}
+
+/// What the first lanes of a group multiply their regressors by: the states that they follow, else one.
+type Times = [f64; VECTOR];
+
+#[inline(always)]
+fn times<const NX: usize>(followed: &[usize], x: &SVector<f64, NX>) -> Times {
+    let mut times = [1.0; VECTOR];
+    for (slot, &state) in followed.iter().enumerate() {
+        times[slot] = x[state];
+    }
+    times
 }
 
 /// Slopes at one stage of a step.
 #[derive(Clone, Copy)]
 struct Slopes<const NX: usize> {
-    /// The state that they are taken at.
-    x: [f64; NX],
+    times: Times,
     a: [[f64; NX]; NX],
     b: [[f64; COEFFICIENTS]; NX],
 }
@@ -43,9 +54,27 @@ struct Slopes<const NX: usize> {
 /// Slopes of the outputs.
 #[derive(Clone, Copy)]
 struct Reading<const NX: usize> {
-    x: [f64; NX],
+    times: Times,
     c: [[f64; NX]; OUTPUTS],
     d: [[f64; COEFFICIENTS]; OUTPUTS],
+}
+
+/// What the lanes need to know of a sample and the step from it.
+#[derive(Clone, Copy)]
+struct Linear<const NX: usize> {
+    reading: Reading<NX>,
+    slopes: [Slopes<NX>; STAGES],
+}
+
+impl<const NX: usize> Linear<NX> {
+    const NONE: Linear<NX> = Linear {
+        reading: Reading {
+            times: [1.0; VECTOR],
+            c: [[0.0; NX]; OUTPUTS],
+            d: [[0.0; COEFFICIENTS]; OUTPUTS],
+        },
+        slopes: [Slopes { times: [1.0; VECTOR], a: [[0.0; NX]; NX], b: [[0.0; COEFFICIENTS]; NX] }; STAGES],
+    };
 }
 
 /// One pass.
@@ -92,29 +121,55 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let samples = case.samples();
         let mut x = self.start;
         let mut sensitivities = at_start::<NX>(case.initial_state, lanes);
-        let row = OUTPUTS * lanes.width;
-        let mut rows = vec![0.0; CHUNK * row];
-        let mut slopes = [Slopes { x: [0.0; NX], a: [[0.0; NX]; NX], b: [[0.0; COEFFICIENTS]; NX] }; STAGES];
-        for sample in 0..samples {
-            let mut sensible = true;
-            for i in 0..NX {
-                sensible &= x[i].abs() < BEYOND_SENSE;
-            }
-            if !sensible {
-                return Err(Diverged { sample });
-            }
-            let (c, c_by_state) = self.coefficients.at(2 * sample, &x);
-            let read = E::outputs(&case.known[2 * sample], &case.sensed[sample], &x, &c);
-            let reading = Reading {
-                x: x.into(),
-                c: total(E::OUTPUTS_BY_STATE, E::OUTPUTS_BY_COEFFICIENT, &read.by_state, &read.by_coefficient, &c_by_state),
-                d: rows_of(&read.by_coefficient),
+        let sensitivities = sensitivities.slice_mut();
+        let row = OUTPUTS * lanes.width();
+        let mut rows = Aligned::zeros(CHUNK * row);
+        let rows = rows.slice_mut();
+        let regressors = case.regressors.slice();
+        // The lanes are a sample behind the states, so that both are under way at once; what they need of a sample lies in
+        // one of two places in turn.
+        let mut linear = [Linear::<NX>::NONE; 2];
+        for sample in 0..=samples {
+            let [even, odd] = &mut linear;
+            let (now, before) = if sample % 2 == 0 { (even, &*odd) } else { (odd, &*even) };
+            let behind = sample.saturating_sub(1);
+            let mut work = Work {
+                simd,
+                lanes,
+                regressors: &regressors[2 * behind * lanes.derivatives()..],
+                sensitivities: &mut *sensitivities,
+                rows: &mut rows[behind % CHUNK * row..],
+                linear: before,
+                step_s: case.step_s,
+                steps: behind + 1 < samples,
             };
-            for o in 0..OUTPUTS {
-                self.outputs[sample][o] = read.outputs[o] + self.biases[o];
+            if sample < samples {
+                let mut sensible = true;
+                for i in 0..NX {
+                    sensible &= x[i].abs() < BEYOND_SENSE;
+                }
+                if !sensible {
+                    return Err(Diverged { sample });
+                }
+                let (c, c_by_state) = self.coefficients.at(2 * sample, &x);
+                let read = E::outputs(&case.known[2 * sample], &case.sensed[sample], &x, &c);
+                now.reading = Reading {
+                    times: times(E::FOLLOWED, &x),
+                    c: total(
+                        E::OUTPUTS_BY_STATE,
+                        E::OUTPUTS_BY_COEFFICIENT,
+                        E::FOLLOWED,
+                        &read.by_state,
+                        &read.by_coefficient,
+                        &c_by_state,
+                    ),
+                    d: rows_of(&read.by_coefficient),
+                };
+                for o in 0..OUTPUTS {
+                    self.outputs[sample][o] = read.outputs[o] + self.biases[o];
+                }
             }
-            let steps = sample + 1 < samples;
-            if steps {
+            if sample + 1 < samples {
                 x = runge_kutta::step(
                     x,
                     case.step_s,
@@ -123,11 +178,17 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                         let point = 2 * sample + runge_kutta::POINT[stage];
                         let (c, c_by_state) = self.coefficients.at(point, &x);
                         let rates = E::rates(&case.known[point], &x, &c);
-                        let (by_state, by_coefficient) = (&rates.by_state, &rates.by_coefficient);
-                        slopes[stage] = Slopes {
-                            x: x.into(),
-                            a: total(E::RATES_BY_STATE, E::RATES_BY_COEFFICIENT, by_state, by_coefficient, &c_by_state),
-                            b: rows_of(by_coefficient),
+                        now.slopes[stage] = Slopes {
+                            times: times(E::FOLLOWED, &x),
+                            a: total(
+                                E::RATES_BY_STATE,
+                                E::RATES_BY_COEFFICIENT,
+                                E::FOLLOWED,
+                                &rates.by_state,
+                                &rates.by_coefficient,
+                                &c_by_state,
+                            ),
+                            b: rows_of(&rates.by_coefficient),
                         };
                         rates.rates
                     },
@@ -135,23 +196,12 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                     |x, h, k| x + k * h,
                 );
             }
-            let at = sample % CHUNK;
-            let mut work = Work {
-                simd,
-                lanes,
-                regressors: &case.regressors[2 * sample * lanes.derivatives()..],
-                sensitivities: &mut sensitivities,
-                rows: &mut rows[at * row..],
-                slopes: steps.then_some(&slopes),
-                reading: &reading,
-                step_s: case.step_s,
-            };
-            work.group::<E, 0>();
-            work.group::<E, 1>();
-            work.group::<E, 2>();
-            work.group::<E, COEFFICIENTS>();
-            if at + 1 == CHUNK || !steps {
-                self.sink.take(simd, sample - at, &self.outputs[sample - at..=sample], &mut rows);
+            if sample > 0 {
+                work.all::<E>();
+            }
+            let at = behind % CHUNK;
+            if sample > 0 && (at + 1 == CHUNK || sample == samples) {
+                self.sink.take(simd, behind - at, &self.outputs[behind - at..=behind], rows);
             }
         }
         Ok(())
@@ -159,11 +209,11 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
 }
 
 /// Zero, but one for each free initial state along itself.
-fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Vec<f64> {
-    let mut sensitivities = vec![0.0; NX * lanes.padded()];
+fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Aligned {
+    let mut sensitivities = Aligned::zeros(NX * lanes.width());
     if initial_state == InitialState::Estimated {
         for i in 0..NX {
-            sensitivities[i * lanes.padded() + lanes.initial() + i] = 1.0;
+            sensitivities.slice_mut()[i * lanes.width() + lanes.derivatives() + i] = 1.0;
         }
     }
     sensitivities
@@ -174,6 +224,7 @@ fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Vec<
 fn total<const N: usize, const NX: usize>(
     along_states: &[(usize, usize)],
     along_coefficients: &[(usize, usize)],
+    followed: &[usize],
     by_state: &nalgebra::SMatrix<f64, N, NX>,
     by_coefficient: &nalgebra::SMatrix<f64, N, COEFFICIENTS>,
     c_by_state: &[[f64; NX]; COEFFICIENTS],
@@ -181,10 +232,10 @@ fn total<const N: usize, const NX: usize>(
     let mut sum = [[0.0; NX]; N];
     for &(i, j) in along_states {
         sum[i][j] = by_state[(i, j)];
-        for &(row, k) in along_coefficients {
-            if row == i {
-                sum[i][j] = by_coefficient[(i, k)].mul_add(c_by_state[k][j], sum[i][j]);
-            }
+    }
+    for &(i, k) in along_coefficients {
+        for &j in followed {
+            sum[i][j] = by_coefficient[(i, k)].mul_add(c_by_state[k][j], sum[i][j]);
         }
     }
     sum
@@ -210,74 +261,98 @@ struct Work<'a, S: Simd, const NX: usize> {
     regressors: &'a [f64],
     sensitivities: &'a mut [f64],
     rows: &'a mut [f64],
-    /// None at the last sample.
-    slopes: Option<&'a [Slopes<NX>; STAGES]>,
-    reading: &'a Reading<NX>,
+    linear: &'a Linear<NX>,
     step_s: f64,
+    /// Whether a step follows: not after the last sample.
+    steps: bool,
 }
 
 impl<S: Simd, const NX: usize> Work<'_, S, NX> {
-    /// Reads the sensors and takes a step for the lanes of coefficient `K`; for those of the initial states where `K` is
-    /// none.
+    /// Reads the sensors and takes a step: the groups of all coefficients side by side, so that the processor has several
+    /// independent sums to work on, then that of the initial states.
     #[inline(always)]
-    fn group<E: Equations<NX>, const K: usize>(&mut self) {
-        let (simd, lanes) = (self.simd, self.lanes);
-        let padded = lanes.padded();
-        for lane in lanes.groups[K].clone().step_by(S::F64_LANES) {
-            let mut s = [simd.splat_f64s(0.0); NX];
+    fn all<E: Equations<NX>>(&mut self) {
+        let (from, end) = (self.lanes.groups[0].start, self.lanes.groups[0].end);
+        for lane in (from..end).step_by(S::F64_LANES) {
+            self.bundle::<E, COEFFICIENTS>(lane, [0, 1, 2]);
+        }
+        let initial = &self.lanes.groups[COEFFICIENTS];
+        for lane in (0..initial.end - initial.start).step_by(S::F64_LANES) {
+            self.bundle::<E, 1>(lane, [COEFFICIENTS]);
+        }
+    }
+
+    /// The vectors that begin at a lane of each of some groups.
+    #[inline(always)]
+    fn bundle<E: Equations<NX>, const N: usize>(&mut self, lane: usize, groups: [usize; N]) {
+        let (simd, lanes, linear) = (self.simd, self.lanes, self.linear);
+        let width = lanes.width();
+        let mut s = [[simd.splat_f64s(0.0); NX]; N];
+        let mut r = [simd.splat_f64s(0.0); N];
+        for n in 0..N {
+            let at = lanes.groups[groups[n]].start + lane;
             for i in 0..NX {
-                s[i] = load::<S>(self.sensitivities, i * padded + lane);
+                s[n][i] = load::<S>(self.sensitivities, i * width + at);
             }
-            let r = self.regressor::<E, K>(lane, 0, &self.reading.x);
-            let packed = lanes.packed[K] + lane - lanes.groups[K].start;
-            let y = read::<S, NX, E, K>(simd, self.reading, &s, r);
+            r[n] = self.regressor(groups[n], lane, 0, &linear.reading.times);
+            let y = read::<S, NX, E>(simd, groups[n], &linear.reading, &s[n], r[n]);
             for o in 0..OUTPUTS {
-                store::<S>(self.rows, o * lanes.width + packed, y[o]);
+                store::<S>(self.rows, o * width + at, y[o]);
             }
-            let Some(slopes) = self.slopes else { continue };
-            let next = runge_kutta::step(
-                s,
-                self.step_s,
-                #[inline(always)]
-                |stage, s| {
-                    let at = &slopes[stage];
-                    let r = if stage == 0 { r } else { self.regressor::<E, K>(lane, runge_kutta::POINT[stage], &at.x) };
-                    rates::<S, NX, E, K>(simd, at, &s, r)
-                },
-                #[inline(always)]
-                |s, h, k| {
-                    let (mut moved, h) = (s, simd.splat_f64s(h));
+        }
+        if !self.steps {
+            return;
+        }
+        let next = runge_kutta::step(
+            s,
+            self.step_s,
+            #[inline(always)]
+            |stage, s| {
+                let at = &linear.slopes[stage];
+                let point = runge_kutta::POINT[stage];
+                let mut slope = s;
+                for n in 0..N {
+                    let r = if stage == 0 { r[n] } else { self.regressor(groups[n], lane, point, &at.times) };
+                    slope[n] = rates::<S, NX, E>(simd, groups[n], at, &s[n], r);
+                }
+                slope
+            },
+            #[inline(always)]
+            |s, h, k| {
+                let (mut moved, h) = (s, simd.splat_f64s(h));
+                for n in 0..N {
                     for i in 0..NX {
-                        moved[i] = simd.mul_add_f64s(h, k[i], s[i]);
+                        moved[n][i] = simd.mul_add_f64s(h, k[n][i], s[n][i]);
                     }
-                    moved
-                },
-            );
+                }
+                moved
+            },
+        );
+        for n in 0..N {
+            let at = lanes.groups[groups[n]].start + lane;
             for i in 0..NX {
-                store::<S>(self.sensitivities, i * padded + lane, next[i]);
+                store::<S>(self.sensitivities, i * width + at, next[n][i]);
             }
         }
     }
 
-    /// What the derivatives of these lanes multiply at a point, when the state is x.
+    /// What the derivatives of a group's lanes multiply at a point; nothing for initial states.
     #[inline(always)]
-    fn regressor<E: Equations<NX>, const K: usize>(&self, lane: usize, point: usize, x: &[f64; NX]) -> S::f64s {
-        let (simd, lanes) = (self.simd, self.lanes);
-        if K == COEFFICIENTS {
-            return simd.splat_f64s(0.0);
+    fn regressor(&self, group: usize, lane: usize, point: usize, times: &Times) -> S::f64s {
+        if group == COEFFICIENTS {
+            return self.simd.splat_f64s(0.0);
         }
-        let mut times = load::<S>(&lanes.along[0], lane);
-        for &i in E::FOLLOWED {
-            times = simd.mul_add_f64s(load::<S>(&lanes.along[i + 1], lane), simd.splat_f64s(x[i]), times);
-        }
-        simd.mul_f64s(load::<S>(self.regressors, point * lanes.derivatives() + lane), times)
+        let at = point * self.lanes.derivatives() + self.lanes.groups[group].start + lane;
+        let regressor = load::<S>(self.regressors, at);
+        if lane < VECTOR { self.simd.mul_f64s(regressor, load::<S>(times, lane)) } else { regressor }
     }
 }
 
-/// y = C s + D r for lanes of coefficient `K`.
+/// y = C s + D r for lanes of a coefficient.
 #[inline(always)]
-fn read<S: Simd, const NX: usize, E: Equations<NX>, const K: usize>(
+fn read<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
+    coefficient: usize,
     at: &Reading<NX>,
     s: &[S::f64s; NX],
     r: S::f64s,
@@ -287,17 +362,18 @@ fn read<S: Simd, const NX: usize, E: Equations<NX>, const K: usize>(
         y[o] = simd.mul_add_f64s(simd.splat_f64s(at.c[o][i]), s[i], y[o]);
     }
     for &(o, k) in E::OUTPUTS_BY_COEFFICIENT {
-        if k == K {
+        if k == coefficient {
             y[o] = simd.mul_add_f64s(simd.splat_f64s(at.d[o][k]), r, y[o]);
         }
     }
     y
 }
 
-/// ṡ = A s + B r for lanes of coefficient `K`.
+/// ṡ = A s + B r for lanes of a coefficient.
 #[inline(always)]
-fn rates<S: Simd, const NX: usize, E: Equations<NX>, const K: usize>(
+fn rates<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
+    coefficient: usize,
     at: &Slopes<NX>,
     s: &[S::f64s; NX],
     r: S::f64s,
@@ -307,7 +383,7 @@ fn rates<S: Simd, const NX: usize, E: Equations<NX>, const K: usize>(
         rates[i] = simd.mul_add_f64s(simd.splat_f64s(at.a[i][j]), s[j], rates[i]);
     }
     for &(i, k) in E::RATES_BY_COEFFICIENT {
-        if k == K {
+        if k == coefficient {
             rates[i] = simd.mul_add_f64s(simd.splat_f64s(at.b[i][k]), r, rates[i]);
         }
     }

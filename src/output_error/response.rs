@@ -28,8 +28,8 @@ pub struct Sensitivities {
     /// Output by output, sample by sample: the slopes along the parameters in order.
     outputs: [Vec<f64>; OUTPUTS],
     parameters: usize,
-    /// The parameter of each packed lane.
-    places: Vec<usize>,
+    /// The lane of each parameter but the biases, and that parameter.
+    places: Vec<(usize, usize)>,
     width: usize,
 }
 
@@ -53,8 +53,8 @@ impl Sink for Sensitivities {
         for (at, row) in rows.chunks_exact(self.width).take(outputs.len() * OUTPUTS).enumerate() {
             let (sample, o) = (first + at / OUTPUTS, at % OUTPUTS);
             let whole = &mut self.outputs[o][sample * n..(sample + 1) * n];
-            for (s, &place) in row.iter().zip(&self.places) {
-                whole[place] = *s;
+            for &(lane, parameter) in &self.places {
+                whole[parameter] = row[lane];
             }
         }
     }
@@ -86,12 +86,13 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
     pub fn sensitivities(&self, parameters: &[f64]) -> Result<Sensitivities, Diverged> {
         let (n, derivatives) = (self.parameters(), self.derivatives());
-        let place = |lane: usize| if lane < derivatives { lane } else { lane + self.biased.len() };
+        let biases = derivatives..derivatives + self.biased.len();
+        let driven = (0..n).filter(|j| !biases.contains(j));
         let mut sensitivities = Sensitivities {
             outputs: std::array::from_fn(|_| vec![0.0; self.samples() * n]),
             parameters: n,
-            places: (0..self.lanes.driven).map(place).collect(),
-            width: self.lanes.width,
+            places: self.lanes.places.iter().copied().zip(driven).collect(),
+            width: self.lanes.width(),
         };
         self.pass(parameters, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut sensitivities)?;
         for (b, &o) in self.biased.iter().enumerate() {
