@@ -12,8 +12,8 @@ use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
 use crate::pipeline::show::{self, Subject};
 use crate::pipeline::{self, Campaign, Progress, Stage};
-use crate::store::archive;
-use crate::{simulation, validation};
+use crate::store::{archive, atomic};
+use crate::{bench_case, simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
@@ -70,6 +70,8 @@ enum Command {
     Simulate(SimulateOptions),
     /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise, and estimated
     Validate(ValidateOptions),
+    /// Time the standard case: estimate a maneuver given as JSON with its record as CSV beside it, again and again
+    BenchCase(BenchCaseOptions),
 }
 
 #[derive(Debug, Subcommand)]
@@ -152,6 +154,21 @@ struct ValidateOptions {
 }
 
 #[derive(Args, Debug)]
+struct BenchCaseOptions {
+    /// The case, JSON, with a CSV of the same name beside it; or a folder of such cases, which are estimated in parallel
+    case: PathBuf,
+    /// How often each is estimated
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    repetitions: usize,
+    /// The file to write [default: the terminal]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+#[derive(Args, Debug)]
 struct Options {
     /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its name under pipelines/
     #[arg(default_value = "harv")]
@@ -203,6 +220,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
         Command::Validate(options) => return validate(&options),
+        Command::BenchCase(options) => return bench(&options),
         Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
         Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
@@ -263,6 +281,26 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
         println!("tables in {}\npage: {}", options.out.display(), options.page.display());
     }
     Ok(if found.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+}
+
+/// Times a standard case, or a folder of them, and says what came of it as JSON.
+#[expect(clippy::print_stdout, reason = "what the timing says")]
+fn bench(options: &BenchCaseOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.threads)?;
+    let (case, repetitions) = (&options.case, options.repetitions);
+    let text = if case.is_dir() {
+        serde_json::to_string_pretty(&bench_case::batch(case, repetitions)?)?
+    } else {
+        let timed = bench_case::timed(&bench_case::load(case)?, repetitions).map_err(anyhow::Error::msg)?;
+        serde_json::to_string_pretty(&timed)?
+    };
+    match &options.out {
+        Some(file) => {
+            atomic::place(file, text.as_bytes())?;
+        }
+        None => println!("{text}"),
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Draws a flight or a maneuver and says where the picture is.

@@ -37,4 +37,5 @@ pub mod config;
 pub mod pipeline;
 pub mod simulation;
 pub mod validation;
+pub mod bench_case;
 pub mod cli;

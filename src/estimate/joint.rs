@@ -266,10 +266,10 @@ fn miscalibrate<const NX: usize, E: Equations<NX>>(
         return;
     }
     let mut together: Vec<DVector<f64>> = vec![];
-    for (i, (part, response)) in parts.iter().zip(&fit.response).enumerate() {
+    for (i, part) in parts.iter().enumerate() {
         let places = joint.places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
-        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, response, &fit.weights) else {
+        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, &fit.weights) else {
             fit.reason.push_str(calibration::NOT_COUNTED);
             return;
         };

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, InitialState, Model};
-use super::response::{Diverged, Response};
+use super::response::{Diverged, Sensitivities};
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -49,7 +49,7 @@ pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
     pub model: &'a Model<'a>,
     pub case: &'a Case<NX, E>,
     pub values: &'a [f64],
-    pub response: &'a Response,
+    pub sensitivities: &'a Sensitivities,
     pub weights: &'a [f64; OUTPUTS],
 }
 
@@ -79,7 +79,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
             for o in (0..OUTPUTS).filter(|&o| measurements.used[k][o]) {
                 let measured = if read[o] { error.scale * measurements.values[k][o] + error.bias } else { 0.0 };
                 let factor = self.weights[o] * (measured - (now[o] - before[o]));
-                for (g, s) in shift.iter_mut().zip(self.response.sensitivity(k, o)) {
+                for (g, s) in shift.iter_mut().zip(self.sensitivities.at(k, o)) {
                     *g += factor * s;
                 }
             }

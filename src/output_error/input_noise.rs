@@ -10,11 +10,11 @@ use nalgebra::{DMatrix, DVector, Dyn, OMatrix, SMatrix};
 
 use super::case::{Case, surface_factor};
 use super::cost::add_square;
-use super::response::Response;
+use super::response::Sensitivities;
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::dynamics::{COEFFICIENTS, Equations, Motion, OUTPUTS};
 
 /// A surface with noise: how much, and what it acts on.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ pub fn noisy_surfaces(
     free: &[&Derivative],
     held: &[(&Derivative, f64)],
 ) -> Vec<NoisySurface> {
-    let motion = window.motion(aircraft);
+    let motion: Vec<Motion> = window.motion(aircraft).step_by(2).collect();
     let free = free.iter().enumerate().map(|(j, d)| (*d, Value::Free(j)));
     let all: Vec<(&Derivative, Value)> = free.chain(held.iter().map(|(d, v)| (*d, Value::Held(*v)))).collect();
     let mut names: Vec<&str> = all.iter().filter_map(|(d, _)| d.regressor.surface()).collect();
@@ -60,7 +60,7 @@ pub fn noisy_surfaces(
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
-            factors: motion.iter().step_by(2).map(|m| surface_factor(aircraft, m, d)).collect(),
+            factors: motion.iter().map(|m| surface_factor(aircraft, m, d)).collect(),
         };
         (variance > 0.0).then(|| NoisySurface { variance, effects: acting.map(effect).collect() })
     };
@@ -84,7 +84,7 @@ pub fn white_variance(samples: &[f64]) -> f64 {
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
-    response: &Response,
+    sensitivities: &Sensitivities,
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
     let n = case.parameters();
@@ -92,14 +92,15 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     if case.noisy_surfaces.is_empty() {
         return scatter;
     }
-    let mut regressors = vec![0.0; case.derivatives()];
+    let coefficients = case.with(parameters);
     let mut adjoint = OMatrix::<f64, nalgebra::Const<NX>, Dyn>::zeros(n);
     for k in (0..case.samples()).rev() {
         let x = &case.states[k];
-        let (c, c_by_state) = case.coefficients(2 * k, parameters, x, &mut regressors);
+        let (c, c_by_state) = coefficients.at(2 * k, x);
+        let c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::from_fn(|k, i| c_by_state[k][i]);
         let rates = E::rates(&case.known[2 * k], x, &c);
-        let read = E::outputs(&case.known[2 * k], x, &c);
-        let weighted = weighted(case, response, weights, k);
+        let read = E::outputs(&case.known[2 * k], &case.sensed[k], x, &c);
+        let weighted = weighted(case, sensitivities, weights, k);
         let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * case.step_s;
         let transition = SMatrix::<f64, NX, NX>::identity() + by_state + by_state * by_state * 0.5;
         let later = transition.transpose() * &adjoint;
@@ -120,13 +121,13 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
 /// W S of a sample, zero for outputs that do not count.
 fn weighted<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
-    response: &Response,
+    sensitivities: &Sensitivities,
     weights: &[f64; OUTPUTS],
     sample: usize,
 ) -> OMatrix<f64, nalgebra::Const<OUTPUTS>, Dyn> {
     let used = &case.measurements.used[sample];
     OMatrix::<f64, nalgebra::Const<OUTPUTS>, Dyn>::from_fn(case.parameters(), |o, j| {
-        if used[o] { weights[o] * response.sensitivity(sample, o)[j] } else { 0.0 }
+        if used[o] { weights[o] * sensitivities.at(sample, o)[j] } else { 0.0 }
     })
 }
 
@@ -157,7 +158,6 @@ impl NoisySurface {
 mod tests {
     use approx::assert_relative_eq;
 
-    use super::super::cost::sums;
     use super::super::tests::{Noise, SAMPLES, TABLE, nothing_measured, record, truth};
     use super::super::{InitialState, Model};
     use super::*;
@@ -213,16 +213,21 @@ mod tests {
         let mut response = case.response();
         case.respond(&parameters, &mut response).unwrap();
         case.measurements.values.clone_from(&response.outputs);
+        let sensitivities = case.sensitivities(&parameters).unwrap();
         let mut scatter = vec![0.0; parameters.len()];
         let mut flown = case.response();
         for _ in 0..draws {
             let other =
                 Case::<NX, E>::new(&aircraft(), &window(&noisy(sd_deg, &mut noise)), nothing_measured(), &model);
             other.respond(&parameters, &mut flown).unwrap();
-            let mut moved = response.clone();
-            moved.outputs.clone_from(&flown.outputs);
-            let gradient = sums(&case.measurements, &moved, &TABLE, parameters.len()).gradient;
-            for (s, g) in scatter.iter_mut().zip(gradient.iter()) {
+            let mut gradient = vec![0.0; parameters.len()];
+            for (k, (y, moved)) in response.outputs.iter().zip(&flown.outputs).enumerate() {
+                for o in 0..OUTPUTS {
+                    let v = y[o] - moved[o];
+                    gradient.iter_mut().zip(sensitivities.at(k, o)).for_each(|(g, s)| *g += TABLE[o] * v * s);
+                }
+            }
+            for (s, g) in scatter.iter_mut().zip(&gradient) {
                 *s += g * g / f64::from(draws);
             }
         }
@@ -230,7 +235,7 @@ mod tests {
             case.names.iter().filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name)).collect();
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
-        let said = gradient_covariance(&case, &parameters, &response, &TABLE);
+        let said = gradient_covariance(&case, &parameters, &sensitivities, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
             let ratio = (scatter[j] / said[(j, j)]).sqrt();

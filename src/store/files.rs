@@ -1,5 +1,6 @@
 //! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a simulation's truth.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -72,6 +73,23 @@ pub fn tunnel_rows(path: &Path) -> Result<Vec<(usize, TunnelRow)>> {
 /// [`Error::Config`] naming file, line and column of what cannot be read.
 pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
+}
+
+/// The columns of a CSV of numbers, by the names of its header.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be opened, [`Error::Config`] naming the line of what is no number.
+pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
+    let text = text(path)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let wrong = |e: &csv::Error| Error::config(path, None, e.to_string());
+    let names: Vec<String> = reader.headers().map_err(|e| wrong(&e))?.iter().map(str::to_owned).collect();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    for row in reader.deserialize() {
+        let row: Vec<f64> = row.map_err(|e| wrong(&e))?;
+        columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+    }
+    Ok(names.into_iter().zip(columns).collect())
 }
 
 /// Places rows as CSV with a header, whole or not at all.
