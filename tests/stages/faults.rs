@@ -18,7 +18,7 @@ fn config() -> Config {
 
 fn flights(config: &Config) -> Vec<RawFlight> {
     let found = archive::find(&config.archive).unwrap();
-    found.iter().map(|files| archive::read(files, &config.channels).unwrap()).collect()
+    found.iter().map(|files| archive::read(files, &config.channels).unwrap().swap_remove(0)).collect()
 }
 
 fn ingest(config: &Config, raw: &RawFlight, settings: &Settings) -> Result<Ingested, Problem> {
