@@ -301,11 +301,13 @@ impl<'a> Run<'a> {
         if outputs > most {
             return Err(format!("{:.0}% of its output samples are marked", 100.0 * outputs));
         }
-        let share = |surface: &&str| (*surface, self.record.marked_share([*surface], start_s, end_s));
-        match surfaces.iter().map(share).find(|(_, share)| *share > most) {
-            Some((surface, share)) => Err(format!("{:.0}% of the samples of `{surface}` are marked", 100.0 * share)),
-            None => Ok(()),
+        for surface in surfaces {
+            let share = self.record.marked_share([*surface], start_s, end_s);
+            if share > most {
+                return Err(format!("{:.0}% of the samples of `{surface}` are marked", 100.0 * share));
+            }
         }
+        Ok(())
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.

@@ -159,24 +159,27 @@ fn truncated_and_other_files_are_named_with_the_reason() {
 }
 
 #[test]
-fn a_column_that_one_part_lacks_is_missing_there() {
-    let (_folder, text) = archive(&[
-        ("flight=1/a.parquet", &parquet(vec![("time", None, floats(&[0.0, 1.0]))])),
-        ("flight=1/b.parquet", &simple(&[2.0])),
-        ("flight=1/c.parquet", &parquet(vec![("time", None, floats(&[3.0]))])),
-    ]);
-    let flight = read(&find(&text).unwrap()[0], &channels()).unwrap();
-    let q = &flight.columns["q"].values;
-    assert_eq!(q.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [true, true, false, true]);
-}
-
-#[test]
-fn parts_in_different_units_are_refused() {
-    let in_radians = parquet(vec![("time", None, floats(&[2.0])), ("q", Some("rad/s"), floats(&[0.1]))]);
-    let (_folder, text) = archive(&[("flight=1/a.parquet", &simple(&[0.0])), ("flight=1/b.parquet", &in_radians)]);
-    let problem = read(&find(&text).unwrap()[0], &channels()).unwrap_err();
-    assert!(problem.place.ends_with("b.parquet"));
-    assert_eq!(problem.reason, "column `q` is in `rad/s` here and in `deg/s` in an earlier file of the flight");
+fn rows_are_read_from_the_middle_of_row_groups_and_pages() {
+    let schema = Arc::new(Schema::new(vec![Field::new("q", DataType::Float64, true)]));
+    let properties = parquet::file::properties::WriterProperties::builder()
+        .set_max_row_group_row_count(Some(1000))
+        .set_data_page_row_count_limit(64)
+        .set_write_batch_size(16)
+        .build();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, schema.clone(), Some(properties)).unwrap();
+    let values: Vec<Option<f64>> = (0..5000_i32).map(|k| (k % 7 != 0).then_some(f64::from(k))).collect();
+    writer.write(&RecordBatch::try_new(schema, vec![Arc::new(Float64Array::from(values))]).unwrap()).unwrap();
+    writer.close().unwrap();
+    let (_folder, text) = archive(&[("f.parquet", &bytes)]);
+    let opened = open(&find(&text).unwrap()[0], &channels()).unwrap();
+    assert_eq!((opened.files(), opened.rows(0)), (1, 5000));
+    let mut read = Vec::new();
+    opened.read(0, "q", 950..3100, &mut |v| read.extend_from_slice(v)).unwrap();
+    assert_eq!(read.len(), 2150);
+    let expected = |k: usize| if k % 7 == 0 { f64::NAN } else { k as f64 };
+    assert!(read.iter().enumerate().all(|(i, v)| v.to_bits() == expected(950 + i).to_bits() || v.is_nan() && (950 + i) % 7 == 0));
+    assert!(opened.read(0, "q", 4900..5001, &mut |_| {}).is_err());
 }
 
 proptest! {
