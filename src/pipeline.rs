@@ -21,6 +21,7 @@ use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
+use crate::ingest::Signature;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::store::archive::FlightFiles;
@@ -29,7 +30,6 @@ use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
     TrendRow,
 };
-use crate::ingest::Signature;
 use crate::{compare, estimate, report, trend};
 use conditioning::{Done, Shares};
 

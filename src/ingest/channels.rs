@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use super::Spoilt;
 use super::clock::Clock;
 use super::conditioner::Done;
 use super::source::Source;
-use super::Spoilt;
 use crate::flight::Channel;
 use crate::units::Unit;
 

@@ -212,7 +212,8 @@ fn quantisation(values: &[f64]) -> Option<f64> {
     let every = (values.len() / (4 * CHANGES)).max(1);
     let change = |pair: &[f64]| (pair[1] - pair[0]).abs();
     let finest = 1e-9 * values.iter().take(CHANGES).filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let changes: Vec<f64> = values.windows(2).step_by(every).map(change).filter(|c| *c > finest).take(CHANGES).collect();
+    let changes: Vec<f64> =
+        values.windows(2).step_by(every).map(change).filter(|c| *c > finest).take(CHANGES).collect();
     if changes.len() < FEW_CHANGES {
         return None;
     }

@@ -95,12 +95,7 @@ pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
 
 /// (predicted, measured) of each relation in every window in which both are known. The motion is computed window by
 /// window: that of a whole flight would be the largest thing in memory.
-fn windows(
-    relations: &[Relation],
-    blocks: &Blocks,
-    aircraft: &Aircraft,
-    settings: &Checks,
-) -> Vec<Vec<(f64, f64)>> {
+fn windows(relations: &[Relation], blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Vec<(f64, f64)>> {
     let length = super::gaps::longest(settings.window_s, blocks.block_s).max(1);
     let mut pairs = vec![Vec::new(); relations.len()];
     let mut motion: Vec<Option<Motion>> = Vec::new();

@@ -93,9 +93,8 @@ impl Slots {
         let clock = &mut self.clock;
         clock.rows += 1;
         clock.samples = sample + 1;
-        let goes_on = |run: &&mut Run| {
-            run.file == file && run.row + run.count == row && run.sample + run.count == sample
-        };
+        let goes_on =
+            |run: &&mut Run| run.file == file && run.row + run.count == row && run.sample + run.count == sample;
         match clock.runs.last_mut().filter(goes_on) {
             Some(run) => run.count += 1,
             None => clock.runs.push(Run { file, row, sample, count: 1 }),

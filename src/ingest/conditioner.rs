@@ -193,8 +193,12 @@ impl Conditioner {
         let stuck = self.leave_out(&mut values, from);
         let despiked = if self.flag { Vec::new() } else { self.despike(&mut values, from) };
         let mut marks = self.bridge(&mut values, from);
-        stuck.iter().for_each(|range| marks[range.clone()].fill(Mark::Stuck));
-        despiked.iter().for_each(|&k| marks[k] = Mark::Despiked);
+        for range in stuck {
+            marks[range].fill(Mark::Stuck);
+        }
+        for k in despiked {
+            marks[k] = Mark::Despiked;
+        }
         let core = self.settled - from..until - from;
         self.count(&marks[core.clone()]);
         self.settled = until;
@@ -266,7 +270,9 @@ impl Conditioner {
             }
         }
         close(start, end, count, before);
-        stuck.iter().for_each(|range| values[range.clone()].fill(f64::NAN));
+        for range in &stuck {
+            values[range.clone()].fill(f64::NAN);
+        }
         stuck
     }
 
@@ -285,7 +291,9 @@ impl Conditioner {
         let spikes = spikes::remove(&mut own, step_s, floor, &self.settings.spikes);
         let spikes: Vec<(usize, f64)> =
             spikes.into_iter().filter_map(|i| Some((*places.get(i)?, *own.get(i)?))).collect();
-        spikes.iter().for_each(|(k, v)| values[*k] = *v);
+        for (k, value) in &spikes {
+            values[*k] = *value;
+        }
         spikes.into_iter().map(|(k, _)| k).collect()
     }
 

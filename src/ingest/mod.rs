@@ -90,11 +90,7 @@ pub fn record(
 ///
 /// # Errors
 /// A problem that refuses the whole flight; inside, one that refuses a stretch.
-pub fn records(
-    files: &[RawFlight],
-    basis: &Basis,
-    piece: usize,
-) -> Result<Vec<Result<Ingested, Problem>>, Problem> {
+pub fn records(files: &[RawFlight], basis: &Basis, piece: usize) -> Result<Vec<Result<Ingested, Problem>>, Problem> {
     let (plans, mut problems) = flows(files, basis)?;
     let survey = survey(files, basis.channels, basis.settings)?;
     problems.extend(survey.problems);
@@ -149,10 +145,7 @@ pub struct Plan<'a> {
 /// # Errors
 /// A problem that refuses the flight: a unit in a file that is not the channel map's, a required channel that is in no
 /// file, a signal with two channels, or a required signal that nobody gives.
-pub fn flows<'a>(
-    source: &(impl Source + ?Sized),
-    basis: &Basis<'a>,
-) -> Result<(Vec<Plan<'a>>, Vec<Problem>), Problem> {
+pub fn flows<'a>(source: &(impl Source + ?Sized), basis: &Basis<'a>) -> Result<(Vec<Plan<'a>>, Vec<Problem>), Problem> {
     let refused = |(place, reason): Spoilt| problem(source.flight_id(), place, reason);
     channels::check_units(source, basis.channels).map_err(refused)?;
     let mut plans: BTreeMap<&str, Plan> = BTreeMap::new();

@@ -30,7 +30,7 @@ impl Unusable {
 
 /// What the first pass knows of one file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pieces {
+pub struct Scanned {
     pub pieces: Vec<Piece>,
     /// The recorder's step: the mean of those without lost frames, s.
     pub step_s: f64,
@@ -62,8 +62,10 @@ pub struct Scan {
     /// The last two rows' times of the open piece.
     last: Option<f64>,
     before_last: Option<f64>,
+    /// Whether a row was left out after them.
+    closed: bool,
     whole: (f64, f64),
-    found: Pieces,
+    found: Scanned,
 }
 
 impl Scan {
@@ -75,7 +77,7 @@ impl Scan {
     /// The next times, s.
     pub fn push(&mut self, times: &[f64]) {
         if self.median_s.is_some() {
-            times.iter().for_each(|t| self.row(*t));
+            self.rows(times);
             return;
         }
         self.head.extend_from_slice(times);
@@ -88,12 +90,18 @@ impl Scan {
         let head = std::mem::take(&mut self.head);
         // Of a fixed number of rows, whatever the pieces in which they come.
         self.median_s = Some(median_step(head.get(..HEAD_ROWS).unwrap_or(&head)));
-        head.iter().for_each(|t| self.row(*t));
+        self.rows(&head);
+    }
+
+    fn rows(&mut self, times: &[f64]) {
+        for time in times {
+            self.row(*time);
+        }
     }
 
     /// What was found; the scan is over.
     #[must_use]
-    pub fn finish(mut self) -> Pieces {
+    pub fn finish(mut self) -> Scanned {
         if self.median_s.is_none() {
             self.begin();
         }
@@ -107,28 +115,28 @@ impl Scan {
         self.found.rows += 1;
         if !t.is_finite() {
             self.found.unreadable.add(self.file, row);
-            self.last = None;
+            self.closed = true;
             return;
         }
         let median = self.median_s.unwrap_or_default();
         let Some(last) = self.last else { return self.open(row, t) };
         let step = t - last;
         if step == 0.0 {
+            // Left out; the next row begins a piece that goes on.
             self.found.still.add(self.file, row);
-            self.last = None;
-            self.before_last = None;
-            // The row that stands still is left out; the next one begins a piece that goes on.
+            self.closed = true;
             return;
         }
         if step <= -JITTER * median {
-            let goes_on = self.before_last.filter(|before| t > *before && t - before < 3.0 * median);
+            let near = |before: &f64| !self.closed && t > *before && t - before < 3.0 * median;
+            let goes_on = self.before_last.filter(near);
             if let Some(before) = goes_on {
                 self.take_back(row, before);
             }
             return self.open(row, t);
         }
         let full = self.found.pieces.last().is_some_and(|p| p.rows >= LONGEST_PIECE);
-        if step > JUMP_S.max(4.0 * median) || full {
+        if step > JUMP_S.max(4.0 * median) || full || self.closed {
             return self.open(row, t);
         }
         if (0.5..1.5).contains(&(step / median)) {
@@ -144,7 +152,7 @@ impl Scan {
 
     fn open(&mut self, row: usize, t: f64) {
         self.found.pieces.push(Piece { file: self.file, row, rows: 1, start_s: t, end_s: t });
-        (self.before_last, self.last) = (None, Some(t));
+        (self.before_last, self.last, self.closed) = (None, Some(t), false);
     }
 
     /// The row before `row` had a time too far ahead: it leaves the open piece.
@@ -168,7 +176,7 @@ pub fn median_step(times: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    fn scan(times: &[f64]) -> Pieces {
+    fn scan(times: &[f64]) -> Scanned {
         let mut scan = Scan::of_file(0);
         for part in times.chunks(3) {
             scan.push(part);
@@ -180,7 +188,7 @@ mod tests {
         (0..rows).map(|k| k as f64 * 0.025).collect()
     }
 
-    fn rows(pieces: &Pieces) -> Vec<(usize, usize)> {
+    fn rows(pieces: &Scanned) -> Vec<(usize, usize)> {
         pieces.pieces.iter().map(|p| (p.row, p.rows)).collect()
     }
 

@@ -24,13 +24,7 @@ pub trait Source: Sync {
     ///
     /// # Errors
     /// Why they cannot be read, in words.
-    fn read(
-        &self,
-        file: usize,
-        column: &str,
-        rows: Range<usize>,
-        sink: &mut dyn FnMut(&[f64]),
-    ) -> Result<(), String>;
+    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String>;
 }
 
 /// Several files in memory.
@@ -59,13 +53,7 @@ impl Source for [RawFlight] {
         self.get(file)?.columns.get(column)?.unit.as_deref()
     }
 
-    fn read(
-        &self,
-        file: usize,
-        column: &str,
-        rows: Range<usize>,
-        sink: &mut dyn FnMut(&[f64]),
-    ) -> Result<(), String> {
+    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
         let values = self.get(file).and_then(|f| f.columns.get(column)).and_then(|c| c.values.get(rows));
         sink(values.ok_or_else(|| format!("column `{column}` has no such rows"))?);
         Ok(())

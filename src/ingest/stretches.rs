@@ -4,7 +4,7 @@
 //! rows again, which are left out, or a clock that was started anew, which begins a new stretch; the rows themselves tell.
 
 use super::Settings;
-use super::pieces::{Piece, Pieces};
+use super::pieces::{Piece, Scanned};
 
 /// A piece as a stretch uses it: its rows later than `after_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Stretch {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     pub stretches: Vec<Stretch>,
-    /// Pieces whose rows, or some of them, are there already.
+    /// Scanned whose rows, or some of them, are there already.
     pub again: Vec<Piece>,
     /// Single rows whose time fits nowhere.
     pub stray: Vec<Piece>,
@@ -43,13 +43,13 @@ const STRAY_ROWS: usize = 3;
 /// # Errors
 /// What `same` cannot read.
 pub fn plan(
-    files: &[Pieces],
+    files: &[Scanned],
     settings: &Settings,
     name: &dyn Fn(usize) -> String,
     same: &mut dyn FnMut(&Piece, &Piece) -> Result<bool, String>,
 ) -> Result<Plan, String> {
-    let mut files: Vec<&Pieces> = files.iter().filter(|f| !f.pieces.is_empty()).collect();
-    let starts = |f: &&Pieces| f.pieces.first().map_or(0.0, |p| p.start_s);
+    let mut files: Vec<&Scanned> = files.iter().filter(|f| !f.pieces.is_empty()).collect();
+    let starts = |f: &&Scanned| f.pieces.first().map_or(0.0, |p| p.start_s);
     files.sort_by(|a, b| starts(a).total_cmp(&starts(b)));
     let all: Vec<(&Piece, f64)> = files.iter().flat_map(|f| f.pieces.iter().map(|p| (p, f.step_s))).collect();
     let mut plan = Plan::default();
@@ -82,8 +82,7 @@ impl Plan {
             if short && !next_fits {
                 self.stray.push(*piece);
             } else if gap_s > settings.longest_clock_gap_s {
-                let because =
-                    format!("the clock lacks {gap_s:.1} s from {end_s:.1} s to {:.1} s", piece.start_s);
+                let because = format!("the clock lacks {gap_s:.1} s from {end_s:.1} s to {:.1} s", piece.start_s);
                 self.begin(piece, step_s, Some(because));
             } else if too_long {
                 let because = format!("a stretch is at most {} h long", settings.longest_stretch_h);
@@ -148,7 +147,7 @@ impl Stretch {
 mod tests {
     use super::*;
 
-    fn file(pieces: &[(usize, usize, f64)]) -> Pieces {
+    fn file(pieces: &[(usize, usize, f64)]) -> Scanned {
         let piece = |&(file, row, start_s): &(usize, usize, f64)| Piece {
             file,
             row,
@@ -156,10 +155,10 @@ mod tests {
             start_s,
             end_s: start_s + 9.975,
         };
-        Pieces { pieces: pieces.iter().map(piece).collect(), step_s: 0.025, ..Pieces::default() }
+        Scanned { pieces: pieces.iter().map(piece).collect(), step_s: 0.025, ..Scanned::default() }
     }
 
-    fn planned(files: &[Pieces], same: bool) -> Plan {
+    fn planned(files: &[Scanned], same: bool) -> Plan {
         let name = |file: usize| format!("part-{file}");
         plan(files, &Settings::default(), &name, &mut |_, _| Ok(same)).unwrap()
     }

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::{Clock, Slots};
-use super::pieces::{Piece, Pieces, Scan, Unusable};
+use super::pieces::{Piece, Scan, Scanned, Unusable};
 use super::source::Source;
 use super::stretches::{self, Plan, Stretch};
 use super::{Settings, Spoilt, TIME, problem};
@@ -65,7 +65,7 @@ struct Surveyor<'a, S: Source + ?Sized> {
 /// Files of the same channels.
 struct Stream {
     columns: BTreeSet<String>,
-    files: Vec<Pieces>,
+    files: Vec<Scanned>,
     plan: Plan,
 }
 

@@ -413,7 +413,8 @@ fn a_channel_in_a_file_of_its_own_is_brought_to_the_record_s_clock() {
     let mut own = RawFlight { flight_id: "007".to_owned(), columns: BTreeMap::new() };
     // 10 Hz, 7 ms late, of a value that rises slowly.
     let times: Vec<f64> = (0..500).map(|k| f64::from(k) * 0.1 + 0.007).collect();
-    own.columns.insert("psi".to_owned(), RawColumn { unit: None, values: times.iter().map(|t| 100.0 + 0.2 * t).collect() });
+    own.columns
+        .insert("psi".to_owned(), RawColumn { unit: None, values: times.iter().map(|t| 100.0 + 0.2 * t).collect() });
     own.columns.insert("time".to_owned(), RawColumn { unit: None, values: times });
     flight.raw.columns.remove("psi");
     for files in [[flight.raw.clone(), own.clone()], [own, flight.raw.clone()]] {
@@ -455,7 +456,11 @@ fn a_control_at_rest_and_a_coarse_channel_are_not_stuck() {
 #[test]
 fn noise_and_quantisation_are_estimated_and_wraps_counted() {
     let mut flight = Flight::noisy();
-    flight.values("phi_deg").iter_mut().enumerate().for_each(|(k, v)| *v = (*v + 0.7 * k as f64 + 180.0) % 360.0 - 180.0);
+    flight
+        .values("phi_deg")
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, v)| *v = (*v + 0.7 * k as f64 + 180.0) % 360.0 - 180.0);
     flight.settings.on_failed_check = OnFailedCheck::Report;
     let ingested = flight.ingest().unwrap();
     let row = |name: &str| ingested.channels.iter().find(|c| c.channel == name).unwrap();

@@ -128,13 +128,13 @@ impl Run<'_> {
         let whole = |(id, ingested): &(String, Ingested)| {
             !ingested.accepted || record_file::is_whole(&self.record_path(id, fingerprint))
         };
-        let kept = match self.store.load::<Kept>(&artefact).filter(|kept| kept.stretches.iter().all(whole)) {
-            Some(kept) => kept,
-            None => {
-                let kept = self.ingest_files(files, fingerprint)?;
-                self.store.save(&artefact, &kept)?;
-                kept
-            }
+        let present = self.store.load::<Kept>(&artefact).filter(|kept| kept.stretches.iter().all(whole));
+        let kept = if let Some(kept) = present {
+            kept
+        } else {
+            let kept = self.ingest_files(files, fingerprint)?;
+            self.store.save(&artefact, &kept)?;
+            kept
         };
         let stretch = |(flight_id, ingested): (String, Ingested)| Flight {
             record: self.record_path(&flight_id, fingerprint),

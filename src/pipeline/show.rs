@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::stretches::is_stretch;
 use super::{Campaign, Flight, Progress, Run, begin};
 use crate::aero::Regressor;
 use crate::config::Config;
@@ -77,7 +78,7 @@ fn unknown(config: &Config, what: String) -> Error {
 }
 
 fn known_flight(config: &Config, id: &str, files: &[FlightFiles]) -> Result<()> {
-    if files.iter().any(|f| f.flight_id == id) {
+    if files.iter().any(|f| is_stretch(id, &f.flight_id)) {
         return Ok(());
     }
     let near = did_you_mean(id, files.iter().map(|f| f.flight_id.as_str()));

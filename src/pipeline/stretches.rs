@@ -23,11 +23,16 @@ const SURROUNDINGS_S: f64 = 180.0;
 /// How far from an event no window ends, s.
 const EVENT_S: f64 = 10.0;
 
+/// Whether an id is a flight's own or that of one of its stretches.
+pub(super) fn is_stretch(id: &str, flight_id: &str) -> bool {
+    let rest = id.strip_prefix(flight_id);
+    rest.is_some_and(|r| r.is_empty() || r.strip_prefix('.').is_some_and(|n| n.parse::<usize>().is_ok()))
+}
+
 impl Flight {
     /// Whether this is a stretch of a flight, or the flight itself.
     pub(super) fn is_of(&self, flight_id: &str) -> bool {
-        let rest = self.flight_id.strip_prefix(flight_id);
-        rest.is_some_and(|r| r.is_empty() || r.strip_prefix('.').is_some_and(|n| n.parse::<usize>().is_ok()))
+        is_stretch(&self.flight_id, flight_id)
     }
 
     /// The analyst's events in this stretch: those that name it, and those of its flight that lie in its time.
@@ -132,12 +137,11 @@ fn window_ends(about: &About, beyond: usize, events: &[Event]) -> Vec<usize> {
     while end + window / 2 < about.samples {
         let time_s = about.start_s + end as f64 * about.step_s;
         let at = |e: &&Event| e.start_s - EVENT_S <= time_s && time_s <= e.end_s + EVENT_S;
-        match events.iter().find(at) {
-            Some(event) => end = samples(event.end_s + EVENT_S - about.start_s, about.step_s) + 1,
-            None => {
-                ends.push(end);
-                end += window;
-            }
+        if let Some(event) = events.iter().find(at) {
+            end = samples(event.end_s + EVENT_S - about.start_s, about.step_s) + 1;
+        } else {
+            ends.push(end);
+            end += window;
         }
     }
     ends.push(about.samples);

@@ -255,7 +255,11 @@ impl Pen<'_> {
             scale,
             traces: vec![self.trace(record.start_s, &series.values, scale, look)],
             dots: vec![],
-            marks: Marks { bridged: of(Mark::Bridged), despiked: of(Mark::Despiked), missing: [of(Mark::Missing), of(Mark::Stuck)].concat() },
+            marks: Marks {
+                bridged: of(Mark::Bridged),
+                despiked: of(Mark::Despiked),
+                missing: [of(Mark::Missing), of(Mark::Stuck)].concat(),
+            },
         })
     }
 

@@ -211,13 +211,7 @@ impl Source for Opened {
         self.files.get(file)?.columns.get(column)?.unit.as_deref()
     }
 
-    fn read(
-        &self,
-        file: usize,
-        column: &str,
-        rows: Range<usize>,
-        sink: &mut dyn FnMut(&[f64]),
-    ) -> Result<(), String> {
+    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
         let known = self.files.get(file).and_then(|f| Some((f, f.columns.get(column)?)));
         let (file, column) = known.ok_or_else(|| format!("there is no column `{column}`"))?;
         guarded(|| file.read(column, rows, sink))

@@ -58,7 +58,8 @@ pub struct About {
 
 impl About {
     fn metadata(&self) -> Vec<KeyValue> {
-        let constants = self.constants.iter().map(|(name, v)| KeyValue::new(format!("{CONSTANT}{name}"), v.to_string()));
+        let constants =
+            self.constants.iter().map(|(name, v)| KeyValue::new(format!("{CONSTANT}{name}"), v.to_string()));
         let own = [
             KeyValue::new(FLIGHT.to_owned(), self.flight_id.clone()),
             KeyValue::new(START.to_owned(), self.start_s.to_string()),
@@ -139,10 +140,7 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// The reason in words.
-    pub fn append(
-        &mut self,
-        mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String>,
-    ) -> Result<(), String> {
+    pub fn append(&mut self, mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String>) -> Result<(), String> {
         let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
         while let Some(chunks) = next()? {
             for column in chunks.into_iter().flat_map(|c| c.0) {
@@ -245,7 +243,8 @@ pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
         let mut parts = writer.group()?.into_iter().zip(record.signals.values());
         writer.append(|| {
             let Some((mut signal, series)) = parts.next() else { return Ok(None) };
-            signal.push(&Series { values: series.values[from..to].to_vec(), marks: series.marks[from..to].to_vec() })?;
+            signal
+                .push(&Series { values: series.values[from..to].to_vec(), marks: series.marks[from..to].to_vec() })?;
             Ok(Some(vec![signal.close()?]))
         })?;
     }

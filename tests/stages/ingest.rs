@@ -197,7 +197,8 @@ fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one
     let main = without(&record, "psi");
     crate::support::write(&main.slice(0, 3000), &folder.join("a.parquet"));
     crate::support::write(&main.slice(2500, main.num_rows() - 2500), &folder.join("b.parquet"));
-    let every_fourth = arrow::array::UInt32Array::from_iter_values((0..record.num_rows() as u32).step_by(4));
+    let every_fourth =
+        arrow::array::UInt32Array::from_iter_values((0..u32::try_from(record.num_rows()).unwrap()).step_by(4));
     let slow = record.project(&[record.schema().index_of("time").unwrap(), record.schema().index_of("psi").unwrap()]);
     let slow = arrow::compute::take_record_batch(&slow.unwrap(), &every_fourth).unwrap();
     crate::support::write(&slow, &folder.join("heading.parquet"));
@@ -234,7 +235,10 @@ fn a_stuck_surface_rejects_its_maneuver_with_the_reason() {
     campaign.add("flight_001", &stuck);
     campaign.ends("estimate", 2);
     let problems = campaign.table("problems");
-    assert!(problems[0]["place"] == "channel `de`" && problems[0]["reason"].contains("its value is stuck"), "{problems:?}");
+    assert!(
+        problems[0]["place"] == "channel `de`" && problems[0]["reason"].contains("its value is stuck"),
+        "{problems:?}"
+    );
     let fits = campaign.table("fits");
     let rejected = |f: &crate::support::Row| f["outcome"] == "rejected" && f["reason"].contains("`de_deg` are marked");
     assert!(fits.is_empty() || fits.iter().all(rejected), "{fits:?}");
