@@ -130,9 +130,16 @@ fn between_nulls(distances: &[usize]) -> Option<usize> {
     (period > 1 && fits && 2 * distances.get(1).copied().unwrap_or_default() < total).then_some(period)
 }
 
+/// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one of so many chances.
+const CHANCES: usize = 4;
+
 /// The longest period of which nearly all changes keep one phase.
 fn held(changes: &[usize]) -> Option<Rate> {
+    let span = changes.last()? - changes.first()?;
     let of_period = |period: usize| {
+        if CHANCES * changes.len() * period < span {
+            return None;
+        }
         let mut phases = vec![0_usize; period];
         for change in changes {
             phases[change % period] += 1;
@@ -222,4 +229,64 @@ fn quantisation(values: &[f64]) -> Option<f64> {
     let on_grid = small.iter().filter(|n| (*n - n.round()).abs() < OFF_GRID).count();
     let share = on_grid as f64 / small.len().max(1) as f64;
     (small.len() >= FEW_CHANGES && share >= FITS).then_some(smallest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF: usize = SPELL / 2;
+
+    /// Uniform noise between −1 and 1, the same on every run.
+    fn noise(k: usize) -> f64 {
+        let mut state = (k as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        state = (state ^ (state >> 31)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn spell(value: impl Fn(usize) -> f64) -> Vec<f64> {
+        (0..SPELL).map(value).collect()
+    }
+
+    fn character(values: &[f64]) -> Character {
+        Character::of(values, 0, 0.025, &Character::UNKNOWN, &Stuck::default())
+    }
+
+    #[test]
+    fn a_rate_is_known_by_nulls_or_by_repeated_values() {
+        let nulls = spell(|k| if k % 4 == 3 { noise(k) } else { f64::NAN });
+        assert_eq!(character(&nulls).rate, Rate { period: 4, held: None });
+        let held = spell(|k| noise((k + 5) / 8));
+        assert_eq!(character(&held).rate, Rate { period: 8, held: Some(3) });
+        let lost = spell(|k| if k % 97 == 5 { f64::NAN } else { noise(k) });
+        assert_eq!(character(&lost).rate, Rate::FULL);
+    }
+
+    #[test]
+    fn a_coarse_channel_that_changes_at_equal_distances_is_at_full_rate() {
+        assert_eq!(character(&spell(|k| (k / 400) as f64)).rate, Rate::FULL);
+    }
+
+    #[test]
+    fn quantisation_is_the_step_of_the_numbers() {
+        let coarse = character(&spell(|k| (20.0 * noise(k)).round() * 0.02 + 7.0));
+        assert!((coarse.quantisation.unwrap() - 0.02).abs() < 1e-9);
+        assert_eq!(character(&spell(noise)).quantisation, None);
+    }
+
+    #[test]
+    fn only_noise_makes_a_stand_still_suspicious() {
+        let rounded = |k: usize, by: f64| (noise(k) / by).round() * by;
+        let noisy = character(&spell(|k| rounded(k, 0.2)));
+        assert!(noisy.stuck.is_some_and(|n| (40..80).contains(&n)), "{noisy:?}");
+        assert_eq!(character(&spell(|k| rounded(k, 2.5))).stuck, None);
+        assert_eq!(character(&spell(|k| (k as f64 * 0.01).sin())).stuck, None);
+        // A spell that is stuck throughout is like the one before.
+        let after = Character::of(&spell(|_| 3.0), SPELL, 0.025, &noisy, &Stuck::default());
+        assert_eq!(after.stuck, noisy.stuck);
+        let often = spell(|k| if k % 1000 < 100 { 0.4 } else { rounded(k, 0.2) });
+        assert_eq!(character(&often).stuck, None);
+        let once = spell(|k| if (HALF..HALF + 100).contains(&k) { 0.4 } else { rounded(k, 0.2) });
+        assert!(character(&once).stuck.is_some());
+    }
 }

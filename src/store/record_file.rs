@@ -469,6 +469,61 @@ mod tests {
         assert_eq!(bytes(&record()), bytes(&record()));
     }
 
+    /// A signal long enough for several row groups and pages.
+    fn long() -> Record {
+        let samples = GROUP + 3 * PAGE + 77;
+        let values: Vec<f64> = (0..samples).map(|k| (k as f64 * 0.01).sin()).collect();
+        let mark = |k: usize| if k % 1000 == 3 { Mark::Bridged } else { Mark::Measured };
+        let q = Series { values, marks: (0..samples).map(mark).collect() };
+        Record { samples, signals: [("q_deg_s".to_owned(), q)].into(), ..record() }
+    }
+
+    #[test]
+    fn a_window_is_the_part_of_the_record() {
+        let (given, (_folder, path)) = (long(), saved(&bytes(&long())));
+        let file = open(&path).expect("a record");
+        let (start_s, end_s) = (given.time_s(GROUP - 40), given.time_s(GROUP + 90));
+        let (part, own) = (given.part(start_s, end_s), file.part(None, start_s, end_s).expect("a part"));
+        assert_eq!(own.signals, part.signals);
+        assert_eq!((own.samples, own.start_s.to_bits()), (part.samples, part.start_s.to_bits()));
+        let none = BTreeSet::from(["mach".to_owned()]);
+        assert!(file.window(Some(&none), 0..10).expect("a window").signals.is_empty());
+        assert_eq!(file.window(None, given.samples - 5..given.samples + 5).expect("a window").samples, 5);
+    }
+
+    #[test]
+    fn an_outline_keeps_the_extremes_and_the_marks() {
+        let mut given = long();
+        given.signals.values_mut().for_each(|s| s.values[300_001] = 40.0);
+        let (_folder, path) = saved(&bytes(&given));
+        let outline = open(&path).expect("a record").outline(5000).expect("an outline");
+        let q = &outline.signals["q_deg_s"];
+        assert!((4000..=5000).contains(&outline.samples) && q.values.len() == outline.samples);
+        let k = q.values.iter().position(|v| *v > 2.0).expect("the peak");
+        assert!((outline.time_s(k) - given.time_s(300_001)).abs() < 2.0 * outline.step_s);
+        assert!(q.marks.contains(&Mark::Bridged));
+    }
+
+    #[test]
+    fn constants_come_back_in_every_window() {
+        let about = About { samples: 3, step_s: 0.1, constants: [("mach".to_owned(), 0.3)].into(), ..About::default() };
+        let mut out = Vec::new();
+        let mut writer = Writer::create(&about, ["obes"].into_iter(), &mut out).expect("a writer");
+        let mut parts = writer.group().expect("a group").into_iter();
+        let flag = Series { values: vec![0.0; 3], marks: vec![Mark::Measured; 3] };
+        let mut next = || {
+            let Some(mut signal) = parts.next() else { return Ok(None) };
+            signal.push(&flag)?;
+            Ok(Some(vec![signal.close()?]))
+        };
+        writer.append(&mut next).expect("appended");
+        writer.finish().expect("finished");
+        let (_folder, path) = saved(&out);
+        let window = open(&path).expect("a record").window(None, 1..3).expect("a window");
+        assert_eq!(window.values("mach"), Some(&[0.3, 0.3][..]));
+        assert_eq!(window.values("obes"), Some(&[0.0, 0.0][..]));
+    }
+
     #[test]
     fn a_series_of_another_length_is_refused() {
         let mut short = record();
