@@ -90,7 +90,8 @@ pub struct Settings {
     pub held_uncertainty_pct: f64,
     /// What calibration leaves unknown of signals; those not named are believed.
     pub calibration: BTreeMap<String, Calibration>,
-    /// A maneuver with a larger share of marked output samples is rejected.
+    /// A maneuver with a larger share of faulty samples (bridged, despiked, missing, stuck), over its outputs together or in
+    /// one of its surfaces, is rejected.
     pub max_marked_share: f64,
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
@@ -282,14 +283,12 @@ impl<'a> Run<'a> {
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
+        self.refuse_marked(&surfaces)?;
         let window = Window::cut(self.record, range.clone(), surfaces.iter().copied(), settings.mass_properties)?;
         let measurements = self.measurements(&range)?;
         let mut case = Case::<NX, E>::new(self.basis.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
-        if left_out > settings.max_marked_share {
-            return Err(format!("{:.0}% of its output samples are marked", 100.0 * left_out));
-        }
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
@@ -297,6 +296,24 @@ impl<'a> Run<'a> {
         free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
         case.noisy_surfaces = noisy_surfaces(self.basis.aircraft, &window, &free, &model.held);
         Ok(Ready { model, surfaces, window, case, left_out })
+    }
+
+    /// Refuses a maneuver of which too much is repaired or missing. Samples between those of a slow channel do not count:
+    /// nothing is wrong with them, and the cost leaves them out.
+    fn refuse_marked(&self, surfaces: &[&str]) -> Result<(), String> {
+        let Maneuver { start_s, end_s, .. } = *self.maneuver;
+        let most = self.basis.settings.max_marked_share;
+        let outputs = self.record.marked_share(self.class.axis.outputs().map(Output::signal), start_s, end_s);
+        if outputs > most {
+            return Err(format!("{:.0}% of its output samples are marked", 100.0 * outputs));
+        }
+        for surface in surfaces {
+            let share = self.record.marked_share([*surface], start_s, end_s);
+            if share > most {
+                return Err(format!("{:.0}% of the samples of `{surface}` are marked", 100.0 * share));
+            }
+        }
+        Ok(())
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.

@@ -16,10 +16,22 @@ pub struct ChannelRow {
     pub signal: String,
     /// Samples on the record's clock.
     pub samples: usize,
-    /// Of them: bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
+    /// How often the channel is recorded; the record's rate unless the channel is slower.
+    pub rate_hz: Option<f64>,
+    /// Of the samples: on the line between two samples of a slower channel.
+    pub between: usize,
+    /// Bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
     pub bridged: usize,
     pub despiked: usize,
     pub missing: usize,
+    /// Left out because the channel stood still.
+    pub stuck: usize,
+    /// How often the value wrapped around.
+    pub wraps: usize,
+    /// The step of the recorder's numbers and the standard deviation of the noise, in the signal's unit. Of the clock: the
+    /// jitter of its time stamps, s.
+    pub quantisation: Option<f64>,
+    pub noise: Option<f64>,
     /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in words.
     pub verdict: String,
 }

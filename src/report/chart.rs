@@ -64,6 +64,8 @@ pub struct Groups {
 pub struct FlightView<'a> {
     pub aircraft: &'a str,
     pub record: &'a Record,
+    /// How many samples were recorded and the step between them, s: the record at hand may be an outline.
+    pub recorded: (usize, f64),
     pub groups: &'a Groups,
     pub maneuvers: &'a [Maneuver],
     /// The analyst's list against what was found; empty without a list.
@@ -106,8 +108,8 @@ pub fn flight(view: &FlightView) -> String {
         description: format!("Strip chart of flight {}, {lasting}, with {maneuvers} shaded.", record.flight_id),
         heading: vec![format!(
             "{lasting}, {} samples of {} s, {maneuvers}",
-            record.samples,
-            number(Some(record.step_s), 3)
+            view.recorded.0,
+            number(Some(view.recorded.1), 3)
         )],
         legend: legend(&strips, !view.maneuvers.is_empty(), !view.events.is_empty(), false),
         time: pen.time,
@@ -253,7 +255,11 @@ impl Pen<'_> {
             scale,
             traces: vec![self.trace(record.start_s, &series.values, scale, look)],
             dots: vec![],
-            marks: Marks { bridged: of(Mark::Bridged), despiked: of(Mark::Despiked), missing: of(Mark::Missing) },
+            marks: Marks {
+                bridged: of(Mark::Bridged),
+                despiked: of(Mark::Despiked),
+                missing: [of(Mark::Missing), of(Mark::Stuck)].concat(),
+            },
         })
     }
 

@@ -93,9 +93,15 @@ pub fn campaign() -> Campaign {
         channel: "alpha".into(),
         signal: "alpha_vane_deg".into(),
         samples: 100,
+        rate_hz: Some(40.0),
+        between: 0,
         bridged: 3,
         despiked: 1,
         missing: 0,
+        stuck: 0,
+        wraps: 0,
+        quantisation: None,
+        noise: Some(0.02),
         verdict: "ok".into(),
     });
     campaign.problems.push(problem("a file that is no record"));

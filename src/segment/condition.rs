@@ -7,6 +7,23 @@ use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver};
 use crate::units::DEG;
 
+/// The signals that a flight condition is made of.
+pub(super) const SIGNALS: &[&str] = &[
+    signal::ALPHA_VANE,
+    signal::BETA_VANE,
+    signal::VELOCITY,
+    signal::MACH,
+    signal::ALTITUDE,
+    signal::P,
+    signal::Q,
+    signal::R,
+    signal::QBAR,
+    signal::MASS,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
 /// The maneuver of a class in a window (s on the record's clock), cut at the record.
 ///
 /// # Errors

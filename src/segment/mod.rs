@@ -103,6 +103,14 @@ pub struct Segmented {
     pub problems: Vec<Problem>,
 }
 
+/// The signals that are looked at: steps and flags, and what the flight condition is made of. A record needs no others.
+#[must_use]
+pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
+    let named = classes.iter().flat_map(|c| c.recognition.steps.keys().chain(c.recognition.flags.keys()));
+    let steps = named.chain(settings.steps.keys()).chain([&settings.excitation_flag]).cloned();
+    steps.chain(condition::SIGNALS.iter().map(|s| (*s).to_owned())).collect()
+}
+
 /// Finds the maneuvers of one record.
 ///
 /// Excitation that fits no class or several, maneuvers that the record cuts, and signals that the record lacks are

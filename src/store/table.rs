@@ -100,7 +100,8 @@ table!(CorrelationRow, "correlations", maneuver_id class kind first second corre
 table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
     difference_pct z verdict);
-table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
+table!(ChannelRow, "channels", flight_id channel signal samples rate_hz between bridged despiked missing
+    stuck wraps quantisation noise verdict);
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
 table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
 table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative unit truth realisations converged bias scatter

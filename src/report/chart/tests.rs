@@ -64,7 +64,8 @@ fn fit(outcome: &str, reason: &str) -> FitRow {
 
 fn drawn(record: &Record, maneuvers: &[Maneuver], events: &[EventRow]) -> String {
     let groups = groups();
-    flight(&FlightView { aircraft: "an aircraft", record, groups: &groups, maneuvers, events, problems: &[] })
+    let recorded = (record.samples, record.step_s);
+    flight(&FlightView { aircraft: "an aircraft", record, recorded, groups: &groups, maneuvers, events, problems: &[] })
 }
 
 fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> String {
