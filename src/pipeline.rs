@@ -19,7 +19,7 @@ use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
@@ -32,7 +32,7 @@ use crate::{compare, estimate, ingest, report, segment, trend};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
-const SEGMENT_VERSION: u32 = 1;
+const SEGMENT_VERSION: u32 = 2;
 const ESTIMATE_VERSION: u32 = 5;
 const JOINT_VERSION: u32 = 2;
 const PREDICT_VERSION: u32 = 2;
@@ -78,6 +78,7 @@ struct Ingested {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Found {
     maneuvers: Vec<Maneuver>,
+    unknown: Vec<Unknown>,
     events: Vec<EventRow>,
     problems: Vec<Problem>,
 }
@@ -89,6 +90,8 @@ pub struct Campaign {
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub maneuvers: Vec<Maneuver>,
+    /// Excitation that fits no class.
+    pub unknown: Vec<Unknown>,
     pub events: Vec<EventRow>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
@@ -273,6 +276,7 @@ impl Run<'_> {
         self.store.keep_only("segment", &paths)?;
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
+            campaign.unknown.extend(flight.unknown);
             campaign.events.extend(flight.events);
             campaign.problems.extend(flight.problems);
         }
@@ -283,6 +287,7 @@ impl Run<'_> {
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
         table::publish(&self.config.reports, &campaign.maneuvers)?;
+        table::publish(&self.config.reports, &campaign.unknown)?;
         table::publish(&self.config.reports, &campaign.events)
     }
 
@@ -302,12 +307,13 @@ impl Run<'_> {
         }
         let record = record_file::read(&flight.record)?;
         let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
-        let (Segmented { maneuvers, problems }, events) = if events.is_empty() {
+        let (Segmented { maneuvers, unknown, problems }, events) = if events.is_empty() {
             (found, Vec::new())
         } else {
-            segment::with_events(found, &record, &events, &config.classes, &config.aircraft)
+            let limits = &config.segment.quality;
+            segment::with_events(found, &record, &events, &config.classes, &config.aircraft, limits)
         };
-        let found = Found { maneuvers, events, problems };
+        let found = Found { maneuvers, unknown, events, problems };
         self.store.save(&path, &found)?;
         Ok((path, found))
     }

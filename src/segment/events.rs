@@ -6,6 +6,7 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Event, Maneuver};
 use crate::tables::EventRow;
 
+use super::quality::Limits;
 use super::{Segmented, condition, problem};
 
 /// Start and end of a found maneuver agree with a given event when both are within this, s.
@@ -22,15 +23,16 @@ pub fn with_events(
     events: &[Event],
     classes: &[Class],
     aircraft: &Aircraft,
+    limits: &Limits,
 ) -> (Segmented, Vec<EventRow>) {
     if events.is_empty() {
         return (found, Vec::new());
     }
-    let Segmented { maneuvers: found, mut problems } = found;
+    let Segmented { maneuvers: found, unknown, mut problems } = found;
     let mut given = Vec::new();
     let mut rows = Vec::new();
     for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
-        match as_given(event, record, classes, aircraft) {
+        match as_given(event, record, classes, aircraft, limits) {
             Ok(maneuver) => {
                 rows.push(compared(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
@@ -45,11 +47,17 @@ pub fn with_events(
     maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     let time = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-    (Segmented { maneuvers, problems }, rows)
+    (Segmented { maneuvers, unknown, problems }, rows)
 }
 
 /// The maneuver that an event names, or why there is none.
-fn as_given(event: &Event, record: &Record, classes: &[Class], aircraft: &Aircraft) -> Result<Maneuver, String> {
+fn as_given(
+    event: &Event,
+    record: &Record,
+    classes: &[Class],
+    aircraft: &Aircraft,
+    limits: &Limits,
+) -> Result<Maneuver, String> {
     let class = classes.iter().find(|c| c.name == event.class).ok_or_else(|| {
         let near = did_you_mean(&event.class, classes.iter().map(|c| c.name.as_str()));
         format!("an event is of the unknown class `{}`{near}", event.class)
@@ -65,7 +73,7 @@ fn as_given(event: &Event, record: &Record, classes: &[Class], aircraft: &Aircra
             event.class
         ));
     }
-    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), "given")
+    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), None, limits)
 }
 
 fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {

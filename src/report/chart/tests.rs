@@ -42,6 +42,8 @@ fn maneuver_at(start_s: f64) -> Maneuver {
         x_cg_ft: 32.0,
         samples: 401,
         origin: "found".into(),
+        recognised: crate::maneuver::Recognised::default(),
+        quality: crate::maneuver::Quality::default(),
     }
 }
 
