@@ -98,6 +98,7 @@ impl Run<'_> {
             record: &record,
             groups: &groups(self.config),
             maneuvers: &of_flight(campaign, id),
+            unknown: &campaign.unknown.iter().filter(|u| u.flight_id == id).cloned().collect::<Vec<_>>(),
             events: &events,
             problems: &about(campaign, |p| p.flight_id == id),
         }))

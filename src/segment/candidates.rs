@@ -118,9 +118,8 @@ pub(super) fn trains<'a>(scene: &'a Scene, classes: &[Class]) -> Vec<Train<'a>> 
 
 fn edges<'a>(steps: &'a Steps, wanted: impl Fn(&str) -> bool, (from_s, to_s): (f64, f64)) -> Vec<Edge<'a>> {
     let signals = steps.of.keys().filter(|s| wanted(s));
-    let of = |signal: &'a String| {
-        steps.between(signal, from_s, to_s).iter().map(move |s| Edge { signal, time_s: s.time_s })
-    };
+    let of =
+        |signal: &'a String| steps.between(signal, from_s, to_s).iter().map(move |s| Edge { signal, time_s: s.time_s });
     let mut edges: Vec<Edge> = signals.flat_map(of).collect();
     edges.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     edges
@@ -179,34 +178,44 @@ struct Growing<'a> {
     controls: BTreeMap<&'a str, Control>,
 }
 
-/// Where one control of a train stands.
+/// Where one control of a train stands. Trim drifts in a turn, so a control is back at it by its level or by its steps, which
+/// then cancel.
 struct Control {
     trim: f64,
     now: f64,
+    /// The sum of its steps.
+    moved: f64,
     /// The smallest change that is a deflection.
     deflection: f64,
 }
 
 impl Control {
-    /// Whether a level is trim: no deflection from where the train found the control.
-    fn is_trim(&self, level: f64) -> bool {
-        (level - self.trim).abs() < self.deflection
+    /// Whether a level is trim, no deflection from where the train found the control, or whether its steps cancel.
+    fn is_trim(&self, level: f64, moved: f64) -> bool {
+        (level - self.trim).abs() < self.deflection || moved.abs() < self.deflection
+    }
+
+    fn rests(&self) -> bool {
+        self.is_trim(self.now, self.moved)
     }
 }
 
 impl<'a> Growing<'a> {
     fn add(&mut self, signal: &'a str, step: &Step, trim: f64, deflection: f64) {
         self.to_s = step.time_s;
-        self.controls.entry(signal).or_insert(Control { trim, now: trim, deflection }).now = step.after;
+        let control = self.controls.entry(signal).or_insert(Control { trim, now: trim, moved: 0.0, deflection });
+        control.now = step.after;
+        // The first step that counts may follow the deflection that opens the train.
+        control.moved = if control.moved == 0.0 { step.after - trim } else { control.moved + step.change() };
     }
 
     fn at_trim(&self) -> bool {
-        self.controls.values().all(|c| c.is_trim(c.now))
+        self.controls.values().all(Control::rests)
     }
 
     /// Whether a control of the train that is held away from trim comes back to it with this step.
     fn brings_to_trim(&self, signal: &str, step: &Step) -> bool {
-        self.controls.get(signal).is_some_and(|c| !c.is_trim(c.now) && c.is_trim(step.after))
+        self.controls.get(signal).is_some_and(|c| !c.rests() && c.is_trim(step.after, c.moved + step.change()))
     }
 
     fn longest_quiet(&self, settings: &Settings) -> f64 {

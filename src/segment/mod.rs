@@ -59,7 +59,7 @@ pub struct Settings {
     #[serde(default = "default_level")]
     pub level_s: f64,
     /// A step is at least this many standard deviations of the signal's own changes, whatever its smallest step: in
-    /// turbulence feedback moves the surfaces. Default 5.
+    /// turbulence feedback moves the surfaces. Default 4.
     #[serde(default = "default_over_noise")]
     pub steps_over_noise: f64,
     /// Steps smaller than this share of the signal's largest in the same maneuver are feedback and not counted. Default
@@ -104,7 +104,7 @@ fn default_level() -> f64 {
     0.125
 }
 fn default_over_noise() -> f64 {
-    5.0
+    4.0
 }
 fn default_outstanding() -> f64 {
     0.35

@@ -37,7 +37,8 @@ pub struct Limits {
     pub signal_to_noise: f64,
     /// Share of the inputs' time at a stop. Default 0.5: a surface that rests there excites nothing.
     pub saturated_share: f64,
-    /// Share of the inputs' time at the actuator's rate. Default 0.5.
+    /// Share of the inputs' time at the actuator's rate. Default 0.8: a surface that is always on its way follows no command;
+    /// what it does is measured, so less does no harm.
     pub rate_limited_share: f64,
     /// Share of samples that are not as recorded. Default 0.2.
     pub marked_share: f64,
@@ -53,7 +54,7 @@ impl Default for Limits {
             other_axis: 1.0,
             signal_to_noise: 5.0,
             saturated_share: 0.5,
-            rate_limited_share: 0.5,
+            rate_limited_share: 0.8,
             marked_share: 0.2,
             actuators: BTreeMap::new(),
         }
@@ -138,7 +139,8 @@ fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 
 /// Root of the sum of the mean squares of signals about their mean or a straight line.
 fn motion(record: &Record, signals: &[&str], part: &RangeInclusive<usize>, fit: Fit) -> Option<f64> {
-    let squares: Option<Vec<f64>> = signals.iter().map(|s| mean_square(record.values(s)?.get(part.clone())?, fit)).collect();
+    let squares: Option<Vec<f64>> =
+        signals.iter().map(|s| mean_square(record.values(s)?.get(part.clone())?, fit)).collect();
     squares.map(|s| s.iter().sum::<f64>().sqrt())
 }
 
@@ -153,9 +155,9 @@ fn mean_square(values: &[f64], fit: Fit) -> Option<f64> {
     let slope = match fit {
         Fit::Mean => 0.0,
         Fit::Line => {
-            let (xy, xx) = known.iter().fold((0.0, 0.0), |(xy, xx), (t, v)| {
-                (xy + (t - time) * (v - mean), xx + (t - time) * (t - time))
-            });
+            let (xy, xx) = known
+                .iter()
+                .fold((0.0, 0.0), |(xy, xx), (t, v)| (xy + (t - time) * (v - mean), xx + (t - time) * (t - time)));
             xy / xx
         }
     };
@@ -191,9 +193,8 @@ fn worst(
     let of = |(name, actuator): (&String, &Actuator)| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
         let pairs = values.windows(2).filter(|w| w.iter().all(|v| v.is_finite()));
-        let (n, met) = pairs.fold((0_usize, 0_usize), |(n, met), w| {
-            (n + 1, met + usize::from(holds(actuator, w, record.step_s)))
-        });
+        let (n, met) =
+            pairs.fold((0_usize, 0_usize), |(n, met), w| (n + 1, met + usize::from(holds(actuator, w, record.step_s))));
         (n > 0).then(|| met as f64 / n as f64)
     };
     limits.actuators.iter().filter_map(of).max_by(f64::total_cmp)

@@ -44,10 +44,8 @@ enum Verdict<'a> {
 pub(super) fn all<'a>(scene: &Scene, classes: &'a [Class], trains: &[Train]) -> Recognition<'a> {
     let mut recognition = Recognition::default();
     for train in trains {
-        let of_its_kind: Vec<&Class> = classes
-            .iter()
-            .filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind)
-            .collect();
+        let of_its_kind: Vec<&Class> =
+            classes.iter().filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind).collect();
         one_train(scene, &of_its_kind, train, &mut recognition);
     }
     for class in classes {
@@ -192,13 +190,7 @@ fn verdict<'a>(seen: &Seen, classes: &[&'a Class]) -> Verdict<'a> {
     }
 }
 
-fn stretch<'a>(
-    scene: &Scene,
-    classes: &[&'a Class],
-    train: &Train,
-    range: (usize, usize),
-    into: &mut Recognition<'a>,
-) {
+fn stretch<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, range: (usize, usize), into: &mut Recognition<'a>) {
     let seen = seen(scene, train, range);
     match verdict(&seen, classes) {
         Verdict::Fits(class) => {
@@ -226,7 +218,8 @@ fn opening(scene: &Scene, seen: &Seen, first_s: f64) -> f64 {
         let steps = scene.own.between(signal, first_s - scene.settings.longest_rest_s, first_s);
         let first = steps.iter().find(at_first)?;
         let opens = |s: &&super::Step| s.time_s < first.time_s && s.change() * first.change() < 0.0;
-        let share = |s: &&super::Step| s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs();
+        let share =
+            |s: &&super::Step| s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs();
         steps.iter().filter(opens).filter(share).map(|s| s.time_s).next_back()
     };
     scene.own.of.keys().filter_map(before).fold(first_s, f64::min)
@@ -243,9 +236,8 @@ fn leave<'a>(
 ) {
     let Some(range) = range else { return };
     let seen = seen(scene, train, range);
-    let nearest = classes.iter().map(|c| (*c, seen.misses(c))).min_by_key(|(c, misses)| {
-        (misses.len(), usize::MAX - seen.explained(c))
-    });
+    let misses = classes.iter().map(|c| (*c, seen.misses(c)));
+    let nearest = misses.min_by_key(|(c, misses)| (usize::MAX - seen.explained(c), misses.len()));
     let Some((class, misses)) = nearest else { return };
     let signals = train.edges.iter().map(|e| e.signal);
     if !signals.collect::<std::collections::BTreeSet<_>>().into_iter().any(|s| is_excitation(&seen, s)) {
@@ -259,12 +251,12 @@ fn leave<'a>(
     into.unknown.push(unknown(&seen, classes, class.name.clone(), reason));
 }
 
-/// Three steps to alternating sides, one of them well beyond the smallest.
+/// Three steps to alternating sides, one of them a reversal: twice the smallest.
 fn is_excitation(seen: &Seen, signal: &str) -> bool {
     let steps = seen.steps_of(signal);
     let turns = steps.windows(2).filter(|s| s[0].change() * s[1].change() < 0.0).count();
     let smallest = seen.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
-    turns + 1 >= seen.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 1.5 * smallest)
+    turns + 1 >= seen.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
 }
 
 /// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants of all its inputs
@@ -321,12 +313,7 @@ fn runs(scene: &Scene, swings: Vec<Swing>) -> Vec<Vec<Swing>> {
     runs
 }
 
-fn one_sweep<'a>(
-    scene: &Scene,
-    class: &'a Class,
-    run: &[Swing],
-    wanted: &crate::maneuver::Sweep,
-) -> Option<Found<'a>> {
+fn one_sweep<'a>(scene: &Scene, class: &'a Class, run: &[Swing], wanted: &crate::maneuver::Sweep) -> Option<Found<'a>> {
     let ratio = patterns::sweep(run, wanted).ok()?;
     let kind = kind_of(class, scene);
     let (first_s, last_s) = (run.first()?.from_s, run.last()?.to_s);
@@ -336,7 +323,8 @@ fn one_sweep<'a>(
     }
     let mut recognised = seen.recognised(class, (first_s, last_s));
     let evidence = format!("{} swings that become {ratio:.1} times as fast", run.len());
-    recognised.evidence = if recognised.evidence.is_empty() { evidence } else { format!("{evidence}; {}", recognised.evidence) };
+    recognised.evidence =
+        if recognised.evidence.is_empty() { evidence } else { format!("{evidence}; {}", recognised.evidence) };
     Some(Found { class, first_s, last_s, recognised })
 }
 
@@ -389,7 +377,8 @@ pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
 fn taken_over_s(scene: &Scene, last_s: f64, end_s: f64) -> f64 {
     let settings = scene.settings;
     let clear_s = last_s + settings.transit_s + 2.0 * settings.level_s;
-    let steps = settings.pilot_controls.iter().flat_map(|c| scene.steps.between(c, clear_s, end_s + settings.transit_s));
+    let steps =
+        settings.pilot_controls.iter().flat_map(|c| scene.steps.between(c, clear_s, end_s + settings.transit_s));
     steps.map(|s| s.time_s - settings.transit_s).fold(f64::INFINITY, f64::min)
 }
 
@@ -397,7 +386,8 @@ fn taken_over_s(scene: &Scene, last_s: f64, end_s: f64) -> f64 {
 pub(super) fn problems(scene: &Scene, unknown: &[Unknown]) -> Vec<Problem> {
     let of = |u: &Unknown| {
         let lasting_s = u.end_s - u.start_s;
-        let reason = format!("excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}", u.reason, u.inputs);
+        let reason =
+            format!("excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}", u.reason, u.inputs);
         problem(scene.record, u.start_s, reason)
     };
     unknown.iter().map(of).collect()

@@ -102,8 +102,8 @@ impl<'a> Seen<'a> {
         (n > 2).then(|| format!("the pilot's controls step {n} times meanwhile"))
     }
 
-    /// Whether a signal moves: between its 2nd and 98th hundredth over half of its smallest step. Unknown where it is not
-    /// recorded.
+    /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as from side to side. It rests
+    /// within half of the smallest step. Between the two, as where it is not recorded, nothing is known.
     fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.scene.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
@@ -112,7 +112,9 @@ impl<'a> Seen<'a> {
         known.sort_by(f64::total_cmp);
         let aside = known.len() / 50;
         let range = known.get(known.len().checked_sub(aside + 1)?)? - known.get(aside)?;
-        Some(range >= 0.5 * self.scene.settings.steps.get(signal)?)
+        let smallest = self.scene.settings.steps.get(signal)?;
+        let moves = range >= 2.0 * smallest;
+        (moves || range <= 0.5 * smallest).then_some(moves)
     }
 
     /// Whether a flag is up for most of the stretch; unknown where it is not recorded.
@@ -172,9 +174,8 @@ impl<'a> Seen<'a> {
     /// Signals other than the inputs that step during the maneuver: by gearing or feedback.
     fn followed(&self, inputs: &BTreeSet<&str>) -> String {
         let scene = self.scene;
-        let steps = |s: &&String| {
-            !scene.steps.between(s, self.from_s - self.slack_s(), self.to_s + self.slack_s()).is_empty()
-        };
+        let steps =
+            |s: &&String| !scene.steps.between(s, self.from_s - self.slack_s(), self.to_s + self.slack_s()).is_empty();
         let others = scene.steps.of.keys().filter(|s| !inputs.contains(s.as_str())).filter(steps);
         others.map(String::as_str).collect::<Vec<_>>().join(", ")
     }
@@ -196,12 +197,15 @@ impl<'a> Seen<'a> {
         for (signal, wanted) in &rule.moves {
             match self.moves(signal) {
                 Some(_) => say(1.0, format!("{signal} {}", if *wanted { "moves" } else { "rests" })),
-                None => say(0.9, format!("{signal} is not recorded")),
+                None => say(0.9, format!("{signal} says nothing")),
             }
         }
         for (signal, pulses) in &rule.pulses {
             if let Ok(fit) = patterns::pulses(&self.steps_of(signal), pulses) {
-                say(1.0 - 0.5 * fit.deviation / pulses.tolerance, format!("{signal} pulses of {:.2} s the unit", fit.unit_s));
+                say(
+                    1.0 - 0.5 * fit.deviation / pulses.tolerance,
+                    format!("{signal} pulses of {:.2} s the unit", fit.unit_s),
+                );
             }
         }
         if !self.scene.sees_pilot {

@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn a_sine_of_any_period_has_its_half_periods() {
         for period in [20.0, 200.0] {
-            let values: Vec<f64> = (0..600).map(|k| 4.0 * (f64::from(k) * std::f64::consts::TAU / period).sin()).collect();
+            let values: Vec<f64> =
+                (0..600).map(|k| 4.0 * (f64::from(k) * std::f64::consts::TAU / period).sin()).collect();
             let swings = of_signal(&values, 3.0);
             assert!((swings.len() as f64 - 1200.0 / period).abs() <= 1.0, "{}", swings.len());
             for pair in swings.windows(2).skip(1).take(3) {

@@ -66,7 +66,15 @@ fn fit(outcome: &str, reason: &str) -> FitRow {
 
 fn drawn(record: &Record, maneuvers: &[Maneuver], events: &[EventRow]) -> String {
     let groups = groups();
-    flight(&FlightView { aircraft: "an aircraft", record, groups: &groups, maneuvers, events, problems: &[] })
+    flight(&FlightView {
+        aircraft: "an aircraft",
+        record,
+        groups: &groups,
+        maneuvers,
+        unknown: &[],
+        events,
+        problems: &[],
+    })
 }
 
 fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> String {
