@@ -332,7 +332,7 @@ fn patterns_that_cannot_be_are_named_with_their_line() {
     for (from, to, said) in [
         ("widths: [3, 2, 1, 1]", "widths: [3]", "`widths` are the lengths of two pulses or more"),
         ("unit_s: [0.2, 2]", "unit_s: [2, 0.2]", "`unit_s` is the shortest unit and the longest"),
-        ("unit_s: [0.2, 2]", "tolerance: 0", "`tolerance` must be greater than zero"),
+        ("tolerance: 0.35", "tolerance: 0", "`tolerance` must be greater than zero"),
     ] {
         let copy = Copy::new();
         let line = copy.spoil("maneuvers/3211.yaml", from, to);

@@ -12,7 +12,8 @@ use super::{Segmented, condition, problem};
 /// Start and end of a found maneuver agree with a given event when both are within this, s.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Replaces what was found by the events given for this flight where the two overlap, and says how they compare.
+/// Replaces what was found by the events given for this flight where one covers more than half of the other, and says how they
+/// compare.
 ///
 /// An event of an unknown class or outside the record becomes a problem and replaces nothing. Without any event for any
 /// flight nothing is compared.
@@ -40,7 +41,10 @@ pub fn with_events(
             Err(reason) => problems.push(problem(record, event.start_s, reason)),
         }
     }
-    let is_replaced = |f: &Maneuver| given.iter().any(|g| overlap_s(f, g.start_s, g.end_s) > 0.0);
+    // Windows close together share what is between them: an event replaces what it covers by more than half of either.
+    let shorter_s = |f: &Maneuver, g: &Maneuver| (f.end_s - f.start_s).min(g.end_s - g.start_s);
+    let covers = |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);
+    let is_replaced = |f: &Maneuver| given.iter().any(|g| covers(f, g));
     let kept: Vec<Maneuver> = found.into_iter().filter(|f| !is_replaced(f)).collect();
     rows.extend(kept.iter().map(|f| compared(None, Some(f))));
     let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();

@@ -85,6 +85,10 @@ pub struct Settings {
     /// what comes after it is recovery. Default 2 s.
     #[serde(default = "default_rest")]
     pub longest_rest_s: f64,
+    /// The share of a lead-in that the decay of the maneuver right before it may use: a lead-in need not be quiet from its
+    /// first sample on. Default 0.4.
+    #[serde(default = "default_shared")]
+    pub shared_lead_in: f64,
     /// Excitation of fewer steps than this is no maneuver and not worth a word: a flag that flickers, a turn. Default 3,
     /// the edges of one doublet.
     #[serde(default = "default_fewest")]
@@ -126,6 +130,9 @@ fn default_hold() -> f64 {
 }
 fn default_rest() -> f64 {
     2.0
+}
+fn default_shared() -> f64 {
+    0.4
 }
 fn default_fewest() -> usize {
     3

@@ -353,8 +353,8 @@ pub(super) fn keep_apart(recognition: &mut Recognition) {
 }
 
 /// The windows of maneuvers in order of time: the lead-in before the first input, the decay after the last. A window ends
-/// where the pilot takes over. Of a pause too short for both, the next maneuver has its lead-in, but leaves half of the pause
-/// to the decay.
+/// where the pilot takes over. Of a pause too short for both, the next maneuver has its lead-in as far as half of the pause,
+/// and the decay before it may use a share of that lead-in.
 pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     let of = |f: &Found| {
         let rule = &f.class.recognition;
@@ -363,12 +363,10 @@ pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     };
     let mut windows: Vec<(f64, f64)> = found.iter().map(of).collect();
     for k in 1..windows.len() {
-        let pause = (found[k - 1].last_s, found[k].first_s);
-        let shared_s = windows[k].0.max(f64::midpoint(pause.0, pause.1)).min(pause.1);
-        if windows[k - 1].1 > windows[k].0 {
-            windows[k - 1].1 = windows[k - 1].1.min(shared_s);
-            windows[k].0 = windows[k].0.max(windows[k - 1].1);
-        }
+        let (last_s, next_s) = (found[k - 1].last_s, found[k].first_s);
+        windows[k].0 = windows[k].0.max(f64::midpoint(last_s, next_s));
+        let shared_s = scene.settings.shared_lead_in * (next_s - windows[k].0);
+        windows[k - 1].1 = windows[k - 1].1.min(windows[k].0 + shared_s);
     }
     windows
 }

@@ -1,8 +1,8 @@
 //! Swings of a signal: from one extreme to the next, by more than the smallest step. Unlike steps they need not be fast, so
 //! a slow sine shows them as well as a pulse does.
 
-/// From one extreme to the other: when the signal has left the first by a tenth of the way, and when it has come within a
-/// tenth of the second, s or samples.
+/// From one extreme to the other: when the signal has left the first by a quarter of the way, and when it has come within a
+/// quarter of the second, s or samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
     pub from_s: f64,
@@ -62,8 +62,8 @@ fn extremes(values: &[(usize, f64)], size: f64) -> Vec<usize> {
 fn swing(part: &[(usize, f64)]) -> Option<Swing> {
     let (first, last) = (part.first()?.1, part.last()?.1);
     let share = |v: f64| (v - first) / (last - first);
-    let from = part.iter().rev().find(|(_, v)| share(*v) <= 0.1)?;
-    let to = part.iter().find(|(_, v)| share(*v) >= 0.9)?;
+    let from = part.iter().rev().find(|(_, v)| share(*v) <= 0.25)?;
+    let to = part.iter().find(|(_, v)| share(*v) >= 0.75)?;
     Some(Swing { from_s: from.0 as f64, to_s: to.0 as f64 })
 }
 
