@@ -284,7 +284,7 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
     for name in std::iter::once(&settings.excitation_flag).chain(named) {
         known_signal(config, source, name, "segment")?;
     }
-    for name in settings.pilot_controls.iter().filter(|name| !settings.steps.contains_key(*name)) {
+    if let Some(name) = settings.pilot_controls.iter().find(|name| !settings.steps.contains_key(*name)) {
         let what = format!("segment: `steps` says no size for steps of the pilot control `{name}`");
         return Err(source.error_under("pilot_controls", name, what));
     }
@@ -305,8 +305,20 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
         ("marked_share", q.marked_share),
     ];
     for (name, limit) in limits {
-        if !(limit >= 0.0) {
+        if limit.is_nan() || limit < 0.0 {
             return Err(source.error_under("quality", name, format!("`{name}` must not be negative, not {limit}")));
+        }
+    }
+    Ok(())
+}
+
+fn calibration(config: &Config, source: &Source) -> Result<()> {
+    for (name, left) in &config.estimate.calibration {
+        known_signal(config, source, name, "calibration")?;
+        let sizes = [("bias", left.bias), ("scale_pct", left.scale_pct)];
+        if let Some((what, size)) = sizes.into_iter().find(|(_, size)| !(size.is_finite() && *size >= 0.0)) {
+            let what = format!("calibration of `{name}`: `{what}` is a standard deviation, not {size}");
+            return Err(source.error_under("calibration", name, what));
         }
     }
     Ok(())
@@ -318,6 +330,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
     }
+    calibration(config, source)?;
     segment(config, source)?;
     let angles = config.estimate.joint.iter().map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
     let distances = config.estimate.prediction.iter().map(|p| ("alpha_distance_deg", p.alpha_distance_deg));

@@ -72,9 +72,7 @@ pub(super) fn of(record: &Record, class: &Class, maneuver: &Maneuver, limits: &L
     let (own, other) = rates(class.axis);
     let motion = |signals: &[&str], part: &RangeInclusive<usize>, fit| motion(record, signals, part, fit);
     let moved = motion(own, &whole, Fit::Line);
-    let mut quality = Quality {
-        verdict: ACCEPTED.to_owned(),
-        reason: String::new(),
+    let measured = Quality {
         lead_in_motion: ratio(motion(own, &lead_in, Fit::Mean), moved),
         alpha_rms_deg: motion(&[signal::ALPHA_VANE], &whole, Fit::Mean),
         other_axis: ratio(motion(other, &whole, Fit::Line), moved),
@@ -82,15 +80,11 @@ pub(super) fn of(record: &Record, class: &Class, maneuver: &Maneuver, limits: &L
         saturated_share: worst(record, limits, &excited, at_a_stop),
         rate_limited_share: worst(record, limits, &excited, at_full_rate),
         marked_share: marked(record, class, &whole),
+        ..Quality::default()
     };
-    let reasons = beyond(&quality, limits);
-    if !reasons.is_empty() {
-        quality.reason = reasons.join("; ");
-        if !given {
-            quality.verdict = REJECTED.to_owned();
-        }
-    }
-    quality
+    let reason = beyond(&measured, limits).join("; ");
+    let verdict = if reason.is_empty() || given { ACCEPTED } else { REJECTED };
+    Quality { verdict: verdict.to_owned(), reason, ..measured }
 }
 
 /// The angular rates of an axis, and of the other.
