@@ -160,6 +160,8 @@ mod tests {
             x_cg_ft: 38.0,
             samples: 401,
             origin: "found".into(),
+            recognised: crate::maneuver::Recognised::default(),
+            quality: crate::maneuver::Quality::default(),
         }
     }
 

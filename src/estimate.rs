@@ -178,6 +178,9 @@ pub struct Estimated {
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
     let run = Run { record, maneuver, class, basis };
+    if maneuver.is_rejected() {
+        return run.rejected(maneuver.quality.reason.clone());
+    }
     match basis.settings.hold {
         Hold::Table => run.estimated(),
         Hold::Evidence => by_evidence(&run),

@@ -22,7 +22,7 @@ use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::Record;
 use crate::ingest::Signature;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, fingerprint, record_file, table};
@@ -35,7 +35,7 @@ use conditioning::{Done, Shares};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 2;
-const SEGMENT_VERSION: u32 = 1;
+const SEGMENT_VERSION: u32 = 2;
 const ESTIMATE_VERSION: u32 = 6;
 const JOINT_VERSION: u32 = 2;
 const PREDICT_VERSION: u32 = 2;
@@ -81,6 +81,7 @@ struct Ingested {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Found {
     maneuvers: Vec<Maneuver>,
+    unknown: Vec<Unknown>,
     events: Vec<EventRow>,
     problems: Vec<Problem>,
 }
@@ -92,6 +93,8 @@ pub struct Campaign {
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub maneuvers: Vec<Maneuver>,
+    /// Excitation that fits no class.
+    pub unknown: Vec<Unknown>,
     pub events: Vec<EventRow>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
@@ -285,6 +288,7 @@ impl Run<'_> {
         self.store.keep_only("segment", &paths)?;
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
+            campaign.unknown.extend(flight.unknown);
             campaign.events.extend(flight.events);
             campaign.problems.extend(flight.problems);
         }
@@ -296,6 +300,7 @@ impl Run<'_> {
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
         table::publish(&self.config.reports, &campaign.maneuvers)?;
+        table::publish(&self.config.reports, &campaign.unknown)?;
         table::publish(&self.config.reports, &campaign.events)
     }
 

@@ -219,24 +219,94 @@ fn word(output: Output) -> String {
 
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     let rule = &class.recognition;
-    for name in rule.flags.keys().chain(rule.steps.keys()) {
+    let error = |name: &str, what: String| Err(source.error_under("recognise", name, what));
+    for name in rule.flags.keys().chain(rule.counted()) {
         known_signal(config, source, name, &format!("class {}", class.name))?;
     }
     for (name, count) in &rule.steps {
         if count.at_least > count.at_most {
-            return Err(source.error(name, format!("class {}: `{name}` steps at least more than at most", class.name)));
+            return error(name, format!("class {}: `{name}` steps at least more than at most", class.name));
         }
+    }
+    for name in rule.counted() {
         if !config.segment.steps.contains_key(name) {
             let what =
                 format!("class {}: `segment: steps:` of pipeline.yaml says no size for steps of `{name}`", class.name);
-            return Err(source.error(name, what));
+            return error(name, what);
         }
     }
+    if rule.inputs().is_empty() {
+        let what = format!(
+            "class {}: nothing makes this maneuver; `steps` with `at_least`, `pulses` or `sweep` name its inputs",
+            class.name
+        );
+        return error("recognise", what);
+    }
+    patterns(class, source)?;
     for (name, time_s) in [("lead_in_s", rule.lead_in_s), ("decay_s", rule.decay_s)] {
         if !(time_s.is_finite() && time_s >= 0.0) {
-            return Err(
-                source.error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name))
-            );
+            return error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name));
+        }
+    }
+    Ok(())
+}
+
+/// Lengths of pulses and rising frequencies that can be.
+fn patterns(class: &Class, source: &Source) -> Result<()> {
+    let error =
+        |name: &str, what: &str| Err(source.error_under("recognise", name, format!("class {}: {what}", class.name)));
+    for pulses in class.recognition.pulses.values() {
+        if pulses.widths.len() < 2 || !pulses.widths.iter().all(|w| w.is_finite() && *w > 0.0) {
+            return error("widths", "`widths` are the lengths of two pulses or more, all greater than zero");
+        }
+        if !(pulses.unit_s.0 >= 0.0 && pulses.unit_s.1 > pulses.unit_s.0) {
+            return error("unit_s", "`unit_s` is the shortest unit and the longest, in s: [0.2, 2]");
+        }
+        if !(pulses.tolerance > 0.0 && pulses.tolerance.is_finite()) {
+            return error("tolerance", "`tolerance` must be greater than zero");
+        }
+    }
+    for sweep in class.recognition.sweep.values() {
+        if sweep.at_least < 4 {
+            return error("at_least", "a sweep has at least 4 swings");
+        }
+        if !(sweep.ratio > 1.0 && sweep.ratio.is_finite()) {
+            return error("ratio", "the frequency of a sweep rises: `ratio` must be greater than 1");
+        }
+    }
+    Ok(())
+}
+
+/// What segment is told of signals, and its limits.
+fn segment(config: &Config, source: &Source) -> Result<()> {
+    let settings = &config.segment;
+    let named = settings.steps.keys().chain(&settings.pilot_controls).chain(settings.quality.actuators.keys());
+    for name in std::iter::once(&settings.excitation_flag).chain(named) {
+        known_signal(config, source, name, "segment")?;
+    }
+    if let Some(name) = settings.pilot_controls.iter().find(|name| !settings.steps.contains_key(*name)) {
+        let what = format!("segment: `steps` says no size for steps of the pilot control `{name}`");
+        return Err(source.error_under("pilot_controls", name, what));
+    }
+    for (name, actuator) in &settings.quality.actuators {
+        if !(actuator.lower_deg < actuator.upper_deg && actuator.rate_deg_s > 0.0) {
+            let what = format!("the actuator of `{name}` needs lower_deg < upper_deg and a rate greater than zero");
+            return Err(source.error_under("actuators", name, what));
+        }
+    }
+    let q = &settings.quality;
+    let limits = [
+        ("lead_in_motion", q.lead_in_motion),
+        ("alpha_rms_deg", q.alpha_rms_deg),
+        ("other_axis", q.other_axis),
+        ("signal_to_noise", q.signal_to_noise),
+        ("saturated_share", q.saturated_share),
+        ("rate_limited_share", q.rate_limited_share),
+        ("marked_share", q.marked_share),
+    ];
+    for (name, limit) in limits {
+        if limit.is_nan() || limit < 0.0 {
+            return Err(source.error_under("quality", name, format!("`{name}` must not be negative, not {limit}")));
         }
     }
     Ok(())
@@ -261,10 +331,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
         return Err(source.error_under("estimate", "joint", what));
     }
     calibration(config, source)?;
-    let segment = std::iter::once(&config.segment.excitation_flag).chain(config.segment.steps.keys());
-    for name in segment {
-        known_signal(config, source, name, "segment")?;
-    }
+    segment(config, source)?;
     let angles = config.estimate.joint.iter().map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
     let distances = config.estimate.prediction.iter().map(|p| ("alpha_distance_deg", p.alpha_distance_deg));
     for (name, angle_deg) in angles.chain(distances) {

@@ -316,6 +316,66 @@ fn recognition_by_steps_of_no_stated_size_is_named() {
 }
 
 #[test]
+fn an_unknown_word_of_recognition_is_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/3211.yaml", "{widths: [", "{width: [");
+    let e = copy.error();
+    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `widths`?"), "{e}");
+    let copy = Copy::new();
+    copy.spoil("maneuvers/3211.yaml", "  pulses:", "  pulse:");
+    let e = copy.error();
+    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `pulses`?"), "{e}");
+}
+
+#[test]
+fn patterns_that_cannot_be_are_named_with_their_line() {
+    for (from, to, said) in [
+        ("widths: [3, 2, 1, 1]", "widths: [3]", "`widths` are the lengths of two pulses or more"),
+        ("unit_s: [0.2, 2]", "unit_s: [2, 0.2]", "`unit_s` is the shortest unit and the longest"),
+        ("tolerance: 0.35", "tolerance: 0", "`tolerance` must be greater than zero"),
+    ] {
+        let copy = Copy::new();
+        let line = copy.spoil("maneuvers/3211.yaml", from, to);
+        let e = copy.error();
+        assert!(e.starts_with(&format!("maneuvers/3211.yaml:{line}: class 3211: {said}")), "{e}");
+    }
+    for (sweep, said) in
+        [("{at_least: 3}", "at least 4 swings"), ("{at_least: 9, ratio: 0.5}", "`ratio` must be greater")]
+    {
+        let copy = Copy::new();
+        let line =
+            copy.spoil("maneuvers/olon.yaml", "  lead_in_s:", &format!("  sweep: {{de_deg: {sweep}}}\n  lead_in_s:"));
+        let e = copy.error();
+        assert!(e.contains(said) && e.starts_with("maneuvers/olon.yaml:"), "{line}: {e}");
+    }
+}
+
+#[test]
+fn a_class_that_nothing_makes_is_named() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "{at_least: 7, at_most: 12}", "{at_most: 12}");
+    let e = copy.error();
+    assert!(e.contains("class PPSS: nothing makes this maneuver"), "{e}");
+}
+
+#[test]
+fn pilot_controls_and_actuators_of_no_signal_are_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "[stick_pitch_in, stick_lat_in, pedal_in]", "[stick_pitch_in, pedal_inn]");
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: segment: no channel gives the signal `pedal_inn`; did you mean `pedal_in`?")
+    );
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "lower_deg: -24, upper_deg: 10.5", "lower_deg: 24, upper_deg: 10.5");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("pipeline.yaml:{line}: the actuator of `de_deg` needs")), "{e}");
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "other_axis: 1 ", "other_axis: -1 ");
+    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: `other_axis` must not be negative, not -1"));
+}
+
+#[test]
 fn a_trend_group_of_an_unknown_derivative_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "derivatives: [CN_q, Cm_q]", "derivatives: [CN_q, Cm_qq]");

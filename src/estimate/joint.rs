@@ -16,7 +16,7 @@ use super::{Basis, Estimated, Ready, Run, calibration, covariance, values_of};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
-use crate::maneuver::{Class, Maneuver, Status};
+use crate::maneuver::{Class, Maneuver, Quality, Recognised, Status};
 use crate::output_error::cramer_rao::{self, Considered};
 use crate::output_error::{Case, Fit, Joint, Likelihood, Outcome, Response, mean, newton_raphson};
 use crate::tables::{EstimateRow, JointRow};
@@ -306,6 +306,8 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
         x_cg_ft: mean(|m| m.x_cg_ft),
         samples: maneuvers.iter().map(|m| m.samples).sum(),
         origin: "joint".to_owned(),
+        recognised: Recognised::default(),
+        quality: Quality::default(),
     }
 }
 

@@ -108,6 +108,7 @@ impl Run<'_> {
             recorded,
             groups: &groups(self.config),
             maneuvers: &of_flight(campaign, id),
+            unknown: &campaign.unknown.iter().filter(|u| u.flight_id == id).cloned().collect::<Vec<_>>(),
             events: &events,
             problems: &about(campaign, |p| p.flight_id == id),
         }))

@@ -94,7 +94,7 @@ pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) ->
     let signals = segment::signals(&config.classes, &config.segment);
     let about = &file.about;
     let beyond = samples(SURROUNDINGS_S, about.step_s);
-    let mut all = Found { maneuvers: vec![], events: vec![], problems: vec![] };
+    let mut all = Found { maneuvers: vec![], unknown: vec![], events: vec![], problems: vec![] };
     let ends = window_ends(about, beyond, events);
     let mut from = 0_usize;
     for to in ends {
@@ -102,18 +102,21 @@ pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) ->
         let time_s = |sample: usize| about.start_s + sample as f64 * about.step_s;
         let (first, last) = (from == 0, to >= about.samples);
         let own = |t: f64| (first || t >= time_s(from)) && (last || t < time_s(to));
-        let Segmented { maneuvers, problems } =
+        let Segmented { maneuvers, unknown, problems } =
             segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
         let maneuvers = maneuvers.into_iter().filter(|m| own(m.start_s)).collect();
         let problems = problems.into_iter().filter(|p| said_at(p).is_none_or(own)).collect();
         let events: Vec<Event> = events.iter().filter(|e| own(e.start_s)).cloned().collect();
-        let mut found = Segmented { maneuvers, problems };
+        let unknown = unknown.into_iter().filter(|u| own(u.start_s)).collect();
+        let mut found = Segmented { maneuvers, unknown, problems };
         if !events.is_empty() {
-            let compared = segment::with_events(found, &record, &events, &config.classes, &config.aircraft);
+            let limits = &config.segment.quality;
+            let compared = segment::with_events(found, &record, &events, &config.classes, &config.aircraft, limits);
             all.events.extend(compared.1);
             found = compared.0;
         }
         all.maneuvers.extend(found.maneuvers);
+        all.unknown.extend(found.unknown);
         all.problems.extend(found.problems);
         from = to;
     }

@@ -3,7 +3,7 @@
 use super::Contents;
 use crate::aero::Axis;
 use crate::error::Problem;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
@@ -140,6 +140,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         x_cg_ft: 20.0,
         samples: 600,
         origin: "found".into(),
+        recognised: Recognised::default(),
+        quality: Quality::default(),
     });
     campaign.fits.push(FitRow {
         maneuver_id: maneuver_id.clone(),

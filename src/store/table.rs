@@ -8,7 +8,7 @@ use polars::prelude::{Column, CsvWriter, DataFrame, NamedFrom, ParquetCompressio
 use super::atomic;
 use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Unknown};
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
     PredictedRow, PredictionRow, StartRow, TrendRow,
@@ -89,8 +89,7 @@ macro_rules! table {
     };
 }
 
-table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
-    altitude_ft mass_slug x_cg_ft samples origin);
+table!(Unknown, "unknown", flight_id start_s end_s inputs nearest_class reason);
 table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial_cost final_cost condition_number left_out
     largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
@@ -109,6 +108,25 @@ table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative uni
     corrected_coverage_95);
 table!(StartRow, "starts", class alpha_deg start records alone reached);
 table!(Problem, "problems", stage flight_id place reason);
+
+/// What it was recognised by and what it is worth follow the maneuver's own columns.
+impl Table for Maneuver {
+    const NAME: &'static str = "maneuvers";
+    fn columns(rows: &[Self]) -> Vec<Column> {
+        macro_rules! columns {
+            ($($($part:ident).+)*) => { vec![$(Cell::column(last!($($part)+), rows.iter().map(|row| &row.$($part).+))),*] };
+        }
+        macro_rules! last {
+            ($name:ident) => { stringify!($name) };
+            ($first:ident $($rest:ident)+) => { last!($($rest)+) };
+        }
+        columns!(maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s altitude_ft mass_slug
+            x_cg_ft samples origin recognised.confidence recognised.first_input_s recognised.last_input_s
+            recognised.inputs recognised.followed recognised.evidence quality.verdict quality.reason
+            quality.lead_in_motion quality.alpha_rms_deg quality.other_axis quality.signal_to_noise
+            quality.saturated_share quality.rate_limited_share quality.marked_share)
+    }
+}
 
 table!(PredictionRow, "predictions", maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias
     theil_variance theil_covariance r_squared);
