@@ -137,6 +137,10 @@ mod tests {
             standard_error,
             lower_95: value - 2.0 * standard_error,
             upper_95: value + 2.0 * standard_error,
+            prediction_lower_95: 0.0,
+            prediction_upper_95: 0.0,
+            outliers: 0,
+            curve: "polynomial".into(),
             maneuvers: 10,
             order: 1,
             scatter: 0.0,
@@ -236,7 +240,7 @@ mod tests {
             let point = TunnelPoint { alpha_deg: 20.0, mach: Some(mach), value, uncertainty: None, source: None };
             tunnel.insert("d", point);
         }
-        let group = trend::Group { name: "A".into(), derivatives: Vec::new(), classes: vec!["A".into()] };
+        let group = trend::Group { name: "A".into(), classes: vec!["A".into()], ..trend::Group::default() };
         let groups = trend::Settings { groups: vec![group], ..trend::Settings::default() };
         let maneuvers =
             [maneuver("A", 19.0, 0.3), maneuver("A", 21.0, 0.4), maneuver("B", 20.0, 0.6), maneuver("A", 40.0, 0.2)];

@@ -397,9 +397,10 @@ impl Run<'_> {
         let names = self.config.derivative_names();
         let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
         let estimates: Vec<EstimateRow> = campaign.estimated().filter(counts).cloned().collect();
-        let (trends, problems) = trend::trends(&estimates, &self.config.trend);
-        campaign.trends = trends;
-        campaign.problems.extend(problems);
+        let found = trend::trends(&estimates, &self.config.trend, |name| self.config.tunnel.alphas_deg(name));
+        campaign.trends = found.rows;
+        campaign.problems.extend(found.problems);
+        table::publish(&self.config.reports, &found.outliers)?;
         table::publish(&self.config.reports, &campaign.trends)
     }
 

@@ -198,12 +198,38 @@ pub struct TrendRow {
     pub standard_error: f64,
     pub lower_95: f64,
     pub upper_95: f64,
+    /// Where one more maneuver's estimate is expected.
+    pub prediction_lower_95: f64,
+    pub prediction_upper_95: f64,
     /// How many maneuvers the trend is fitted through.
     pub maneuvers: usize,
-    /// Order of the polynomial that the criterion chose.
+    /// How many of them lie far from it: rows of `outliers`.
+    pub outliers: usize,
+    /// `polynomial`, or `spline` with its knots.
+    pub curve: String,
+    /// Order of the polynomial, or of the spline between its knots, that the criterion chose.
     pub order: usize,
     /// Standard deviation between maneuvers beyond their bounds.
     pub scatter: f64,
+}
+
+/// `outliers`: one maneuver's estimate that lies far from the trend of its group.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OutlierRow {
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub maneuver_id: String,
+    pub class: String,
+    pub alpha_deg: f64,
+    pub value: f64,
+    pub bound: f64,
+    /// The trend there.
+    pub trend: f64,
+    /// Value minus trend over its standard deviation.
+    pub z: f64,
+    /// What is left of the maneuver's weight in the trend: below one.
+    pub weight_share: f64,
 }
 
 /// `comparison`: flight against tunnel for one derivative at one angle of attack.

@@ -76,7 +76,7 @@ impl Config {
         let events = overrides.events.or(pipeline.events);
         let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
         let config = Config {
-            tunnel: check::tunnel(&wind_tunnel, &buildup)?,
+            tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
             events: check::events(events.as_deref(), &classes)?,
             title: pipeline.title,
             archive: overrides.archive.unwrap_or(pipeline.archive),

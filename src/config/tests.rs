@@ -379,8 +379,8 @@ fn an_event_with_a_time_that_is_no_number_is_named_by_line_and_column() {
 #[test]
 fn a_tunnel_table_in_another_unit_is_named() {
     assert_eq!(
-        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,per_rad\n"),
-        "tunnel.csv:3: `CN_alpha` is in `per_rad`, the model's unit is `per_deg`"
+        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,lbf\n"),
+        "tunnel.csv:3: `CN_alpha` is in `lbf`, which cannot become the model's `per_deg`"
     );
 }
 

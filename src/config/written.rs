@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor};
+use crate::aero::{Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
@@ -26,6 +26,9 @@ pub struct PipelineFile {
     /// CSV of the analyst's events.
     #[serde(default)]
     pub events: Option<PathBuf>,
+    /// How the tunnel's tables are read.
+    #[serde(default)]
+    pub tunnel: wind_tunnel::Settings,
     #[serde(default)]
     pub ingest: ingest::Settings,
     pub segment: segment::Settings,

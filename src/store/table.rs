@@ -11,7 +11,7 @@ use crate::error::{Error, Problem, Result};
 use crate::maneuver::Maneuver;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
-    PredictedRow, PredictionRow, StartRow, TrendRow,
+    OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow,
 };
 
 /// A row type with the name of its table and its columns.
@@ -96,7 +96,9 @@ table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
     bound_held bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error held_because);
 table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
-table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
+table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95
+    prediction_upper_95 maneuvers outliers curve order scatter);
+table!(OutlierRow, "outliers", derivative unit group maneuver_id class alpha_deg value bound trend z weight_share);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
     difference_pct z verdict);
 table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
