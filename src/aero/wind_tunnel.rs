@@ -119,6 +119,13 @@ impl WindTunnel {
         &self.settings
     }
 
+    /// The same tables, constant beyond their ends.
+    #[must_use]
+    pub fn clamped(&self) -> WindTunnel {
+        let settings = Settings { extrapolation: Extrapolation::Clamp, ..self.settings.clone() };
+        WindTunnel { tables: self.tables.clone(), settings }
+    }
+
     /// Adds one point; points may come in any order.
     pub fn insert(&mut self, derivative: &str, point: TunnelPoint) {
         self.insert_at(derivative, None, point);

@@ -10,7 +10,7 @@ use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
-use crate::{compare, estimate, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]
@@ -38,6 +38,8 @@ pub struct PipelineFile {
     pub trend: trend::Settings,
     #[serde(default)]
     pub compare: compare::Settings,
+    #[serde(default)]
+    pub export: export::Settings,
     #[serde(default)]
     pub report: ReportSettings,
 }

@@ -9,6 +9,7 @@ use super::atomic;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::error::{Error, Result};
 use crate::maneuver::Event;
+use crate::tables::EarlierTrendRow;
 
 /// A text file whole.
 ///
@@ -68,6 +69,19 @@ impl TunnelRow {
 /// [`Error::Config`] naming file, line and column of what cannot be read.
 pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
+}
+
+/// The `trends` that an earlier campaign published in a folder.
+///
+/// # Errors
+/// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no such table.
+pub fn earlier_trends(folder: &Path) -> Result<Vec<EarlierTrendRow>> {
+    let path = folder.join("trends.csv");
+    if !path.is_file() {
+        let what = "nothing to compare against: an earlier campaign's folder of reports has the table trends.csv";
+        return Err(Error::config(&path, None, what));
+    }
+    Ok(rows(&path)?.into_iter().map(|(_, row)| row).collect())
 }
 
 /// Places rows as CSV with a header, whole or not at all.
