@@ -321,6 +321,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             return Err(source.error(name, format!("`{name}` must be greater than zero, not {angle_deg}")));
         }
     }
+    trends_and_tunnel(config, source)?;
     let names = config.derivative_names();
     let known = names.iter().map(String::as_str);
     let in_groups = config.trend.groups.iter().flat_map(|g| &g.derivatives);
@@ -335,6 +336,35 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
             return Err(source.error(name, format!("unknown class `{name}`{near}")));
         }
+    }
+    Ok(())
+}
+
+/// Numbers of trends and tunnel that would make no sense.
+fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
+    let (trend, compare) = (&config.trend, &config.compare);
+    let knots = trend.knots_deg.iter().chain(trend.groups.iter().flat_map(|g| g.knots_deg.iter().flatten()));
+    if let Some(knot) = knots.copied().find(|k| !k.is_finite()) {
+        return Err(source.error_under("trend", "knots_deg", format!("a knot is an angle of attack in deg, not {knot}")));
+    }
+    let positive = [
+        ("trend", "outlier_z", trend.outlier_z),
+        ("trend", "alpha_step_deg", trend.alpha_step_deg),
+        ("compare", "agreement_z", compare.agreement_z),
+    ];
+    for (key, name, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
+        }
+    }
+    if let Some(third) = config.tunnel.settings().third.as_ref().filter(|third| !third.at.is_finite()) {
+        return Err(source.error_under("tunnel", "at", format!("`at` must be a number, not {}", third.at)));
+    }
+    let given = config.export.jsbsim_properties.keys();
+    let used = || config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    for signal in given.filter(|signal| !used().any(|s| s == signal.as_str())) {
+        let near = did_you_mean(signal, used());
+        return Err(source.error(signal, format!("export: no derivative is of the signal `{signal}`{near}")));
     }
     Ok(())
 }
