@@ -360,7 +360,7 @@ impl<'a> Run<'a> {
     /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
     fn held_uncertainty(&self, derivative: &Derivative) -> f64 {
         let tunnel = self.basis.tunnel;
-        let stated = tunnel.value(&derivative.name, self.maneuver.alpha_deg, self.maneuver.mach);
+        let stated = tunnel.at(&derivative.name, &self.maneuver.condition(tunnel));
         let share = self.basis.settings.held_uncertainty_pct / 100.0;
         stated.and_then(|v| v.uncertainty).unwrap_or_else(|| share * tunnel.root_mean_square(&derivative.name))
     }
@@ -375,7 +375,7 @@ impl<'a> Run<'a> {
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {
-        self.basis.tunnel.value(name, self.maneuver.alpha_deg, self.maneuver.mach).map(|v| v.value)
+        self.basis.tunnel.at(name, &self.maneuver.condition(self.basis.tunnel)).map(|v| v.value)
     }
 
     /// Sorts the axis's derivatives and biases into free and held.
@@ -409,7 +409,7 @@ impl<'a> Run<'a> {
 
     fn held(&self, derivative: &Derivative) -> Result<f64, String> {
         self.tunnel(&derivative.name)
-            .ok_or_else(|| format!("{} is to be held at a wind-tunnel value and has none", derivative.name))
+            .ok_or_else(|| format!("{} is to be held at a wind-tunnel value and has none here", derivative.name))
     }
 
     fn weights(&self) -> Result<[f64; OUTPUTS], String> {

@@ -5,7 +5,9 @@
 //! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
 //! the order of flights and maneuvers, whatever thread made them.
 
+mod comparison;
 mod conditioning;
+pub mod export;
 mod others;
 mod stretches;
 pub mod show;
@@ -27,10 +29,10 @@ use crate::output_error::Outcome;
 use crate::store::archive::FlightFiles;
 use crate::store::{Fingerprint, Store, archive, atomic, fingerprint, record_file, table};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
-    TrendRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
+    History, OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
-use crate::{compare, estimate, report, trend};
+use crate::{estimate, report, trend};
 use conditioning::{Done, Shares};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
@@ -107,7 +109,14 @@ pub struct Campaign {
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
     pub trends: Vec<TrendRow>,
+    /// Maneuvers far from their trend.
+    pub outliers: Vec<OutlierRow>,
     pub comparison: Vec<ComparisonRow>,
+    /// The comparison in words, with the tunnel and with earlier campaigns.
+    pub verdicts: Vec<VerdictRow>,
+    pub disagreements: Vec<DisagreementRow>,
+    /// Against earlier campaigns, where some are named.
+    pub changes: Vec<ChangeRow>,
     pub problems: Vec<Problem>,
     /// Rows that an earlier flight has, too: the later flight's id, from when to when, s.
     pub again: Vec<(String, f64, f64)>,
@@ -152,6 +161,8 @@ impl Campaign {
 /// the campaign's problems.
 pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
     let (run, files) = begin(config, progress)?;
+    // Read before anything is published: it may lie in the same folder.
+    let earlier = comparison::earlier(config)?;
     let mut campaign = Campaign::default();
     run.ingest(&files, &mut campaign)?;
     if until >= Stage::Segment {
@@ -164,9 +175,7 @@ pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Cam
         run.trend(&mut campaign)?;
     }
     if until >= Stage::Compare {
-        campaign.comparison =
-            compare::comparison(&campaign.trends, &campaign.maneuvers, &config.tunnel, &config.trend, &config.compare);
-        table::publish(&config.reports, &campaign.comparison)?;
+        run.compare(&mut campaign, &earlier)?;
     }
     if until >= Stage::Report {
         run.report(&mut campaign)?;
@@ -401,18 +410,12 @@ impl Run<'_> {
     }
 
     fn trend(&self, campaign: &mut Campaign) -> Result<()> {
-        let converged: std::collections::BTreeSet<&str> = campaign
-            .fits
-            .iter()
-            .filter(|f| f.outcome == Outcome::Converged.name())
-            .map(|f| f.maneuver_id.as_str())
-            .collect();
-        let names = self.config.derivative_names();
-        let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
-        let estimates: Vec<EstimateRow> = campaign.estimated().filter(counts).cloned().collect();
-        let (trends, problems) = trend::trends(&estimates, &self.config.trend);
-        campaign.trends = trends;
-        campaign.problems.extend(problems);
+        let estimates = comparison::converged(self.config, campaign);
+        let found = trend::trends(&estimates, &self.config.trend, |name| self.config.tunnel.alphas_deg(name));
+        campaign.trends = found.rows;
+        campaign.problems.extend(found.problems);
+        campaign.outliers = found.outliers;
+        table::publish(&self.config.reports, &campaign.outliers)?;
         table::publish(&self.config.reports, &campaign.trends)
     }
 

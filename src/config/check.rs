@@ -1,33 +1,95 @@
 //! The checks of a configuration that its types cannot make: names resolve, units fit, nothing is missing.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::Config;
 use super::source::{Files, Source};
-use crate::aero::{Buildup, Output, WindTunnel};
+use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Hold;
 use crate::flight::signal;
 use crate::maneuver::{Class, Event, Status};
-use crate::store::files;
+use crate::store::files::{self, TunnelRow};
+use crate::store;
 use crate::units::Unit;
 
-/// Reads the tunnel's table; units must be those of the model's derivatives.
-pub(super) fn tunnel(path: &Path, buildup: &Buildup) -> Result<WindTunnel> {
-    let plain = |name: &str| name.replace('_', "");
-    let mut tunnel = WindTunnel::default();
-    for (line, row) in files::tunnel_rows(path)? {
+/// Reads the tunnel's tables, in the units of the model's derivatives.
+pub(super) fn tunnel(path: &Path, buildup: &Buildup, settings: &wind_tunnel::Settings) -> Result<WindTunnel> {
+    let mut tunnel = WindTunnel::new(settings.clone());
+    let mut seen = Seen::default();
+    for (line, mut row) in tunnel_rows(path, buildup, settings)? {
         let error = |what: String| Err(Error::config(path, Some(line), what));
-        let derivative = buildup.derivatives.iter().find(|d| plain(&d.name) == plain(&row.derivative));
-        if let Some(unit) = derivative.map(|d| d.unit().name()).filter(|unit| *unit != row.unit) {
-            return error(format!("`{}` is in `{}`, the model's unit is `{unit}`", row.derivative, row.unit));
-        }
-        if !(row.alpha_deg.is_finite() && row.value.is_finite()) {
+        let numbers = [Some(row.alpha_deg), Some(row.value), row.mach, row.uncertainty, row.third];
+        if numbers.iter().flatten().any(|v| !v.is_finite()) {
             return error(format!("`{}` has a value that is no number", row.derivative));
         }
-        tunnel.insert(&row.derivative, row.point());
+        if let Some(derivative) = buildup.derivatives.iter().find(|d| plain(&d.name) == plain(&row.derivative)) {
+            let unit = derivative.unit();
+            let Some(factor) = unit.factor_from(&row.unit) else {
+                let (name, written, unit) = (&row.derivative, &row.unit, unit.name());
+                return error(format!("`{name}` is in `{written}`, which cannot become the model's `{unit}`"));
+            };
+            row.value *= factor;
+            row.uncertainty = row.uncertainty.map(|u| u * factor);
+        }
+        seen.add(&row).map_err(|what| Error::config(path, Some(line), what))?;
+        tunnel.insert_at(&row.derivative, row.third, row.point());
+    }
+    if let Some(third) = settings.third.as_ref().filter(|_| !seen.third) {
+        let what = format!("no table depends on `{}`, which pipeline.yaml names (tunnel: third:)", third.name);
+        return Err(Error::config(path, None, what));
     }
     Ok(tunnel)
+}
+
+/// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's derivatives and sums.
+pub(super) fn tunnel_rows(
+    path: &Path,
+    buildup: &Buildup,
+    settings: &wind_tunnel::Settings,
+) -> Result<Vec<(usize, TunnelRow)>> {
+    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+    let names: Vec<String> = derivatives.chain(buildup.combined.iter().map(|c| &c.name)).map(|n| plain(n)).collect();
+    let third = settings.third.as_ref().map(|third| third.name.as_str());
+    store::tunnel::rows(path, third, |variable| names.contains(&plain(variable)))
+}
+
+/// A name as tunnels are compared by.
+fn plain(name: &str) -> String {
+    name.replace('_', "")
+}
+
+/// What the tunnel's rows have given so far: each point once, and of each derivative always the same variables.
+#[derive(Default)]
+struct Seen {
+    points: BTreeSet<(String, [Option<u64>; 3])>,
+    variables: BTreeMap<String, (bool, bool)>,
+    third: bool,
+}
+
+impl Seen {
+    fn add(&mut self, row: &TunnelRow) -> std::result::Result<(), String> {
+        let name = plain(&row.derivative);
+        let given = (row.mach.is_some(), row.third.is_some());
+        self.third |= given.1;
+        if *self.variables.entry(name.clone()).or_insert(given) != given {
+            let what = "has Mach number or third variable in some rows and not in others: give it in all or in none";
+            return Err(format!("`{}` {what}", row.derivative));
+        }
+        // Adding zero makes one of the two zeros.
+        let bits = |v: f64| (v + 0.0).to_bits();
+        let point = [Some(bits(row.alpha_deg)), row.mach.map(bits), row.third.map(bits)];
+        if self.points.insert((name, point)) {
+            return Ok(());
+        }
+        let mach = row.mach.map_or_else(String::new, |m| format!(", Mach {m}"));
+        Err(format!(
+            "`{}` has a second value at alpha {} deg{mach}; a table over a third variable needs its name in \
+             pipeline.yaml (tunnel: third:)",
+            row.derivative, row.alpha_deg
+        ))
+    }
 }
 
 /// Reads the analyst's events, where there are any.
@@ -339,6 +401,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             return Err(source.error(name, format!("`{name}` must be greater than zero, not {angle_deg}")));
         }
     }
+    trends_and_tunnel(config, source)?;
     let names = config.derivative_names();
     let known = names.iter().map(String::as_str);
     let in_groups = config.trend.groups.iter().flat_map(|g| &g.derivatives);
@@ -353,6 +416,35 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
             return Err(source.error(name, format!("unknown class `{name}`{near}")));
         }
+    }
+    Ok(())
+}
+
+/// Numbers of trends and tunnel that would make no sense.
+fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
+    let (trend, compare) = (&config.trend, &config.compare);
+    let knots = trend.knots_deg.iter().chain(trend.groups.iter().flat_map(|g| g.knots_deg.iter().flatten()));
+    if let Some(knot) = knots.copied().find(|k| !k.is_finite()) {
+        return Err(source.error_under("trend", "knots_deg", format!("a knot is an angle of attack in deg, not {knot}")));
+    }
+    let positive = [
+        ("trend", "outlier_z", trend.outlier_z),
+        ("trend", "alpha_step_deg", trend.alpha_step_deg),
+        ("compare", "agreement_z", compare.agreement_z),
+    ];
+    for (key, name, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
+        }
+    }
+    if let Some(third) = config.tunnel.settings().third.as_ref().filter(|third| !third.at.is_finite()) {
+        return Err(source.error_under("tunnel", "at", format!("`at` must be a number, not {}", third.at)));
+    }
+    let given = config.export.jsbsim_properties.keys();
+    let used = || config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    for signal in given.filter(|signal| !used().any(|s| s == signal.as_str())) {
+        let near = did_you_mean(signal, used());
+        return Err(source.error(signal, format!("export: no derivative is of the signal `{signal}`{near}")));
     }
     Ok(())
 }

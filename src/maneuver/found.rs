@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::aero::Axis;
+use crate::aero::{Axis, Condition, WindTunnel};
 
 /// One line of the analyst's list of events.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,4 +103,20 @@ pub struct Unknown {
     pub nearest_class: String,
     /// What keeps it from being of that class.
     pub reason: String,
+}
+
+impl Maneuver {
+    /// Where a tunnel is read for this maneuver: its means, as far as the tunnel's third variable is among them.
+    #[must_use]
+    pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
+        let third = tunnel.settings().third.as_ref().and_then(|third| match third.name.as_str() {
+            "altitude_ft" => Some(self.altitude_ft),
+            "qbar_psf" => Some(self.qbar_psf),
+            "velocity_ft_s" => Some(self.velocity_ft_s),
+            "mass_slug" => Some(self.mass_slug),
+            "x_cg_ft" => Some(self.x_cg_ft),
+            _ => None,
+        });
+        Condition { alpha_deg: self.alpha_deg, mach: self.mach, third: third.filter(|v| v.is_finite()) }
+    }
 }

@@ -10,8 +10,9 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::{Maneuver, Unknown};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
-    PredictedRow, PredictionRow, StartRow, TrendRow,
+    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow, EstimateRow,
+    EventRow, ExportRow, FitRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow,
+    VerdictRow,
 };
 
 /// A row type with the name of its table and its columns.
@@ -96,9 +97,19 @@ table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach deri
     bound_held bound_calibration bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error
     held_because);
 table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
-table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
-table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
-    difference_pct z verdict);
+table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95
+    prediction_upper_95 maneuvers outliers curve order scatter);
+table!(OutlierRow, "outliers", derivative unit group maneuver_id class alpha_deg value bound trend z weight_share);
+table!(ComparisonRow, "comparison", derivative unit group alpha_deg mach flight standard_error wind_tunnel difference
+    uncertainty difference_pct z verdict);
+table!(ManeuverComparisonRow, "maneuver_comparison", maneuver_id class derivative unit alpha_deg mach flight bound
+    wind_tunnel difference uncertainty difference_pct z verdict);
+table!(VerdictRow, "verdicts", against derivative unit group alpha_from_deg alpha_to_deg verdict difference_pct words);
+table!(DisagreementRow, "disagreements", rank against derivative unit alpha_deg flight other difference z size_pct words);
+table!(ChangeRow, "changes", against derivative unit group alpha_deg flight standard_error before before_standard_error
+    difference difference_pct z verdict);
+table!(BeyondRow, "beyond_tunnel", maneuver_id alpha_deg mach variable read_at tabulated_from tabulated_to treatment
+    derivatives);
 table!(ChannelRow, "channels", flight_id channel signal samples rate_hz between bridged despiked missing
     stuck wraps quantisation noise verdict);
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
@@ -164,6 +175,20 @@ pub fn publish_fits(folder: &Path, fits: &[FitRow], predicted: &[PredictedRow]) 
     let mut columns = FitRow::columns(fits);
     columns.extend(PredictedRow::columns(&beside));
     place(folder, FitRow::NAME, fits.len(), columns)
+}
+
+/// Publishes the export's rows; the third variable, where the tables have one, is a column of its name.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn publish_export(folder: &Path, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
+    macro_rules! columns {
+        ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
+    }
+    let mut columns = columns!(derivative alpha_deg mach);
+    columns.extend(third.map(|name| Cell::column(name, rows.iter().map(|row| &row.third))));
+    columns.extend(columns!(value unit uncertainty source is_flight));
+    place(folder, "flight_updated", rows.len(), columns)
 }
 
 /// Publishes rows as `<name>.parquet` and `<name>.csv` in a folder, each placed whole.
