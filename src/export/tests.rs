@@ -65,6 +65,8 @@ fn maneuver(maneuver_id: &str, class: &str, mach: f64) -> Maneuver {
         x_cg_ft: 38.0,
         samples: 401,
         origin: "found".into(),
+        recognised: crate::maneuver::Recognised::default(),
+        quality: crate::maneuver::Quality::default(),
     }
 }
 
@@ -81,6 +83,7 @@ fn estimate(maneuver_id: &str, class: &str, derivative: &str) -> EstimateRow {
         value: Some(1.0),
         bound: Some(0.1),
         bound_held: None,
+        bound_calibration: None,
         bound_corrected: None,
         wind_tunnel: None,
         variance_inflation: None,

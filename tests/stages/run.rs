@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_roll_steps};
 
 /// Tables and their columns that other programs rely on, with the stage that publishes them.
-const PUBLISHED: [(&str, &str, &str); 13] = [
+const PUBLISHED: &[(&str, &str, &str)] = &[
     ("ingest", "channels", "flight_id channel signal samples bridged despiked missing verdict"),
     ("ingest", "checks", "flight_id relation signals slope correlation verdict"),
     ("ingest", "problems", "stage flight_id place reason"),
