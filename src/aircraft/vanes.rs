@@ -99,6 +99,18 @@ impl Vane {
 }
 
 impl Sensors {
+    /// What the α vane reads, rad, with the c.g. at `cg`.
+    #[must_use]
+    pub fn alpha_reading(&self, flow: &Flow, cg: Position) -> Reading {
+        self.alpha_vane.alpha_reading(self.vane_model, flow, cg)
+    }
+
+    /// What the β vane reads, rad, with the c.g. at `cg`.
+    #[must_use]
+    pub fn beta_reading(&self, flow: &Flow, cg: Position) -> Reading {
+        self.beta_vane.beta_reading(self.vane_model, flow, cg)
+    }
+
     /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the readings inverted by
     /// fixed-point iteration, which contracts by the ratio of arm times rate to velocity.
     #[must_use]
@@ -106,8 +118,8 @@ impl Sensors {
         let mut flow =
             Flow { alpha: read.alpha / self.alpha_vane.factor, beta: read.beta / self.beta_vane.factor, ..*read };
         for _ in 0..8 {
-            let alpha_error = read.alpha - self.alpha_vane.alpha_reading(self.vane_model, &flow, cg).angle;
-            let beta_error = read.beta - self.beta_vane.beta_reading(self.vane_model, &flow, cg).angle;
+            let alpha_error = read.alpha - self.alpha_reading(&flow, cg).angle;
+            let beta_error = read.beta - self.beta_reading(&flow, cg).angle;
             flow.alpha += alpha_error / self.alpha_vane.factor;
             flow.beta += beta_error / self.beta_vane.factor;
             if alpha_error.abs().max(beta_error.abs()) < ROUNDING {

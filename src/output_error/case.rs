@@ -160,8 +160,10 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
         let outputs = E::AXIS.outputs();
         let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
+        let biased: Vec<usize> =
+            model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect();
         let initial = if model.initial_state == InitialState::Estimated { NX } else { 0 };
-        let lanes = Lanes::new(&acting, E::FOLLOWED, initial);
+        let lanes = Lanes::new(&acting, E::FOLLOWED, initial, biased.len());
         Case {
             step_s: window.step_s,
             known: along.known,
@@ -172,7 +174,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             acting,
             lanes,
             ranges,
-            biased: model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect(),
+            biased,
             start: mean(along.states.iter().take(TRIMMED)),
             initial_state: model.initial_state,
             states: along.states,
@@ -321,16 +323,16 @@ fn regressor<const NX: usize, E: Equations<NX>>(
         Regressor::RollRate => rate(aircraft.span_ft, p),
         Regressor::PitchRate => rate(aircraft.chord_ft, q),
         Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(_) | Regressor::Vane(_) => deflections[point] * surface_factor(aircraft, motion, derivative),
+        Regressor::Surface(_) | Regressor::Vane(_) => deflections[point] * surface_factor(aircraft, motion.qbar, derivative),
     }
 }
 
 /// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and moment are made coefficients.
-pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &Derivative) -> f64 {
+pub(super) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
     if !matches!(derivative.regressor, Regressor::Vane(_)) {
         return 1.0;
     }
-    let force = motion.qbar * aircraft.wing_area_ft2;
+    let force = qbar * aircraft.wing_area_ft2;
     let length = match derivative.coefficient.axis() {
         crate::aero::Axis::Longitudinal => aircraft.chord_ft,
         crate::aero::Axis::Lateral => aircraft.span_ft,

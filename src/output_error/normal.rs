@@ -73,6 +73,13 @@ impl Normal {
         DVector::from_iterator(lanes.len(), lanes.iter().map(|lane| of(*lane)))
     }
 
+    /// Σ s sᵀ of one output, for all parameters.
+    pub fn squares(&self, output: usize) -> DMatrix<f64> {
+        let mut weights = [0.0; OUTPUTS];
+        weights[output] = 1.0;
+        self.information(&weights)
+    }
+
     /// Σ_o w_o Σ s sᵀ of all parameters.
     pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let width = self.lanes.width();
