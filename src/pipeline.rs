@@ -33,9 +33,9 @@ use crate::{compare, estimate, ingest, report, segment, trend};
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 1;
 const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 5;
-const JOINT_VERSION: u32 = 2;
-const PREDICT_VERSION: u32 = 2;
+const ESTIMATE_VERSION: u32 = 6;
+const JOINT_VERSION: u32 = 3;
+const PREDICT_VERSION: u32 = 3;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -37,7 +37,8 @@ pub(super) struct Coefficients<const NX: usize> {
 
 impl<const NX: usize> Coefficients<NX> {
     fn zero(points: usize) -> Self {
-        let none = || vec![0.0; points];
+        // A step needs three points, also the one that would follow the last sample.
+        let none = || vec![0.0; points + 2];
         Coefficients {
             offset: std::array::from_fn(|_| none()),
             slope: std::array::from_fn(|_| std::array::from_fn(|_| none())),
@@ -53,23 +54,52 @@ impl<const NX: usize> Coefficients<NX> {
         sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += value * r);
     }
 
-    /// Their values at a point, and their slopes along the states.
+    /// Those of a point.
     #[inline(always)]
-    pub(super) fn at(
-        &self,
-        point: usize,
-        x: &SVector<f64, NX>,
-    ) -> ([f64; COEFFICIENTS], [[f64; NX]; COEFFICIENTS]) {
-        let (mut values, mut slopes) = ([0.0; COEFFICIENTS], [[0.0; NX]; COEFFICIENTS]);
+    pub(super) fn at(&self, point: usize) -> At<NX> {
+        self.near::<1>(point)[0]
+    }
+
+    /// Those of some points from one on.
+    #[inline(always)]
+    pub(super) fn near<const N: usize>(&self, point: usize) -> [At<NX>; N] {
+        let mut near = [At { offset: [0.0; COEFFICIENTS], slope: [[0.0; NX]; COEFFICIENTS] }; N];
         for k in 0..COEFFICIENTS {
-            values[k] = self.offset[k][point];
-            // The first state last: it is the one that the sum would wait for.
-            for i in (0..NX).rev() {
-                slopes[k][i] = self.slope[k][i][point];
-                values[k] = slopes[k][i].mul_add(x[i], values[k]);
+            let offset = &self.offset[k][point..point + N];
+            for n in 0..N {
+                near[n].offset[k] = offset[n];
+            }
+            for i in 0..NX {
+                if let Some(slope) = self.slope[k][i].get(point..point + N) {
+                    for n in 0..N {
+                        near[n].slope[k][i] = slope[n];
+                    }
+                }
             }
         }
-        (values, slopes)
+        near
+    }
+}
+
+/// The coefficients at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct At<const NX: usize> {
+    offset: [f64; COEFFICIENTS],
+    pub(super) slope: [[f64; NX]; COEFFICIENTS],
+}
+
+impl<const NX: usize> At<NX> {
+    /// Their values when the state is x.
+    #[inline(always)]
+    pub(super) fn with(&self, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+        let mut values = self.offset;
+        for k in 0..COEFFICIENTS {
+            // The first state last: it is the one that the sum would wait for.
+            for i in (0..NX).rev() {
+                values[k] = self.slope[k][i].mul_add(x[i], values[k]);
+            }
+        }
+        values
     }
 }
 

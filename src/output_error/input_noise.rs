@@ -191,11 +191,12 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     fn at(&self, k: usize) -> At<NX> {
         let case = self.case;
         let x = &case.states[k];
-        let (c, slopes) = self.coefficients.at(2 * k, x);
+        let coefficients = self.coefficients.at(2 * k);
+        let c = coefficients.with(x);
         let mut c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::zeros();
         for k in 0..COEFFICIENTS {
             for i in 0..NX {
-                c_by_state[(k, i)] = slopes[k][i];
+                c_by_state[(k, i)] = coefficients.slope[k][i];
             }
         }
         let rates = E::rates(&case.known[2 * k], x, &c);
