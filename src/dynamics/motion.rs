@@ -106,6 +106,20 @@ impl Window {
         self.points.get(name).map_or(&[], Vec::as_slice)
     }
 
+    /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
+    #[must_use]
+    pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
+        let mut window = self.clone();
+        let mut change = |name: &str, bias: f64| {
+            for value in window.points.get_mut(name).into_iter().flatten() {
+                *value += scale * *value + bias;
+            }
+        };
+        change(name, bias);
+        change(&slope_name(name), 0.0);
+        window
+    }
+
     /// The motion at every point in order.
     pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> impl Iterator<Item = Motion> + 'a {
         let signals = Signals {

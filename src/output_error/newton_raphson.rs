@@ -117,6 +117,7 @@ pub fn minimise<D: Likelihood>(
         undetermined: vec![],
         covariance: None,
         covariance_held: None,
+        covariance_calibration: None,
         covariance_corrected: None,
     };
     if let Err(diverged) = data.respond(&fit.values, &mut response) {

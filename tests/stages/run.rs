@@ -147,7 +147,8 @@ fn explained_columns(published: &BTreeMap<String, Vec<String>>) -> BTreeMap<Stri
     let mut explained = BTreeMap::new();
     for section in page.split("\n## ").skip(1) {
         let table = section.split([' ', '\n']).next().unwrap();
-        let columns = &published[table];
+        // Not every section is of a table; a table without a section is found by its name.
+        let Some(columns) = published.get(table) else { continue };
         let mut names = BTreeSet::new();
         for cell in section.lines().filter_map(|line| line.strip_prefix("| `")?.split(" |").next()) {
             let words: Vec<&str> = cell.split(['`', ' ']).filter(|word| !word.is_empty()).collect();
