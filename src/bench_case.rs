@@ -392,10 +392,7 @@ impl Given {
             let (down, forward) = (-r * p * c.x_an, -p * r * c.z_ax);
             [alpha[k], q[k], theta[k], an[k] / unit - down / G0_FT_S2, ax[k] / unit + forward / G0_FT_S2]
         };
-        Measurements {
-            values: (0..record.samples).map(row).collect(),
-            used: vec![[true; OUTPUTS]; record.samples],
-        }
+        Measurements { values: (0..record.samples).map(row).collect(), used: vec![[true; OUTPUTS]; record.samples] }
     }
 }
 
@@ -457,4 +454,31 @@ impl Clock {
 fn processor_s() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    #[test]
+    fn the_standard_case_reaches_the_minimum_of_its_peers_and_the_truth() {
+        #[derive(Deserialize)]
+        struct Said {
+            truth: BTreeMap<String, f64>,
+        }
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/standard_case.json");
+        let timed = timed(&load(&file).unwrap(), 1).unwrap();
+        assert_eq!((timed.outcome, timed.iterations), ("converged", 4));
+        // CasADi, JAX, SciPy, C++ and others; the copy of the record is rounded to a millionth.
+        assert_relative_eq!(timed.cost.unwrap(), 0.011_840_931_330, max_relative = 1e-6);
+        let said: Said = serde_json::from_str(&files::text(&file).unwrap()).unwrap();
+        // Biases and constants take up what the noise of the substituted signals does.
+        for (name, truth) in said.truth.iter().filter(|(name, _)| bias(name).is_none()) {
+            let off = (timed.theta[name] - truth) / timed.std[name].max(timed.std_corrected[name]);
+            assert!(off.abs() < 5.0, "{name} is {off:.1} standard errors off");
+        }
+        assert_eq!(timed.wall_s.len(), 1);
+    }
 }

@@ -11,12 +11,7 @@ pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
 /// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and `along(x, h, slope)` is
 /// x + h slope.
 #[inline(always)]
-pub fn step<X: Copy>(
-    x: X,
-    step_s: f64,
-    mut slope: impl FnMut(usize, X) -> X,
-    along: impl Fn(X, f64, X) -> X,
-) -> X {
+pub fn step<X: Copy>(x: X, step_s: f64, mut slope: impl FnMut(usize, X) -> X, along: impl Fn(X, f64, X) -> X) -> X {
     let half = 0.5 * step_s;
     let k1 = slope(0, x);
     let k2 = slope(1, along(x, half, k1));

@@ -72,7 +72,8 @@ fn slopes_match<const NX: usize, E: Equations<NX>>() {
         up[j] += h;
         down[j] -= h;
         let rate = (E::rates(&known, &up, &C).rates - E::rates(&known, &down, &C).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &sensed, &up, &C).outputs - E::outputs(&known, &sensed, &down, &C).outputs) / (2.0 * h);
+        let output =
+            (E::outputs(&known, &sensed, &up, &C).outputs - E::outputs(&known, &sensed, &down, &C).outputs) / (2.0 * h);
         assert_abs_diff_eq!(rates.by_state.column(j).into_owned(), rate, epsilon = 1e-7);
         assert_abs_diff_eq!(outputs.by_state.column(j).into_owned(), output, epsilon = 1e-6);
     }
@@ -81,7 +82,8 @@ fn slopes_match<const NX: usize, E: Equations<NX>>() {
         up[j] += h;
         down[j] -= h;
         let rate = (E::rates(&known, &x, &up).rates - E::rates(&known, &x, &down).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &sensed, &x, &up).outputs - E::outputs(&known, &sensed, &x, &down).outputs) / (2.0 * h);
+        let output =
+            (E::outputs(&known, &sensed, &x, &up).outputs - E::outputs(&known, &sensed, &x, &down).outputs) / (2.0 * h);
         assert_abs_diff_eq!(rates.by_coefficient.column(j).into_owned(), rate, epsilon = 1e-7);
         assert_abs_diff_eq!(outputs.by_coefficient.column(j).into_owned(), output, epsilon = 1e-6);
     }
@@ -115,7 +117,8 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
         all.filter(|&(i, j)| at(i, j) != 0.0).collect::<std::collections::BTreeSet<_>>()
     };
     let said = |list: &[(usize, usize)]| list.iter().copied().collect::<std::collections::BTreeSet<_>>();
-    let (a, c) = (rates.by_state + rates.by_coefficient * c_by_state, outputs.by_state + outputs.by_coefficient * c_by_state);
+    let (a, c) =
+        (rates.by_state + rates.by_coefficient * c_by_state, outputs.by_state + outputs.by_coefficient * c_by_state);
     assert!(nonzero(NX, NX, &|i, j| a[(i, j)]).is_subset(&said(E::RATES_BY_STATE)));
     assert!(nonzero(NX, COEFFICIENTS, &|i, j| rates.by_coefficient[(i, j)]).is_subset(&said(E::RATES_BY_COEFFICIENT)));
     assert!(nonzero(OUTPUTS, NX, &|i, j| c[(i, j)]).is_subset(&said(E::OUTPUTS_BY_STATE)));

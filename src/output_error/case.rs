@@ -5,6 +5,7 @@
 //!
 //! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states if they are free.
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -181,7 +182,9 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
         let columns = columns.values;
         let mut held_part = Coefficients::zero(window.len());
-        held.into_iter().for_each(|(acting, value)| held_part.add(value, acting, &columns[acting.column]));
+        for (acting, value) in held {
+            held_part.add(value, acting, &columns[acting.column]);
+        }
         let before = |k: usize| free.iter().filter(|d| d.coefficient.index() < k).count();
         let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
         names.extend(model.biases.iter().map(|b| b.name.clone()));
@@ -353,7 +356,9 @@ fn regressor<const NX: usize, E: Equations<NX>>(
         Regressor::RollRate => rate(aircraft.span_ft, p),
         Regressor::PitchRate => rate(aircraft.chord_ft, q),
         Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(_) | Regressor::Vane(_) => deflections[point] * surface_factor(aircraft, motion.qbar, derivative),
+        Regressor::Surface(_) | Regressor::Vane(_) => {
+            deflections[point] * surface_factor(aircraft, motion.qbar, derivative)
+        }
     }
 }
 

@@ -170,7 +170,9 @@ impl Series {
                 let factor = row[j] / count.max(1) as f64;
                 column.iter_mut().zip(row.iter()).for_each(|(within, s)| *within -= factor * s);
             }
-            row.iter_mut().for_each(|s| *s /= block as f64);
+            for s in row.iter_mut() {
+                *s /= block as f64;
+            }
         }
         series
     }
@@ -247,7 +249,9 @@ impl Series {
         filtered.truncate(self.used.len() * width);
         for (row, used) in filtered.chunks_exact_mut(width.max(1)).zip(&self.used) {
             let factor = if *used { noise.innovation } else { 0.0 };
-            row.iter_mut().for_each(|s| *s *= factor);
+            for s in row.iter_mut() {
+                *s *= factor;
+            }
         }
     }
 
@@ -352,9 +356,8 @@ impl WithSimd for Squares<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let used: Vec<usize> =
-            (0..self.width / VECTOR).map(|v| (self.parameters - v * VECTOR).min(VECTOR)).collect();
-        let rows = Rows { rows: self.rows, stride: self.width, samples: self.rows.len() / self.width };
+        let used: Vec<usize> = (0..self.width / VECTOR).map(|v| (self.parameters - v * VECTOR).min(VECTOR)).collect();
+        let rows = Rows { values: self.rows, stride: self.width, samples: self.rows.len() / self.width };
         rows.add_squares(simd, &used, self.matrix, self.width);
     }
 }

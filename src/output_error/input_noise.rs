@@ -7,6 +7,7 @@
 //! adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. However many surfaces there are, they reach the aircraft through three
 //! coefficients, so three vectors g a sample are enough.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::{DMatrix, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
@@ -180,7 +181,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
             }
             if k % CHUNK == 0 {
                 let samples = COEFFICIENTS * CHUNK.min(samples - k);
-                Rows { rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
+                Rows { values: rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
             }
         }
     }

@@ -172,7 +172,9 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     ) -> Vec<Series> {
         let members = self.members.iter().zip(response.iter().zip(sensitivities));
         members
-            .flat_map(|(m, (r, s))| m.case.series(r, s, weights).into_iter().map(|s| s.widened(&m.places, self.names.len())))
+            .flat_map(|(m, (r, s))| {
+                m.case.series(r, s, weights).into_iter().map(|s| s.widened(&m.places, self.names.len()))
+            })
             .collect()
     }
 

@@ -8,6 +8,7 @@
 //! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed alike in all of them, with
 //! fused multiplication, so the width does not show in the results.
 #![expect(clippy::inline_always, reason = "compiled into one loop for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -66,11 +67,7 @@ struct Linear<const NX: usize> {
 
 impl<const NX: usize> Linear<NX> {
     const NONE: Linear<NX> = Linear {
-        reading: Reading {
-            times: [1.0; VECTOR],
-            c: [[0.0; NX]; OUTPUTS],
-            d: [[0.0; COEFFICIENTS]; OUTPUTS],
-        },
+        reading: Reading { times: [1.0; VECTOR], c: [[0.0; NX]; OUTPUTS], d: [[0.0; COEFFICIENTS]; OUTPUTS] },
         slopes: [Slopes { times: [1.0; VECTOR], a: [[0.0; NX]; NX], b: [[0.0; COEFFICIENTS]; NX] }; STAGES],
     };
 }

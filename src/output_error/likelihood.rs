@@ -93,12 +93,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         cramer_rao::variances(&residuals, &self.used(), self.parameters())
     }
 
-    fn series(
-        &self,
-        response: &Response,
-        sensitivities: &Sensitivities,
-        weights: &[f64; OUTPUTS],
-    ) -> Vec<Series> {
+    fn series(&self, response: &Response, sensitivities: &Sensitivities, weights: &[f64; OUTPUTS]) -> Vec<Series> {
         let all = cost::residuals(&self.measurements, response);
         let series = |o: usize| {
             let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
