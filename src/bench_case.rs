@@ -124,7 +124,7 @@ pub fn load(file: &Path) -> Result<Subject> {
     let columns = files::columns(&table)?;
     let aircraft = given.aircraft();
     let record = given.record(&columns).map_err(|what| Error::config(&table, None, what))?;
-    let derivative = |name: &String| given.derivative(name).map_err(|what| Error::config(file, None, what));
+    let derivative = |name: &String| derivative(name).map_err(|what| Error::config(file, None, what));
     let mut free = Vec::new();
     let mut biases = Vec::new();
     for name in given.start.keys() {
@@ -145,7 +145,7 @@ pub fn timed(subject: &Subject, repetitions: usize) -> Result<Timed, String> {
     let clock = Clock::start();
     let mut estimated = subject.estimate()?;
     let first_s = clock.wall_s();
-    let corrected = estimated.corrected(subject)?.unwrap_or_default();
+    let corrected = estimated.corrected(subject).unwrap_or_default();
     let (mut wall_s, mut cpu_s, mut ready_s, mut corrected_s) = (vec![], vec![], vec![], vec![]);
     for _ in 0..repetitions {
         let clock = Clock::start();
@@ -154,7 +154,7 @@ pub fn timed(subject: &Subject, repetitions: usize) -> Result<Timed, String> {
         cpu_s.push(clock.cpu_s());
         ready_s.push(again.ready_s);
         let clock = Clock::start();
-        again.corrected(subject)?;
+        again.corrected(subject);
         corrected_s.push(clock.wall_s());
     }
     let Estimated { fit, std, case, .. } = &estimated;
@@ -210,7 +210,7 @@ struct Estimated {
 
 impl Estimated {
     /// Standard errors with autocorrelation and the surfaces' noise counted; none where the data determine none.
-    fn corrected(&mut self, subject: &Subject) -> Result<Option<Vec<f64>>, String> {
+    fn corrected(&mut self, subject: &Subject) -> Option<Vec<f64>> {
         let names = &self.case.names;
         let mut free: Vec<&Derivative> = subject.free.iter().collect();
         free.sort_by_key(|d| names.iter().position(|name| *name == d.name));
@@ -220,10 +220,10 @@ impl Estimated {
         let Identified::Determined { root, .. } =
             cramer_rao::identified(&information, self.settings.max_condition_number)
         else {
-            return Ok(None);
+            return None;
         };
-        let bounds = cramer_rao::bounds(&root, &self.case, &self.fit);
-        Ok(bounds.map(|b| b.corrected.diagonal().iter().map(|v| v.sqrt()).collect()))
+        let bounds = cramer_rao::bounds(&root, &self.case, &self.fit)?;
+        Some(bounds.corrected.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 }
 
@@ -264,6 +264,17 @@ impl Subject {
         case
     }
 
+    /// Free derivatives and held ones with their values.
+    #[must_use]
+    pub fn derivatives(&self) -> (&[Derivative], &[(Derivative, f64)]) {
+        (&self.free, &self.held)
+    }
+
+    #[must_use]
+    pub fn aircraft(&self) -> &Aircraft {
+        &self.aircraft
+    }
+
     /// The case's starting values in the order of its parameters, and its weights.
     #[must_use]
     pub fn start(&self, case: &Case<3, Longitudinal>) -> (Vec<f64>, [f64; OUTPUTS]) {
@@ -293,23 +304,23 @@ fn bias(name: &str) -> Option<Bias> {
     Some(Bias { name: name.to_owned(), output })
 }
 
-impl Given {
-    /// Coefficient, then `0`, `a`, `q` or the column of a surface; that of a thrust-vectoring vane ends in `v`.
-    fn derivative(&self, name: &str) -> Result<Derivative, String> {
-        let coefficients = Axis::Longitudinal.coefficients();
-        let of = |c: &Coefficient| name.strip_prefix(format!("{c:?}").as_str());
-        let found = coefficients.into_iter().find_map(|c| Some((c, of(&c)?)));
-        let (coefficient, along) = found.ok_or_else(|| format!("`{name}` is no derivative of CN, Cm or CA"))?;
-        let regressor = match along {
-            "0" => Regressor::Constant,
-            "a" => Regressor::Alpha,
-            "q" => Regressor::PitchRate,
-            vane if vane.ends_with('v') => Regressor::Vane(vane.to_owned()),
-            surface => Regressor::Surface(surface.to_owned()),
-        };
-        Ok(Derivative { name: name.to_owned(), coefficient, regressor })
-    }
+/// Coefficient, then `0`, `a`, `q` or the column of a surface; that of a thrust-vectoring vane ends in `v`.
+fn derivative(name: &str) -> Result<Derivative, String> {
+    let coefficients = Axis::Longitudinal.coefficients();
+    let of = |c: &Coefficient| name.strip_prefix(format!("{c:?}").as_str());
+    let found = coefficients.into_iter().find_map(|c| Some((c, of(&c)?)));
+    let (coefficient, along) = found.ok_or_else(|| format!("`{name}` is no derivative of CN, Cm or CA"))?;
+    let regressor = match along {
+        "0" => Regressor::Constant,
+        "a" => Regressor::Alpha,
+        "q" => Regressor::PitchRate,
+        vane if vane.ends_with('v') => Regressor::Vane(vane.to_owned()),
+        surface => Regressor::Surface(surface.to_owned()),
+    };
+    Ok(Derivative { name: name.to_owned(), coefficient, regressor })
+}
 
+impl Given {
     /// The c.g. is the reference point, so that arms are positions.
     fn aircraft(&self) -> Aircraft {
         let c = &self.constants;
