@@ -39,8 +39,8 @@ use conditioning::{Done, Shares};
 const INGEST_VERSION: u32 = 2;
 const SEGMENT_VERSION: u32 = 2;
 const ESTIMATE_VERSION: u32 = 6;
-const JOINT_VERSION: u32 = 2;
-const PREDICT_VERSION: u32 = 2;
+const JOINT_VERSION: u32 = 3;
+const PREDICT_VERSION: u32 = 3;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

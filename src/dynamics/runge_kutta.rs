@@ -8,22 +8,17 @@
 pub const STAGES: usize = 4;
 /// Which of start (0), middle (1) and end (2) of the step each slope is taken at.
 pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
-/// How far ahead of the start, in steps, each slope but the first is taken along the one before.
-const AHEAD: [f64; STAGES] = [0.0, 0.5, 0.5, 1.0];
-/// The share of each slope in the step.
-const SHARE: [f64; STAGES] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-
 /// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and `along(x, h, slope)` is
 /// x + h slope.
 #[inline(always)]
 pub fn step<X: Copy>(x: X, step_s: f64, mut slope: impl FnMut(usize, X) -> X, along: impl Fn(X, f64, X) -> X) -> X {
-    let mut k = slope(0, x);
-    let mut end = along(x, SHARE[0] * step_s, k);
-    for stage in 1..STAGES {
-        k = slope(stage, along(x, AHEAD[stage] * step_s, k));
-        end = along(end, SHARE[stage] * step_s, k);
-    }
-    end
+    let half = 0.5 * step_s;
+    let k1 = slope(0, x);
+    let k2 = slope(1, along(x, half, k1));
+    let k3 = slope(2, along(x, half, k2));
+    let k4 = slope(3, along(x, step_s, k3));
+    let (sixth, third) = (step_s / 6.0, step_s / 3.0);
+    along(along(along(along(x, sixth, k1), third, k2), third, k3), sixth, k4)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! is stopped). With fused multiplication throughout, every processor gets the same bits.
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4};
 
 /// sin(r)/r − 1 over r², in powers of r².
 const SINE: [f64; 6] = [
@@ -27,7 +27,7 @@ const COSINE: [f64; 6] = [
     -1.135_964_755_778_819_5e-11,
 ];
 /// π/2 in two parts, the first exact in products with small whole numbers.
-const HALF_PI: [f64; 2] = [1.570_796_326_794_896_6, 6.123_233_995_736_766e-17];
+const HALF_PI: [f64; 2] = [FRAC_PI_2, 6.123_233_995_736_766e-17];
 
 /// (sin x, cos x) of two angles in rad, which the processor computes side by side.
 #[inline(always)]

@@ -37,7 +37,6 @@ impl<'a> Run<'a> {
         let errors: Vec<Misreading> = used.flat_map(|(signal, c)| c.misreadings(signal)).collect();
         let aircraft = self.basis.aircraft;
         let Ready { window, model, case, .. } = ready;
-        let sensitivities = &case.sensitivities(values)?;
-        Fitted { aircraft, window, model, case, values, sensitivities, weights }.gradient_shifts(&errors)
+        Fitted { aircraft, window, model, case, values, weights }.gradient_shifts(&errors)
     }
 }

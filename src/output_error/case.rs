@@ -5,6 +5,7 @@
 //!
 //! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states if they are free.
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -37,7 +38,8 @@ pub(super) struct Coefficients<const NX: usize> {
 
 impl<const NX: usize> Coefficients<NX> {
     fn zero(points: usize) -> Self {
-        let none = || vec![0.0; points];
+        // A step needs three points, also the one that would follow the last sample.
+        let none = || vec![0.0; points + 2];
         Coefficients {
             offset: std::array::from_fn(|_| none()),
             slope: std::array::from_fn(|_| std::array::from_fn(|_| none())),
@@ -53,19 +55,52 @@ impl<const NX: usize> Coefficients<NX> {
         sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += value * r);
     }
 
-    /// Their values at a point, and their slopes along the states.
+    /// Those of a point.
     #[inline(always)]
-    pub(super) fn at(&self, point: usize, x: &SVector<f64, NX>) -> ([f64; COEFFICIENTS], [[f64; NX]; COEFFICIENTS]) {
-        let (mut values, mut slopes) = ([0.0; COEFFICIENTS], [[0.0; NX]; COEFFICIENTS]);
+    pub(super) fn at(&self, point: usize) -> At<NX> {
+        self.near::<1>(point)[0]
+    }
+
+    /// Those of some points from one on.
+    #[inline(always)]
+    pub(super) fn near<const N: usize>(&self, point: usize) -> [At<NX>; N] {
+        let mut near = [At { offset: [0.0; COEFFICIENTS], slope: [[0.0; NX]; COEFFICIENTS] }; N];
         for k in 0..COEFFICIENTS {
-            values[k] = self.offset[k][point];
-            // The first state last: it is the one that the sum would wait for.
-            for i in (0..NX).rev() {
-                slopes[k][i] = self.slope[k][i][point];
-                values[k] = slopes[k][i].mul_add(x[i], values[k]);
+            let offset = &self.offset[k][point..point + N];
+            for n in 0..N {
+                near[n].offset[k] = offset[n];
+            }
+            for i in 0..NX {
+                if let Some(slope) = self.slope[k][i].get(point..point + N) {
+                    for n in 0..N {
+                        near[n].slope[k][i] = slope[n];
+                    }
+                }
             }
         }
-        (values, slopes)
+        near
+    }
+}
+
+/// The coefficients at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct At<const NX: usize> {
+    offset: [f64; COEFFICIENTS],
+    pub(super) slope: [[f64; NX]; COEFFICIENTS],
+}
+
+impl<const NX: usize> At<NX> {
+    /// Their values when the state is x.
+    #[inline(always)]
+    pub(super) fn with(&self, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+        let mut values = self.offset;
+        for k in 0..COEFFICIENTS {
+            // The first state last: it is the one that the sum would wait for.
+            for i in (0..NX).rev() {
+                values[k] = self.slope[k][i].mul_add(x[i], values[k]);
+            }
+        }
+        values
     }
 }
 
@@ -147,7 +182,9 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
         let columns = columns.values;
         let mut held_part = Coefficients::zero(window.len());
-        held.into_iter().for_each(|(acting, value)| held_part.add(value, acting, &columns[acting.column]));
+        for (acting, value) in held {
+            held_part.add(value, acting, &columns[acting.column]);
+        }
         let before = |k: usize| free.iter().filter(|d| d.coefficient.index() < k).count();
         let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
         names.extend(model.biases.iter().map(|b| b.name.clone()));
@@ -156,8 +193,10 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
         let outputs = E::AXIS.outputs();
         let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
+        let biased: Vec<usize> =
+            model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect();
         let initial = if model.initial_state == InitialState::Estimated { NX } else { 0 };
-        let lanes = Lanes::new(&acting, E::FOLLOWED, initial);
+        let lanes = Lanes::new(&acting, E::FOLLOWED, initial, biased.len());
         Case {
             step_s: window.step_s,
             known: along.known,
@@ -168,7 +207,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             acting,
             lanes,
             ranges,
-            biased: model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect(),
+            biased,
             start: mean(along.states.iter().take(TRIMMED)),
             initial_state: model.initial_state,
             states: along.states,
@@ -317,16 +356,18 @@ fn regressor<const NX: usize, E: Equations<NX>>(
         Regressor::RollRate => rate(aircraft.span_ft, p),
         Regressor::PitchRate => rate(aircraft.chord_ft, q),
         Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(_) | Regressor::Vane(_) => deflections[point] * surface_factor(aircraft, motion, derivative),
+        Regressor::Surface(_) | Regressor::Vane(_) => {
+            deflections[point] * surface_factor(aircraft, motion.qbar, derivative)
+        }
     }
 }
 
 /// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and moment are made coefficients.
-pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &Derivative) -> f64 {
+pub(super) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
     if !matches!(derivative.regressor, Regressor::Vane(_)) {
         return 1.0;
     }
-    let force = motion.qbar * aircraft.wing_area_ft2;
+    let force = qbar * aircraft.wing_area_ft2;
     let length = match derivative.coefficient.axis() {
         crate::aero::Axis::Longitudinal => aircraft.chord_ft,
         crate::aero::Axis::Lateral => aircraft.span_ft,

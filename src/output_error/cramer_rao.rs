@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::coloured;
-use super::cost::{add_square, sums};
+use super::cost::sums;
 use super::likelihood::Likelihood;
 use super::outcome::Fit;
 use crate::dynamics::{Equations, OUTPUTS};
@@ -90,13 +90,7 @@ pub struct Bounds {
 pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Option<Bounds> {
     let sensitivities = data.sensitivities(&fit.values).ok()?;
     let series = data.series(&fit.response, &sensitivities, &fit.weights);
-    let n = root.nrows();
-    let mut white = DMatrix::zeros(n, n);
-    for output in &series {
-        let factor = output.weight * output.weight * output.variance;
-        output.sensitivities.chunks_exact(n).for_each(|s| add_square(&mut white, factor, s));
-    }
-    white.fill_upper_triangle_with_lower_triangle();
+    let white = data.white_covariance(&fit.response, &fit.weights);
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
     let inputs = data.input_covariance(&fit.values, &sensitivities, &fit.weights);

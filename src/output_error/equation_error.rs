@@ -41,7 +41,7 @@ fn regress<const NX: usize, E: Equations<NX>>(
     let coefficients = case.with(prior);
     let (mut normal, mut right) = (DMatrix::zeros(range.len(), range.len()), DVector::zeros(range.len()));
     for (sample, (state, implied)) in case.states.iter().zip(&case.implied).enumerate() {
-        let (computed, _) = coefficients.at(2 * sample, state);
+        let computed = coefficients.at(2 * sample).with(state);
         case.regressors_at(2 * sample, state, &mut regressors);
         let error = implied[coefficient] - computed[coefficient];
         let row = &regressors[range.clone()];
@@ -114,7 +114,7 @@ fn rows<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usiz
     let coefficients = case.with(none);
     let samples = case.states.iter().zip(&case.implied).enumerate();
     let row = samples.map(|(sample, (state, implied))| {
-        let (held, _) = coefficients.at(2 * sample, state);
+        let held = coefficients.at(2 * sample).with(state);
         case.regressors_at(2 * sample, state, &mut regressors);
         let mut row = regressors[case.ranges[coefficient].clone()].to_vec();
         row.extend([held[coefficient], implied[coefficient]]);

@@ -35,16 +35,6 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
         self.places.iter().map(|&place| joint[place]).collect()
     }
 
-    /// A series with the sensitivities to all joint parameters, zero to those of other members.
-    fn widened(&self, series: Series, parameters: usize) -> Series {
-        let mut sensitivities = vec![0.0; series.used.len() * parameters];
-        let own = series.sensitivities.chunks_exact(self.places.len());
-        for (wide, own) in sensitivities.chunks_exact_mut(parameters).zip(own) {
-            self.places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
-        }
-        Series { sensitivities, ..series }
-    }
-
     fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
         for (j, &column) in self.places.iter().enumerate() {
             for (i, &row) in self.places.iter().enumerate() {
@@ -182,8 +172,18 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     ) -> Vec<Series> {
         let members = self.members.iter().zip(response.iter().zip(sensitivities));
         members
-            .flat_map(|(m, (r, s))| m.case.series(r, s, weights).into_iter().map(|s| m.widened(s, self.names.len())))
+            .flat_map(|(m, (r, s))| {
+                m.case.series(r, s, weights).into_iter().map(|s| s.widened(&m.places, self.names.len()))
+            })
             .collect()
+    }
+
+    fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
+        for (member, own) in self.members.iter().zip(response) {
+            member.add(&member.case.white_covariance(own, weights), &mut sum);
+        }
+        sum
     }
 
     fn input_covariance(

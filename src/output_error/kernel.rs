@@ -8,6 +8,7 @@
 //! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed alike in all of them, with
 //! fused multiplication, so the width does not show in the results.
 #![expect(clippy::inline_always, reason = "compiled into one loop for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -35,12 +36,10 @@ pub(super) trait Sink {
 type Times = [f64; VECTOR];
 
 #[inline(always)]
-fn times<const NX: usize>(followed: &[usize], x: &SVector<f64, NX>) -> Times {
-    let mut times = [1.0; VECTOR];
+fn set_times<const NX: usize>(times: &mut Times, followed: &[usize], x: &SVector<f64, NX>) {
     for (slot, &state) in followed.iter().enumerate() {
         times[slot] = x[state];
     }
-    times
 }
 
 /// Slopes at one stage of a step.
@@ -132,13 +131,14 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             let mut work = Work {
                 simd,
                 lanes,
-                regressors: &regressors[2 * behind * lanes.derivatives()..],
-                sensitivities: &mut *sensitivities,
-                rows: &mut rows[behind % CHUNK * row..],
+                regressors: S::as_simd_f64s(&regressors[2 * behind * lanes.derivatives()..]).0,
+                sensitivities: S::as_mut_simd_f64s(sensitivities).0,
+                rows: S::as_mut_simd_f64s(&mut rows[behind % CHUNK * row..]).0,
                 linear: before,
                 step_s: case.step_s,
                 steps: behind + 1 < samples,
             };
+            let near = self.coefficients.near::<3>((2 * sample).min(2 * samples - 2));
             if sample < samples {
                 let mut sensible = true;
                 for i in 0..NX {
@@ -147,49 +147,43 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 if !sensible {
                     return Err(Diverged { sample });
                 }
-                let (c, c_by_state) = self.coefficients.at(2 * sample, &x);
+                let c = near[0].with(&x);
                 let read = E::outputs(&case.known[2 * sample], &case.sensed[sample], &x, &c);
-                now.reading = Reading {
-                    times: times(E::FOLLOWED, &x),
-                    c: total(
-                        E::OUTPUTS_BY_STATE,
-                        E::OUTPUTS_BY_COEFFICIENT,
-                        E::FOLLOWED,
-                        &read.by_state,
-                        &read.by_coefficient,
-                        &c_by_state,
-                    ),
-                    d: rows_of(&read.by_coefficient),
-                };
+                let reading = &mut now.reading;
+                set_times(&mut reading.times, E::FOLLOWED, &x);
+                set(&mut reading.d, E::OUTPUTS_BY_COEFFICIENT, &read.by_coefficient);
+                set(&mut reading.c, E::OUTPUTS_BY_STATE, &read.by_state);
+                let slopes = &near[0].slope;
+                add_through(&mut reading.c, E::OUTPUTS_BY_COEFFICIENT, E::FOLLOWED, &read.by_coefficient, slopes);
                 for o in 0..OUTPUTS {
                     self.outputs[sample][o] = read.outputs[o] + self.biases[o];
                 }
             }
             if sample + 1 < samples {
+                let known = &case.known[2 * sample..2 * sample + 3];
                 x = runge_kutta::step(
                     x,
                     case.step_s,
                     #[inline(always)]
                     |stage, x| {
-                        let point = 2 * sample + runge_kutta::POINT[stage];
-                        let (c, c_by_state) = self.coefficients.at(point, &x);
-                        let rates = E::rates(&case.known[point], &x, &c);
-                        now.slopes[stage] = Slopes {
-                            times: times(E::FOLLOWED, &x),
-                            a: total(
-                                E::RATES_BY_STATE,
-                                E::RATES_BY_COEFFICIENT,
-                                E::FOLLOWED,
-                                &rates.by_state,
-                                &rates.by_coefficient,
-                                &c_by_state,
-                            ),
-                            b: rows_of(&rates.by_coefficient),
-                        };
+                        let point = runge_kutta::POINT[stage];
+                        let rates = E::rates(&known[point], &x, &near[point].with(&x));
+                        let at = &mut now.slopes[stage];
+                        set_times(&mut at.times, E::FOLLOWED, &x);
+                        set(&mut at.b, E::RATES_BY_COEFFICIENT, &rates.by_coefficient);
+                        set(&mut at.a, E::RATES_BY_STATE, &rates.by_state);
+                        let slopes = &near[point].slope;
+                        add_through(&mut at.a, E::RATES_BY_COEFFICIENT, E::FOLLOWED, &rates.by_coefficient, slopes);
                         rates.rates
                     },
                     #[inline(always)]
-                    |x, h, k| x + k * h,
+                    |x, h, k| {
+                        let mut moved = x;
+                        for i in 0..NX {
+                            moved[i] = k[i].mul_add(h, x[i]);
+                        }
+                        moved
+                    },
                 );
             }
             if sample > 0 {
@@ -215,38 +209,32 @@ fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Alig
     sensitivities
 }
 
-/// Slopes along the states with those through the coefficients, where they can be other than zero.
+/// Takes over what can be other than zero.
 #[inline(always)]
-fn total<const N: usize, const NX: usize>(
-    along_states: &[(usize, usize)],
-    along_coefficients: &[(usize, usize)],
-    followed: &[usize],
-    by_state: &nalgebra::SMatrix<f64, N, NX>,
-    by_coefficient: &nalgebra::SMatrix<f64, N, COEFFICIENTS>,
-    c_by_state: &[[f64; NX]; COEFFICIENTS],
-) -> [[f64; NX]; N] {
-    let mut sum = [[0.0; NX]; N];
-    for &(i, j) in along_states {
-        sum[i][j] = by_state[(i, j)];
+fn set<const N: usize, const M: usize>(
+    rows: &mut [[f64; M]; N],
+    places: &[(usize, usize)],
+    slopes: &nalgebra::SMatrix<f64, N, M>,
+) {
+    for &(i, j) in places {
+        rows[i][j] = slopes[(i, j)];
     }
-    for &(i, k) in along_coefficients {
-        for &j in followed {
-            sum[i][j] = by_coefficient[(i, k)].mul_add(c_by_state[k][j], sum[i][j]);
-        }
-    }
-    sum
 }
 
-/// The rows of a matrix.
+/// Adds to slopes along states those through the coefficients.
 #[inline(always)]
-fn rows_of<const N: usize, const M: usize>(matrix: &nalgebra::SMatrix<f64, N, M>) -> [[f64; M]; N] {
-    let mut rows = [[0.0; M]; N];
-    for i in 0..N {
-        for j in 0..M {
-            rows[i][j] = matrix[(i, j)];
+fn add_through<const N: usize, const NX: usize>(
+    by_state: &mut [[f64; NX]; N],
+    places: &[(usize, usize)],
+    followed: &[usize],
+    by_coefficient: &nalgebra::SMatrix<f64, N, COEFFICIENTS>,
+    c_by_state: &[[f64; NX]; COEFFICIENTS],
+) {
+    for &(i, k) in places {
+        for &j in followed {
+            by_state[i][j] = by_coefficient[(i, k)].mul_add(c_by_state[k][j], by_state[i][j]);
         }
     }
-    rows
 }
 
 /// One sample's work on the lanes.
@@ -254,9 +242,9 @@ struct Work<'a, S: Simd, const NX: usize> {
     simd: S,
     lanes: &'a Lanes,
     /// Rows of regressors from the sample's point on.
-    regressors: &'a [f64],
-    sensitivities: &'a mut [f64],
-    rows: &'a mut [f64],
+    regressors: &'a [S::f64s],
+    sensitivities: &'a mut [S::f64s],
+    rows: &'a mut [S::f64s],
     linear: &'a Linear<NX>,
     step_s: f64,
     /// Whether a step follows: not after the last sample.
@@ -288,12 +276,12 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
         for n in 0..N {
             let at = lanes.groups[groups[n]].start + lane;
             for i in 0..NX {
-                s[n][i] = load::<S>(self.sensitivities, i * width + at);
+                s[n][i] = self.sensitivities[(i * width + at) / S::F64_LANES];
             }
             r[n] = self.regressor(groups[n], lane, 0, &linear.reading.times);
             let y = read::<S, NX, E>(simd, groups[n], &linear.reading, &s[n], r[n]);
             for o in 0..OUTPUTS {
-                store::<S>(self.rows, o * width + at, y[o]);
+                self.rows[(o * width + at) / S::F64_LANES] = y[o];
             }
         }
         if !self.steps {
@@ -327,7 +315,7 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
         for n in 0..N {
             let at = lanes.groups[groups[n]].start + lane;
             for i in 0..NX {
-                store::<S>(self.sensitivities, i * width + at, next[n][i]);
+                self.sensitivities[(i * width + at) / S::F64_LANES] = next[n][i];
             }
         }
     }
@@ -339,7 +327,7 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
             return self.simd.splat_f64s(0.0);
         }
         let at = point * self.lanes.derivatives() + self.lanes.groups[group].start + lane;
-        let regressor = load::<S>(self.regressors, at);
+        let regressor = self.regressors[at / S::F64_LANES];
         if lane < VECTOR { self.simd.mul_f64s(regressor, load::<S>(times, lane)) } else { regressor }
     }
 }

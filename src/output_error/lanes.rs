@@ -23,8 +23,10 @@ pub(super) struct Lanes {
     pub groups: [Range<usize>; GROUPS],
     /// The lane of each parameter in order, without the biases.
     pub places: Vec<usize>,
+    /// Lanes left over: for the residual and a one when sums are taken, for the biases when sensitivities are kept.
     pub residual: usize,
     pub one: usize,
+    pub biases: Vec<usize>,
     /// Lanes in use of each vector, from its first.
     pub used: Vec<usize>,
 }
@@ -36,7 +38,7 @@ fn padded(count: usize) -> usize {
 impl Lanes {
     /// The layout for these derivatives, sorted by coefficient, and this number of free initial states. `followed` are
     /// the states that derivatives can be along.
-    pub fn new(acting: &[Acting], followed: &[usize], initial: usize) -> Lanes {
+    pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
         let of = |k: usize| acting.iter().filter(move |a| a.coefficient == k);
         let count = |k: usize| followed.len() + of(k).filter(|a| a.along.is_none()).count();
         let widest = (0..COEFFICIENTS).map(count).max().filter(|_| !acting.is_empty()).map_or(0, padded);
@@ -53,9 +55,10 @@ impl Lanes {
         let first = COEFFICIENTS * widest;
         lanes.groups[COEFFICIENTS] = first..first + padded(initial);
         lanes.places.extend(first..first + initial);
-        let mut left_over = (0..).filter(|lane| !lanes.places.contains(lane));
-        (lanes.residual, lanes.one) = (left_over.next().unwrap_or(0), left_over.next().unwrap_or(0));
-        let last = lanes.places.iter().copied().chain([lanes.residual, lanes.one]).max().unwrap_or(0);
+        let left_over: Vec<usize> = (0..).filter(|lane| !lanes.places.contains(lane)).take(biases.max(2)).collect();
+        (lanes.residual, lanes.one) = (left_over[0], left_over[1]);
+        lanes.biases = left_over[..biases].to_vec();
+        let last = lanes.places.iter().chain(&left_over).copied().max().unwrap_or(0);
         let last_of = |vector: usize| {
             let lanes = lanes.places.iter().copied().chain([lanes.residual, lanes.one]);
             lanes.filter(|lane| lane / VECTOR == vector).map(|lane| lane % VECTOR + 1).max().unwrap_or(0)

@@ -49,6 +49,9 @@ pub trait Likelihood {
         weights: &[f64; OUTPUTS],
     ) -> Vec<Series>;
 
+    /// Σ Sᵀ W R W S for white residuals.
+    fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64>;
+
     /// What noise of what is taken as exact does to the gradient.
     fn input_covariance(
         &self,
@@ -91,19 +94,25 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
     }
 
     fn series(&self, response: &Response, sensitivities: &Sensitivities, weights: &[f64; OUTPUTS]) -> Vec<Series> {
-        let residuals = cost::residuals(&self.measurements, response);
-        let variances = Likelihood::variances(self, response);
-        let n = self.parameters();
+        let all = cost::residuals(&self.measurements, response);
         let series = |o: usize| {
             let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
-            let mut sensitivities = sensitivities.of(o).to_vec();
-            for (row, _) in sensitivities.chunks_exact_mut(n).zip(&used).filter(|(_, used)| !**used) {
-                row.fill(0.0);
-            }
-            let residuals = residuals.iter().map(|v| v[o]).collect();
-            Series { step_s: self.step_s, weight: weights[o], variance: variances[o], residuals, used, sensitivities }
+            let residuals: Vec<f64> = all.iter().map(|v| v[o]).collect();
+            let squares = response.normal.squares(o);
+            Series::new(self.step_s, weights[o], &residuals, &used, squares, |samples, row| {
+                let mut sum = vec![0.0; sensitivities.width];
+                for k in samples {
+                    sum.iter_mut().zip(sensitivities.row(k, o)).for_each(|(sum, s)| *sum += s);
+                }
+                row.iter_mut().zip(&sensitivities.lanes).for_each(|(row, lane)| *row += sum[*lane]);
+            })
         };
         (0..OUTPUTS).map(series).collect()
+    }
+
+    fn white_covariance(&self, response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        let variances = Likelihood::variances(self, response);
+        response.normal.information(&std::array::from_fn(|o| weights[o] * weights[o] * variances[o]))
     }
 
     fn input_covariance(

@@ -5,6 +5,7 @@
 //! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
 //! past, and only tiles that touch the lower triangle are computed.
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::{DMatrix, DVector};
 use pulp::Simd;
@@ -73,6 +74,13 @@ impl Normal {
         DVector::from_iterator(lanes.len(), lanes.iter().map(|lane| of(*lane)))
     }
 
+    /// Σ s sᵀ of one output, for all parameters.
+    pub fn squares(&self, output: usize) -> DMatrix<f64> {
+        let mut weights = [0.0; OUTPUTS];
+        weights[output] = 1.0;
+        self.information(&weights)
+    }
+
     /// Σ_o w_o Σ s sᵀ of all parameters.
     pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let width = self.lanes.width();
@@ -120,7 +128,7 @@ impl Sink for Summing<'_> {
             }
         }
         for o in 0..OUTPUTS {
-            let rows = Rows { rows: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
+            let rows = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
             rows.add_squares(simd, &lanes.used, squares[o].slice_mut(), width);
         }
     }
@@ -129,7 +137,7 @@ impl Sink for Summing<'_> {
 /// Rows of some samples, `stride` apart.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
-    pub rows: &'a [f64],
+    pub values: &'a [f64],
     pub stride: usize,
     pub samples: usize,
 }
@@ -185,7 +193,7 @@ impl Rows<'_> {
             }
         }
         for k in 0..self.samples {
-            let row = &self.rows[k * self.stride..];
+            let row = &self.values[k * self.stride..];
             let mut s = [simd.splat_f64s(0.0); C];
             for c in 0..C {
                 s[c] = load::<S>(row, lane + c * S::F64_LANES);

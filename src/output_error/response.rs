@@ -5,6 +5,7 @@ use pulp::Simd;
 
 use super::case::Case;
 use super::kernel::Sink;
+use super::lanes::Aligned;
 use super::normal::{Normal, Summing};
 use crate::dynamics::{Equations, OUTPUTS};
 
@@ -22,39 +23,49 @@ pub struct Diverged {
     pub sample: usize,
 }
 
-/// The slopes of every output at every sample along every parameter.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// The slopes of every output along every parameter at every sample, zero where a sample does not count.
+#[derive(Clone, Debug, Default)]
 pub struct Sensitivities {
-    /// Output by output, sample by sample: the slopes along the parameters in order.
-    outputs: [Vec<f64>; OUTPUTS],
-    parameters: usize,
-    /// The lane of each parameter but the biases, and that parameter.
-    places: Vec<(usize, usize)>,
-    width: usize,
+    /// Sample by sample, output by output a row of lanes.
+    rows: Aligned,
+    pub(super) width: usize,
+    /// The lane of each parameter.
+    pub(super) lanes: Vec<usize>,
 }
 
 impl Sensitivities {
-    /// The slopes of one output at one sample along the parameters.
+    /// The slope of one output at one sample along a parameter.
     #[must_use]
-    pub fn at(&self, sample: usize, output: usize) -> &[f64] {
-        &self.outputs[output][sample * self.parameters..(sample + 1) * self.parameters]
+    pub fn at(&self, sample: usize, output: usize, parameter: usize) -> f64 {
+        self.row(sample, output)[self.lanes[parameter]]
     }
 
-    /// The slopes of one output, sample by sample.
-    #[must_use]
-    pub fn of(&self, output: usize) -> &[f64] {
-        &self.outputs[output]
+    /// The lanes of one output at one sample.
+    pub(super) fn row(&self, sample: usize, output: usize) -> &[f64] {
+        &self.rows.slice()[(sample * OUTPUTS + output) * self.width..][..self.width]
     }
 }
 
-impl Sink for Sensitivities {
+/// Keeps the rows of a pass.
+struct Keeping<'a> {
+    kept: &'a mut Sensitivities,
+    used: &'a [[bool; OUTPUTS]],
+    /// The lane of each bias, and the output that it shifts.
+    biases: Vec<(usize, usize)>,
+}
+
+impl Sink for Keeping<'_> {
     fn take<S: Simd>(&mut self, _: S, first: usize, outputs: &[[f64; OUTPUTS]], rows: &mut [f64]) {
-        let n = self.parameters;
-        for (at, row) in rows.chunks_exact(self.width).take(outputs.len() * OUTPUTS).enumerate() {
-            let (sample, o) = (first + at / OUTPUTS, at % OUTPUTS);
-            let whole = &mut self.outputs[o][sample * n..(sample + 1) * n];
-            for &(lane, parameter) in &self.places {
-                whole[parameter] = row[lane];
+        let row = OUTPUTS * self.kept.width;
+        let kept = &mut self.kept.rows.slice_mut()[first * row..][..outputs.len() * row];
+        kept.copy_from_slice(&rows[..outputs.len() * row]);
+        for (row, used) in kept.chunks_exact_mut(row).zip(&self.used[first..]) {
+            for (o, row) in row.chunks_exact_mut(self.kept.width).enumerate() {
+                if used[o] {
+                    self.biases.iter().for_each(|(lane, output)| row[*lane] = f64::from(u8::from(*output == o)));
+                } else {
+                    row.fill(0.0);
+                }
             }
         }
     }
@@ -85,19 +96,16 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
     pub fn sensitivities(&self, parameters: &[f64]) -> Result<Sensitivities, Diverged> {
-        let (n, derivatives) = (self.parameters(), self.derivatives());
-        let biases = derivatives..derivatives + self.biased.len();
-        let driven = (0..n).filter(|j| !biases.contains(j));
-        let mut sensitivities = Sensitivities {
-            outputs: std::array::from_fn(|_| vec![0.0; self.samples() * n]),
-            parameters: n,
-            places: self.lanes.places.iter().copied().zip(driven).collect(),
-            width: self.lanes.width(),
+        let lanes = &self.lanes;
+        let (derivatives, initial) = lanes.places.split_at(self.derivatives());
+        let mut kept = Sensitivities {
+            rows: Aligned::zeros(self.samples() * OUTPUTS * lanes.width()),
+            width: lanes.width(),
+            lanes: [derivatives, &lanes.biases, initial].concat(),
         };
-        self.pass(parameters, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut sensitivities)?;
-        for (b, &o) in self.biased.iter().enumerate() {
-            sensitivities.outputs[o].chunks_exact_mut(n).for_each(|row| row[derivatives + b] = 1.0);
-        }
-        Ok(sensitivities)
+        let biases = lanes.biases.iter().copied().zip(self.biased.iter().copied()).collect();
+        let mut keeping = Keeping { kept: &mut kept, used: &self.measurements.used, biases };
+        self.pass(parameters, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut keeping)?;
+        Ok(kept)
     }
 }

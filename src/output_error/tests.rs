@@ -165,7 +165,7 @@ fn gradients_match<const NX: usize, E: Equations<NX>>() {
             for o in 0..OUTPUTS {
                 let numeric = (up.outputs[k][o] - down.outputs[k][o]) / (2.0 * h);
                 let scale = numeric.abs().max(1e-3 / parameters[j].abs().max(1e-2));
-                assert_abs_diff_eq!(sensitivities.at(k, o)[j] / scale, numeric / scale, epsilon = 2e-5);
+                assert_abs_diff_eq!(sensitivities.at(k, o, j) / scale, numeric / scale, epsilon = 2e-5);
             }
         }
     }

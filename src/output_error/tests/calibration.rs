@@ -40,7 +40,6 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
             model: &model,
             case: &self.case,
             values: &self.parameters,
-            sensitivities: &self.case.sensitivities(&self.parameters).unwrap(),
             weights: &TABLE,
         };
         let shifts = fitted.gradient_shifts(std::slice::from_ref(error)).unwrap();
