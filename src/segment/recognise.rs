@@ -1,7 +1,8 @@
 //! Recognition: which classes the stretches of a train fit, and what fits none.
 //!
 //! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
-//! that leave the fewest steps unexplained, then into as few as possible, then at the longest pauses. A stretch that fits
+//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then into as few as possible,
+//! then at the longest pauses. A stretch that fits
 //! several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one about
 //! counts; where nothing else differs the flags decide.
 
@@ -71,6 +72,8 @@ struct Block {
 #[derive(Clone, Copy, Debug)]
 struct Cut {
     unexplained: usize,
+    /// Steps that rules about lengths of pulses explain.
+    in_pulses: usize,
     stretches: usize,
     /// The pauses cut at, s.
     paused_s: f64,
@@ -81,7 +84,7 @@ struct Cut {
 
 impl Cut {
     fn is_better_than(&self, other: &Cut) -> bool {
-        let key = |c: &Cut| (c.unexplained, c.stretches);
+        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches);
         key(self) < key(other) || (key(self) == key(other) && self.paused_s > other.paused_s)
     }
 }
@@ -120,7 +123,7 @@ fn seen<'s>(scene: &'s Scene, train: &'s Train, (first, end): (usize, usize)) ->
 
 /// The train's stretches and what is between them, as ranges of blocks.
 fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Vec<(usize, usize, bool)> {
-    let nothing = Cut { unexplained: 0, stretches: 0, paused_s: 0.0, from: 0, is_stretch: false };
+    let nothing = Cut { unexplained: 0, in_pulses: 0, stretches: 0, paused_s: 0.0, from: 0, is_stretch: false };
     let mut best: Vec<Cut> = vec![nothing];
     for end in 1..=blocks.len() {
         let before = best[end - 1];
@@ -133,7 +136,7 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
         };
         for from in (end.saturating_sub(MOST_PAUSES)..end).rev() {
             let range = (blocks[from].first, block.end);
-            let Some(unexplained) = unexplained(&seen(scene, train, range), classes, train, range) else { continue };
+            let Some(explained) = explained(&seen(scene, train, range), classes, train, range) else { continue };
             let before = best[from];
             let paused_s = if from == 0 || !before.is_stretch {
                 0.0
@@ -141,7 +144,8 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
                 train.edges[range.0].time_s - train.edges[range.0 - 1].time_s
             };
             let candidate = Cut {
-                unexplained: before.unexplained + unexplained,
+                unexplained: before.unexplained + explained.0,
+                in_pulses: before.in_pulses + explained.1,
                 stretches: before.stretches + 1,
                 paused_s: before.paused_s + paused_s,
                 from,
@@ -163,15 +167,18 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
     parts
 }
 
-/// How many of a stretch's edges no class explains that it fits; none where it fits no class.
-fn unexplained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<usize> {
+/// How many of a stretch's edges the class that explains most of them leaves, and how many it has in pulses; none where it
+/// fits no class.
+fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<(usize, usize)> {
     let edges = train.edges.get(first..end)?;
-    let of_class = |class: &&&Class| {
+    let of_class = |class: &&Class| {
         let inputs = class.recognition.inputs();
-        edges.iter().filter(|e| !inputs.contains(e.signal)).count()
+        let left = edges.iter().filter(|e| !inputs.contains(e.signal)).count();
+        let in_pulses = edges.iter().filter(|e| class.recognition.pulses.contains_key(e.signal)).count();
+        (left, in_pulses)
     };
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
-    fitting.map(|c| of_class(&c)).min()
+    fitting.map(of_class).min_by_key(|(left, in_pulses)| (*left, usize::MAX - in_pulses))
 }
 
 fn verdict<'a>(seen: &Seen, classes: &[&'a Class]) -> Verdict<'a> {

@@ -167,7 +167,7 @@ fn a_new_class_a_frequency_sweep_is_a_matter_of_yaml() {
     let (head, rest) = olon.split_once("recognise:").unwrap();
     let (_, rest) = rest.split_once("# Table 1").unwrap();
     let head = head.replace("class: OLON", "class: SWEEP");
-    let rule = "recognise:\n  flags: {obes: true}\n  sweep: {de_deg: {at_least: 12, ratio: 3}}\n  steps: {dtef_deg: {at_most: 2}}\n  \
+    let rule = "recognise:\n  flags: {obes: true}\n  sweep: {de_deg: {at_least: 12, ratio: 2}}\n  steps: {dtef_deg: {at_most: 2}}\n  \
                 lead_in_s: 1\n  decay_s: 2.4\n\n# Table 1";
     fs::write(campaign.path("pipeline/maneuvers/sweep.yaml"), format!("{head}{rule}{rest}")).unwrap();
     campaign.harvest("segment");
