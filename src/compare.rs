@@ -405,6 +405,7 @@ mod tests {
             value: Some(4.0),
             bound: Some(0.1),
             bound_held: None,
+            bound_calibration: None,
             bound_corrected: Some(0.4),
             wind_tunnel: None,
             variance_inflation: None,

@@ -396,8 +396,13 @@ mod tests {
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
         let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
-        assert!(Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2);
+        assert!(
+            Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2
+        );
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
-        assert_eq!(Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(), 0);
+        assert_eq!(
+            Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(),
+            0
+        );
     }
 }
