@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_roll_steps};
 
 /// Tables and their columns that other programs rely on, with the stage that publishes them.
-const PUBLISHED: [(&str, &str, &str); 13] = [
+const PUBLISHED: [(&str, &str, &str); 19] = [
     ("ingest", "channels", "flight_id channel signal samples bridged despiked missing verdict"),
     ("ingest", "checks", "flight_id relation signals slope correlation verdict"),
     ("ingest", "problems", "stage flight_id place reason"),
@@ -81,7 +81,7 @@ const PUBLISHED: [(&str, &str, &str); 13] = [
 
 /// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
 /// nothing fails.
-const WITHOUT_ROWS: [&str; 4] = ["events", "joint", "predictions", "problems"];
+const WITHOUT_ROWS: [&str; 6] = ["beyond_tunnel", "changes", "events", "joint", "predictions", "problems"];
 
 const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
 
