@@ -132,7 +132,8 @@ impl Contents<'_> {
     /// Between which Mach numbers and third values the maneuvers flew that speak for a derivative.
     fn flown(&self, name: &str) -> Option<Flown> {
         let group = self.groups.group_of(name)?;
-        let estimates = self.estimates.iter().filter(|e| e.derivative == name && e.value.is_some() && group.has(&e.class));
+        let estimates =
+            self.estimates.iter().filter(|e| e.derivative == name && e.value.is_some() && group.has(&e.class));
         let ids: std::collections::BTreeSet<&str> = estimates.map(|e| e.maneuver_id.as_str()).collect();
         let maneuvers = || self.maneuvers.iter().filter(|m| ids.contains(m.maneuver_id.as_str()));
         let third = range(maneuvers().filter_map(|m| m.condition(self.tunnel).third));
@@ -221,7 +222,8 @@ impl Table {
                 None => words.push((run[0].source.clone(), vec![span])),
             }
         }
-        let words: Vec<String> = words.into_iter().map(|(source, spans)| format!("{source}: {}", spans.join(", "))).collect();
+        let words: Vec<String> =
+            words.into_iter().map(|(source, spans)| format!("{source}: {}", spans.join(", "))).collect();
         words.join("; ")
     }
 }

@@ -290,7 +290,9 @@ mod tests {
         for unit in [Number, PerDeg, PerRad, LbfPerDeg, FtLbfPerDeg] {
             assert_eq!(unit.factor_from(unit.name()), Some(1.0));
         }
-        for (unit, written) in [(PerDeg, "-"), (Number, "per_deg"), (PerDeg, "lbf_per_deg"), (PerDeg, "per_ft"), (PerDeg, "x")] {
+        for (unit, written) in
+            [(PerDeg, "-"), (Number, "per_deg"), (PerDeg, "lbf_per_deg"), (PerDeg, "per_ft"), (PerDeg, "x")]
+        {
             assert_eq!(unit.factor_from(written), None, "{written}");
         }
     }

@@ -61,10 +61,7 @@ pub(super) fn monotone(
     let (h, t) = (length(low), fraction);
     let (d0, d1) = (slope(low), slope(high));
     let (t2, t3) = (t * t, t * t * t);
-    (2.0 * t3 - 3.0 * t2 + 1.0) * y0
-        + (t3 - 2.0 * t2 + t) * h * d0
-        + (3.0 * t2 - 2.0 * t3) * y1
-        + (t3 - t2) * h * d1
+    (2.0 * t3 - 3.0 * t2 + 1.0) * y0 + (t3 - 2.0 * t2 + t) * h * d0 + (3.0 * t2 - 2.0 * t3) * y1 + (t3 - t2) * h * d1
 }
 
 fn inner_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {

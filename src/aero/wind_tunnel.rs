@@ -388,7 +388,8 @@ mod tests {
 
     #[test]
     fn a_monotone_cubic_runs_through_the_points_and_differs_between_them() {
-        let mut cubic = WindTunnel::new(Settings { interpolation: Interpolation::MonotoneCubic, ..Settings::default() });
+        let mut cubic =
+            WindTunnel::new(Settings { interpolation: Interpolation::MonotoneCubic, ..Settings::default() });
         let straight = tunnel(&points());
         for (alpha_deg, mach, value) in points() {
             cubic.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });

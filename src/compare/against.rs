@@ -42,7 +42,12 @@ impl Earlier {
 
 /// One row per derivative and α of the trend that speaks for it.
 #[must_use]
-pub fn changes(trends: &[TrendRow], earlier: &Earlier, groups: &trend::Settings, settings: &Settings) -> Vec<ChangeRow> {
+pub fn changes(
+    trends: &[TrendRow],
+    earlier: &Earlier,
+    groups: &trend::Settings,
+    settings: &Settings,
+) -> Vec<ChangeRow> {
     let speaks = |t: &&TrendRow| groups.group_of(&t.derivative).is_some_and(|g| g.name == t.group);
     let row = |t: &TrendRow| {
         let before = earlier.at(t);

@@ -239,7 +239,11 @@ mod tests {
         ];
         assert_eq!(
             said(&rows),
-            ["no tunnel value at 35°", "flight higher than tunnel at 40°, by 2.500e0 per_deg", "sign differs above 40°"]
+            [
+                "no tunnel value at 35°",
+                "flight higher than tunnel at 40°, by 2.500e0 per_deg",
+                "sign differs above 40°"
+            ]
         );
     }
 

@@ -10,8 +10,8 @@ use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Hold;
 use crate::flight::signal;
 use crate::maneuver::{Class, Event, Status};
-use crate::store::files::{self, TunnelRow};
 use crate::store;
+use crate::store::files::{self, TunnelRow};
 use crate::units::Unit;
 
 /// Reads the tunnel's tables, in the units of the model's derivatives.
@@ -425,7 +425,11 @@ fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
     let (trend, compare) = (&config.trend, &config.compare);
     let knots = trend.knots_deg.iter().chain(trend.groups.iter().flat_map(|g| g.knots_deg.iter().flatten()));
     if let Some(knot) = knots.copied().find(|k| !k.is_finite()) {
-        return Err(source.error_under("trend", "knots_deg", format!("a knot is an angle of attack in deg, not {knot}")));
+        return Err(source.error_under(
+            "trend",
+            "knots_deg",
+            format!("a knot is an angle of attack in deg, not {knot}"),
+        ));
     }
     let positive = [
         ("trend", "outlier_z", trend.outlier_z),

@@ -523,7 +523,10 @@ fn a_third_variable_without_a_column_is_named() {
     let copy = Copy::new();
     copy.spoil("pipeline.yaml", "  # third: {", "  third: {");
     let e = copy.error();
-    assert_eq!(e, "data/demo/wt_tables.csv: no table depends on `altitude_ft`, which pipeline.yaml names (tunnel: third:)");
+    assert_eq!(
+        e,
+        "data/demo/wt_tables.csv: no table depends on `altitude_ft`, which pipeline.yaml names (tunnel: third:)"
+    );
 }
 
 #[test]
@@ -538,5 +541,8 @@ fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "# export:\n", "export: { jsbsim_properties: { de_dg: fcs/de } }\n");
     let e = copy.error();
-    assert!(e.starts_with(&format!("pipeline.yaml:{line}: export: no derivative is of the signal `de_dg`; did you mean")), "{e}");
+    assert!(
+        e.starts_with(&format!("pipeline.yaml:{line}: export: no derivative is of the signal `de_dg`; did you mean")),
+        "{e}"
+    );
 }

@@ -35,7 +35,8 @@ pub fn section(contents: &Contents, tables: &[Table]) -> String {
         xml.open("function", &[("name", &format!("aero/harvest/{}", word(coefficient)))]);
         let text = format!("{} without thrust-vectoring vanes", word(coefficient));
         xml.text("description", &[], &text);
-        let products: Vec<Vec<String>> = terms(contents, tables, coefficient, false).map(|d| factors(contents, d)).collect();
+        let products: Vec<Vec<String>> =
+            terms(contents, tables, coefficient, false).map(|d| factors(contents, d)).collect();
         sum(&mut xml, &products);
         xml.close();
     }

@@ -12,9 +12,9 @@ use nalgebra::Vector3;
 use super::*;
 use crate::aero::Axis;
 use crate::config::{Config, Overrides};
+use crate::export::jsbsim::section as section_of;
 use crate::simulate::aerodynamics::Aerodynamics;
 use crate::simulate::air_data::AirData;
-use crate::export::jsbsim::section as section_of;
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
 
@@ -133,7 +133,8 @@ impl Flown {
             for mach in [0.2, 0.9] {
                 for alpha_deg in [5.0, 20.0, 50.0] {
                     let value = alpha_deg * (1.0 + mach) + 1e-4 * altitude;
-                    let point = TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: Some(0.5), source: None };
+                    let point =
+                        TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: Some(0.5), source: None };
                     tunnel.insert_at("CN_alpha", Some(altitude), point);
                 }
             }
@@ -169,7 +170,8 @@ fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
     assert_eq!(slope.thirds, [10e3, 25e3, 40e3]);
     assert_eq!(slope.alphas_deg, [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0]);
     for (at, cell) in slope.points() {
-        let inside = (0.25..=0.35).contains(&at.mach) && at.third == Some(25e3) && (10.0..=40.0).contains(&at.alpha_deg);
+        let inside =
+            (0.25..=0.35).contains(&at.mach) && at.third == Some(25e3) && (10.0..=40.0).contains(&at.alpha_deg);
         assert_eq!(cell.is_flight, inside, "{at:?}");
     }
 }
@@ -231,7 +233,9 @@ fn daveml_keeps_the_uncertainties_where_every_value_has_one() {
     let path = folder.path().join("model.dml");
     std::fs::write(&path, text).unwrap();
     let found = tunnel::rows(&path, Some("altitude_ft"), |name| name == "CN_alpha").unwrap();
-    assert!(found.iter().any(|(_, r)| r.uncertainty == Some(0.5)) && found.iter().all(|(_, r)| r.uncertainty.is_some()));
+    assert!(
+        found.iter().any(|(_, r)| r.uncertainty == Some(0.5)) && found.iter().all(|(_, r)| r.uncertainty.is_some())
+    );
 }
 
 #[test]
@@ -326,8 +330,18 @@ fn the_jsbsim_tables_over_three_variables_are_the_database_s() {
     for (alpha_deg, mach, altitude) in [(12.0, 0.3, 25e3), (33.3, 0.5, 12e3), (3.0, 0.1, 50e3), (50.0, 0.25, 25e3)] {
         let condition = Condition { alpha_deg, mach, third: Some(altitude) };
         let properties = [("aero/alpha-deg", alpha_deg), ("velocities/mach", mach), ("position/h-sl-ft", altitude)];
-        let rest = ["aero/beta-deg", "aero/bi2vel", "aero/ci2vel", "velocities/p-aero-rad_sec", "velocities/q-aero-rad_sec",
-            "velocities/r-aero-rad_sec", "aero/qbar-psf", "metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft"];
+        let rest = [
+            "aero/beta-deg",
+            "aero/bi2vel",
+            "aero/ci2vel",
+            "velocities/p-aero-rad_sec",
+            "velocities/q-aero-rad_sec",
+            "velocities/r-aero-rad_sec",
+            "aero/qbar-psf",
+            "metrics/Sw-sqft",
+            "metrics/bw-ft",
+            "metrics/cbarw-ft",
+        ];
         let all = properties.into_iter().chain(rest.map(|name| (name, 0.0))).collect();
         let value = jsbsim::evaluated(&section, &all)["aero/harvest/CN_alpha"];
         assert_relative_eq!(value, database.at("CN_alpha", &condition).unwrap().value, max_relative = 1e-12);

@@ -35,10 +35,8 @@ impl Run<'_> {
     pub(super) fn compare(&self, campaign: &mut Campaign, earlier: &[Earlier]) -> Result<()> {
         let config = self.config;
         let (tunnel, settings, reports) = (&config.tunnel, &config.compare, &config.reports);
-        let comparison =
-            compare::comparison(&campaign.trends, &campaign.maneuvers, tunnel, &config.trend, settings);
-        let of_maneuvers =
-            compare::of_maneuvers(&converged(config, campaign), &campaign.maneuvers, tunnel, settings);
+        let comparison = compare::comparison(&campaign.trends, &campaign.maneuvers, tunnel, &config.trend, settings);
+        let of_maneuvers = compare::of_maneuvers(&converged(config, campaign), &campaign.maneuvers, tunnel, settings);
         let beyond = beyond::beyond(&campaign.estimates, &campaign.maneuvers, &comparison, tunnel);
         let (mut verdicts, mut worst) = ranges::of_tunnel(&comparison, tunnel, settings);
         let mut changes = Vec::new();

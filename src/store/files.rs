@@ -63,7 +63,6 @@ impl TunnelRow {
     }
 }
 
-
 /// The analyst's events, CSV with columns `flight_id,class,start_s,end_s`, each with its line.
 ///
 /// # Errors

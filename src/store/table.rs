@@ -10,9 +10,9 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::{Maneuver, Unknown};
 use crate::tables::{
-    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow, EstimateRow,
-    EventRow, ExportRow, FitRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow,
-    VerdictRow,
+    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow,
+    EstimateRow, EventRow, ExportRow, FitRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow,
+    StartRow, TrendRow, VerdictRow,
 };
 
 /// A row type with the name of its table and its columns.

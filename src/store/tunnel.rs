@@ -39,7 +39,9 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let fields: Vec<(usize, BTreeMap<String, String>)> = files::rows(path)?;
     for ((line, row), (_, fields)) in rows.iter_mut().zip(fields) {
         let Some(text) = fields.get(third).filter(|text| !text.is_empty()) else { continue };
-        let number = text.parse().map_err(|_| Error::config(path, Some(*line), format!("column `{third}`: `{text}` is no number")));
+        let number = text
+            .parse()
+            .map_err(|_| Error::config(path, Some(*line), format!("column `{third}`: `{text}` is no number")));
         row.third = Some(number?);
     }
     Ok(rows)
@@ -47,7 +49,8 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let bytes = std::fs::read(path).map_err(Error::io(path, "cannot read it"))?;
-    let frame = ParquetReader::new(Cursor::new(bytes)).finish().map_err(|e| Error::config(path, None, e.to_string()))?;
+    let frame =
+        ParquetReader::new(Cursor::new(bytes)).finish().map_err(|e| Error::config(path, None, e.to_string()))?;
     let table = Frame { path, frame: &frame };
     let [derivative, unit, source] = ["derivative", "unit", "source"].map(|name| table.words(name));
     let numbers = |name: &str| table.numbers(name);
@@ -56,7 +59,8 @@ fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)
     let (derivative, unit, source) = (derivative?, unit?, source?);
     let (alpha, mach, value, uncertainty) = (alpha?, mach?, value?, uncertainty?);
     let row = |i: usize| {
-        let lacks = |name: &str| Error::config(path, Some(i + 1), format!("column `{name}` has no value here, or is missing"));
+        let lacks =
+            |name: &str| Error::config(path, Some(i + 1), format!("column `{name}` has no value here, or is missing"));
         let at = |column: &Option<Vec<Option<f64>>>| column.as_ref().and_then(|c| c.get(i).copied().flatten());
         let word = |column: &Option<Vec<Option<String>>>| column.as_ref().and_then(|c| c.get(i).cloned().flatten());
         let row = TunnelRow {

@@ -4,6 +4,7 @@ use super::tests::{Lcg, estimate, through};
 use super::*;
 
 /// How a campaign of one derivative is drawn.
+#[derive(Debug)]
 struct Study {
     maneuvers: usize,
     /// Distinct test points in α.
@@ -47,17 +48,30 @@ fn stall(a: f64) -> f64 {
     0.08 - 0.07 / (1.0 + (-(a - 22.0) / 4.0).exp()) + 3e-4 * a
 }
 
+/// Maneuvers, test points, truth, scatter between maneuvers; the share that the band holds at least. A stall within 15° bends
+/// more than test points 5° apart show: there the band is known to hold less than it says.
+const STUDIES: [(Study, f64); 7] = [
+    (Study { maneuvers: 4, points: 4, truth: constant, scatter: 0.008 }, 0.92),
+    (Study { maneuvers: 8, points: 4, truth: constant, scatter: 0.003 }, 0.92),
+    (Study { maneuvers: 6, points: 6, truth: parabola, scatter: 0.003 }, 0.92),
+    (Study { maneuvers: 12, points: 12, truth: parabola, scatter: 0.008 }, 0.90),
+    (Study { maneuvers: 40, points: 12, truth: parabola, scatter: 0.003 }, 0.92),
+    (Study { maneuvers: 12, points: 12, truth: stall, scatter: 0.003 }, 0.84),
+    (Study { maneuvers: 40, points: 12, truth: stall, scatter: 0.008 }, 0.86),
+];
+
 #[test]
 fn the_bands_hold_the_truth_and_one_more_maneuver_as_often_as_they_say() {
-    let mut lines = Vec::new();
-    for (name, truth) in [("constant", constant as fn(f64) -> f64), ("parabola", parabola), ("stall", stall)] {
-        for (maneuvers, points) in [(4, 4), (6, 6), (8, 4), (12, 12), (20, 10), (40, 12)] {
-            for scatter in [0.0, 0.003, 0.008] {
-                let (held, predicted) = covered(&Study { maneuvers, points, truth, scatter }, 200);
-                lines.push((name, maneuvers, points, scatter, held, predicted));
-            }
-        }
+    for (study, least) in &STUDIES {
+        let (held, predicted) = covered(study, 60);
+        assert!(held >= *least, "{study:?}: {held}");
+        assert!(predicted >= 0.92, "{study:?}: {predicted}");
     }
-    let table: Vec<String> = lines.iter().map(|l| format!("{} n={} points={} scatter={} held {:.3} predicted {:.3}", l.0, l.1, l.2, l.3, l.4, l.5)).collect();
-    println!("{}", table.join("\n"));
+}
+
+#[test]
+fn the_bands_are_not_wide_for_nothing() {
+    let study = Study { maneuvers: 40, points: 12, truth: parabola, scatter: 0.008 };
+    let (held, predicted) = covered(&study, 60);
+    assert!(held < 0.99 && predicted < 0.98, "{held} {predicted}");
 }

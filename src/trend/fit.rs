@@ -20,7 +20,8 @@
 //!
 //! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not chosen count in the
 //! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance), each with its own
-//! variance and its distance from the chosen trend.
+//! variance and its distance from the chosen trend. And a criterion smooths: it leaves a bias as large as the errors. So no
+//! standard error is smaller than that of one coefficient more (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -103,7 +104,15 @@ impl Trend {
             let (other, error) = fit.at(alpha_deg);
             weight * (error * error + (other - value).powi(2))
         };
-        (value, self.orders.iter().map(variance).sum::<f64>().sqrt())
+        let averaged = self.orders.iter().map(variance).sum::<f64>().sqrt();
+        (value, averaged.max(self.error_of_the_next_order(alpha_deg)))
+    }
+
+    /// The standard error of the fit with one coefficient more; zero where the data allow none.
+    fn error_of_the_next_order(&self, alpha_deg: f64) -> f64 {
+        let size = self.best.basis.size() + 1;
+        let next = self.orders.iter().find(|(_, fit)| fit.basis.size() == size);
+        next.map_or(0.0, |(_, fit)| fit.at(alpha_deg).1)
     }
 }
 
@@ -396,8 +405,13 @@ mod tests {
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
         let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
-        assert!(Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2);
+        assert!(
+            Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2
+        );
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
-        assert_eq!(Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(), 0);
+        assert_eq!(
+            Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(),
+            0
+        );
     }
 }

@@ -81,7 +81,7 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
 
 /// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
 /// nothing fails.
-const WITHOUT_ROWS: [&str; 4] = ["events", "joint", "predictions", "problems"];
+const WITHOUT_ROWS: [&str; 6] = ["beyond_tunnel", "changes", "events", "joint", "predictions", "problems"];
 
 const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
 

@@ -32,22 +32,14 @@ const MODELS: [(&str, &str, &str); 35] = [
     ("ci", "#text", ""),
     ("breakpointDef", "description? bpVals", "bpID"),
     ("bpVals", "#text", ""),
-    (
-        "griddedTableDef",
-        "description? provenance|provenanceRef? breakpointRefs uncertainty? dataTable",
-        "gtID",
-    ),
+    ("griddedTableDef", "description? provenance|provenanceRef? breakpointRefs uncertainty? dataTable", "gtID"),
     ("breakpointRefs", "bpRef+", ""),
     ("bpRef", "", "bpID"),
     ("uncertainty", "normalPDF|uniformPDF", "effect"),
     ("normalPDF", "bounds correlatesWith* correlation*", "numSigmas"),
     ("bounds", "dataTable", ""),
     ("dataTable", "#text", ""),
-    (
-        "function",
-        "description? provenance|provenanceRef? independentVarRef+ dependentVarRef functionDefn",
-        "name",
-    ),
+    ("function", "description? provenance|provenanceRef? independentVarRef+ dependentVarRef functionDefn", "name"),
     ("independentVarRef", "", "varID"),
     ("dependentVarRef", "", "varID"),
     ("functionDefn", "griddedTableRef|griddedTableDef", ""),
@@ -63,7 +55,8 @@ const MODELS: [(&str, &str, &str); 35] = [
 
 /// All that is wrong with a document.
 pub(super) fn faults(text: &str) -> Vec<String> {
-    let document = Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..Default::default() }).unwrap();
+    let document =
+        Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..Default::default() }).unwrap();
     let nodes: Vec<Node> = document.descendants().filter(Node::is_element).collect();
     let mut faults: Vec<String> = nodes.iter().flat_map(|n| of(*n)).collect();
     let ids: Vec<&str> = nodes

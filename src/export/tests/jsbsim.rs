@@ -69,7 +69,8 @@ fn table(node: Node, all: &BTreeMap<String, f64>) -> f64 {
     };
     let plane = |data: Node| {
         let lines = lines(data);
-        let across = |l: &Vec<f64>| along(&lines[0].iter().copied().zip(l[1..].iter().copied()).collect::<Vec<_>>(), column);
+        let across =
+            |l: &Vec<f64>| along(&lines[0].iter().copied().zip(l[1..].iter().copied()).collect::<Vec<_>>(), column);
         along(&lines[1..].iter().map(|l| (l[0], across(l))).collect::<Vec<_>>(), row)
     };
     match key("table") {

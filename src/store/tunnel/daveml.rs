@@ -51,7 +51,10 @@ pub(super) fn rows(
         }
     }
     if rows.is_empty() {
-        return Err((None, "no function of the file gives a derivative of the model, by the `varID` of its dependent variable".into()));
+        return Err((
+            None,
+            "no function of the file gives a derivative of the model, by the `varID` of its dependent variable".into(),
+        ));
     }
     Ok(rows)
 }
@@ -113,7 +116,9 @@ impl<'a, 'input> File<'a, 'input> {
         let is = |known: &[&str]| names.iter().any(|name| known.contains(&name.as_str()));
         let is_third = self.third.is_some_and(|third| names.contains(&plain(third)));
         if let Some(other) = reference.attribute("interpolate").filter(|i| *i != "linear") {
-            let what = format!("`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml says (tunnel: interpolation:)");
+            let what = format!(
+                "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml says (tunnel: interpolation:)"
+            );
             return Err(self.wrong(reference, what));
         }
         if is(&["alpha", "alphadeg", "alpharad", "aoa", "angleofattack", "angleofattackdeg", "angleofattackrad"]) {
@@ -127,7 +132,9 @@ impl<'a, 'input> File<'a, 'input> {
         } else if is_third {
             Ok(Variable::Third)
         } else {
-            let what = format!("a table over `{id}`: only angle of attack, Mach number and the variable that pipeline.yaml names (tunnel: third:) are read");
+            let what = format!(
+                "a table over `{id}`: only angle of attack, Mach number and the variable that pipeline.yaml names (tunnel: third:) are read"
+            );
             Err(self.wrong(reference, what))
         }
     }
@@ -149,13 +156,19 @@ impl<'a, 'input> File<'a, 'input> {
             .map(|reference| self.breakpoints(reference))
             .collect::<Result<_, _>>()?;
         if variables.len() != breakpoints.len() {
-            return Err(self.wrong(table, format!("{} independent variables and {} breakpoints", variables.len(), breakpoints.len())));
+            return Err(self.wrong(
+                table,
+                format!("{} independent variables and {} breakpoints", variables.len(), breakpoints.len()),
+            ));
         }
         let data = child(table, "dataTable").ok_or_else(|| self.wrong(table, "no `dataTable`"))?;
         let values = self.numbers(data)?;
         let uncertainties = self.uncertainties(table, values.len())?;
         let source = child(table, "description").or(child(function, "description")).map(content);
-        self.whole(table, Grid { axes: variables.into_iter().zip(breakpoints).collect(), values, uncertainties, source })
+        self.whole(
+            table,
+            Grid { axes: variables.into_iter().zip(breakpoints).collect(), values, uncertainties, source },
+        )
     }
 
     /// A grid of which the numbers fit each other.
@@ -211,7 +224,7 @@ impl<'a, 'input> File<'a, 'input> {
 
     /// The numbers in an element's text, between commas and blanks.
     fn numbers(&self, node: Node) -> Result<Vec<f64>, Wrong> {
-        let text: String = node.children().filter_map(|n| n.text()).collect();
+        let text: String = node.children().filter(Node::is_text).filter_map(|n| n.text()).collect();
         let words = text.split([',', ' ', '\n', '\t', '\r']).filter(|w| !w.is_empty());
         let number = |word: &str| {
             let number = word.parse::<f64>().ok().filter(|v| v.is_finite());

@@ -109,10 +109,14 @@ fn daveml_s_mistakes_are_named_by_line() {
     assert_eq!(error("1, 2, <", "1, two, <"), "t.dml:14: `two` is no number");
     assert_eq!(error("0.2 0.4 0.6", "0.4 0.2 0.6"), "t.dml:10: breakpoints must ascend");
     assert_eq!(error("bpRef bpID=\"A\"", "bpRef bpID=\"B\""), "t.dml:12: there are no breakpoints `B`");
-    assert!(error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"beta\"/>")
-        .starts_with("t.dml:19: a table over `beta`"));
-    assert!(error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"mach\" interpolate=\"cubicSpline\"/>")
-        .starts_with("t.dml:19: `interpolate"));
+    assert!(
+        error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"beta\"/>")
+            .starts_with("t.dml:19: a table over `beta`")
+    );
+    assert!(
+        error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"mach\" interpolate=\"cubicSpline\"/>")
+            .starts_with("t.dml:19: `interpolate")
+    );
     assert!(error("effect=\"additive\"", "effect=\"percentage\"").starts_with("t.dml:13: only additive"));
     assert!(error("</DAVEfunc>", "").starts_with("t.dml:"));
     assert!(error("varID=\"CNalpha\"", "varID=\"lift\"").contains("no function of the file gives a derivative"));
