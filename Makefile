@@ -16,6 +16,7 @@ options = \
 	$(if $(ARCHIVE),--archive '$(ARCHIVE)') \
 	$(if $(WIND_TUNNEL),--wind-tunnel '$(WIND_TUNNEL)') \
 	$(if $(EVENTS),--events '$(EVENTS)') \
+	$(if $(AGAINST),--against '$(AGAINST)') \
 	$(if $(STORE),--store '$(STORE)') \
 	$(if $(REPORTS),--reports '$(REPORTS)') \
 	$(if $(THREADS),--threads '$(THREADS)')
@@ -25,7 +26,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report nightly check show shown simulate validate build test bench lint clean help
+.PHONY: ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest)
@@ -44,6 +45,9 @@ compare: build ## compare the trends with the wind-tunnel database
 
 report: build ## write the report
 	$(call harvest,report)
+
+export: build ## write the flight-updated derivatives for simulators: DAVE-ML, JSBSim, CSV, Parquet
+	$(call harvest,export)
 
 nightly: build ## the main job: every stage, to the report
 	$(call harvest,run)
@@ -83,7 +87,7 @@ clean: ## remove what runs made: data/store and the folders under reports (cargo
 	rm -rf data/store reports/*/
 
 help: ## this list
-	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [STORE=] [REPORTS=] [THREADS=]'
+	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [AGAINST=] [STORE=] [REPORTS=] [THREADS=]'
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo

@@ -24,6 +24,7 @@ pub mod segment;
 pub mod estimate;
 pub mod trend;
 pub mod compare;
+pub mod export;
 pub mod report;
 
 // Studies: is what the stages say of themselves true?
@@ -37,4 +38,5 @@ pub mod config;
 pub mod pipeline;
 pub mod simulation;
 pub mod validation;
+pub mod bench_case;
 pub mod cli;

@@ -5,7 +5,11 @@
 //! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
 //! the order of flights and maneuvers, whatever thread made them.
 
+mod comparison;
+mod conditioning;
+pub mod export;
 mod others;
+mod stretches;
 pub mod show;
 
 use std::path::PathBuf;
@@ -18,24 +22,25 @@ use crate::error::{Problem, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
-use crate::flight::Record;
-use crate::maneuver::Maneuver;
+use crate::flight::{Correction, Record};
+use crate::ingest::Signature;
+use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
-use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
-use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
+use crate::store::{Fingerprint, Store, archive, atomic, fingerprint, table};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
-    PredictionRow, TrendRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
+    History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
-use crate::{compare, estimate, ingest, report, segment, trend};
+use crate::{estimate, report, trend};
+use conditioning::{Done, Shares};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 2;
-const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 5;
-const JOINT_VERSION: u32 = 2;
-const PREDICT_VERSION: u32 = 2;
+const SEGMENT_VERSION: u32 = 2;
+const ESTIMATE_VERSION: u32 = 6;
+const JOINT_VERSION: u32 = 3;
+const PREDICT_VERSION: u32 = 3;
 
 /// The stages in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,30 +60,33 @@ pub trait Progress: Sync {
     fn end(&self);
 }
 
-/// One flight after ingest: where its record lies, or why there is none.
+/// One stretch of a flight after ingest: where its record lies, or why there is none.
 #[derive(Clone, Debug)]
 pub struct Flight {
     pub flight_id: String,
     fingerprint: String,
     record: PathBuf,
-    artefacts: Vec<PathBuf>,
     ingested: Ingested,
 }
 
-/// What the store keeps of ingest besides the record.
+/// What the store keeps of a stretch besides its record.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Ingested {
     accepted: bool,
     channels: Vec<ChannelRow>,
     checks: Vec<CheckRow>,
     instruments: Vec<InstrumentRow>,
+    /// What signals are corrected by when the record is read.
+    corrections: Vec<Correction>,
     problems: Vec<Problem>,
+    signature: Signature,
 }
 
 /// What the store keeps of segment.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Found {
     maneuvers: Vec<Maneuver>,
+    unknown: Vec<Unknown>,
     events: Vec<EventRow>,
     problems: Vec<Problem>,
 }
@@ -91,6 +99,8 @@ pub struct Campaign {
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,
     pub maneuvers: Vec<Maneuver>,
+    /// Excitation that fits no class.
+    pub unknown: Vec<Unknown>,
     pub events: Vec<EventRow>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
@@ -103,8 +113,17 @@ pub struct Campaign {
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
     pub trends: Vec<TrendRow>,
+    /// Maneuvers far from their trend.
+    pub outliers: Vec<OutlierRow>,
     pub comparison: Vec<ComparisonRow>,
+    /// The comparison in words, with the tunnel and with earlier campaigns.
+    pub verdicts: Vec<VerdictRow>,
+    pub disagreements: Vec<DisagreementRow>,
+    /// Against earlier campaigns, where some are named.
+    pub changes: Vec<ChangeRow>,
     pub problems: Vec<Problem>,
+    /// Rows that an earlier flight has, too: the later flight's id, from when to when, s.
+    pub again: Vec<(String, f64, f64)>,
     /// The report, where it was written.
     pub report: Option<PathBuf>,
 }
@@ -146,6 +165,8 @@ impl Campaign {
 /// the campaign's problems.
 pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
     let (run, files) = begin(config, progress)?;
+    // Read before anything is published: it may lie in the same folder.
+    let earlier = comparison::earlier(config)?;
     let mut campaign = Campaign::default();
     run.ingest(&files, &mut campaign)?;
     if until >= Stage::Segment {
@@ -158,9 +179,7 @@ pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Cam
         run.trend(&mut campaign)?;
     }
     if until >= Stage::Compare {
-        campaign.comparison =
-            compare::comparison(&campaign.trends, &campaign.maneuvers, &config.tunnel, &config.trend, &config.compare);
-        table::publish(&config.reports, &campaign.comparison)?;
+        run.compare(&mut campaign, &earlier)?;
     }
     if until >= Stage::Report {
         run.report(&mut campaign)?;
@@ -174,13 +193,21 @@ fn begin<'a>(config: &'a Config, progress: &'a dyn Progress) -> Result<(Run<'a>,
     let files = archive::find(&config.archive)?;
     let store = Store::open(&config.store)?;
     atomic::sweep(&config.reports)?;
-    Ok((Run { config, store, progress }, files))
+    let shares = Shares::of(config.ingest.memory_mb, config.channels.len(), rayon::current_num_threads());
+    Ok((Run { config, store, progress, shares }, files))
 }
 
 struct Run<'a> {
     config: &'a Config,
     store: Store,
     progress: &'a dyn Progress,
+    shares: Shares,
+}
+
+/// The fingerprint of a flight, and those of its files, or why there are none.
+struct Prints {
+    fingerprint: String,
+    content: std::result::Result<Vec<String>, String>,
 }
 
 impl Run<'_> {
@@ -206,7 +233,28 @@ impl Run<'_> {
     }
 
     fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
-        campaign.flights = self.each("ingest", files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
+        let prints: Vec<Prints> = files.par_iter().map(|f| self.prints(f)).collect();
+        let items: Vec<(&FlightFiles, &Prints)> = files.iter().zip(&prints).collect();
+        let copy = |prints: &Prints| items.iter().find(|(_, p)| p.content.is_ok() && p.content == prints.content);
+        let work = |(files, prints): &(&FlightFiles, &Prints)| {
+            let id = &files.flight_id;
+            let first = copy(prints).map(|(f, _)| &f.flight_id).filter(|first| *first != id);
+            match (&prints.content, first) {
+                (Err(reason), _) => Ok(self.refused(id, &prints.fingerprint, problem("ingest", id, id, reason))),
+                (Ok(_), Some(first)) => {
+                    let reason = format!("its files are those of flight `{first}` under another name; it is left out");
+                    Ok(self.refused(id, &prints.fingerprint, problem("ingest", id, id, &reason)))
+                }
+                (Ok(_), None) => self.ingest_flight(files, &prints.fingerprint),
+            }
+        };
+        let done = self.each_flight(&items, |(f, _)| &f.flight_id, work)?;
+        let artefacts: Vec<PathBuf> = done.iter().map(|d| d.artefact.clone()).collect();
+        for flight in done {
+            campaign.problems.extend(flight.problems);
+            campaign.flights.extend(flight.stretches);
+        }
+        stretches::same_rows(campaign);
         for flight in &campaign.flights {
             campaign.channels.extend_from_slice(&flight.ingested.channels);
             campaign.checks.extend_from_slice(&flight.ingested.checks);
@@ -214,7 +262,6 @@ impl Run<'_> {
             campaign.problems.extend_from_slice(&flight.ingested.problems);
         }
         let records: Vec<PathBuf> = campaign.flights.iter().map(|f| f.record.clone()).collect();
-        let artefacts: Vec<PathBuf> = campaign.flights.iter().flat_map(|f| f.artefacts.clone()).collect();
         self.store.keep_only("records", &records)?;
         self.store.keep_only("ingest", &artefacts)?;
         table::publish(&self.config.reports, &campaign.channels)?;
@@ -222,63 +269,31 @@ impl Run<'_> {
         table::publish(&self.config.reports, &campaign.instruments)
     }
 
-    fn ingest_flight(&self, files: &FlightFiles) -> Result<Flight> {
+    /// What decides a flight's record, and what its files hold alone.
+    fn prints(&self, files: &FlightFiles) -> Prints {
         let config = self.config;
-        let id = &files.flight_id;
-        let decides = Fingerprint::of("ingest", INGEST_VERSION)
-            .with(id)
+        let content = files.files.iter().map(|path| fingerprint::of_file(path)).collect::<Result<Vec<String>>>();
+        let content = content.map_err(|error| error.to_string());
+        let fingerprint = Fingerprint::of("ingest", INGEST_VERSION)
+            .with(&files.flight_id)
             .with(&config.channels)
             .with(&config.constants)
             .with(&config.aircraft)
-            .with(&config.ingest);
-        let fingerprint = match files.files.iter().try_fold(decides, |f, path| f.with_file(path)) {
-            Ok(fingerprint) => fingerprint.finish(),
-            Err(error) => return Ok(self.refused(id, "unreadable", problem("ingest", id, id, &error.to_string()))),
-        };
-        let path = self.store.path("ingest", id, &fingerprint, "json");
-        let record = self.store.path("records", id, &fingerprint, "parquet");
-        if let Some(ingested) = self.store.load::<Ingested>(&path)
-            && (!ingested.accepted || record_file::is_whole(&record))
-        {
-            return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], ingested });
-        }
-        let done = archive::read(files, &config.channels).and_then(|raw| {
-            ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
-        });
-        let flight = match done {
-            Ok(done) => {
-                let mut bytes = Vec::new();
-                record_file::write(&done.record, &mut bytes).map_err(|e| crate::error::Error::store(&record, &e))?;
-                atomic::place(&record, &bytes)?;
-                let ingested = Ingested {
-                    accepted: true,
-                    channels: done.channels,
-                    checks: done.checks,
-                    instruments: done.instruments,
-                    problems: done.problems,
-                };
-                Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], ingested }
-            }
-            Err(problem) => self.refused(id, &fingerprint, problem),
-        };
-        self.store.save(&path, &flight.ingested)?;
-        Ok(flight)
+            .with(&config.ingest)
+            .with(&content);
+        Prints { fingerprint: fingerprint.finish(), content }
     }
 
-    fn refused(&self, id: &str, fingerprint: &str, problem: Problem) -> Flight {
-        Flight {
+    /// A flight that has no record.
+    fn refused(&self, id: &str, fingerprint: &str, problem: Problem) -> Done {
+        let flight = Flight {
             flight_id: id.to_owned(),
             fingerprint: fingerprint.to_owned(),
-            record: self.store.path("records", id, fingerprint, "parquet"),
-            artefacts: vec![self.store.path("ingest", id, fingerprint, "json")],
-            ingested: Ingested {
-                accepted: false,
-                channels: vec![],
-                checks: vec![],
-                instruments: vec![],
-                problems: vec![problem],
-            },
-        }
+            record: self.record_path(id, fingerprint),
+            ingested: Ingested::refused(problem),
+        };
+        let artefact = self.store.path("ingest", id, fingerprint, "json");
+        Done { stretches: vec![flight], problems: vec![], artefact }
     }
 
     fn segment(&self, campaign: &mut Campaign) -> Result<()> {
@@ -288,22 +303,26 @@ impl Run<'_> {
         self.store.keep_only("segment", &paths)?;
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
+            campaign.unknown.extend(flight.unknown);
             campaign.events.extend(flight.events);
             campaign.problems.extend(flight.problems);
         }
-        let unflown = |flight_id: &str| !campaign.flights.iter().any(|f| f.flight_id == flight_id);
+        stretches::leave_out_same(campaign);
+        let unflown = |flight_id: &str| !campaign.flights.iter().any(|f| f.is_of(flight_id));
         for event in self.config.events.iter().filter(|e| unflown(&e.flight_id)) {
             let place = format!("event {} at {:.1} s", event.class, event.start_s);
             let reason = "the archive has no such flight; the analyst's list names it";
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
         table::publish(&self.config.reports, &campaign.maneuvers)?;
+        table::publish(&self.config.reports, &campaign.unknown)?;
         table::publish(&self.config.reports, &campaign.events)
     }
 
     fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
         let config = self.config;
-        let events: Vec<_> = config.events.iter().filter(|e| e.flight_id == flight.flight_id).cloned().collect();
+        let record = flight.open()?;
+        let events = flight.events(&config.events, &record.about);
         let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
         let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
             .with(&flight.fingerprint)
@@ -315,14 +334,7 @@ impl Run<'_> {
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
         }
-        let record = record_file::read(&flight.record)?;
-        let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
-        let (Segmented { maneuvers, problems }, events) = if events.is_empty() {
-            (found, Vec::new())
-        } else {
-            segment::with_events(found, &record, &events, &config.classes, &config.aircraft)
-        };
-        let found = Found { maneuvers, events, problems };
+        let found = stretches::segmented(config, &record, &events)?;
         self.store.save(&path, &found)?;
         Ok((path, found))
     }
@@ -356,7 +368,7 @@ impl Run<'_> {
     fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
         let present: Vec<Option<Estimated>> = paths.iter().map(|path| self.store.load(path)).collect();
-        let record = if present.iter().all(Option::is_some) { None } else { Some(record_file::read(&flight.record)?) };
+        let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open()?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()
@@ -364,7 +376,8 @@ impl Run<'_> {
                 let estimated = match (present, &record) {
                     (Some(estimated), _) => estimated,
                     (None, Some(record)) => {
-                        let estimated = Estimated { history: None, ..self.estimate_maneuver(record, maneuver) };
+                        let record = record.part(None, maneuver.start_s, maneuver.end_s)?;
+                        let estimated = Estimated { history: None, ..self.estimate_maneuver(&record, maneuver) };
                         self.store.save(&path, &estimated)?;
                         estimated
                     }
@@ -403,18 +416,12 @@ impl Run<'_> {
     }
 
     fn trend(&self, campaign: &mut Campaign) -> Result<()> {
-        let converged: std::collections::BTreeSet<&str> = campaign
-            .fits
-            .iter()
-            .filter(|f| f.outcome == Outcome::Converged.name())
-            .map(|f| f.maneuver_id.as_str())
-            .collect();
-        let names = self.config.derivative_names();
-        let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
-        let estimates: Vec<EstimateRow> = campaign.estimated().filter(counts).cloned().collect();
-        let (trends, problems) = trend::trends(&estimates, &self.config.trend);
-        campaign.trends = trends;
-        campaign.problems.extend(problems);
+        let estimates = comparison::converged(self.config, campaign);
+        let found = trend::trends(&estimates, &self.config.trend, |name| self.config.tunnel.alphas_deg(name));
+        campaign.trends = found.rows;
+        campaign.problems.extend(found.problems);
+        campaign.outliers = found.outliers;
+        table::publish(&self.config.reports, &campaign.outliers)?;
         table::publish(&self.config.reports, &campaign.trends)
     }
 
@@ -474,7 +481,8 @@ impl Run<'_> {
             |m| &m.maneuver_id,
             |maneuver| {
                 let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
-                let record = flight.map(|f| record_file::read(&f.record)).transpose()?;
+                let part = |f: &Flight| f.open()?.part(None, maneuver.start_s, maneuver.end_s);
+                let record = flight.map(part).transpose()?;
                 Ok(record.and_then(|record| self.estimate_maneuver(&record, maneuver).history))
             },
         )?;

@@ -16,7 +16,7 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{compare, estimate, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 pub use cards::Simulation;
 pub use written::ReportSettings;
@@ -45,6 +45,7 @@ pub struct Config {
     pub estimate: estimate::Settings,
     pub trend: trend::Settings,
     pub compare: compare::Settings,
+    pub export: export::Settings,
     pub report: ReportSettings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
@@ -58,6 +59,8 @@ pub struct Overrides {
     pub store: Option<PathBuf>,
     pub reports: Option<PathBuf>,
     pub events: Option<PathBuf>,
+    /// Folders of earlier campaigns' tables; the pipeline's own where it is empty.
+    pub against: Vec<PathBuf>,
 }
 
 impl Config {
@@ -76,7 +79,7 @@ impl Config {
         let events = overrides.events.or(pipeline.events);
         let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
         let config = Config {
-            tunnel: check::tunnel(&wind_tunnel, &buildup)?,
+            tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
             events: check::events(events.as_deref(), &classes)?,
             title: pipeline.title,
             archive: overrides.archive.unwrap_or(pipeline.archive),
@@ -93,7 +96,8 @@ impl Config {
             segment: pipeline.segment,
             estimate: pipeline.estimate,
             trend: pipeline.trend,
-            compare: pipeline.compare,
+            compare: against(pipeline.compare, overrides.against),
+            export: pipeline.export,
             report: pipeline.report,
             template,
         };
@@ -112,6 +116,11 @@ impl Config {
         let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
         derivatives.chain(self.buildup.combined.iter().map(|c| &c.name)).cloned().collect()
     }
+}
+
+/// The comparison's settings with the earlier campaigns that the command line names, where it names some.
+fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
+    if named.is_empty() { settings } else { compare::Settings { against: named, ..settings } }
 }
 
 #[cfg(test)]

@@ -137,11 +137,11 @@ fn instruments(contents: &Contents) -> TableView {
 
 /// Channels that were repaired or are not as they should be, summed over the flights with the same verdict.
 fn channels(contents: &Contents) -> TableView {
-    let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 4])> = BTreeMap::new();
+    let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 5])> = BTreeMap::new();
     for c in contents.channels.iter().filter(|c| is_noteworthy(c)) {
         let (flights, counts) = sums.entry((&c.channel, &c.signal, &c.verdict)).or_default();
         *flights += 1;
-        for (sum, n) in counts.iter_mut().zip([c.samples, c.bridged, c.despiked, c.missing]) {
+        for (sum, n) in counts.iter_mut().zip([c.samples, c.bridged, c.despiked, c.missing, c.stuck]) {
             *sum += n;
         }
     }
@@ -152,11 +152,11 @@ fn channels(contents: &Contents) -> TableView {
             [words.to_vec(), counts.map(|n| n.to_string()).to_vec(), vec![verdict.to_owned()]].concat()
         })
         .collect();
-    let heads = ["channel", "signal", "flights", "samples", "bridged", "despiked", "missing", "verdict"];
-    let note = "Short dropouts bridged, single-sample spikes replaced, samples left missing: summed over the flights.";
+    let heads = ["channel", "signal", "flights", "samples", "bridged", "despiked", "missing", "stuck", "verdict"];
+    let note = "Short dropouts bridged, single-sample spikes replaced, samples left missing or left out as stuck: summed over the flights.";
     TableView::new("Channels repaired or in doubt", note, &heads, rows)
 }
 
 fn is_noteworthy(c: &ChannelRow) -> bool {
-    c.bridged + c.despiked + c.missing > 0 || !is_check_passed(&c.verdict)
+    c.bridged + c.despiked + c.missing + c.stuck > 0 || !is_check_passed(&c.verdict)
 }

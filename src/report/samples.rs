@@ -3,7 +3,7 @@
 use super::Contents;
 use crate::aero::Axis;
 use crate::error::Problem;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
@@ -95,9 +95,15 @@ pub fn campaign() -> Campaign {
         channel: "alpha".into(),
         signal: "alpha_vane_deg".into(),
         samples: 100,
+        rate_hz: Some(40.0),
+        between: 0,
         bridged: 3,
         despiked: 1,
         missing: 0,
+        stuck: 0,
+        wraps: 0,
+        quantisation: None,
+        noise: Some(0.02),
         verdict: "ok".into(),
     });
     campaign.problems.push(problem("a file that is no record"));
@@ -136,6 +142,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         x_cg_ft: 20.0,
         samples: 600,
         origin: "found".into(),
+        recognised: Recognised::default(),
+        quality: Quality::default(),
     });
     campaign.fits.push(FitRow {
         maneuver_id: maneuver_id.clone(),
@@ -203,6 +211,10 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         standard_error: 0.001,
         lower_95: value - 0.002,
         upper_95: value + 0.002,
+        prediction_lower_95: value - 0.004,
+        prediction_upper_95: value + 0.004,
+        outliers: 0,
+        curve: "polynomial".into(),
         maneuvers: 10,
         order: 2,
         scatter: 0.001,
@@ -212,10 +224,12 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         unit: unit.into(),
         group: "all".into(),
         alpha_deg,
+        mach: Some(0.3),
         flight: value,
         standard_error: 0.001,
         wind_tunnel: Some(0.05),
         difference: Some(value - 0.05),
+        uncertainty: Some(0.001),
         difference_pct: Some(100.0 * (value - 0.05) / 0.05),
         z: Some(-3.0),
         verdict: if alpha_deg < 25.0 { "agrees" } else { "flight lower" }.into(),

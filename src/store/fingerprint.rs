@@ -32,25 +32,26 @@ impl Fingerprint {
         self
     }
 
-    /// Adds a file's content.
-    ///
-    /// # Errors
-    /// [`Error::Io`] naming the file.
-    pub fn with_file(mut self, path: &Path) -> Result<Self> {
-        let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
-        let mut buffer = vec![0; 1 << 20];
-        loop {
-            let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
-            if n == 0 {
-                return Ok(self);
-            }
-            self.0.update(&buffer[..n]);
-        }
-    }
-
     #[must_use]
     pub fn finish(self) -> String {
         self.0.finalize().to_hex()[..16].to_owned()
+    }
+}
+
+/// The fingerprint of a file's content, whatever its name.
+///
+/// # Errors
+/// [`Error::Io`] naming the file.
+pub fn of_file(path: &Path) -> Result<String> {
+    let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+    let mut hasher = blake3::Hasher::new();
+    let mut buffer = vec![0; 1 << 17];
+    loop {
+        let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
+        if n == 0 {
+            return Ok(hasher.finalize().to_hex().to_string());
+        }
+        hasher.update(&buffer[..n]);
     }
 }
 

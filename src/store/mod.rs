@@ -8,6 +8,7 @@ pub mod fingerprint;
 pub mod record_file;
 pub mod recorder;
 pub mod table;
+pub mod tunnel;
 
 pub use artefacts::Store;
 pub use fingerprint::Fingerprint;

@@ -19,7 +19,7 @@ fn config() -> Config {
 
 fn flights(config: &Config) -> Vec<RawFlight> {
     let found = archive::find(&config.archive).unwrap();
-    found.iter().map(|files| archive::read(files, &config.channels).unwrap()).collect()
+    found.iter().map(|files| archive::read(files, &config.channels).unwrap().swap_remove(0)).collect()
 }
 
 fn ingest(config: &Config, raw: &RawFlight, settings: &Settings) -> Result<Ingested, Problem> {
@@ -42,7 +42,8 @@ fn every_demonstration_flight_passes_its_checks_and_is_repaired() {
         let lost = ingested.record.samples - raw.columns["time"].values.len();
         assert!(lost < 30, "{lost} lost frames");
         for row in &ingested.channels {
-            assert_eq!(row.missing, 0, "{row:?}");
+            assert_eq!((row.missing, row.stuck, row.between), (0, 0, 0), "{row:?}");
+            assert!(row.rate_hz.is_some_and(|rate| (rate - 40.0).abs() < 0.01), "{row:?}");
             assert!(row.bridged >= lost && row.bridged < 150, "{row:?}");
             assert!(row.despiked <= 12, "{row:?}");
         }

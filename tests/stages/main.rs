@@ -5,6 +5,7 @@
 mod check;
 mod compare;
 mod estimate;
+mod export;
 mod faults;
 mod house;
 mod ingest;

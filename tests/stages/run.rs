@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_roll_steps};
 
 /// Tables and their columns that other programs rely on, with the stage that publishes them.
-const PUBLISHED: [(&str, &str, &str); 14] = [
+const PUBLISHED: &[(&str, &str, &str)] = &[
     ("ingest", "channels", "flight_id channel signal samples bridged despiked missing verdict"),
     ("ingest", "checks", "flight_id relation signals slope correlation verdict"),
     (
@@ -61,17 +61,32 @@ const PUBLISHED: [(&str, &str, &str); 14] = [
         "joint_id class joint_alpha_deg joint_mach maneuvers maneuver_id flight_id alpha_deg mach part cost_alone \
          cost_joint",
     ),
-    ("trend", "trends", "derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers"),
+    (
+        "trend",
+        "trends",
+        "derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95 prediction_upper_95 \
+         maneuvers outliers curve",
+    ),
+    ("trend", "outliers", "derivative unit group maneuver_id class alpha_deg value bound trend z weight_share"),
     (
         "compare",
         "comparison",
-        "derivative unit alpha_deg flight standard_error wind_tunnel difference difference_pct z verdict",
+        "derivative unit alpha_deg mach flight standard_error wind_tunnel difference uncertainty difference_pct z verdict",
     ),
+    (
+        "compare",
+        "maneuver_comparison",
+        "maneuver_id derivative alpha_deg mach flight bound wind_tunnel difference uncertainty difference_pct z verdict",
+    ),
+    ("compare", "verdicts", "against derivative alpha_from_deg alpha_to_deg verdict difference_pct words"),
+    ("compare", "disagreements", "rank against derivative alpha_deg flight other difference z size_pct words"),
+    ("compare", "changes", "against derivative group alpha_deg flight before difference difference_pct z verdict"),
+    ("compare", "beyond_tunnel", "maneuver_id variable read_at tabulated_from tabulated_to treatment derivatives"),
 ];
 
 /// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
 /// nothing fails.
-const WITHOUT_ROWS: [&str; 4] = ["events", "joint", "predictions", "problems"];
+const WITHOUT_ROWS: [&str; 6] = ["beyond_tunnel", "changes", "events", "joint", "predictions", "problems"];
 
 const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
 

@@ -1,14 +1,12 @@
-//! What was found of each instrument, in words and rows, and its correction of the record.
+//! What was found of each instrument, in words and rows, and what the record is to be corrected by.
 
 use std::collections::BTreeMap;
 
 use super::fit::{Errors, MODEL_SCALE};
 use super::instruments::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, observable, place, size};
 use super::settings::{Action, Compatibility, OnFault};
-use super::taps::Taps;
 use crate::error::Problem;
-use crate::flight::record::Series;
-use crate::flight::{Channel, Mark, Record, signal};
+use crate::flight::{Channel, Correction, signal};
 use crate::tables::InstrumentRow;
 use crate::units::Unit;
 
@@ -93,18 +91,16 @@ impl Findings {
         self
     }
 
-    /// Corrects the record by what is to be applied.
-    pub fn correct(&self, record: &mut Record) {
-        for finding in &self.0 {
+    /// What the record is to be corrected by.
+    #[must_use]
+    pub fn corrections(&self) -> Vec<Correction> {
+        let correction = |finding: &Finding| {
             let of = |kind: Kind| finding.estimates[kind as usize].filter(|e| e.applied).map_or(0.0, |e| e.value);
-            let (bias, scale, delay) = (of(Kind::Bias), of(Kind::Scale), of(Kind::Delay));
-            let step_s = record.step_s;
-            if let Some(series) = record.signals.get_mut(finding.signal)
-                && (bias, scale, delay) != (0.0, 0.0, 0.0)
-            {
-                corrected(series, bias, scale, delay / step_s);
-            }
-        }
+            let (bias, scale, delay_s) = (of(Kind::Bias), of(Kind::Scale), of(Kind::Delay));
+            let counts = (bias, scale, delay_s) != (0.0, 0.0, 0.0);
+            counts.then(|| Correction { signal: finding.signal.to_owned(), bias, scale, delay_s })
+        };
+        self.0.iter().filter_map(correction).collect()
     }
 
     /// Rows of the table `instruments`.
@@ -176,20 +172,6 @@ fn correct_together(estimates: &mut [Option<Estimate>; KINDS], settings: &Compat
     {
         bias.applied |= settings.bias == Action::Apply && !bias.fault;
         scale.applied |= settings.scale == Action::Apply && !scale.fault;
-    }
-}
-
-/// (y(t + delay) − bias)/(1 + scale), the delay in samples; a mark travels with its sample.
-fn corrected(series: &mut Series, bias: f64, scale: f64, delay: f64) {
-    let taps = Taps::at(delay);
-    let count = series.values.len();
-    let old = series.clone();
-    for (k, (value, mark)) in series.values.iter_mut().zip(&mut series.marks).enumerate() {
-        let weighty = || taps.each(k, count).filter(|(_, weight, _)| *weight != 0.0);
-        let sum: f64 = weighty().map(|(sample, weight, _)| weight * old.values[sample]).sum();
-        *value = (sum - bias) / (1.0 + scale);
-        let worst = weighty().map(|(sample, _, _)| old.marks[sample] as u8).max().unwrap_or(Mark::Measured as u8);
-        *mark = if value.is_finite() { Mark::from_u8(worst) } else { Mark::Missing };
     }
 }
 

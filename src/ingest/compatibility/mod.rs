@@ -12,25 +12,32 @@ mod fit;
 mod instruments;
 mod response;
 mod settings;
-mod taps;
 mod window;
 
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub use finding::{Estimate, Finding, Findings};
 pub use settings::{Action, Compatibility, Error, Errors, OnFault};
 
 use crate::aircraft::Aircraft;
-use crate::flight::{Channel, Record};
+use crate::flight::{Channel, Record, signal};
 use window::Window;
 
-/// What a record tells of its instruments; `recorded` are the signals that come from channels.
+/// The signals that are read of a record.
+#[must_use]
+pub fn signals() -> BTreeSet<String> {
+    instruments::SIGNALS.iter().chain(&[signal::X_CG, signal::Y_CG, signal::Z_CG]).map(|s| (*s).to_owned()).collect()
+}
+
+/// What a record tells of its instruments; `recorded` are the signals that come from channels. A long record comes in
+/// `count` parts, each of which has its share of the windows.
 #[must_use]
 pub fn examine(
-    record: &Record,
+    parts: impl Iterator<Item = Record>,
+    count: usize,
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
     aircraft: &Aircraft,
@@ -39,8 +46,12 @@ pub fn examine(
     if !settings.reconstruct {
         return Findings::default();
     }
-    let stretches = window::choose(record, settings);
-    let windows: Vec<Window> = stretches.into_iter().map(|w| Window::of(record, w, aircraft, settings)).collect();
+    let share = Compatibility { windows: settings.windows.div_ceil(count.max(1)), ..settings.clone() };
+    let of_part = |record: Record| -> Vec<Window> {
+        let stretches = window::choose(&record, &share);
+        stretches.into_iter().map(|w| Window::of(&record, w, aircraft, settings)).collect()
+    };
+    let windows: Vec<Window> = parts.flat_map(of_part).collect();
     let errors = fit::fit(&windows, aircraft, settings);
     Findings::of(errors.as_ref(), channels, recorded, settings)
 }

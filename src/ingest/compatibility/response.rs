@@ -3,12 +3,14 @@
 //! An input is freed of its error before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale); an output is
 //! given its error after them, y(t) = (1 + scale) h(t − delay) + bias.
 
+use nalgebra::SMatrix;
+
 use super::equations::{self, Driven, STATES, State};
 use super::instruments::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
-use super::taps::Taps;
 use super::window::{Window, factor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::runge_kutta::{Integrator, Stage};
+use crate::dynamics::runge_kutta::{POINT, step};
+use crate::flight::taps::Taps;
 
 /// Parameters of a window alone: its first state, and the change of the wind north, east and down, ft/s².
 pub const LOCAL: usize = STATES + 3;
@@ -18,6 +20,9 @@ const DRIVING: usize = LOCAL + INPUTS * KINDS;
 pub const ROW: usize = DRIVING + KINDS;
 
 pub type Local = [f64; LOCAL];
+
+/// Slopes of the states along what they depend on.
+type Slopes = SMatrix<f64, STATES, DRIVING>;
 
 /// One input freed of its error at one instant, in rad/s or ft/s², with its slopes along bias, scale and delay.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,24 +47,19 @@ const CELL: usize = 1 + DRIVING;
 /// The computed outputs of a window; none where the integration leaves sense.
 pub fn respond(window: &Window, aircraft: &Aircraft, local: &Local, shared: &[f64; PARAMETERS]) -> Option<Response> {
     let points = freed(window, shared);
-    let mut it = Integrator::<STATES>::new(State::from_column_slice(&local[..STATES]), DRIVING);
-    for i in 0..STATES {
-        it.sensitivity[i][i] = 1.0;
-    }
+    let mut at = (State::from_column_slice(&local[..STATES]), Slopes::identity());
+    let along = |(x, s): (State, Slopes), h: f64, (dx, ds): (State, Slopes)| (x + dx * h, s + ds * h);
     let mut exact = Vec::with_capacity(window.samples * OUTPUTS * CELL);
     for k in 0..window.samples {
-        read(&mut exact, window, aircraft, k, &points[2 * k], &it);
+        read(&mut exact, window, aircraft, k, &points[2 * k], &at);
         if k + 1 < window.samples {
-            it.step(window.step_s, |stage, x, s, ds| {
-                let (point, sample) = match stage {
-                    Stage::Start => (2 * k, k),
-                    Stage::Middle => (2 * k + 1, k),
-                    Stage::End => (2 * k + 2, k + 1),
-                };
-                slope(window, sample, &points[point], local, x, s, ds)
-            });
+            let rate = |stage: usize, at| {
+                let sample = if POINT[stage] == 2 { k + 1 } else { k };
+                slope(window, sample, &points[2 * k + POINT[stage]], local, at)
+            };
+            at = step(at, window.step_s, rate, along);
         }
-        if !it.state.iter().all(|x| x.is_finite() && x.abs() < 1e7) {
+        if !at.0.iter().all(|x| x.is_finite() && x.abs() < 1e7) {
             return None;
         }
     }
@@ -87,41 +87,32 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
     points
 }
 
-/// Rates of the states and of their sensitivities.
+/// Rates of the states and of their slopes.
 fn slope(
     window: &Window,
     sample: usize,
     point: &[Freed; INPUTS],
     local: &Local,
-    x: &State,
-    s: &[Vec<f64>; STATES],
-    ds: &mut [Vec<f64>; STATES],
-) -> State {
+    (x, s): (State, Slopes),
+) -> (State, Slopes) {
     let driven: Driven = point.map(|p| p.value);
     let known = &window.known[sample];
-    let at = equations::rates(x, &driven, known);
-    let mut rates = at.rates;
-    for (i, row) in ds.iter_mut().enumerate() {
-        row.fill(0.0);
-        for (j, s) in s.iter().enumerate() {
-            let a = at.by_state[(i, j)];
-            if a != 0.0 {
-                row.iter_mut().zip(s).for_each(|(d, s)| *d += a * s);
-            }
-        }
+    let at = equations::rates(&x, &driven, known);
+    let (mut rates, mut slopes) = (at.rates, at.by_state * s);
+    for i in 0..STATES {
         for (input, freed) in point.iter().enumerate() {
-            let b = at.by_input[(i, input)];
-            let first = LOCAL + input * KINDS;
-            row[first..first + KINDS].iter_mut().zip(freed.by).for_each(|(d, by)| *d += b * by);
+            for (kind, by) in freed.by.iter().enumerate() {
+                slopes[(i, LOCAL + input * KINDS + kind)] += at.by_input[(i, input)] * by;
+            }
         }
     }
     for i in 0..3 {
         for j in 0..3 {
             rates[i] -= known.to_body[(i, j)] * local[STATES + j];
-            ds[i][STATES + j] -= known.to_body[(i, j)];
+            slopes[(i, STATES + j)] -= known.to_body[(i, j)];
         }
     }
-    rates
+    (rates, slopes)
 }
 
 /// Adds the outputs of a sample, without their own errors.
@@ -131,19 +122,19 @@ fn read(
     aircraft: &Aircraft,
     k: usize,
     point: &[Freed; INPUTS],
-    it: &Integrator<STATES>,
+    (x, s): &(State, Slopes),
 ) {
     let driven: Driven = point.map(|p| p.value);
-    let at = equations::readings(aircraft, &it.state, &driven, &window.known[k]);
+    let at = equations::readings(aircraft, x, &driven, &window.known[k]);
     for o in 0..OUTPUTS {
         let first = exact.len() + 1;
         exact.push(at.values[o]);
         exact.resize(first + DRIVING, 0.0);
         let row = &mut exact[first..];
-        for (i, s) in it.sensitivity.iter().enumerate() {
+        for (i, s) in s.row_iter().enumerate() {
             let by = at.by_state[(o, i)];
             if by != 0.0 {
-                row.iter_mut().zip(s).for_each(|(r, s)| *r += by * s);
+                row.iter_mut().zip(s.iter()).for_each(|(r, s)| *r += by * s);
             }
         }
         for (input, freed) in point.iter().enumerate().take(3) {
