@@ -41,7 +41,7 @@ fn the_export_is_the_trend_where_flight_has_data_and_comes_back_as_the_tunnel() 
 fn jsbsim_itself_computes_the_exported_coefficients() {
     let campaign = exported();
     let python = std::env::var("JSBSIM_PYTHON").unwrap_or_else(|_| "python3".into());
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/jsbsim.py");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/load_in_jsbsim.py");
     let Ok(output) = Command::new(python).arg(script).arg(campaign.path("reports/export")).output() else { return };
     // 77: JSBSim is not installed; `export::tests` evaluates the section by its rules in any case.
     assert!(matches!(output.status.code(), Some(0 | 77)), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,6 +1,6 @@
 """Loads an exported section into JSBSim itself and compares what it computes with the exported table.
 
-    python3 tests/jsbsim.py FOLDER [WING_AREA_FT2 SPAN_FT CHORD_FT]
+    python3 tests/load_in_jsbsim.py FOLDER [WING_AREA_FT2 SPAN_FT CHORD_FT]
 
 FOLDER is what `harvest export` wrote. Needs the package jsbsim; says so and ends with 77 where it is missing. Ends with 0
 when every derivative, every coefficient and all forces and moments agree to 1e-9 of their size, else with 1.
