@@ -284,7 +284,7 @@ fn ends(ascending: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// The items on either side of `x`; one where it is at an item or beyond the ends.
-fn either_side<'a, T>(items: &'a [T], x_of: impl Fn(&T) -> f64, x: f64) -> &'a [T] {
+fn either_side<T>(items: &[T], x_of: impl Fn(&T) -> f64, x: f64) -> &[T] {
     if items.is_empty() {
         return items;
     }

@@ -444,9 +444,9 @@ fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
     if let Some(third) = config.tunnel.settings().third.as_ref().filter(|third| !third.at.is_finite()) {
         return Err(source.error_under("tunnel", "at", format!("`at` must be a number, not {}", third.at)));
     }
-    let given = config.export.jsbsim_properties.keys();
+    let mut given = config.export.jsbsim_properties.keys();
     let used = || config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
-    for signal in given.filter(|signal| !used().any(|s| s == signal.as_str())) {
+    if let Some(signal) = given.find(|signal| !used().any(|s| s == signal.as_str())) {
         let near = did_you_mean(signal, used());
         return Err(source.error(signal, format!("export: no derivative is of the signal `{signal}`{near}")));
     }

@@ -15,7 +15,8 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 fn with(attributes: &[(&str, &str)]) -> String {
-    attributes.iter().map(|(name, value)| format!(" {name}=\"{}\"", escaped(value))).collect()
+    let one = |(name, value): &(&str, &str)| [" ", name, "=\"", &escaped(value), "\""].concat();
+    attributes.iter().map(one).collect()
 }
 
 impl Xml {

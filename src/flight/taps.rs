@@ -12,6 +12,7 @@ pub struct Taps {
 
 impl Taps {
     /// The value `shift` samples later than a sample.
+    #[must_use]
     pub fn at(shift: f64) -> Taps {
         let whole = shift.floor();
         let f = shift - whole;

@@ -194,6 +194,9 @@ pub struct Judgement {
     pub signature: Signature,
 }
 
+/// Gives signals of a record over a range of its samples; none where they cannot be read.
+type Read<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
+
 /// The samples of a long record that are examined at once: under an hour of a usual recorder.
 const PART: usize = 1 << 17;
 
@@ -202,12 +205,7 @@ const PART: usize = 1 << 17;
 ///
 /// # Errors
 /// A problem that refuses the stretch: a required channel without any number, or one that the relations prove wrong.
-pub fn judge(
-    stretch: &Surveyed,
-    flowed: Vec<Flowed>,
-    basis: &Basis,
-    read: &dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record>,
-) -> Result<Judgement, Problem> {
+pub fn judge(stretch: &Surveyed, flowed: Vec<Flowed>, basis: &Basis, read: &Read) -> Result<Judgement, Problem> {
     let id = stretch.flight_id.as_str();
     let clock = &stretch.clock;
     let refused = |(place, reason): Spoilt| problem(id, place, reason);

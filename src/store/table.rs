@@ -35,9 +35,11 @@ where
     Series::new(name.into(), values).into()
 }
 
+/// Empty is absent: a CSV cannot tell the two apart.
 impl Cell for String {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[&str], _>(name, cells.map(String::as_str).collect::<Vec<_>>())
+        let text = cells.map(|text| (!text.is_empty()).then_some(text.as_str()));
+        column::<[Option<&str>], _>(name, text.collect::<Vec<_>>())
     }
 }
 

@@ -165,7 +165,7 @@ pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl 
         if let Some(group) = group {
             let members: Vec<&EstimateRow> = of_it.iter().filter(|e| group.has(&e.class)).copied().collect();
             let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
-            match trend(members, &group.name, settings, knots, &further) {
+            match trend(&members, &group.name, settings, knots, &further) {
                 Ok((rows, outliers)) => {
                     trends.rows.extend(rows);
                     trends.outliers.extend(outliers);
@@ -176,9 +176,9 @@ pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl 
         if settings.per_class {
             let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
             for class in names.into_iter().filter(|name| group.is_none_or(|g| g.name != *name)) {
-                let members = of_it.iter().filter(|e| e.class == class).copied().collect();
+                let members: Vec<&EstimateRow> = of_it.iter().filter(|e| e.class == class).copied().collect();
                 // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
-                let of_class = trend(members, class, settings, &settings.knots_deg, &further);
+                let of_class = trend(&members, class, settings, &settings.knots_deg, &further);
                 trends.rows.extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
             }
         }
@@ -213,7 +213,7 @@ fn point(e: &EstimateRow) -> Option<Point> {
 
 /// One trend on the published grid, and the maneuvers far from it.
 fn trend(
-    members: Vec<&EstimateRow>,
+    members: &[&EstimateRow],
     group: &str,
     settings: &Settings,
     knots_deg: &[f64],
@@ -232,7 +232,7 @@ fn trend(
     let one_more = fit.best.scatter().hypot(median_bound(&points));
     let row = |alpha_deg: f64| {
         let (value, own_error) = fit.at(inside(&points, alpha_deg));
-        let standard_error = own_error.hypot(held_error(&members, alpha_deg, settings.alpha_step_deg));
+        let standard_error = own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
         let prediction = half_width * standard_error.hypot(one_more);
         TrendRow {
             derivative: members[0].derivative.clone(),
@@ -286,15 +286,15 @@ fn inside(points: &[Point], alpha_deg: f64) -> f64 {
     alpha_deg.max(first.alpha_deg).min(last.alpha_deg)
 }
 
-/// What the uncertainty of held values does to the trend at an angle of attack. Maneuvers that hold the same derivative
-/// at the same tunnel err together, so it does not average out: it is the mean over the maneuvers within a step of α,
-/// each with its weight 1/bound².
-fn held_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
+/// What the uncertainty of held values and of the instruments' calibration does to the trend at an angle of attack.
+/// Maneuvers that hold the same derivative at the same tunnel err together, and so do those with the same instruments: it
+/// does not average out. It is the mean over the maneuvers within a step of α, each with its weight 1/bound².
+fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
     let near = members.iter().filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (held, p) in near.filter_map(|e| Some((e.bound_held?, point(e)?))) {
+    for (e, p) in near.filter_map(|e| Some((e, point(e)?))) {
         let weight = p.bound.powi(-2);
-        sum += weight * held;
+        sum += weight * e.bound_held.unwrap_or(0.0).hypot(e.bound_calibration.unwrap_or(0.0));
         weights += weight;
     }
     if weights > 0.0 { sum / weights } else { 0.0 }

@@ -309,7 +309,7 @@ fn channels() -> (BTreeMap<String, Channel>, Vec<String>) {
 
 fn examined(record: &Record, settings: &Compatibility) -> Findings {
     let (channels, names) = channels();
-    examine(record, &channels, &names, &aircraft(), settings)
+    examine(std::iter::once(record.clone()), 1, &channels, &names, &aircraft(), settings)
 }
 
 /// The faults of a flight: signal and words.
@@ -379,7 +379,7 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
         let findings = examined(&record, &settings());
         let found: Vec<&str> = faults(&findings).into_iter().map(|f| f.0).collect();
         assert_eq!(found, [name]);
-        findings.correct(&mut record);
+        findings.corrections().iter().for_each(|c| c.apply(&mut record));
         let (values, truth) = (record.values(name).unwrap(), exact.values(name).unwrap());
         let swing = truth.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let mean = values.iter().zip(truth).map(|(a, b)| (a - b).abs()).sum::<f64>() / values.len() as f64;
@@ -420,7 +420,7 @@ fn an_applied_correction_carries_the_marks_along() {
         channel: "theta".into(),
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
     }]);
-    findings.correct(&mut record);
+    findings.corrections().iter().for_each(|c| c.apply(&mut record));
     let series = &record.signals[s::THETA];
     assert_relative_eq!(series.values[1], (3.0 - 1.0) / 2.0);
     assert_eq!((series.marks[3], series.marks[5]), (Mark::Bridged, Mark::Measured));

@@ -47,7 +47,7 @@ pub(super) fn rows(
         let name = dependent.and_then(|d| d.attribute("varID")).unwrap_or_default();
         if wanted(name) {
             let line = file.line(function).unwrap_or(0);
-            rows.extend(file.rows(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)));
+            rows.extend(rows_of(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)));
         }
     }
     if rows.is_empty() {
@@ -232,32 +232,33 @@ impl<'a, 'input> File<'a, 'input> {
         };
         words.map(number).collect()
     }
+}
 
-    fn rows<'g>(&self, name: &'g str, grid: &'g Grid, unit: &'g str) -> impl Iterator<Item = TunnelRow> + use<'g> {
-        (0..grid.values.len()).map(move |i| {
-            let mut row = TunnelRow {
-                derivative: name.to_owned(),
-                alpha_deg: 0.0,
-                mach: None,
-                value: grid.values[i],
-                unit: unit.to_owned(),
-                uncertainty: grid.uncertainties.as_ref().map(|u| u[i]),
-                source: grid.source.clone(),
-                third: None,
-            };
-            let mut rest = i;
-            for (variable, points) in grid.axes.iter().rev() {
-                let at = points[rest % points.len()];
-                rest /= points.len();
-                match variable {
-                    Variable::Alpha { in_rad } => row.alpha_deg = if *in_rad { at * DEG } else { at },
-                    Variable::Mach => row.mach = Some(at),
-                    Variable::Third => row.third = Some(at),
-                }
+/// A grid's points as rows of a tunnel's table.
+fn rows_of<'g>(name: &'g str, grid: &'g Grid, unit: &'g str) -> impl Iterator<Item = TunnelRow> + use<'g> {
+    (0..grid.values.len()).map(move |i| {
+        let mut row = TunnelRow {
+            derivative: name.to_owned(),
+            alpha_deg: 0.0,
+            mach: None,
+            value: grid.values[i],
+            unit: unit.to_owned(),
+            uncertainty: grid.uncertainties.as_ref().map(|u| u[i]),
+            source: grid.source.clone(),
+            third: None,
+        };
+        let mut rest = i;
+        for (variable, points) in grid.axes.iter().rev() {
+            let at = points[rest % points.len()];
+            rest /= points.len();
+            match variable {
+                Variable::Alpha { in_rad } => row.alpha_deg = if *in_rad { at * DEG } else { at },
+                Variable::Mach => row.mach = Some(at),
+                Variable::Third => row.third = Some(at),
             }
-            row
-        })
-    }
+        }
+        row
+    })
 }
 
 fn content(node: Node) -> String {
