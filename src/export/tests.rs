@@ -288,7 +288,8 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
     surfaces.dedup();
     let deflections: Vec<f64> = (0..surfaces.len()).map(|i| 3.0 - 1.1 * i as f64).collect();
     let names: Vec<String> = surfaces.iter().map(|s| format!("harvest/{s}")).collect();
-    let truth = Aerodynamics::new(contents.buildup, database(&tables, &wind_tunnel::Settings::default()), &surfaces).unwrap();
+    let truth =
+        Aerodynamics::new(contents.buildup, database(&tables, &wind_tunnel::Settings::default()), &surfaces).unwrap();
     for (alpha_deg, beta_deg, rates) in states() {
         let (alpha, beta) = (alpha_deg.to_radians(), f64::to_radians(beta_deg));
         let air = AirData { velocity_ft_s: 310.0, alpha, beta, mach: 0.3, qbar_psf: 55.0 };
