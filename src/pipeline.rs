@@ -8,7 +8,7 @@
 mod others;
 pub mod show;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::segment::Segmented;
 use crate::store::archive::FlightFiles;
-use crate::store::{Fingerprint, Store, archive, atomic, record_file, table};
+use crate::store::{Digest, Fingerprint, Store, archive, atomic, record_file, table};
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
     TrendRow,
@@ -62,6 +62,8 @@ pub struct Flight {
     fingerprint: String,
     record: PathBuf,
     artefacts: Vec<PathBuf>,
+    /// Its files by name, as far as they could be read.
+    sources: Vec<report::SourceFile>,
     ingested: Ingested,
 }
 
@@ -82,6 +84,9 @@ struct Found {
     problems: Vec<Problem>,
 }
 
+/// A maneuver's estimate, and its time history as the report draws it.
+type Done = (Estimated, Option<History>);
+
 /// The campaign as far as it has been brought.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
@@ -100,6 +105,8 @@ pub struct Campaign {
     /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
+    /// Time histories, thinned for the report, of the maneuvers that have one.
+    pub histories: Vec<History>,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
     pub problems: Vec<Problem>,
@@ -227,16 +234,18 @@ impl Run<'_> {
             .with(&config.constants)
             .with(&config.aircraft)
             .with(&config.ingest);
-        let fingerprint = match files.files.iter().try_fold(decides, |f, path| f.with_file(path)) {
-            Ok(fingerprint) => fingerprint.finish(),
+        let digests = match files.files.iter().map(|path| Digest::of_file(path)).collect::<Result<Vec<_>>>() {
+            Ok(digests) => digests,
             Err(error) => return Ok(self.refused(id, "unreadable", problem("ingest", id, id, &error.to_string()))),
         };
+        let fingerprint = decides.with(&digests).finish();
+        let sources: Vec<_> = files.files.iter().zip(digests).map(|(path, digest)| source_file(path, digest)).collect();
         let path = self.store.path("ingest", id, &fingerprint, "json");
         let record = self.store.path("records", id, &fingerprint, "parquet");
         if let Some(ingested) = self.store.load::<Ingested>(&path)
             && (!ingested.accepted || record_file::is_whole(&record))
         {
-            return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], ingested });
+            return Ok(Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path], sources, ingested });
         }
         let done = archive::read(files, &config.channels).and_then(|raw| {
             ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
@@ -248,9 +257,9 @@ impl Run<'_> {
                 atomic::place(&record, &bytes)?;
                 let (channels, checks, problems) = (done.channels, done.checks, done.problems);
                 let ingested = Ingested { accepted: true, channels, checks, problems };
-                Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], ingested }
+                Flight { flight_id: id.clone(), fingerprint, record, artefacts: vec![path.clone()], sources, ingested }
             }
-            Err(problem) => self.refused(id, &fingerprint, problem),
+            Err(problem) => Flight { sources, ..self.refused(id, &fingerprint, problem) },
         };
         self.store.save(&path, &flight.ingested)?;
         Ok(flight)
@@ -262,6 +271,7 @@ impl Run<'_> {
             fingerprint: fingerprint.to_owned(),
             record: self.store.path("records", id, fingerprint, "parquet"),
             artefacts: vec![self.store.path("ingest", id, fingerprint, "json")],
+            sources: vec![],
             ingested: Ingested { accepted: false, channels: vec![], checks: vec![], problems: vec![problem] },
         }
     }
@@ -318,8 +328,11 @@ impl Run<'_> {
         self.progress.begin("estimate", campaign.maneuvers.len());
         let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
         self.progress.end();
-        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
+        let (paths, done): (Vec<PathBuf>, Vec<_>) = done?.into_iter().flatten().unzip();
+        let (estimated, histories): (Vec<Estimated>, Vec<Option<History>>) = done.into_iter().unzip();
+        campaign.histories = histories.into_iter().flatten().collect();
         self.store.keep_only("estimate", &paths)?;
+        self.store.keep_only("history", &paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>())?;
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -338,25 +351,28 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
+    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Done)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
-        let present: Vec<Option<Estimated>> = paths.iter().map(|path| self.store.load(path)).collect();
+        let load = |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
+        let present: Vec<Option<Done>> = paths.iter().map(load).collect();
         let record = if present.iter().all(Option::is_some) { None } else { Some(record_file::read(&flight.record)?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()
             .map(|((maneuver, path), present)| {
-                let estimated = match (present, &record) {
-                    (Some(estimated), _) => estimated,
+                let done = match (present, &record) {
+                    (Some(done), _) => done,
                     (None, Some(record)) => {
-                        let estimated = Estimated { history: None, ..self.estimate_maneuver(record, maneuver) };
+                        let mut estimated = self.estimate_maneuver(record, maneuver);
+                        let history = estimated.history.take().map(|h| report::thinned(&h));
+                        self.store.save(&self.store.beside(&path, "history"), &history)?;
                         self.store.save(&path, &estimated)?;
-                        estimated
+                        (estimated, history)
                     }
                     (None, None) => return Err(crate::error::Error::store(&path, &"its flight's record was not read")),
                 };
                 self.progress.advance(&maneuver.maneuver_id);
-                Ok((path, estimated))
+                Ok((path, done))
             })
             .collect()
     }
@@ -406,7 +422,6 @@ impl Run<'_> {
     fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
         let path = config.reports.join("report.html");
-        let histories = self.histories(campaign)?;
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
@@ -426,43 +441,48 @@ impl Run<'_> {
             checks: &campaign.checks,
             events: &campaign.events,
             problems: &campaign.problems,
-            histories: &histories,
+            histories: &campaign.histories,
+            typical_alpha_deg: config.report.histories_at_alpha_deg,
+            provenance: &self.provenance(campaign)?,
             order: &config.derivative_names(),
             classes: &classes,
         };
         let html =
             report::html(&contents, config.template.as_deref()).map_err(|e| crate::error::Error::store(&path, &e))?;
         atomic::place(&path, html.as_bytes())?;
+        let printed = config.reports.join("report.pdf");
+        match report::pdf::pdf(&html) {
+            Ok(bytes) => atomic::place(&printed, &bytes)?,
+            Err(why) => {
+                // One of another night beside this page would be taken for the same.
+                atomic::remove(&printed)?;
+                let reason = format!("not made: the template's page is no well-formed XML: {why}");
+                campaign.problems.push(problem("report", "", "report.pdf", &reason));
+            }
+        }
         campaign.report = Some(path);
         Ok(())
     }
 
-    /// Time histories of one maneuver per class: the converged one nearest to the configured angle of attack. They are
-    /// computed again rather than stored: an estimation takes milliseconds, its histories a quarter of a megabyte.
-    fn histories(&self, campaign: &Campaign) -> Result<Vec<History>> {
-        let at = self.config.report.histories_at_alpha_deg;
-        let shown: Vec<&Maneuver> = self
-            .config
-            .classes
-            .iter()
-            .filter_map(|class| {
-                let fits = campaign.maneuvers.iter().zip(&campaign.fits);
-                fits.filter(|(m, f)| m.class == class.name && f.outcome == Outcome::Converged.name())
-                    .map(|(m, _)| m)
-                    .min_by(|a, b| (a.alpha_deg - at).abs().total_cmp(&(b.alpha_deg - at).abs()))
-            })
-            .collect();
-        let histories = self.each(
-            "report",
-            &shown,
-            |m| &m.maneuver_id,
-            |maneuver| {
-                let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
-                let record = flight.map(|f| record_file::read(&f.record)).transpose()?;
-                Ok(record.and_then(|record| self.estimate_maneuver(&record, maneuver).history))
-            },
-        )?;
-        Ok(histories.into_iter().flatten().collect())
+    /// Everything that decided the results, enough to do it again.
+    fn provenance(&self, campaign: &Campaign) -> Result<report::Provenance> {
+        let config = self.config;
+        let tunnel = source_file(&config.wind_tunnel, Digest::of_file(&config.wind_tunnel)?);
+        let versions = format!(
+            "ingest {INGEST_VERSION}, segment {SEGMENT_VERSION}, estimate {ESTIMATE_VERSION}, joint {JOINT_VERSION}, predict \
+             {PREDICT_VERSION}"
+        );
+        Ok(report::Provenance {
+            program: format!("harvest {}, methods: {versions}", env!("CARGO_PKG_VERSION")),
+            command: format!(
+                "harvest run {} --archive '{}' --wind-tunnel '{}'",
+                config.name,
+                config.archive,
+                config.wind_tunnel.display()
+            ),
+            data: campaign.flights.iter().flat_map(|f| f.sources.clone()).chain([tunnel]).collect(),
+            configuration: config.files.clone(),
+        })
     }
 }
 
@@ -474,6 +494,11 @@ fn tunnel_and_sources(config: &Config) -> String {
     } else {
         format!("{name} (sources: {})", sources.join("; "))
     }
+}
+
+fn source_file(path: &Path, digest: Digest) -> report::SourceFile {
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    report::SourceFile { name, bytes: digest.bytes, blake3: digest.blake3 }
 }
 
 fn problem(stage: &str, flight_id: &str, place: &str, reason: &str) -> Problem {

@@ -48,6 +48,8 @@ pub struct Config {
     pub report: ReportSettings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
+    /// The pipeline's files as they are: name and text.
+    pub files: Vec<(String, String)>,
 }
 
 /// What the command line says instead of the pipeline's YAML.
@@ -96,6 +98,7 @@ impl Config {
             compare: pipeline.compare,
             report: pipeline.report,
             template,
+            files: files.all().map(|file| file.named(folder)).collect(),
         };
         check::whole(&config, &files)?;
         Ok(config)

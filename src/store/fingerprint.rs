@@ -4,7 +4,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
@@ -32,25 +32,34 @@ impl Fingerprint {
         self
     }
 
-    /// Adds a file's content.
-    ///
+    #[must_use]
+    pub fn finish(self) -> String {
+        self.0.finalize().to_hex()[..16].to_owned()
+    }
+}
+
+/// What a file holds, in a few words: the same digest is the same content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Digest {
+    pub bytes: u64,
+    /// Hexadecimal.
+    pub blake3: String,
+}
+
+impl Digest {
     /// # Errors
     /// [`Error::Io`] naming the file.
-    pub fn with_file(mut self, path: &Path) -> Result<Self> {
+    pub fn of_file(path: &Path) -> Result<Digest> {
         let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+        let mut hasher = blake3::Hasher::new();
         let mut buffer = vec![0; 1 << 20];
         loop {
             let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
             if n == 0 {
-                return Ok(self);
+                return Ok(Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() });
             }
-            self.0.update(&buffer[..n]);
+            hasher.update(&buffer[..n]);
         }
-    }
-
-    #[must_use]
-    pub fn finish(self) -> String {
-        self.0.finalize().to_hex()[..16].to_owned()
     }
 }
 

@@ -10,4 +10,4 @@ pub mod recorder;
 pub mod table;
 
 pub use artefacts::Store;
-pub use fingerprint::Fingerprint;
+pub use fingerprint::{Digest, Fingerprint};

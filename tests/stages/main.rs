@@ -2,12 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on ends here")]
 
+mod browser;
 mod check;
 mod compare;
 mod estimate;
 mod faults;
 mod house;
 mod ingest;
+mod paper;
 mod report;
 mod run;
 mod segment;
