@@ -1,5 +1,6 @@
 //! Estimate: the derivatives of one maneuver, by output error on its axis's equations.
 
+mod calibration;
 mod evidence;
 pub mod joint;
 mod measures;
@@ -19,6 +20,7 @@ use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::calibration::Calibration;
 use crate::output_error::identifiability;
 use crate::output_error::input_noise::noisy_surfaces;
 use crate::output_error::newton_raphson::{self, Weights};
@@ -86,6 +88,8 @@ pub struct Settings {
     /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
     /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
     pub held_uncertainty_pct: f64,
+    /// What calibration leaves unknown of signals; those not named are believed.
+    pub calibration: BTreeMap<String, Calibration>,
     /// A maneuver with a larger share of marked output samples is rejected.
     pub max_marked_share: f64,
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
@@ -112,6 +116,7 @@ impl Default for Settings {
             start: Start::default(),
             hold: Hold::default(),
             held_uncertainty_pct: 20.0,
+            calibration: BTreeMap::new(),
             max_marked_share: 0.2,
             resolution: BTreeMap::new(),
             iteration: newton_raphson::Settings::default(),
@@ -258,6 +263,7 @@ impl<'a> Run<'a> {
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
         cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
+        self.miscalibrate(&ready, &mut fit);
         let mut estimated = Estimated {
             estimates: self.rows(Some((&case.names, &fit))),
             combined: self.combined(&case.names, &fit),
@@ -438,6 +444,7 @@ impl<'a> Run<'a> {
                     row.value = Some(fit.values[j]);
                     row.bound = deviation(fit.covariance.as_ref(), j);
                     row.bound_held = deviation(fit.covariance_held.as_ref(), j);
+                    row.bound_calibration = deviation(fit.covariance_calibration.as_ref(), j);
                     row.bound_corrected = deviation(fit.covariance_corrected.as_ref(), j);
                 }
                 (Status::Held, ..) => row.value = row.wind_tunnel,
@@ -464,6 +471,7 @@ impl<'a> Run<'a> {
             value: Some(fit.values[i] + alpha * fit.values[j]),
             bound: fit.covariance.as_ref().map(deviation),
             bound_held: fit.covariance_held.as_ref().map(deviation),
+            bound_calibration: fit.covariance_calibration.as_ref().map(deviation),
             bound_corrected: fit.covariance_corrected.as_ref().map(deviation),
             ..self.row(&combined.name, unit, Status::Estimated)
         })
@@ -482,6 +490,7 @@ impl<'a> Run<'a> {
             value: None,
             bound: None,
             bound_held: None,
+            bound_calibration: None,
             bound_corrected: None,
             wind_tunnel: self.tunnel(name),
             variance_inflation: None,

@@ -158,7 +158,9 @@ pub struct EstimateRow {
     pub bound: Option<f64>,
     /// The part of both bounds that comes from the uncertainty of the held values.
     pub bound_held: Option<f64>,
-    /// The bound with the residuals' autocorrelation counted.
+    /// The part of the corrected bound that comes from errors of calibration.
+    pub bound_calibration: Option<f64>,
+    /// The bound with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted.
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.
     pub wind_tunnel: Option<f64>,

@@ -1,6 +1,7 @@
 //! The conductor of the study of bounds: flies the test points of the cards, records them many times, and writes the
 //! tables and the page that say what the bounds are worth.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::aero::WindTunnel;
@@ -59,8 +60,12 @@ pub fn run(
             }
         }
     }
-    // Held values are true, so their uncertainty is nothing that the scatter could show.
-    let settings = estimate::Settings { held_uncertainty_pct: 0.0, ..simulation.config.estimate.clone() };
+    // Held values are true and instruments calibrated: what bounds count of either is nothing that the scatter could show.
+    let settings = estimate::Settings {
+        held_uncertainty_pct: 0.0,
+        calibration: BTreeMap::new(),
+        ..simulation.config.estimate.clone()
+    };
     let study = simulation.cards.study;
     progress.begin("validate", flown.len() * (SETTINGS.len() + 1));
     for (residuals, weights) in SETTINGS {

@@ -242,12 +242,25 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     Ok(())
 }
 
+fn calibration(config: &Config, source: &Source) -> Result<()> {
+    for (name, left) in &config.estimate.calibration {
+        known_signal(config, source, name, "calibration")?;
+        let sizes = [("bias", left.bias), ("scale_pct", left.scale_pct)];
+        if let Some((what, size)) = sizes.into_iter().find(|(_, size)| !(size.is_finite() && *size >= 0.0)) {
+            let what = format!("calibration of `{name}`: `{what}` is a standard deviation, not {size}");
+            return Err(source.error_under("calibration", name, what));
+        }
+    }
+    Ok(())
+}
+
 fn stages(config: &Config, source: &Source) -> Result<()> {
     if config.estimate.joint.is_some() && config.estimate.hold == Hold::Evidence {
         let what = "`joint` needs `hold: table`: by evidence each maneuver chooses for itself what to hold, and \
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
     }
+    calibration(config, source)?;
     let segment = std::iter::once(&config.segment.excitation_flag).chain(config.segment.steps.keys());
     for name in segment {
         known_signal(config, source, name, "segment")?;

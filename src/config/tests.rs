@@ -330,6 +330,22 @@ fn a_trend_group_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
 }
 
 #[test]
+fn calibration_of_an_unknown_signal_or_with_a_negative_size_is_refused() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "    qbar_psf: { scale_pct: 0.5 }", "    qbar_psi: { scale_pct: 0.5 }");
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: calibration: no channel gives the signal `qbar_psi`; did you mean `qbar_psf`?")
+    );
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "    qbar_psf: { scale_pct: 0.5 }", "    qbar_psf: { scale_pct: -0.5 }");
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: calibration of `qbar_psf`: `scale_pct` is a standard deviation, not -0.5")
+    );
+}
+
+#[test]
 fn a_regressor_that_no_channel_gives_is_named() {
     let copy = Copy::new();
     let line = copy.spoil(

@@ -106,51 +106,68 @@ impl Window {
         self.points.get(name).map_or(&[], Vec::as_slice)
     }
 
+    /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
+    #[must_use]
+    pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
+        let mut window = self.clone();
+        let mut change = |name: &str, bias: f64| {
+            for value in window.points.get_mut(name).into_iter().flatten() {
+                *value += scale * *value + bias;
+            }
+        };
+        change(name, bias);
+        change(&slope_name(name), 0.0);
+        window
+    }
+
     /// The motion at every point.
     #[must_use]
     pub fn motion(&self, aircraft: &Aircraft) -> Vec<Motion> {
-        (0..self.len()).map(|i| self.at(aircraft, i)).collect()
-    }
-
-    fn at(&self, aircraft: &Aircraft, i: usize) -> Motion {
-        let value = |name: &str| self.signal(name)[i];
-        let radians = |name: &str| value(name) / DEG;
-        let rates = [signal::P, signal::Q, signal::R].map(radians);
-        let accelerations = [signal::P, signal::Q, signal::R].map(|name| radians(&slope_name(name)));
-        let cg = Position { x_ft: value(signal::X_CG), y_ft: value(signal::Y_CG), z_ft: value(signal::Z_CG) };
-        let read = Flow {
-            alpha: radians(signal::ALPHA_VANE),
-            beta: radians(signal::BETA_VANE),
-            velocity: value(signal::VELOCITY),
-            rates,
+        let named = |name: &str| self.signal(name);
+        let rates = [signal::P, signal::Q, signal::R].map(named);
+        let slopes = [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name)));
+        let [alpha_vane, beta_vane, velocity, theta, phi] =
+            [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY, signal::THETA, signal::PHI].map(named);
+        let [an, ax, ay] = [signal::AN, signal::AX, signal::AY].map(named);
+        let [altitude, qbar, mass, thrust] = [signal::ALTITUDE, signal::QBAR, signal::MASS, signal::THRUST].map(named);
+        let [ix, iy, iz, ixz] = [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(named);
+        let [x_cg, y_cg, z_cg] = [signal::X_CG, signal::Y_CG, signal::Z_CG].map(named);
+        let [left_rpm, right_rpm] = [signal::RPM_LEFT, signal::RPM_RIGHT].map(named);
+        let sensors = &aircraft.sensors;
+        let at = |i: usize| {
+            let rates = rates.map(|rate| rate[i] / DEG);
+            let accelerations = slopes.map(|slope| slope[i] / DEG);
+            let cg = Position { x_ft: x_cg[i], y_ft: y_cg[i], z_ft: z_cg[i] };
+            let (alpha, beta) = (alpha_vane[i] / DEG, beta_vane[i] / DEG);
+            let flow = sensors.flow_at_cg(&Flow { alpha, beta, velocity: velocity[i], rates }, cg);
+            let felt = |axis: usize, sensor: Position| lever(axis, sensor.arm(cg), rates, accelerations).value;
+            let rpm = left_rpm[i] + right_rpm[i];
+            // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
+            let unfelt = if sensors.thrust_in_ax { 0.0 } else { thrust[i] / mass[i] };
+            Motion {
+                alpha: flow.alpha,
+                beta: flow.beta,
+                velocity: flow.velocity,
+                rates,
+                accelerations,
+                theta: theta[i] / DEG,
+                phi: phi[i] / DEG,
+                force_x: G0_FT_S2 * ax[i] - felt(0, sensors.ax) + unfelt,
+                force_y: G0_FT_S2 * ay[i] - felt(1, sensors.ay),
+                force_z: -G0_FT_S2 * an[i] - felt(2, sensors.an),
+                gravity: gravity_ft_s2(aircraft.latitude_deg, altitude[i]),
+                qbar: qbar[i],
+                mass: mass[i],
+                thrust: thrust[i],
+                ix: ix[i],
+                iy: iy[i],
+                iz: iz[i],
+                ixz: ixz[i],
+                engine_momentum: aircraft.engine_inertia_slug_ft2 * rpm * (2.0 * std::f64::consts::PI / 60.0),
+                cg,
+            }
         };
-        let flow = aircraft.sensors.flow_at_cg(&read, cg);
-        let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
-        let rpm = value(signal::RPM_LEFT) + value(signal::RPM_RIGHT);
-        // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
-        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { value(signal::THRUST) / value(signal::MASS) };
-        Motion {
-            alpha: flow.alpha,
-            beta: flow.beta,
-            velocity: flow.velocity,
-            rates,
-            accelerations,
-            theta: radians(signal::THETA),
-            phi: radians(signal::PHI),
-            force_x: G0_FT_S2 * value(signal::AX) - felt(0, aircraft.sensors.ax) + unfelt,
-            force_y: G0_FT_S2 * value(signal::AY) - felt(1, aircraft.sensors.ay),
-            force_z: -G0_FT_S2 * value(signal::AN) - felt(2, aircraft.sensors.an),
-            gravity: gravity_ft_s2(aircraft.latitude_deg, value(signal::ALTITUDE)),
-            qbar: value(signal::QBAR),
-            mass: value(signal::MASS),
-            thrust: value(signal::THRUST),
-            ix: value(signal::IX),
-            iy: value(signal::IY),
-            iz: value(signal::IZ),
-            ixz: value(signal::IXZ),
-            engine_momentum: aircraft.engine_inertia_slug_ft2 * rpm * (2.0 * std::f64::consts::PI / 60.0),
-            cg,
-        }
+        (0..self.len()).map(at).collect()
     }
 }
 

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Estimated, Ready, Run, covariance, values_of};
+use super::{Basis, Estimated, Ready, Run, calibration, covariance, values_of};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
@@ -195,6 +195,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     }
     let costs = if fit.final_cost.is_some() { joint.costs(&fit.response, &fit.weights) } else { vec![] };
     consider(run, parts, &joint, &mut fit);
+    miscalibrate(parts, &joint, &mut fit);
     let names = joint.names().to_vec();
     let (fit, _) = fit.with_response(Response::default());
     // What each maneuver keeps to itself is no row of what they share.
@@ -252,6 +253,34 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
         })
         .collect();
     cramer_rao::consider_together(&considered, &run.held_uncertainties(&first.ready.model), fit);
+}
+
+/// Adds what errors of calibration do to the shared derivatives. An error of a signal is common to all its maneuvers: so
+/// it is where they are of one flight, and where flights have errors of their own this is on the safe side.
+fn miscalibrate<const NX: usize, E: Equations<NX>>(
+    parts: &[Part<NX, E>],
+    joint: &Joint<NX, E>,
+    fit: &mut Fit<Vec<Response>>,
+) {
+    if fit.covariance_corrected.is_none() {
+        return;
+    }
+    let mut together: Vec<DVector<f64>> = vec![];
+    for (i, (part, response)) in parts.iter().zip(&fit.response).enumerate() {
+        let places = joint.places(i);
+        let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
+        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, response, &fit.weights) else {
+            fit.reason.push_str(calibration::NOT_COUNTED);
+            return;
+        };
+        together.resize(shifts.len(), DVector::zeros(joint.names().len()));
+        for (sum, shift) in together.iter_mut().zip(shifts) {
+            for (&place, value) in places.iter().zip(shift.iter()) {
+                sum[place] += value;
+            }
+        }
+    }
+    cramer_rao::miscalibrated(joint, &together, fit);
 }
 
 fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {

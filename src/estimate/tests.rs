@@ -1,5 +1,6 @@
 //! Joint estimates and predictions on simulated maneuvers of known derivatives.
 
+mod calibration;
 mod evidence;
 
 use approx::assert_relative_eq;

@@ -184,6 +184,21 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     fit.covariance_held = Some(held);
 }
 
+/// Adds to a fit's corrected covariance what errors common to all its data do to the estimates: of each, the change of the
+/// gradient with one standard deviation of it ([`super::calibration`]).
+pub fn miscalibrated<D: Likelihood>(data: &D, gradient_shifts: &[DVector<f64>], fit: &mut Fit<D::Response>) {
+    let Some(corrected) = &mut fit.covariance_corrected else { return };
+    let information = data.sums(&fit.response, &fit.weights).information;
+    let Identified::Determined { inverse, .. } = identified(&information, f64::INFINITY) else { return };
+    let mut common = DMatrix::zeros(inverse.nrows(), inverse.ncols());
+    for gradient_shift in gradient_shifts {
+        let shift = &inverse * gradient_shift;
+        common += &shift * shift.transpose();
+    }
+    *corrected += &common;
+    fit.covariance_calibration = Some(common);
+}
+
 /// Raises variances that came out below the white ones to them, keeping the correlations.
 fn never_below(mut corrected: DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
     for j in 0..corrected.nrows() {

@@ -5,6 +5,7 @@
 //! [`cramer_rao`] says how well the data determine them. [`theil`] says how well a response predicts what was measured.
 
 mod autoregression;
+pub mod calibration;
 mod case;
 pub mod coloured;
 pub mod cost;

@@ -111,6 +111,7 @@ fn iterate<D: Likelihood>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], se
         undetermined: vec![],
         covariance: None,
         covariance_held: None,
+        covariance_calibration: None,
         covariance_corrected: None,
     };
     if let Err(diverged) = data.respond(&fit.values, &mut response) {

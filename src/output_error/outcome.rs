@@ -52,7 +52,9 @@ pub struct Fit<R = Response> {
     pub covariance: Option<DMatrix<f64>>,
     /// What the uncertainty of the held values contributes to both covariances.
     pub covariance_held: Option<DMatrix<f64>>,
-    /// The covariance with the residuals' autocorrelation counted.
+    /// What errors of calibration contribute to the corrected covariance.
+    pub covariance_calibration: Option<DMatrix<f64>>,
+    /// The covariance with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted.
     pub covariance_corrected: Option<DMatrix<f64>>,
 }
 
@@ -73,6 +75,7 @@ impl<R> Fit<R> {
             undetermined: self.undetermined,
             covariance: self.covariance,
             covariance_held: self.covariance_held,
+            covariance_calibration: self.covariance_calibration,
             covariance_corrected: self.covariance_corrected,
         };
         (fit, self.response)

@@ -1,5 +1,6 @@
 //! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for the bounds.
 
+mod calibration;
 mod joint;
 
 use std::collections::BTreeMap;

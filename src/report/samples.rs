@@ -171,6 +171,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             value: Some(0.05 - 0.001 * alpha_deg),
             bound: Some(0.002),
             bound_held: None,
+            bound_calibration: None,
             bound_corrected: Some(0.004),
             wind_tunnel: Some(0.05),
             variance_inflation: Some(12.0),

@@ -94,7 +94,8 @@ table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alp
 table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial_cost final_cost condition_number left_out
     largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
-    bound_held bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error held_because);
+    bound_held bound_calibration bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error
+    held_because);
 table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
 table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
 table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference

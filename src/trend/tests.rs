@@ -17,6 +17,7 @@ fn estimate(derivative: &str, class: &str, alpha_deg: f64, value: f64, bound: f6
         value: Some(value),
         bound: Some(bound / 5.0),
         bound_held: None,
+        bound_calibration: None,
         bound_corrected: Some(bound),
         wind_tunnel: None,
         variance_inflation: None,
