@@ -353,7 +353,8 @@ impl Run<'_> {
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
     fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Done)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
-        let load = |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
+        let load =
+            |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
         let present: Vec<Option<Done>> = paths.iter().map(load).collect();
         let record = if present.iter().all(Option::is_some) { None } else { Some(record_file::read(&flight.record)?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();

@@ -65,7 +65,7 @@ fn input_figure(history: &History, number: usize, marks: &[(&str, Mark)]) -> Cla
         time: histories::time_scale(history),
         columns: vec![strips],
     });
-    of_one(history, anchor, svg, vec![], caption, marks)
+    of_one(history, anchor, svg, vec![], &caption, marks)
 }
 
 fn of_one(
@@ -73,7 +73,7 @@ fn of_one(
     anchor: String,
     svg: String,
     legend: Vec<LegendView>,
-    caption: String,
+    caption: &str,
     marks: &[(&str, Mark)],
 ) -> ClassFigure {
     let mark = marks.iter().find(|m| m.0 == history.class);
@@ -151,7 +151,7 @@ fn together_figure(
         time: histories::time_scale(history),
         columns: vec![vec![strip]],
     });
-    of_one(history, anchor, svg, legend, caption, marks)
+    of_one(history, anchor, svg, legend, &caption, marks)
 }
 
 /// A signal's change from its mean over the root mean square of the change; none where it is not in the history or did

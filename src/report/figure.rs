@@ -276,7 +276,11 @@ mod tests {
             trend: vec![(5.0, 0.05), (60.0, 0.03)],
             tunnel: vec![(5.0, 0.055), (60.0, 0.02)],
             classes: vec![
-                ClassEstimates { mark: Mark::nth(0), token: "c1".into(), estimates: vec![(10.0, 0.05, 0.01), (20.0, 3.0, 0.2)] },
+                ClassEstimates {
+                    mark: Mark::nth(0),
+                    token: "c1".into(),
+                    estimates: vec![(10.0, 0.05, 0.01), (20.0, 3.0, 0.2)],
+                },
                 ClassEstimates { mark: Mark::nth(1), token: "c2".into(), estimates: vec![] },
             ],
         }

@@ -128,7 +128,11 @@ fn figure_view(subject: &Subject, anchor: String, number: usize, alpha: Scale, m
         svg,
         legend: classes.chain(lines_legend(subject)).collect(),
         caption: caption(subject, scale),
-        phrase: if subject.is_compared() { verdict::phrase(&verdict::runs(&subject.comparison)) } else { String::new() },
+        phrase: if subject.is_compared() {
+            verdict::phrase(&verdict::runs(&subject.comparison))
+        } else {
+            String::new()
+        },
         comparison: subject.is_compared().then(|| super::comparison(subject)),
         anchor,
     }
@@ -165,7 +169,13 @@ fn description(subject: &Subject) -> String {
     let ends = |name: &str, first: Option<(f64, f64)>, last: Option<(f64, f64)>| {
         let ((a, from), (b, to)) = (first?, last?);
         let value = |v: f64| notation::number(Some(v), 3);
-        Some(format!("{name} from {} at {} to {} at {}", value(from), notation::angle(a), value(to), notation::angle(b)))
+        Some(format!(
+            "{name} from {} at {} to {} at {}",
+            value(from),
+            notation::angle(a),
+            value(to),
+            notation::angle(b)
+        ))
     };
     let trend = |row: &&&crate::tables::TrendRow| (row.alpha_deg, row.value);
     said.extend(ends("trend", subject.trend.first().as_ref().map(trend), subject.trend.last().as_ref().map(trend)));

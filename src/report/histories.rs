@@ -15,9 +15,9 @@ use crate::units::Unit;
 
 /// Width of a maneuver's drawing: two columns.
 const WIDTH: f64 = 800.0;
-const OUTPUT: f64 = 58.0;
-const RESIDUAL: f64 = 24.0;
-const INPUT: f64 = 44.0;
+const OUTPUT: f64 = 48.0;
+const RESIDUAL: f64 = 18.0;
+const INPUT: f64 = 42.0;
 /// An input that moves less than this share of the one that moves most is not drawn.
 const HARDLY: f64 = 0.1;
 /// More inputs than these make the column longer than that of the outputs.
@@ -135,7 +135,7 @@ fn output_strips(history: &History, output: &HistoryOutput) -> [Strip; 2] {
     let (measured, computed) = (points(history, &kept), points(history, &output.computed));
     let residual = points(history, &residual);
     let scale = scale_of(&[&measured, &computed], 3.0);
-    let pale = StripLine { points: measured, colour: figure::MEASURED_COLOUR, width: 2.6, dash: "" };
+    let pale = StripLine { points: measured, colour: figure::MEASURED_COLOUR, width: 2.2, dash: "" };
     let strip = Strip {
         name: without_unit(&output.label).to_owned(),
         unit: output.unit.clone(),
@@ -166,15 +166,18 @@ fn input(history: &History, name: &str, values: &[f64]) -> Option<(f64, Strip)> 
     let points = points(history, values);
     let (low, high) = extent(points.iter().map(|p| p.1))?;
     let unit = Unit::of_signal(name).name;
-    Some((high - low, Strip {
-        name: without_unit(name).to_owned(),
-        unit: if unit == "-" { String::new() } else { unit.to_owned() },
-        height: INPUT,
-        scale: scale_of(&[&points], 2.4),
-        lines: vec![stack::ink(points, 1.1)],
-        dots: vec![],
-        class: String::new(),
-    }))
+    Some((
+        high - low,
+        Strip {
+            name: without_unit(name).to_owned(),
+            unit: if unit == "-" { String::new() } else { unit.to_owned() },
+            height: INPUT,
+            scale: scale_of(&[&points], 2.4),
+            lines: vec![stack::ink(points, 1.1)],
+            dots: vec![],
+            class: String::new(),
+        },
+    ))
 }
 
 /// What the lines of a maneuver's drawing are.

@@ -42,9 +42,9 @@ use crate::tables::{
 };
 use by_class::ClassFigure;
 use failures::TableView;
+pub use histories::thinned;
 use notation::{Digits, NOTHING, angle, fixed, number};
 pub use provenance::{Provenance, SourceFile};
-pub use histories::thinned;
 use subject::Subject;
 use summary::{ClassView, VerdictGroup};
 
@@ -190,7 +190,8 @@ fn comparison(subject: &Subject) -> TableView {
     };
     let heads = ["α", "flight", "standard error", "wind tunnel", "difference", "%", "z", "verdict"];
     let note = subject.trend.first().map_or_else(String::new, |t| trend_in_words(t));
-    TableView::new("Flight against wind tunnel", &note, &heads, rows.iter().map(row).collect())
+    let title = "Flight against wind tunnel".to_owned();
+    TableView { title, ..TableView::new("", &note, &heads, rows.iter().map(row).collect()) }
 }
 
 /// What the trend that speaks for flight was fitted through, and how.

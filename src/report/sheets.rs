@@ -77,7 +77,13 @@ impl Rows<'_> {
             svg: history.map_or_else(String::new, |h| histories::drawing(h, format!("h{place}"))),
             legend: history.map_or_else(Vec::new, |h| histories::legend(h)),
             estimates: estimates(rows),
-            problems: self.problems.get(id).into_iter().flatten().map(|p| format!("{}: {}", p.stage, p.reason)).collect(),
+            problems: self
+                .problems
+                .get(id)
+                .into_iter()
+                .flatten()
+                .map(|p| format!("{}: {}", p.stage, p.reason))
+                .collect(),
         }
     }
 }

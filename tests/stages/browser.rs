@@ -99,6 +99,7 @@ fn a_browser_prints_the_report() {
     let seen = open(&chromium, folder.path(), &page, &[&option, "--no-pdf-header-footer"]);
     assert!(seen.console.is_empty(), "{:?}", seen.console);
     let pages = lopdf::Document::load(&printed).unwrap().get_pages().len();
-    let sheets = demo().report.matches("class=\"maneuver sheet\"").count() + demo().report.matches("class=\"derivative").count();
+    let sheets =
+        demo().report.matches("class=\"maneuver sheet\"").count() + demo().report.matches("class=\"derivative").count();
     assert!(pages > sheets, "{pages} pages for {sheets} sheets");
 }

@@ -21,7 +21,9 @@ fn texts(document: &Document) -> Vec<String> {
 fn the_summary_can_be_read_and_every_page_says_which_it_is() {
     let texts = texts(&printed());
     let all = texts.join(" ");
-    for words in ["What is new", "What failed", "What disagrees", "Flight against wind tunnel, derivative by derivative"] {
+    for words in
+        ["What is new", "What failed", "What disagrees", "Flight against wind tunnel, derivative by derivative"]
+    {
         assert!(all.contains(words), "{words}");
     }
     let maneuvers = demo().tables["maneuvers"].len();
@@ -40,7 +42,8 @@ fn every_derivative_and_maneuver_is_on_a_page_of_its_own_that_the_outline_names(
     let page_of = |words: &str| outline.iter().find(|(title, _)| title.contains(words)).map(|(_, page)| *page);
     let mut pages = Vec::new();
     for row in &demo().tables["maneuvers"] {
-        let page = page_of(&row["maneuver_id"]).unwrap_or_else(|| panic!("{} is not in the outline", row["maneuver_id"]));
+        let page =
+            page_of(&row["maneuver_id"]).unwrap_or_else(|| panic!("{} is not in the outline", row["maneuver_id"]));
         assert!(texts[page - 1].contains(&row["maneuver_id"]) && texts[page - 1].contains("Flight condition"));
         pages.push(page);
     }
@@ -63,7 +66,12 @@ fn the_contents_tell_the_pages_on_which_the_chapters_are() {
     assert!(chapters.len() > 8, "{toc:?}");
     let contents = texts[..3].join(" ");
     for chapter in chapters {
-        assert!(contents.contains(&format!("{} {}", chapter.title, chapter.page)), "{} {}", chapter.title, chapter.page);
+        assert!(
+            contents.contains(&format!("{} {}", chapter.title, chapter.page)),
+            "{} {}",
+            chapter.title,
+            chapter.page
+        );
         assert!(texts[chapter.page - 1].contains(&chapter.title), "{}", chapter.title);
     }
 }

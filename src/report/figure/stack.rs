@@ -115,10 +115,16 @@ impl Column {
         for (value, label) in ticks(self.time) {
             let x = self.x(value);
             let _ = write!(frame, "M{} {}v4", short(x), short(bottom));
-            let _ = write!(texts, r#"<text x="{}" y="{}" text-anchor="middle">{label}</text>"#, short(x), short(bottom + 15.0));
+            let _ = write!(
+                texts,
+                r#"<text x="{}" y="{}" text-anchor="middle">{label}</text>"#,
+                short(x),
+                short(bottom + 15.0)
+            );
         }
         let (middle, below) = (0.5 * (self.left + self.right), bottom + 28.0);
-        let _ = write!(texts, r#"<text x="{}" y="{}" text-anchor="middle">time, s</text>"#, short(middle), short(below));
+        let _ =
+            write!(texts, r#"<text x="{}" y="{}" text-anchor="middle">time, s</text>"#, short(middle), short(below));
         let _ = write!(svg, r##"<path d="{grid}" stroke="#cccccc" stroke-width=".5" fill="none"/>"##);
         svg.push_str(&lines);
         let _ = write!(svg, r##"<path d="{frame}" stroke="#000000" stroke-width=".8" fill="none"/>"##);
@@ -165,7 +171,8 @@ impl Column {
             if d.is_empty() {
                 continue;
             }
-            let dash = if line.dash.is_empty() { String::new() } else { format!(r#" stroke-dasharray="{}""#, line.dash) };
+            let dash =
+                if line.dash.is_empty() { String::new() } else { format!(r#" stroke-dasharray="{}""#, line.dash) };
             let (colour, width) = (line.colour, line.width);
             let _ = write!(svg, r#"<path d="{d}" stroke="{colour}" stroke-width="{width}"{dash} fill="none"/>"#);
         }

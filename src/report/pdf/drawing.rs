@@ -44,7 +44,9 @@ impl Style {
                 "fill-opacity" | "opacity" => style.opacity = percent(value),
                 "font-size" => style.size = value.trim_end_matches("px").parse().unwrap_or(style.size),
                 "font-weight" => style.weight = if value == "bold" { Weight::Bold } else { Weight::Regular },
-                "text-anchor" => style.anchor = [("middle", 0.5), ("end", 1.0)].iter().find(|a| a.0 == value).map_or(0.0, |a| a.1),
+                "text-anchor" => {
+                    style.anchor = [("middle", 0.5), ("end", 1.0)].iter().find(|a| a.0 == value).map_or(0.0, |a| a.1)
+                }
                 _ => {}
             }
         }
@@ -224,7 +226,7 @@ impl Pen<'_> {
     }
 
     fn text(&mut self, node: Node, style: &Style, x: f32, y: f32) {
-        let text: String = node.descendants().filter_map(|n| if n.is_text() { n.text() } else { None }).collect();
+        let text: String = node.descendants().filter(Node::is_text).filter_map(|n| n.text()).collect();
         let back = style.anchor * self.fonts.width(style.weight, style.size, &text);
         let is_upright = node.attribute("transform").is_some_and(|t| t.starts_with("rotate(-90"));
         let place = if is_upright {
@@ -286,8 +288,16 @@ impl Trace {
                     self.to([base[0] + pair[0], base[1] + pair[1]], command.eq_ignore_ascii_case(&'m') && i == 0);
                 }
             }
-            'h' => numbers.iter().for_each(|x| self.to([from(self.at)[0] + x, self.at[1]], false)),
-            'v' => numbers.iter().for_each(|y| self.to([self.at[0], from(self.at)[1] + y], false)),
+            'h' => {
+                for x in numbers {
+                    self.to([from(self.at)[0] + x, self.at[1]], false);
+                }
+            }
+            'v' => {
+                for y in numbers {
+                    self.to([self.at[0], from(self.at)[1] + y], false);
+                }
+            }
             'a' => {
                 for arc in numbers.chunks_exact(7) {
                     let base = from(self.at);

@@ -68,11 +68,11 @@ impl<'a> Flow<'a> {
             items.push(Item::page_break());
         }
         let (made, after) = self.element(node, width, style);
-        if node.tag_name().name() != "nav" {
+        if node.tag_name().name() == "nav" {
+            items.extend(made);
+        } else {
             self.put(made, &mut items);
             items.push(Item::room(after));
-        } else {
-            items.extend(made);
         }
         items
     }
@@ -84,7 +84,9 @@ impl<'a> Flow<'a> {
             "h2" => (self.heading(node, width, 13.0, Some(0)), 3.0),
             "h3" => (self.heading(node, width, 10.5, Some(1)), 2.0),
             "h4" | "summary" => (self.heading(node, width, TEXT, None), 1.0),
-            "nav" => (vec![Item { marks: vec![Mark::Heading { level: 9, title: String::new() }], ..Item::default() }], 0.0),
+            "nav" => {
+                (vec![Item { marks: vec![Mark::Heading { level: 9, title: String::new() }], ..Item::default() }], 0.0)
+            }
             "p" if has_class(node, "note") => {
                 (self.children(node, width, Style { colour: SOFT, ..Style::of_size(SMALL) }), 4.0)
             }
@@ -92,7 +94,9 @@ impl<'a> Flow<'a> {
             "ul" => (self.list(node, width, style), 4.0),
             "dl" => (self.definitions(node, width, style), 5.0),
             "pre" => (self.code(node, width), 5.0),
-            "table" => (table::rows(node, width, self.fonts, has_class(node, "triangle")), 6.0),
+            "table" => {
+                (table::rows(node, width, self.fonts, has_class(node, "triangle") || has_class(node, "dense")), 6.0)
+            }
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, Style::of_size(SMALL)), 1.0),
             "figure" => (vec![together(&self.children(node, width, style))], 8.0),
@@ -117,7 +121,9 @@ impl<'a> Flow<'a> {
                 first.marks.push(Mark::Fill { x: 0.0, y: -3.0, width, height: 0.9, colour: super::item::INK });
             }
         }
-        heading.iter_mut().for_each(|i| i.keep = true);
+        for line in &mut heading {
+            line.keep = true;
+        }
         items.append(&mut heading);
         items
     }
@@ -167,7 +173,9 @@ impl<'a> Flow<'a> {
     fn code(&mut self, node: Node, width: f32) -> Vec<Item> {
         let mut reader = Reader::new(self.fonts).preserved();
         let style = Style::of_size(CODE);
-        node.children().for_each(|child| reader.read(child, style, None));
+        for child in node.children() {
+            reader.read(child, style, None);
+        }
         lines(&reader.words(), Setting { width, size: CODE, align: 0.0 }, self.fonts)
     }
 

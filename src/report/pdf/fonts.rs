@@ -2,6 +2,7 @@
 //! Latin, Greek and the signs that a report needs. Every PDF carries them, so it looks the same everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 
 use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
 use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, Str};
@@ -73,7 +74,11 @@ impl Fonts {
     /// The text as a PDF shows it: the numbers of its glyphs in hexadecimal.
     pub fn encoded(&self, weight: Weight, text: &str) -> String {
         let cut = self.cut(weight);
-        text.chars().map(|c| format!("{:04x}", cut.glyph(c).0)).collect()
+        text.chars().fold(String::new(), |mut all, c| {
+            // Writing into a String cannot fail.
+            let _ = write!(all, "{:04x}", cut.glyph(c).0);
+            all
+        })
     }
 
     /// Writes a face as the objects that begin with `first`; it takes five.
@@ -88,7 +93,8 @@ impl Cut {
         let unit = 1000.0 / f32::from(face.units_per_em());
         let width = |glyph: u16| f32::from(face.glyph_hor_advance(ttf_parser::GlyphId(glyph)).unwrap_or(0)) * unit;
         let mut glyphs = BTreeMap::new();
-        for subtable in face.tables().cmap.into_iter().flat_map(|t| t.subtables).filter(ttf_parser::cmap::Subtable::is_unicode)
+        for subtable in
+            face.tables().cmap.into_iter().flat_map(|t| t.subtables).filter(ttf_parser::cmap::Subtable::is_unicode)
         {
             subtable.codepoints(|code| {
                 if let (Some(c), Some(glyph)) = (char::from_u32(code), subtable.glyph_index(code)) {

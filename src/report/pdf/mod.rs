@@ -100,7 +100,7 @@ impl Writer<'_> {
                 }
                 Mark::PageOf { x, y, style, prefix, target } => {
                     if let Some((page, _)) = self.pages.anchors.get(target) {
-                        content.right(*x, *y, *style, &format!("{}{page}", prefix));
+                        content.right(*x, *y, *style, &format!("{prefix}{page}"));
                     }
                 }
                 other => content.mark(other),
@@ -120,7 +120,10 @@ impl Writer<'_> {
         for percent in &content.opacities {
             let opacity = f32::from(*percent) / 100.0;
             let name = format!("A{percent}");
-            states.insert(Name(name.as_bytes())).start::<pdf_writer::writers::ExtGraphicsState>().non_stroking_alpha(opacity);
+            states
+                .insert(Name(name.as_bytes()))
+                .start::<pdf_writer::writers::ExtGraphicsState>()
+                .non_stroking_alpha(opacity);
         }
         states.finish();
         resources.finish();
@@ -142,7 +145,13 @@ impl Writer<'_> {
     fn footer(&self, content: &mut Content, page: usize) {
         let style = Style { colour: SOFT, ..Style::of_size(7.5) };
         let y = HEIGHT - 28.0;
-        content.mark(&Mark::Fill { x: MARGIN, y: y - 11.0, width: WIDTH - 2.0 * MARGIN, height: 0.4, colour: item::RULE });
+        content.mark(&Mark::Fill {
+            x: MARGIN,
+            y: y - 11.0,
+            width: WIDTH - 2.0 * MARGIN,
+            height: 0.4,
+            colour: item::RULE,
+        });
         content.mark(&Mark::Text { x: MARGIN, y, style, text: self.title.to_owned() });
         content.right(WIDTH - MARGIN, y, style, &format!("page {page} of {}", self.pages.pages.len()));
     }
@@ -173,9 +182,9 @@ impl Writer<'_> {
                 item.first(id(chapter + 1)).last(id(end - 1)).count(-count(end - chapter - 1));
             }
             item.finish();
-            for part in chapter + 1..end {
+            for (part, heading) in headings.iter().enumerate().take(end).skip(chapter + 1) {
                 let mut item = pdf.outline_item(id(part));
-                describe(&mut item, &headings[part], id(chapter));
+                describe(&mut item, heading, id(chapter));
                 if part > chapter + 1 {
                     item.prev(id(part - 1));
                 }
@@ -208,7 +217,8 @@ impl Content<'_> {
                 let [x, y, size] = [*x, HEIGHT - y, style.size].map(number);
                 let encoded = self.fonts.encoded(style.weight, text);
                 let (colour, font) = (rgb(style.colour), style.weight.resource());
-                let _ = writeln!(self.out, "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET");
+                let _ =
+                    writeln!(self.out, "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET");
             }
             Mark::Drawing { x, y, scale, drawing } => {
                 let [x, y] = [*x, HEIGHT - y].map(number);

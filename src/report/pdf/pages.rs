@@ -156,7 +156,7 @@ fn line(level: usize, title: &str, id: &str, fonts: &Fonts) -> Item {
 /// Lines in two columns, the left one first, so many to a page as it has room for.
 fn in_columns(lines: Vec<Item>) -> Vec<Item> {
     /// What the first page has room for beside the title, and what one has that is all contents.
-    const FIRST: usize = 48;
+    const FIRST: usize = 54;
     const WHOLE: usize = 66;
     let mut rows = Vec::new();
     let mut rest = lines.as_slice();
@@ -176,4 +176,3 @@ fn in_columns(lines: Vec<Item>) -> Vec<Item> {
     }
     rows
 }
-

@@ -31,7 +31,7 @@ struct Cell {
 
 /// The rows of a table; a dense one has no lines between them, and small type.
 pub fn rows(table: Node, width: f32, fonts: &Fonts, is_dense: bool) -> Vec<Item> {
-    let sizes = if is_dense { &SIZES[1..] } else { &SIZES[..] };
+    let sizes = if is_dense { &SIZES[2..] } else { &SIZES[..] };
     let (mut size, mut grid, mut columns) = (SIZES[0], Vec::new(), Vec::new());
     for try_size in sizes {
         size = *try_size;
@@ -48,7 +48,7 @@ pub fn rows(table: Node, width: f32, fonts: &Fonts, is_dense: bool) -> Vec<Item>
     let mut head: Option<Rc<Item>> = None;
     let mut items = Vec::new();
     for (is_head, row) in &grid {
-        let mut item = row_item(row, &columns, size, fonts);
+        let mut item = row_item(row, &columns, size, if is_dense { 0.3 } else { 1.2 }, fonts);
         let colour = if *is_head { INK } else { RULE };
         if !is_dense {
             let thickness = if *is_head { 0.8 } else { 0.4 };
@@ -85,7 +85,9 @@ fn read(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
         style = style.bold();
     }
     let mut reader = Reader::new(fonts);
-    cell.children().for_each(|child| reader.read(child, style, None));
+    for child in cell.children() {
+        reader.read(child, style, None);
+    }
     Cell { words: reader.words(), align: if has_class(cell, "n") { 1.0 } else { 0.0 }, shade: shade.map(|s| s.1) }
 }
 
@@ -116,24 +118,24 @@ fn shared(least: &[f32], most: &[f32], room: f32) -> Vec<f32> {
     least.iter().zip(most).map(|(least, most)| least + share * (most - least)).collect()
 }
 
-fn row_item(row: &[Cell], columns: &[f32], size: f32, fonts: &Fonts) -> Item {
-    const ABOVE: f32 = 1.2;
+/// One row, with so much room above and below its text.
+fn row_item(row: &[Cell], columns: &[f32], size: f32, room: f32, fonts: &Fonts) -> Item {
     let mut item = Item::default();
     let mut x = 0.0;
     let mut shades = Vec::new();
     for (cell, width) in row.iter().zip(columns) {
         // A little more than the width, for sums of widths are not exact.
         let set = lines(&cell.words, Setting { width: width + 0.05, size, align: cell.align }, fonts);
-        let mut y = ABOVE;
+        let mut y = room;
         for line in &set {
             item.absorb(line, x, y);
             y += line.height;
         }
-        item.height = item.height.max(y + ABOVE);
+        item.height = item.height.max(y + room);
         shades.extend(cell.shade.map(|colour| (x, *width, colour)));
         x += width + GAP;
     }
-    item.height = item.height.max(size * 1.35 + 2.0 * ABOVE);
+    item.height = item.height.max(size * 1.35 + 2.0 * room);
     let height = item.height;
     let fills = shades.into_iter().map(|(x, width, colour)| {
         let (x, width) = (x - 0.5 * GAP, width + GAP);

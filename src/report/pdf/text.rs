@@ -16,10 +16,16 @@ const LEADING: f32 = 1.35;
 /// A part of a word that is set in one way.
 #[derive(Clone, Debug)]
 enum Part {
-    Text { text: String, style: Style },
+    Text {
+        text: String,
+        style: Style,
+    },
     Drawing(Rc<Drawing>),
     /// Room for the page that a link leads to.
-    PageOf { style: Style, width: f32 },
+    PageOf {
+        style: Style,
+        width: f32,
+    },
 }
 
 /// What is not broken: its parts with their links.
