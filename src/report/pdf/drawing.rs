@@ -45,7 +45,7 @@ impl Style {
                 "font-size" => style.size = value.trim_end_matches("px").parse().unwrap_or(style.size),
                 "font-weight" => style.weight = if value == "bold" { Weight::Bold } else { Weight::Regular },
                 "text-anchor" => {
-                    style.anchor = [("middle", 0.5), ("end", 1.0)].iter().find(|a| a.0 == value).map_or(0.0, |a| a.1)
+                    style.anchor = [("middle", 0.5), ("end", 1.0)].iter().find(|a| a.0 == value).map_or(0.0, |a| a.1);
                 }
                 _ => {}
             }

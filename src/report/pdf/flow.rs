@@ -225,7 +225,7 @@ fn indented(mut items: Vec<Item>, by: f32) -> Vec<Item> {
 /// An element's text in one line, without what is small beside it.
 pub fn plain(node: Node) -> String {
     let mut text = String::new();
-    for part in node.descendants().filter(|n| n.is_text()) {
+    for part in node.descendants().filter(Node::is_text) {
         let is_kept = part.ancestors().all(|a| !a.is_element() || !(is_for_screens(a) || a.has_tag_name("small")));
         if let (Some(part), true) = (part.text(), is_kept) {
             text.push_str(part);

@@ -73,7 +73,7 @@ fn font_ref(weight: Weight) -> Ref {
 impl Writer<'_> {
     fn write(&self) -> Vec<u8> {
         let mut pdf = Pdf::new();
-        let total = self.pages.pages.len();
+        let total = self.pages.sheets.len();
         let mut catalog = pdf.catalog(Ref::new(CATALOG));
         catalog.pages(Ref::new(TREE)).outlines(Ref::new(OUTLINE)).page_mode(PageMode::UseOutlines).lang(TextStr("en"));
         catalog.viewer_preferences().pair(Name(b"DisplayDocTitle"), true);
@@ -93,7 +93,7 @@ impl Writer<'_> {
     fn page(&self, pdf: &mut Pdf, number: usize) {
         let mut content = Content { fonts: self.fonts, out: String::new(), opacities: BTreeSet::from([100]) };
         let mut links = Vec::new();
-        for mark in self.pages.pages.get(number - 1).map_or(&[][..], |p| &p.marks) {
+        for mark in self.pages.sheets.get(number - 1).map_or(&[][..], |p| &p.marks) {
             match mark {
                 Mark::Link { x, y, width, height, target } => {
                     links.extend(self.pages.anchors.get(target).map(|to| ([*x, *y, *width, *height], *to)));
@@ -153,13 +153,13 @@ impl Writer<'_> {
             colour: item::RULE,
         });
         content.mark(&Mark::Text { x: MARGIN, y, style, text: self.title.to_owned() });
-        content.right(WIDTH - MARGIN, y, style, &format!("page {page} of {}", self.pages.pages.len()));
+        content.right(WIDTH - MARGIN, y, style, &format!("page {page} of {}", self.pages.sheets.len()));
     }
 
     /// The headings as a tree of two levels, the second folded.
     fn outline(&self, pdf: &mut Pdf) {
         let headings = &self.pages.headings;
-        let first = FIRST_PAGE + 2 * count(self.pages.pages.len());
+        let first = FIRST_PAGE + 2 * count(self.pages.sheets.len());
         let id = |i: usize| Ref::new(first + count(i));
         let chapters: Vec<usize> = (0..headings.len()).filter(|i| headings[*i].level == 0).collect();
         let mut root = pdf.outline(Ref::new(OUTLINE));

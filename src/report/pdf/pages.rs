@@ -30,7 +30,7 @@ pub struct Heading {
 /// The document on its pages.
 #[derive(Debug, Default)]
 pub struct Pages {
-    pub pages: Vec<Page>,
+    pub sheets: Vec<Page>,
     pub headings: Vec<Heading>,
     /// Page and place of each anchor.
     pub anchors: BTreeMap<String, (usize, f32)>,
@@ -44,12 +44,12 @@ const MOST_ENTRIES: usize = 400;
 /// Puts the items on pages.
 pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
     let items = with_contents(items, fonts);
-    let mut pages = Pages { pages: vec![Page::default()], ..Pages::default() };
+    let mut pages = Pages { sheets: vec![Page::default()], ..Pages::default() };
     let mut y = TOP;
     for (i, item) in items.iter().enumerate() {
         let is_full = y + item.height + kept(&items, i) > HEIGHT - BOTTOM;
         if y > TOP && (item.breaks || (is_full && !item.is_room)) {
-            pages.pages.push(Page::default());
+            pages.sheets.push(Page::default());
             y = TOP;
             if let Some(head) = &item.head {
                 pages.put(head, y);
@@ -82,7 +82,7 @@ fn kept(items: &[Item], i: usize) -> f32 {
 
 impl Pages {
     fn put(&mut self, item: &Item, y: f32) {
-        let page = self.pages.len();
+        let page = self.sheets.len();
         for mark in &item.marks {
             match mark {
                 Mark::Anchor { id } => {
@@ -92,7 +92,7 @@ impl Pages {
                     self.headings.push(Heading { level: *level, title: title.clone(), page, y });
                 }
                 other => {
-                    if let Some(last) = self.pages.last_mut() {
+                    if let Some(last) = self.sheets.last_mut() {
                         last.marks.push(other.moved(MARGIN, y));
                     }
                 }
@@ -124,7 +124,7 @@ fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
     let style = Style::of_size(10.5).bold();
     let title = Mark::Text { x: 0.0, y: 10.5, style, text: "Contents".to_owned() };
     contents.push(Item { height: 16.0, marks: vec![title], keep: true, ..Item::default() });
-    contents.extend(in_columns(lines));
+    contents.extend(in_columns(&lines));
     items.splice(at..=at, contents);
     items
 }
@@ -154,12 +154,12 @@ fn line(level: usize, title: &str, id: &str, fonts: &Fonts) -> Item {
 }
 
 /// Lines in two columns, the left one first, so many to a page as it has room for.
-fn in_columns(lines: Vec<Item>) -> Vec<Item> {
+fn in_columns(lines: &[Item]) -> Vec<Item> {
     /// What the first page has room for beside the title, and what one has that is all contents.
     const FIRST: usize = 54;
     const WHOLE: usize = 66;
     let mut rows = Vec::new();
-    let mut rest = lines.as_slice();
+    let mut rest = lines;
     let mut most = FIRST;
     while !rest.is_empty() {
         let (own, later) = rest.split_at(rest.len().min(2 * most));
