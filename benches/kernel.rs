@@ -87,7 +87,7 @@ impl Plain<'_> {
             let read = Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &self.motion[point]), &x, &c);
             let through = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::from_fn(|k, i| slopes[k][i]);
             let by_state = read.by_state + read.by_coefficient * through;
-            for o in 0..OUTPUTS {
+            for (o, z) in z.iter().enumerate() {
                 let row: Vec<f64> = (0..n)
                     .map(|j| {
                         let direct = read.by_coefficient[(o, self.free[j].coefficient.index())] * regressors[j];
@@ -95,7 +95,7 @@ impl Plain<'_> {
                     })
                     .collect();
                 for i in 0..n {
-                    gradient[i] += row[i] * (z[o] - read.outputs[o]);
+                    gradient[i] += row[i] * (z - read.outputs[o]);
                     for j in 0..n {
                         information[i * n + j] += row[i] * row[j];
                     }

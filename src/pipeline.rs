@@ -12,7 +12,7 @@ mod others;
 mod stretches;
 pub mod show;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ use crate::ingest::Signature;
 use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::store::archive::FlightFiles;
-use crate::store::{Fingerprint, Store, archive, atomic, fingerprint, table};
+use crate::store::{Digest, Fingerprint, Store, archive, atomic, table};
 use crate::tables::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
     History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
@@ -91,9 +91,14 @@ struct Found {
     problems: Vec<Problem>,
 }
 
+/// A maneuver's estimate, and its time history as the report draws it.
+type Fitted = (Estimated, Option<History>);
+
 /// The campaign as far as it has been brought.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
+    /// The archive's files, as far as they could be read.
+    pub sources: Vec<report::SourceFile>,
     pub flights: Vec<Flight>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
@@ -112,6 +117,8 @@ pub struct Campaign {
     /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
+    /// Time histories, thinned for the report, of the maneuvers that have one.
+    pub histories: Vec<History>,
     pub trends: Vec<TrendRow>,
     /// Maneuvers far from their trend.
     pub outliers: Vec<OutlierRow>,
@@ -207,7 +214,7 @@ struct Run<'a> {
 /// The fingerprint of a flight, and those of its files, or why there are none.
 struct Prints {
     fingerprint: String,
-    content: std::result::Result<Vec<String>, String>,
+    content: std::result::Result<Vec<Digest>, String>,
 }
 
 impl Run<'_> {
@@ -235,6 +242,10 @@ impl Run<'_> {
     fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
         let prints: Vec<Prints> = files.par_iter().map(|f| self.prints(f)).collect();
         let items: Vec<(&FlightFiles, &Prints)> = files.iter().zip(&prints).collect();
+        for (files, prints) in &items {
+            let digests = prints.content.iter().flatten().cloned();
+            campaign.sources.extend(files.files.iter().zip(digests).map(|(path, digest)| source_file(path, digest)));
+        }
         let copy = |prints: &Prints| items.iter().find(|(_, p)| p.content.is_ok() && p.content == prints.content);
         let work = |(files, prints): &(&FlightFiles, &Prints)| {
             let id = &files.flight_id;
@@ -272,7 +283,7 @@ impl Run<'_> {
     /// What decides a flight's record, and what its files hold alone.
     fn prints(&self, files: &FlightFiles) -> Prints {
         let config = self.config;
-        let content = files.files.iter().map(|path| fingerprint::of_file(path)).collect::<Result<Vec<String>>>();
+        let content = files.files.iter().map(|path| Digest::of_file(path)).collect::<Result<Vec<Digest>>>();
         let content = content.map_err(|error| error.to_string());
         let fingerprint = Fingerprint::of("ingest", INGEST_VERSION)
             .with(&files.flight_id)
@@ -345,8 +356,11 @@ impl Run<'_> {
         self.progress.begin("estimate", campaign.maneuvers.len());
         let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
         self.progress.end();
-        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
+        let (paths, done): (Vec<PathBuf>, Vec<_>) = done?.into_iter().flatten().unzip();
+        let (estimated, histories): (Vec<Estimated>, Vec<Option<History>>) = done.into_iter().unzip();
+        campaign.histories = histories.into_iter().flatten().collect();
         self.store.keep_only("estimate", &paths)?;
+        self.store.keep_only("history", &paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>())?;
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -365,26 +379,30 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
+    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Fitted)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
-        let present: Vec<Option<Estimated>> = paths.iter().map(|path| self.store.load(path)).collect();
+        let load =
+            |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
+        let present: Vec<Option<Fitted>> = paths.iter().map(load).collect();
         let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open()?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()
             .map(|((maneuver, path), present)| {
-                let estimated = match (present, &record) {
-                    (Some(estimated), _) => estimated,
+                let done = match (present, &record) {
+                    (Some(done), _) => done,
                     (None, Some(record)) => {
                         let record = record.part(None, maneuver.start_s, maneuver.end_s)?;
-                        let estimated = Estimated { history: None, ..self.estimate_maneuver(&record, maneuver) };
+                        let mut estimated = self.estimate_maneuver(&record, maneuver);
+                        let history = estimated.history.take().map(|h| report::thinned(&h));
+                        self.store.save(&self.store.beside(&path, "history"), &history)?;
                         self.store.save(&path, &estimated)?;
-                        estimated
+                        (estimated, history)
                     }
                     (None, None) => return Err(crate::error::Error::store(&path, &"its flight's record was not read")),
                 };
                 self.progress.advance(&maneuver.maneuver_id);
-                Ok((path, estimated))
+                Ok((path, done))
             })
             .collect()
     }
@@ -428,7 +446,6 @@ impl Run<'_> {
     fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
         let path = config.reports.join("report.html");
-        let histories = self.histories(campaign)?;
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
@@ -449,44 +466,48 @@ impl Run<'_> {
             instruments: &campaign.instruments,
             events: &campaign.events,
             problems: &campaign.problems,
-            histories: &histories,
+            histories: &campaign.histories,
+            typical_alpha_deg: config.report.histories_at_alpha_deg,
+            provenance: &self.provenance(campaign)?,
             order: &config.derivative_names(),
             classes: &classes,
         };
         let html =
             report::html(&contents, config.template.as_deref()).map_err(|e| crate::error::Error::store(&path, &e))?;
         atomic::place(&path, html.as_bytes())?;
+        let printed = config.reports.join("report.pdf");
+        match report::pdf::pdf(&html) {
+            Ok(bytes) => atomic::place(&printed, &bytes)?,
+            Err(why) => {
+                // One of another night beside this page would be taken for the same.
+                atomic::remove(&printed)?;
+                let reason = format!("not made: the template's page is no well-formed XML: {why}");
+                campaign.problems.push(problem("report", "", "report.pdf", &reason));
+            }
+        }
         campaign.report = Some(path);
         Ok(())
     }
 
-    /// Time histories of one maneuver per class: the converged one nearest to the configured angle of attack. They are
-    /// computed again rather than stored: an estimation takes milliseconds, its histories a quarter of a megabyte.
-    fn histories(&self, campaign: &Campaign) -> Result<Vec<History>> {
-        let at = self.config.report.histories_at_alpha_deg;
-        let shown: Vec<&Maneuver> = self
-            .config
-            .classes
-            .iter()
-            .filter_map(|class| {
-                let fits = campaign.maneuvers.iter().zip(&campaign.fits);
-                fits.filter(|(m, f)| m.class == class.name && f.outcome == Outcome::Converged.name())
-                    .map(|(m, _)| m)
-                    .min_by(|a, b| (a.alpha_deg - at).abs().total_cmp(&(b.alpha_deg - at).abs()))
-            })
-            .collect();
-        let histories = self.each(
-            "report",
-            &shown,
-            |m| &m.maneuver_id,
-            |maneuver| {
-                let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
-                let part = |f: &Flight| f.open()?.part(None, maneuver.start_s, maneuver.end_s);
-                let record = flight.map(part).transpose()?;
-                Ok(record.and_then(|record| self.estimate_maneuver(&record, maneuver).history))
-            },
-        )?;
-        Ok(histories.into_iter().flatten().collect())
+    /// Everything that decided the results, enough to do it again.
+    fn provenance(&self, campaign: &Campaign) -> Result<report::Provenance> {
+        let config = self.config;
+        let tunnel = source_file(&config.wind_tunnel, Digest::of_file(&config.wind_tunnel)?);
+        let versions = format!(
+            "ingest {INGEST_VERSION}, segment {SEGMENT_VERSION}, estimate {ESTIMATE_VERSION}, joint {JOINT_VERSION}, predict \
+             {PREDICT_VERSION}"
+        );
+        Ok(report::Provenance {
+            program: format!("harvest {}, methods: {versions}", env!("CARGO_PKG_VERSION")),
+            command: format!(
+                "harvest run {} --archive '{}' --wind-tunnel '{}'",
+                config.name,
+                config.archive,
+                config.wind_tunnel.display()
+            ),
+            data: campaign.sources.iter().cloned().chain([tunnel]).collect(),
+            configuration: config.files.clone(),
+        })
     }
 }
 
@@ -498,6 +519,11 @@ fn tunnel_and_sources(config: &Config) -> String {
     } else {
         format!("{name} (sources: {})", sources.join("; "))
     }
+}
+
+fn source_file(path: &Path, digest: Digest) -> report::SourceFile {
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    report::SourceFile { name, bytes: digest.bytes, blake3: digest.blake3 }
 }
 
 fn problem(stage: &str, flight_id: &str, place: &str, reason: &str) -> Problem {

@@ -433,10 +433,18 @@ pub struct History {
 pub struct HistoryOutput {
     pub label: String,
     pub unit: String,
+    #[serde(deserialize_with = "with_missing")]
     pub measured: Vec<f64>,
+    #[serde(deserialize_with = "with_missing")]
     pub computed: Vec<f64>,
     /// Samples left out of the cost.
     pub marked: Vec<bool>,
+}
+
+/// Numbers of which some are missing: JSON has no word for a number that is none.
+fn with_missing<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let values = Vec::<Option<f64>>::deserialize(deserializer)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
 }
 
 /// `coverage`: what the bounds of one derivative are worth in one maneuver recorded many times.

@@ -49,6 +49,8 @@ pub struct Config {
     pub report: ReportSettings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
+    /// The pipeline's files as they are: name and text.
+    pub files: Vec<(String, String)>,
 }
 
 /// What the command line says instead of the pipeline's YAML.
@@ -100,6 +102,7 @@ impl Config {
             export: pipeline.export,
             report: pipeline.report,
             template,
+            files: files.all().map(|file| file.named(folder)).collect(),
         };
         check::whole(&config, &files)?;
         Ok(config)

@@ -16,13 +16,43 @@ pub struct TableView {
     pub note: String,
     pub heads: Vec<String>,
     pub rows: Vec<Vec<String>>,
+    /// Whether each column is of numbers, which stand right.
+    pub numeric: Vec<bool>,
+    /// Where each row's first cell leads, and the class it is hidden with; empty where no row has any.
+    pub links: Vec<String>,
+    pub classes: Vec<String>,
 }
 
 impl TableView {
     pub fn new(title: &str, note: &str, heads: &[&str], rows: Vec<Vec<String>>) -> TableView {
         let title = format!("{title} ({})", rows.len());
-        TableView { title, note: note.to_owned(), heads: heads.iter().map(|h| (*h).to_owned()).collect(), rows }
+        let numeric = (0..heads.len()).map(|i| is_numeric(rows.iter().filter_map(|row| row.get(i)))).collect();
+        TableView {
+            title,
+            note: note.to_owned(),
+            heads: heads.iter().map(|h| (*h).to_owned()).collect(),
+            rows,
+            numeric,
+            links: vec![],
+            classes: vec![],
+        }
     }
+}
+
+/// Whether cells are numbers or nothing, and one of them a number.
+fn is_numeric<'a>(cells: impl Iterator<Item = &'a String>) -> bool {
+    let is_number = |c: &str| {
+        let bare = c.replace('\u{2212}', "-");
+        bare.trim_end_matches(['%', '°', ' ']).parse::<f64>().is_ok()
+    };
+    let mut some = false;
+    for cell in cells.filter(|c| !c.is_empty() && *c != NOTHING) {
+        if !is_number(cell) {
+            return false;
+        }
+        some = true;
+    }
+    some
 }
 
 /// Whether a check of the records passed, or could not be made for want of excitation.

@@ -1,6 +1,6 @@
 //! A small campaign with every kind of row, for the tests of the report.
 
-use super::Contents;
+use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::{Maneuver, Quality, Recognised};
@@ -27,6 +27,7 @@ pub struct Campaign {
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
     pub histories: Vec<History>,
+    pub provenance: Provenance,
     pub order: Vec<String>,
     pub classes: Vec<(String, String, Axis)>,
 }
@@ -52,6 +53,8 @@ impl Campaign {
             events: &self.events,
             problems: &self.problems,
             histories: &self.histories,
+            typical_alpha_deg: 30.0,
+            provenance: &self.provenance,
             order: &self.order,
             classes: &self.classes,
         }
@@ -80,6 +83,12 @@ pub fn campaign() -> Campaign {
             compare(&mut campaign, name, unit, alpha_deg);
         }
     }
+    campaign.provenance = Provenance {
+        program: "harvest 0.0.0, ingest 1".into(),
+        command: "harvest run mine".into(),
+        data: vec![SourceFile { name: "flight_001.parquet".into(), bytes: 123, blake3: "00ff".into() }],
+        configuration: vec![("pipeline.yaml".into(), "title: a campaign\n  deeper: 1\n".into())],
+    };
     campaign.fits[0].outcome = "not_converged".into();
     campaign.estimates[5].value = Some(1e6);
     campaign.checks.push(CheckRow {

@@ -17,7 +17,7 @@ pub struct Store {
 }
 
 /// The folders of the store, one per kind of artefact.
-const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "joint", "predict"];
+const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "history", "joint", "predict"];
 
 impl Store {
     /// Opens or creates a store and removes what a killed run left half written.
@@ -50,6 +50,12 @@ impl Store {
         let safe: String =
             item.chars().map(|c| if c.is_alphanumeric() || "-_=.".contains(c) { c } else { '_' }).collect();
         self.folder.join(kind).join(format!("{safe}-{fingerprint}.{extension}"))
+    }
+
+    /// Where the artefact of another kind under the same name and fingerprint lies.
+    #[must_use]
+    pub fn beside(&self, path: &Path, kind: &str) -> PathBuf {
+        self.folder.join(kind).join(path.file_name().unwrap_or_default())
     }
 
     /// The artefact at a path, where there is one that can be read; a damaged one counts as none and is made again.

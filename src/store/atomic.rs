@@ -68,6 +68,17 @@ impl Draft {
     }
 }
 
+/// Removes a file, where there is one: what it said is no longer so.
+///
+/// # Errors
+/// [`Error::Io`] naming the path.
+pub fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "cannot remove it")(e)),
+        _ => Ok(()),
+    }
+}
+
 /// Removes what a killed run left half written in a folder.
 ///
 /// # Errors

@@ -4,7 +4,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
@@ -38,20 +38,28 @@ impl Fingerprint {
     }
 }
 
-/// The fingerprint of a file's content, whatever its name.
-///
-/// # Errors
-/// [`Error::Io`] naming the file.
-pub fn of_file(path: &Path) -> Result<String> {
-    let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
-    let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; 1 << 17];
-    loop {
-        let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
-        if n == 0 {
-            return Ok(hasher.finalize().to_hex().to_string());
+/// What a file holds, in a few words: the same digest is the same content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Digest {
+    pub bytes: u64,
+    /// Hexadecimal.
+    pub blake3: String,
+}
+
+impl Digest {
+    /// # Errors
+    /// [`Error::Io`] naming the file.
+    pub fn of_file(path: &Path) -> Result<Digest> {
+        let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+        let mut hasher = blake3::Hasher::new();
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
+            if n == 0 {
+                return Ok(Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() });
+            }
+            hasher.update(&buffer[..n]);
         }
-        hasher.update(&buffer[..n]);
     }
 }
 

@@ -11,4 +11,4 @@ pub mod table;
 pub mod tunnel;
 
 pub use artefacts::Store;
-pub use fingerprint::Fingerprint;
+pub use fingerprint::{Digest, Fingerprint};

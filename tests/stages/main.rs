@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on ends here")]
 
+mod browser;
 mod check;
 mod compare;
 mod estimate;
@@ -9,6 +10,7 @@ mod export;
 mod faults;
 mod house;
 mod ingest;
+mod paper;
 mod report;
 mod run;
 mod segment;

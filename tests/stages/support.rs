@@ -179,6 +179,7 @@ pub fn demo() -> &'static Demo {
             tables: tables.iter().map(|name| (*name, campaign.table(name))).collect(),
             bytes: campaign.tables(),
             report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
+            printed: fs::read(campaign.path("reports/report.pdf")).unwrap(),
             store: campaign.bytes("store"),
             outcome,
         }
@@ -192,6 +193,8 @@ pub struct Demo {
     pub tables: BTreeMap<&'static str, Vec<Row>>,
     pub bytes: BTreeMap<PathBuf, Vec<u8>>,
     pub report: String,
+    /// The report as a PDF.
+    pub printed: Vec<u8>,
     store: BTreeMap<PathBuf, Vec<u8>>,
 }
 
