@@ -188,9 +188,13 @@ fn a_copy_under_another_name_is_left_out_and_named() {
 
 #[test]
 fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one_flight() {
-    let whole = Campaign::of_pitch_steps();
+    let (whole, parted) = (Campaign::of_pitch_steps(), Campaign::new());
+    // Instruments are measured by fewer samples of the slow channel: what is wrong with them comes out a little different.
+    for campaign in [&whole, &parted] {
+        campaign.copy_pipeline();
+        campaign.edit("pipeline.yaml", "bias: apply, scale: apply", "bias: report, scale: report");
+    }
     whole.ends("estimate", 0);
-    let parted = Campaign::new();
     let record = pitch_steps();
     let folder = parted.path("flights/flight=flight_001");
     fs::create_dir(&folder).unwrap();

@@ -68,5 +68,5 @@ fn every_maneuver_has_its_page_with_a_time_history_and_the_provenance_names_ever
         assert!(html.contains(&format!("{}.parquet", row["flight_id"])), "{}", row["flight_id"]);
     }
     assert!(html.contains("harvest run harv --archive"));
-    assert!(html.contains("recognised") || html.contains("recognition:"), "the classes as configured");
+    assert!(html.contains("recognise:"), "the classes as configured");
 }
