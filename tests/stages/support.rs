@@ -162,9 +162,10 @@ impl Campaign {
         files(&folder).into_iter().map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
     }
 
-    /// Bytes of the published tables.
+    /// Bytes of the published tables; the report, on screen and on paper, says where the archive lies.
     pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
-        self.bytes("reports").into_iter().filter(|(p, _)| p.extension().is_none_or(|e| e != "html")).collect()
+        let is_report = |path: &PathBuf| path.extension().is_some_and(|e| e == "html" || e == "pdf");
+        self.bytes("reports").into_iter().filter(|(path, _)| !is_report(path)).collect()
     }
 }
 
