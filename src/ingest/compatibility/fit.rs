@@ -9,6 +9,7 @@
 //! is no error: the mean of the delays, with the weights 1/P, is zero.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::Compatibility;
 use super::instruments::{ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size};
@@ -90,7 +91,7 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
     let problem = Problem { aircraft, margin: margin(settings, step_s), settings, present: present(windows) };
     let mut shared = [0.0; PARAMETERS];
     let begin = |window| Member::begin(window, &problem, &shared);
-    let mut members: Vec<Member> = windows.iter().filter_map(begin).collect();
+    let mut members: Vec<Member> = windows.par_iter().filter_map(begin).collect();
     if members.len() < settings.least_windows {
         return None;
     }
@@ -172,9 +173,7 @@ impl Problem<'_> {
                 break;
             }
         }
-        for member in members {
-            member.reweigh(self);
-        }
+        members.par_iter_mut().for_each(|member| member.reweigh(self));
         Some(steps)
     }
 
@@ -258,8 +257,9 @@ impl Problem<'_> {
         let mut share = 1.0;
         for _ in 0..=HALVINGS {
             let trial = self.moved(shared, &full, share);
-            let moved: Vec<Option<Member>> = members.iter().map(|m| m.moved(self, &trial, &full, share)).collect();
-            if let Some(moved) = moved.into_iter().collect::<Option<Vec<Member>>>()
+            // In the order of the windows, so that no sum depends on the threads.
+            let moved: Option<Vec<Member>> = members.par_iter().map(|m| m.moved(self, &trial, &full, share)).collect();
+            if let Some(moved) = moved
                 && self.cost(&moved, &trial, prior) <= cost * (1.0 + 1e-9)
             {
                 let over = |j: usize| (trial[j] - shared[j]).abs() / inverse[(j, j)].sqrt();
