@@ -100,14 +100,14 @@ impl Record {
         faults as f64 / all.max(1) as f64
     }
 
-    /// Some signals over a range of samples; signals that the record does not have are left out.
+    /// A range of samples of some signals, or of all; signals that the record does not have are left out.
     #[must_use]
-    pub fn cut(&self, signals: &BTreeSet<String>, samples: Range<usize>) -> Record {
+    pub fn cut(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Record {
         let cut = |s: &Series| Series {
             values: s.values.get(samples.clone()).unwrap_or_default().to_vec(),
             marks: s.marks.get(samples.clone()).unwrap_or_default().to_vec(),
         };
-        let wanted = self.signals.iter().filter(|(name, _)| signals.contains(*name));
+        let wanted = self.signals.iter().filter(|(name, _)| signals.is_none_or(|s| s.contains(*name)));
         Record {
             flight_id: self.flight_id.clone(),
             start_s: self.time_s(samples.start),
@@ -124,16 +124,6 @@ impl Record {
         const MARGIN: usize = 10;
         let from = self.sample_at(start_s).saturating_sub(MARGIN);
         let to = (self.sample_at(end_s) + MARGIN + 1).min(self.samples);
-        let cut = |s: &Series| Series {
-            values: s.values.get(from..to).unwrap_or_default().to_vec(),
-            marks: s.marks.get(from..to).unwrap_or_default().to_vec(),
-        };
-        Record {
-            flight_id: self.flight_id.clone(),
-            start_s: self.time_s(from),
-            step_s: self.step_s,
-            samples: to.saturating_sub(from),
-            signals: self.signals.iter().map(|(name, series)| (name.clone(), cut(series))).collect(),
-        }
+        self.cut(None, from..to)
     }
 }

@@ -127,7 +127,7 @@ pub fn records(files: &[RawFlight], basis: &Basis, piece: usize) -> Result<Vec<R
             samples,
             signals,
         };
-        let judged = judge(stretch, finished, basis, &|signals, range| Some(record.cut(signals, range)))?;
+        let judged = judge(stretch, finished, basis, &|signals, range| Some(record.cut(Some(signals), range)))?;
         judged.corrections.iter().for_each(|correction| correction.apply(&mut record));
         let Judgement { channels, checks, instruments, problems, .. } = judged;
         Ok(Ingested { record, channels, checks, instruments, problems })

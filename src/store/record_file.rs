@@ -343,9 +343,8 @@ impl RecordFile {
         if wide == samples {
             return Ok(record);
         }
-        let all: BTreeSet<String> = record.signals.keys().cloned().collect();
         let inside = samples.start - wide.start..samples.end - wide.start;
-        Ok(Record { start_s: self.about.record(&samples).start_s, ..record.cut(&all, inside) })
+        Ok(Record { start_s: self.about.record(&samples).start_s, ..record.cut(None, inside) })
     }
 
     fn as_written(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Result<Record, Error> {
