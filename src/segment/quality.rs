@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use crate::aero::Axis;
-use crate::flight::{Mark, Record, signal};
+use crate::flight::{Record, signal};
 use crate::maneuver::found::{ACCEPTED, REJECTED};
 use crate::maneuver::{Class, Maneuver, Quality};
 
@@ -79,7 +79,7 @@ pub(super) fn of(record: &Record, class: &Class, maneuver: &Maneuver, limits: &L
         signal_to_noise: signal_to_noise(record, own, &whole),
         saturated_share: worst(record, limits, &excited, at_a_stop),
         rate_limited_share: worst(record, limits, &excited, at_full_rate),
-        marked_share: marked(record, class, &whole),
+        marked_share: marked(record, class, maneuver),
         ..Quality::default()
     };
     let reason = beyond(&measured, limits).join("; ");
@@ -205,13 +205,11 @@ fn at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
     values.windows(2).all(|w| (w[1] - w[0]).abs() >= 0.9 * actuator.rate_deg_s * step_s)
 }
 
-/// Share of marked samples among those of the axis's outputs and the class's inputs that are recorded.
-fn marked(record: &Record, class: &Class, part: &RangeInclusive<usize>) -> Option<f64> {
+/// Share of samples with which something went wrong, among those of the axis's outputs and the class's inputs that are
+/// recorded.
+fn marked(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
     let outputs = class.axis.outputs();
     let names = outputs.iter().map(|o| o.signal()).chain(class.recognition.inputs());
-    let marks = names.filter_map(|name| record.signals.get(name)?.marks.get(part.clone()));
-    let (n, marked) = marks.fold((0_usize, 0_usize), |(n, marked), marks| {
-        (n + marks.len(), marked + marks.iter().filter(|m| **m != Mark::Measured).count())
-    });
-    (n > 0).then(|| marked as f64 / n as f64)
+    let recorded: Vec<&str> = names.filter(|name| record.signals.contains_key(*name)).collect();
+    (!recorded.is_empty()).then(|| record.marked_share(recorded, maneuver.start_s, maneuver.end_s))
 }

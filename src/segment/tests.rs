@@ -621,6 +621,18 @@ fn each_limit_rejects_with_its_own_reason() {
 }
 
 #[test]
+fn samples_between_those_of_a_slow_channel_are_no_fault() {
+    let slow = quality(|r| {
+        for name in ["de_deg", signal::Q, signal::AN, signal::ALPHA_VANE] {
+            if let Some(series) = r.signals.get_mut(name) {
+                series.marks.iter_mut().step_by(2).for_each(|mark| *mark = Mark::Between);
+            }
+        }
+    });
+    assert_eq!((slow.verdict.as_str(), slow.marked_share), ("accepted", Some(0.0)), "{slow:?}");
+}
+
+#[test]
 fn a_slow_turn_is_no_motion_of_the_other_axis() {
     let turning = quality(|r| add(r, signal::R, |t| 3.0 + 0.1 * t));
     assert_eq!(turning.verdict, "accepted", "{turning:?}");
