@@ -16,9 +16,11 @@ options = \
 	$(if $(ARCHIVE),--archive '$(ARCHIVE)') \
 	$(if $(WIND_TUNNEL),--wind-tunnel '$(WIND_TUNNEL)') \
 	$(if $(EVENTS),--events '$(EVENTS)') \
+	$(if $(AGAINST),--against '$(AGAINST)') \
 	$(if $(STORE),--store '$(STORE)') \
 	$(if $(REPORTS),--reports '$(REPORTS)') \
-	$(if $(THREADS),--threads '$(THREADS)')
+	$(if $(THREADS),--threads '$(THREADS)') \
+	$(if $(MEMORY_MB),--memory-mb '$(MEMORY_MB)')
 # Of the targets that run stages: make nightly WAIT=3600 LOG=nightly.jsonl
 running = $(if $(WAIT),--wait '$(WAIT)') $(if $(LOG),--log '$(LOG)')
 
@@ -27,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: status explain diff verify gc torture fuzz ingest segment estimate trend compare report nightly check show shown simulate validate build test bench lint clean help
+.PHONY: status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -46,6 +48,9 @@ compare: build ## compare the trends with the wind-tunnel database
 
 report: build ## write the report
 	$(call harvest,report) $(running)
+
+export: build ## write the flight-updated derivatives for simulators: DAVE-ML, JSBSim, CSV, Parquet
+	$(call harvest,export) $(if $(WAIT),--wait '$(WAIT)')
 
 nightly: build ## the main job: every stage, to the report
 	$(call harvest,run) $(running)
@@ -90,12 +95,13 @@ test: ## run the tests
 	cargo test --locked
 
 KILLS ?= 200
-torture: ## kill runs at KILLS random moments, fill the disk, race; the bytes must be those of an undisturbed run
-	HARVEST_KILLS='$(KILLS)' cargo test --locked --test stages -- nights:: --nocapture
+FLIPS ?= 200
+torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; the bytes must be those of an undisturbed run
+	HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
 
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
-	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --locked --test stages -- fuzz:: --nocapture
+	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --release --locked --test stages -- fuzz:: --nocapture
 
 bench: ## run the benchmarks
 	cargo bench --locked
@@ -108,7 +114,7 @@ clean: ## remove what runs made: data/store and the folders under reports (cargo
 	rm -rf data/store reports/*/
 
 help: ## this list
-	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [STORE=] [REPORTS=] [THREADS=]'
+	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [AGAINST=] [STORE=] [REPORTS=] [THREADS=] [MEMORY_MB=]'
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo

@@ -29,7 +29,7 @@ struct Bench {
 fn load() -> anyhow::Result<Bench> {
     let config = Config::load(Path::new("pipelines/harv"), Overrides::default())?;
     for files in archive::find(&config.archive)? {
-        let raw = archive::read(&files, &config.channels).map_err(|p| anyhow::anyhow!(p.reason))?;
+        let raw = archive::read(&files, &config.channels).map_err(|p| anyhow::anyhow!(p.reason))?.swap_remove(0);
         let record = ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
             .map_err(|p| anyhow::anyhow!(p.reason))?
             .record;
@@ -105,7 +105,7 @@ fn stages(c: &mut Criterion) {
     let config = &bench.config;
     let Some(files) = archive::find(&config.archive).ok().and_then(|files| files.into_iter().next()) else { return };
     c.bench_function("read one flight", |b| b.iter(|| archive::read(&files, &config.channels)));
-    if let Ok(raw) = archive::read(&files, &config.channels) {
+    if let Ok(raw) = archive::read(&files, &config.channels).map(|mut files| files.swap_remove(0)) {
         c.bench_function("ingest one flight", |b| {
             b.iter(|| ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest));
         });

@@ -13,11 +13,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
-use crate::pipeline::night::Done;
+use crate::pipeline::night::{self, Done};
 use crate::pipeline::show::{self, Subject};
 use crate::pipeline::{self, Progress, Stage};
-use crate::store::{Log, archive};
-use crate::{simulation, validation};
+use crate::store::{Log, archive, atomic};
+use crate::{bench_case, simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
@@ -41,6 +41,7 @@ Examples:
   harvest run --archive flights/ --reports out/  the same analysis on another archive
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
   harvest show flight flight_001                 a strip chart of the flight with its maneuvers drawn in
+  harvest export                                 the flight-updated derivatives as DAVE-ML, JSBSim section, CSV, Parquet
   harvest run --quiet --wait 3600 --log nightly.jsonl
                                                  from cron or a timer: waits for another run, speaks only of errors
   harvest diff                                   what changed since the night before, and why
@@ -70,6 +71,9 @@ enum Command {
     Compare(RunOptions),
     /// Write the report
     Report(RunOptions),
+    /// Write the flight-updated derivatives for simulators: DAVE-ML, a JSBSim section, CSV and Parquet
+    #[command(after_help = EXPORT_HELP)]
+    Export(ExportOptions),
     /// Validate a pipeline's configuration and say what it would do
     Check(Options),
     /// Say per stage what is fresh, stale or failed, and why
@@ -89,6 +93,8 @@ enum Command {
     Simulate(SimulateOptions),
     /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise, and estimated
     Validate(ValidateOptions),
+    /// Time the standard case: estimate a maneuver given as JSON with its record as CSV beside it, again and again
+    BenchCase(BenchCaseOptions),
 }
 
 #[derive(Debug, Subcommand)]
@@ -131,6 +137,31 @@ struct ShowOptions {
     options: Options,
     /// The file to write [default: show/<ID>.svg in the folder of the reports]
     #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+const EXPORT_HELP: &str = "\
+What is needed is brought up to date first, as far as `compare`. Each derivative is the trend where flight has data and \
+the tunnel elsewhere; every value is marked with its source.
+
+  flight_updated.csv, .parquet   rows that `wind_tunnel:` reads as a database again
+  flight_updated.dml             DAVE-ML (ANSI/AIAA S-119): tables, and the coefficients as their sums
+  flight_updated_jsbsim.xml      JSBSim's <aerodynamics>: name it in the aircraft as <aerodynamics file=\"...\"/>
+
+Examples:
+  harvest export                                 into reports/harv/export
+  harvest export mine --out model                of the pipeline pipelines/mine, into the folder model
+
+Exit codes: 0 written; 1 not written, the message says why; 2 written, and something of the campaign was rejected.";
+
+#[derive(Args, Debug)]
+struct ExportOptions {
+    #[command(flatten)]
+    options: Options,
+    #[command(flatten)]
+    patience: Patience,
+    /// The folder to write into [default: export in the folder of the reports]
+    #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
 
@@ -195,6 +226,21 @@ impl Patience {
 }
 
 #[derive(Args, Debug)]
+struct BenchCaseOptions {
+    /// The case, JSON, with a CSV of the same name beside it; or a folder of such cases, which are estimated in parallel
+    case: PathBuf,
+    /// How often each is estimated
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    repetitions: usize,
+    /// The file to write [default: the terminal]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
+    threads: Option<usize>,
+}
+
+#[derive(Args, Debug)]
 struct Options {
     /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its name under pipelines/
     #[arg(default_value = "harv")]
@@ -202,12 +248,16 @@ struct Options {
     /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also partitioned as flight=…/
     #[arg(long)]
     archive: Option<String>,
-    /// Wind-tunnel table instead of the pipeline's: CSV with derivative, alpha_deg, value, unit[, mach, uncertainty, source]
+    /// Wind-tunnel database instead of the pipeline's: DAVE-ML (.dml, .xml), or CSV or Parquet with derivative, alpha_deg,
+    /// value, unit[, mach, uncertainty, source]
     #[arg(long, value_name = "FILE")]
     wind_tunnel: Option<PathBuf>,
     /// The analyst's events instead of the pipeline's: CSV with flight_id, class, start_s, end_s
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
+    /// Folder with the tables of an earlier campaign or night to compare with, besides the tunnel; may be given again
+    #[arg(long, value_name = "FOLDER")]
+    against: Vec<PathBuf>,
     /// Folder of the intermediate artefacts [default: data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     store: Option<PathBuf>,
@@ -217,6 +267,10 @@ struct Options {
     /// Number of threads; results do not depend on it [default: all cores]
     #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
+    /// What reading flights may hold in memory at once, over all of them, instead of the pipeline's; results do not depend on
+    /// it
+    #[arg(long, value_name = "MB")]
+    memory_mb: Option<f64>,
     /// No progress bars and no summary
     #[arg(long, short)]
     quiet: bool,
@@ -248,9 +302,11 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Diff(options) => return nightly::diff(&options),
         Command::Verify(options) => return nightly::verify(&options),
         Command::Gc(options) => return nightly::gc(&options),
+        Command::Export(options) => return export(&options),
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
         Command::Validate(options) => return validate(&options),
+        Command::BenchCase(options) => return bench(&options),
         Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
         Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
@@ -379,6 +435,46 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     Ok(if found.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
 }
 
+/// Times a standard case, or a folder of them, and says what came of it as JSON.
+#[expect(clippy::print_stdout, reason = "what the timing says")]
+fn bench(options: &BenchCaseOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.threads)?;
+    let (case, repetitions) = (&options.case, options.repetitions);
+    let text = if case.is_dir() {
+        serde_json::to_string_pretty(&bench_case::batch(case, repetitions)?)?
+    } else {
+        let timed = bench_case::timed(&bench_case::load(case)?, repetitions).map_err(anyhow::Error::msg)?;
+        serde_json::to_string_pretty(&timed)?
+    };
+    match &options.out {
+        Some(file) => {
+            atomic::place(file, text.as_bytes())?;
+        }
+        None => println!("{text}"),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the derivatives for simulators and says where they are.
+#[expect(clippy::print_stdout, reason = "what an export says")]
+fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.options.threads)?;
+    let config = options.options.load()?;
+    let bars = Bars::new(options.options.quiet, None);
+    let folder = options.out.clone().unwrap_or_else(|| config.reports.join("export"));
+    let exported = pipeline::export::export(&config, &folder, options.patience.wait(), &bars)?;
+    if !options.options.quiet {
+        println!("{} values, {} of them from flight", exported.values, exported.flight);
+        if !exported.missing.is_empty() {
+            println!("without any value: {}", exported.missing.join(" "));
+        }
+        for file in &exported.files {
+            println!("{}", file.display());
+        }
+    }
+    Ok(if night::rejected(&exported.problems) { ExitCode::from(2) } else { ExitCode::SUCCESS })
+}
+
 /// Draws a flight or a maneuver and says where the picture is.
 #[expect(clippy::print_stdout, reason = "what a picture says")]
 fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Result<ExitCode> {
@@ -410,6 +506,8 @@ impl Options {
             store: self.store.clone(),
             reports: self.reports.clone(),
             events: self.events.clone(),
+            against: self.against.clone(),
+            memory_mb: self.memory_mb,
         };
         Ok(Config::load(&folder, overrides)?)
     }

@@ -1,17 +1,22 @@
-//! Compare sets flight against the wind tunnel, derivative by derivative, at each α of the trend that speaks for it.
+//! Compare sets flight against the wind tunnel, derivative by derivative: the trend that speaks for it at the tunnel's own
+//! breakpoints, and each maneuver at its own α and Mach number; and against earlier campaigns.
 //!
-//! Flight is the trend of the derivative's group; the tunnel is read at that α and at the mean Mach number at which the
-//! group's maneuvers were flown there. The difference is judged by its standard error,
+//! Where the tunnel has no breakpoint inside a trend it is read at the trend's α, else only at its own. The Mach number is
+//! the mean at which the group's maneuvers were flown there. The difference is judged by its standard error,
 //! z = (flight − tunnel) / √(standard error² + tunnel's uncertainty²), with the tunnel's uncertainty where it states one.
 
+pub mod against;
+pub mod beyond;
+pub mod ranges;
+
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::aero::WindTunnel;
-use crate::aero::wind_tunnel::TunnelValue;
-use crate::maneuver::Maneuver;
-use crate::tables::{ComparisonRow, TrendRow};
+use crate::aero::{Condition, WindTunnel};
+use crate::maneuver::{Maneuver, Status};
+use crate::tables::{ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow};
 use crate::trend;
 
 /// What the analyst decides about the comparison.
@@ -28,6 +33,12 @@ pub struct Settings {
     /// the difference is determined. Default 5, about as well as tunnel tests repeat each other.
     #[serde(default = "default_agreement_pct")]
     pub agreement_pct: f64,
+    /// How many of the worst disagreements the table `disagreements` has at most. Default 20.
+    #[serde(default = "default_worst")]
+    pub worst: usize,
+    /// Folders with the published tables of earlier campaigns or nights, to compare this one with.
+    #[serde(default)]
+    pub against: Vec<PathBuf>,
 }
 
 fn default_agreement_z() -> f64 {
@@ -36,6 +47,9 @@ fn default_agreement_z() -> f64 {
 fn default_agreement_pct() -> f64 {
     5.0
 }
+fn default_worst() -> usize {
+    20
+}
 
 impl Default for Settings {
     fn default() -> Settings {
@@ -43,11 +57,20 @@ impl Default for Settings {
             not_comparable: BTreeSet::new(),
             agreement_z: default_agreement_z(),
             agreement_pct: default_agreement_pct(),
+            worst: default_worst(),
+            against: Vec::new(),
         }
     }
 }
 
-/// One row per derivative and α of the trend of the derivative's group, in the order of the trends.
+impl Settings {
+    fn comparable(&self, derivative: &str) -> bool {
+        !self.not_comparable.contains(derivative)
+    }
+}
+
+/// One row per derivative and α of the trend of the derivative's group, in the order of the trends: at the tunnel's
+/// breakpoints where it has some there.
 ///
 /// Verdicts: `no tunnel value`; `sign differs` where both are non-zero beyond their uncertainty and on different sides of
 /// zero; `agrees` within `agreement_z` standard errors or `agreement_pct` percent; else `flight higher` or `flight
@@ -63,60 +86,152 @@ pub fn comparison(
 ) -> Vec<ComparisonRow> {
     let row = |t: &TrendRow| {
         let group = groups.group_of(&t.derivative).filter(|g| g.name == t.group)?;
+        let of_it = || trends.iter().filter(|o| o.derivative == t.derivative && o.group == t.group);
+        let breakpoints = tunnel.alphas_deg(&t.derivative);
+        let is_breakpoint = |alpha: f64| breakpoints.binary_search_by(|b| b.total_cmp(&alpha)).is_ok();
+        let comparable = settings.comparable(&t.derivative);
+        if comparable && !is_breakpoint(t.alpha_deg) && of_it().any(|o| is_breakpoint(o.alpha_deg)) {
+            return None;
+        }
         let classes = maneuvers.iter().filter(|m| group.has(&m.class));
-        let mach = mach_near(classes, t.alpha_deg, groups.alpha_step_deg);
-        let comparable = !settings.not_comparable.contains(&t.derivative);
-        let value = mach.filter(|_| comparable).and_then(|mach| tunnel.value(&t.derivative, t.alpha_deg, mach));
-        Some(compared(t, value, settings))
+        let condition = condition_near(classes, tunnel, t.alpha_deg, groups.alpha_step_deg);
+        let value = condition.filter(|_| comparable).and_then(|condition| tunnel.at(&t.derivative, &condition));
+        let judged = judge(t.value, t.standard_error, value.map(|w| (w.value, w.uncertainty)), settings);
+        Some(ComparisonRow {
+            derivative: t.derivative.clone(),
+            unit: t.unit.clone(),
+            group: t.group.clone(),
+            alpha_deg: t.alpha_deg,
+            mach: condition.map(|c| c.mach),
+            flight: t.value,
+            standard_error: t.standard_error,
+            wind_tunnel: value.map(|w| w.value),
+            difference: judged.difference,
+            uncertainty: judged.uncertainty,
+            difference_pct: judged.difference_pct,
+            z: judged.z,
+            verdict: judged.verdict.of_tunnel().to_owned(),
+        })
     };
     trends.iter().filter_map(row).collect()
 }
 
-/// Mean Mach number of the maneuvers within half a step of α, or else of the nearest one.
-fn mach_near<'a>(maneuvers: impl Iterator<Item = &'a Maneuver>, alpha_deg: f64, step_deg: f64) -> Option<f64> {
+/// One row per maneuver and derivative that it estimates with a bound, in the order of the estimates: the tunnel at the
+/// maneuver's own mean flight condition. The error of the flight's value is its corrected bound, else its bound.
+#[must_use]
+pub fn of_maneuvers(
+    estimates: &[EstimateRow],
+    maneuvers: &[Maneuver],
+    tunnel: &WindTunnel,
+    settings: &Settings,
+) -> Vec<ManeuverComparisonRow> {
+    let places: std::collections::BTreeMap<&str, &Maneuver> =
+        maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m)).collect();
+    let row = |e: &EstimateRow| {
+        let (flight, bound) = (e.value?, e.bound_corrected.or(e.bound)?);
+        let maneuver = places.get(e.maneuver_id.as_str())?;
+        let comparable = settings.comparable(&e.derivative);
+        let value = tunnel.at(&e.derivative, &maneuver.condition(tunnel)).filter(|_| comparable);
+        let judged = judge(flight, bound, value.map(|w| (w.value, w.uncertainty)), settings);
+        Some(ManeuverComparisonRow {
+            maneuver_id: e.maneuver_id.clone(),
+            class: e.class.clone(),
+            derivative: e.derivative.clone(),
+            unit: e.unit.clone(),
+            alpha_deg: maneuver.alpha_deg,
+            mach: maneuver.mach,
+            flight,
+            bound,
+            wind_tunnel: value.map(|w| w.value),
+            difference: judged.difference,
+            uncertainty: judged.uncertainty,
+            difference_pct: judged.difference_pct,
+            z: judged.z,
+            verdict: judged.verdict.of_tunnel().to_owned(),
+        })
+    };
+    estimates.iter().filter(|e| e.status == Status::Estimated.name()).filter_map(row).collect()
+}
+
+/// Mean flight condition of the maneuvers within half a step of α, or else of the nearest one, at that α.
+pub(crate) fn condition_near<'a>(
+    maneuvers: impl Iterator<Item = &'a Maneuver>,
+    tunnel: &WindTunnel,
+    alpha_deg: f64,
+    step_deg: f64,
+) -> Option<Condition> {
     let distance = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
     let known: Vec<&Maneuver> = maneuvers.filter(|m| m.mach.is_finite() && m.alpha_deg.is_finite()).collect();
-    let near: Vec<f64> = known.iter().filter(|m| distance(m) <= 0.5 * step_deg).map(|m| m.mach).collect();
+    let mut near: Vec<&Maneuver> = known.iter().copied().filter(|m| distance(m) <= 0.5 * step_deg).collect();
     if near.is_empty() {
-        known.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|m| m.mach)
-    } else {
-        Some(near.iter().sum::<f64>() / near.len() as f64)
+        near.extend(known.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))));
+    }
+    let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+    let mach = mean(near.iter().map(|m| m.mach).collect())?;
+    let third = mean(near.iter().filter_map(|m| m.condition(tunnel).third).collect());
+    Some(Condition { alpha_deg, mach, third })
+}
+
+/// What two values of one derivative say of each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    NothingThere,
+    Agrees,
+    Higher,
+    Lower,
+    SignDiffers,
+}
+
+impl Verdict {
+    pub(crate) fn of_tunnel(self) -> &'static str {
+        match self {
+            Verdict::NothingThere => "no tunnel value",
+            Verdict::Agrees => "agrees",
+            Verdict::Higher => "flight higher",
+            Verdict::Lower => "flight lower",
+            Verdict::SignDiffers => "sign differs",
+        }
     }
 }
 
-fn compared(t: &TrendRow, tunnel: Option<TunnelValue>, settings: &Settings) -> ComparisonRow {
-    let difference = tunnel.map(|w| t.value - w.value);
-    let uncertainty = tunnel.and_then(|w| w.uncertainty).unwrap_or(0.0);
-    let share = |d: f64, w: TunnelValue| 100.0 * d / w.value.abs();
-    ComparisonRow {
-        derivative: t.derivative.clone(),
-        unit: t.unit.clone(),
-        group: t.group.clone(),
-        alpha_deg: t.alpha_deg,
-        flight: t.value,
-        standard_error: t.standard_error,
-        wind_tunnel: tunnel.map(|w| w.value),
-        difference,
-        difference_pct: difference.zip(tunnel).map(|(d, w)| share(d, w)).filter(|p| p.is_finite()),
-        z: difference.map(|d| d / t.standard_error.hypot(uncertainty)).filter(|z| z.is_finite()),
-        verdict: tunnel.map_or("no tunnel value", |w| verdict(t, w, settings)).to_owned(),
-    }
+/// A value of flight beside another one.
+pub(crate) struct Judged {
+    pub difference: Option<f64>,
+    /// Standard error of the difference.
+    pub uncertainty: Option<f64>,
+    /// Of the other value's magnitude.
+    pub difference_pct: Option<f64>,
+    pub z: Option<f64>,
+    pub verdict: Verdict,
 }
 
-fn verdict(t: &TrendRow, tunnel: TunnelValue, settings: &Settings) -> &'static str {
-    let uncertainty = tunnel.uncertainty.unwrap_or(0.0);
-    let difference = t.value - tunnel.value;
+/// Judges a value with its standard error by another, whose own may not be known.
+pub(crate) fn judge(flight: f64, error: f64, other: Option<(f64, Option<f64>)>, settings: &Settings) -> Judged {
+    let Some((other, stated)) = other else {
+        let verdict = Verdict::NothingThere;
+        return Judged { difference: None, uncertainty: None, difference_pct: None, z: None, verdict };
+    };
+    let other_error = stated.unwrap_or(0.0);
+    let (difference, uncertainty) = (flight - other, error.hypot(other_error));
     let is_nonzero = |value: f64, error: f64| value.abs() > settings.agreement_z * error;
-    if t.value * tunnel.value < 0.0 && is_nonzero(t.value, t.standard_error) && is_nonzero(tunnel.value, uncertainty) {
-        "sign differs"
-    } else if difference.abs() <= settings.agreement_z * t.standard_error.hypot(uncertainty)
-        || difference.abs() <= settings.agreement_pct / 100.0 * tunnel.value.abs()
+    let verdict = if flight * other < 0.0 && is_nonzero(flight, error) && is_nonzero(other, other_error) {
+        Verdict::SignDiffers
+    } else if difference.abs() <= settings.agreement_z * uncertainty
+        || difference.abs() <= settings.agreement_pct / 100.0 * other.abs()
     {
-        "agrees"
+        Verdict::Agrees
     } else if difference > 0.0 {
-        "flight higher"
+        Verdict::Higher
     } else {
-        "flight lower"
+        Verdict::Lower
+    };
+    let finite = |v: f64| v.is_finite().then_some(v);
+    Judged {
+        difference: Some(difference),
+        uncertainty: Some(uncertainty),
+        difference_pct: finite(100.0 * difference / other.abs()),
+        z: finite(difference / uncertainty),
+        verdict,
     }
 }
 
@@ -137,6 +252,10 @@ mod tests {
             standard_error,
             lower_95: value - 2.0 * standard_error,
             upper_95: value + 2.0 * standard_error,
+            prediction_lower_95: 0.0,
+            prediction_upper_95: 0.0,
+            outliers: 0,
+            curve: "polynomial".into(),
             maneuvers: 10,
             order: 1,
             scatter: 0.0,
@@ -160,6 +279,8 @@ mod tests {
             x_cg_ft: 38.0,
             samples: 401,
             origin: "found".into(),
+            recognised: crate::maneuver::Recognised::default(),
+            quality: crate::maneuver::Quality::default(),
         }
     }
 
@@ -232,11 +353,11 @@ mod tests {
     #[test]
     fn the_tunnel_is_read_at_the_mach_of_the_group_s_maneuvers_near_that_alpha() {
         let mut tunnel = WindTunnel::default();
-        for (mach, value) in [(0.2, 2.0), (0.6, 6.0)] {
-            let point = TunnelPoint { alpha_deg: 20.0, mach: Some(mach), value, uncertainty: None, source: None };
+        for (alpha_deg, mach, value) in [(20.0, 0.2, 2.0), (20.0, 0.6, 6.0), (30.0, 0.2, 2.0), (30.0, 0.6, 6.0)] {
+            let point = TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: None, source: None };
             tunnel.insert("d", point);
         }
-        let group = trend::Group { name: "A".into(), derivatives: Vec::new(), classes: vec!["A".into()] };
+        let group = trend::Group { name: "A".into(), classes: vec!["A".into()], ..trend::Group::default() };
         let groups = trend::Settings { groups: vec![group], ..trend::Settings::default() };
         let maneuvers =
             [maneuver("A", 19.0, 0.3), maneuver("A", 21.0, 0.4), maneuver("B", 20.0, 0.6), maneuver("A", 40.0, 0.2)];
@@ -248,5 +369,60 @@ mod tests {
         assert_eq!(rows.len(), 2);
         assert_relative_eq!(rows[0].wind_tunnel.expect("tunnel"), 3.5, max_relative = 1e-12);
         assert_relative_eq!(rows[1].wind_tunnel.expect("tunnel"), 4.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn the_tunnel_is_compared_at_its_own_breakpoints_where_a_trend_has_some() {
+        let mut tunnel = WindTunnel::default();
+        for alpha_deg in [12.5, 20.0] {
+            tunnel.insert("d", TunnelPoint { alpha_deg, mach: None, value: 1.0, uncertainty: None, source: None });
+        }
+        let at = |alpha_deg: f64| TrendRow { alpha_deg, ..flight(1.0, 0.1) };
+        let alphas = |trends: &[TrendRow]| -> Vec<f64> {
+            let maneuvers = [maneuver("A", 20.3, 0.3)];
+            let groups = trend::Settings::default();
+            let rows = comparison(trends, &maneuvers, &tunnel, &groups, &Settings::default());
+            rows.iter().map(|r| r.alpha_deg).collect()
+        };
+        assert_eq!(alphas(&[at(10.0), at(12.5), at(15.0), at(20.0)]), [12.5, 20.0]);
+        assert_eq!(alphas(&[at(15.0), at(17.5)]), [15.0, 17.5]);
+    }
+
+    #[test]
+    fn each_maneuver_is_compared_at_its_own_condition() {
+        let mut tunnel = WindTunnel::default();
+        for (alpha_deg, value) in [(20.0, 2.0), (30.0, 4.0)] {
+            tunnel.insert("d", TunnelPoint { alpha_deg, mach: None, value, uncertainty: Some(0.3), source: None });
+        }
+        let maneuvers = [Maneuver { maneuver_id: "m".into(), ..maneuver("A", 25.0, 0.3) }];
+        let mut estimate = EstimateRow {
+            maneuver_id: "m".into(),
+            flight_id: "f".into(),
+            class: "A".into(),
+            alpha_deg: 25.0,
+            mach: 0.3,
+            derivative: "d".into(),
+            unit: "per_deg".into(),
+            status: "estimated".into(),
+            value: Some(4.0),
+            bound: Some(0.1),
+            bound_held: None,
+            bound_calibration: None,
+            bound_corrected: Some(0.4),
+            wind_tunnel: None,
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
+        };
+        let rows = of_maneuvers(std::slice::from_ref(&estimate), &maneuvers, &tunnel, &Settings::default());
+        assert_relative_eq!(rows[0].wind_tunnel.expect("tunnel"), 3.0);
+        assert_relative_eq!(rows[0].uncertainty.expect("uncertainty"), 0.5, max_relative = 1e-14);
+        assert_relative_eq!(rows[0].z.expect("z"), 2.0, max_relative = 1e-14);
+        assert_relative_eq!(rows[0].difference_pct.expect("percent"), 100.0 / 3.0, max_relative = 1e-14);
+        assert_eq!(rows[0].verdict, "agrees");
+        estimate.status = "held".into();
+        assert_eq!(of_maneuvers(&[estimate], &maneuvers, &tunnel, &Settings::default()), []);
     }
 }

@@ -90,7 +90,8 @@ pub struct Settings {
     pub held_uncertainty_pct: f64,
     /// What calibration leaves unknown of signals; those not named are believed.
     pub calibration: BTreeMap<String, Calibration>,
-    /// A maneuver with a larger share of marked output samples is rejected.
+    /// A maneuver with a larger share of faulty samples (bridged, despiked, missing, stuck), over its outputs together or in
+    /// one of its surfaces, is rejected.
     pub max_marked_share: f64,
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
@@ -177,6 +178,9 @@ pub struct Estimated {
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
     let run = Run { record, maneuver, class, basis };
+    if maneuver.is_rejected() {
+        return run.rejected(maneuver.quality.reason.clone());
+    }
     match basis.settings.hold {
         Hold::Table => run.estimated(),
         Hold::Evidence => by_evidence(&run),
@@ -282,14 +286,12 @@ impl<'a> Run<'a> {
         let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
+        self.refuse_marked(&surfaces)?;
         let window = Window::cut(self.record, range.clone(), surfaces.iter().copied(), settings.mass_properties)?;
         let measurements = self.measurements(&range)?;
         let mut case = Case::<NX, E>::new(self.basis.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
-        if left_out > settings.max_marked_share {
-            return Err(format!("{:.0}% of its output samples are marked", 100.0 * left_out));
-        }
         if counted <= case.parameters() {
             return Err(format!("{counted} output samples for {} parameters", case.parameters()));
         }
@@ -297,6 +299,24 @@ impl<'a> Run<'a> {
         free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
         case.noisy_surfaces = noisy_surfaces(self.basis.aircraft, &window, &free, &model.held);
         Ok(Ready { model, surfaces, window, case, left_out })
+    }
+
+    /// Refuses a maneuver of which too much is repaired or missing. Samples between those of a slow channel do not count:
+    /// nothing is wrong with them, and the cost leaves them out.
+    fn refuse_marked(&self, surfaces: &[&str]) -> Result<(), String> {
+        let Maneuver { start_s, end_s, .. } = *self.maneuver;
+        let most = self.basis.settings.max_marked_share;
+        let outputs = self.record.marked_share(self.class.axis.outputs().map(Output::signal), start_s, end_s);
+        if outputs > most {
+            return Err(format!("{:.0}% of its output samples are marked", 100.0 * outputs));
+        }
+        for surface in surfaces {
+            let share = self.record.marked_share([*surface], start_s, end_s);
+            if share > most {
+                return Err(format!("{:.0}% of the samples of `{surface}` are marked", 100.0 * share));
+            }
+        }
+        Ok(())
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
@@ -340,7 +360,7 @@ impl<'a> Run<'a> {
     /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
     fn held_uncertainty(&self, derivative: &Derivative) -> f64 {
         let tunnel = self.basis.tunnel;
-        let stated = tunnel.value(&derivative.name, self.maneuver.alpha_deg, self.maneuver.mach);
+        let stated = tunnel.at(&derivative.name, &self.maneuver.condition(tunnel));
         let share = self.basis.settings.held_uncertainty_pct / 100.0;
         stated.and_then(|v| v.uncertainty).unwrap_or_else(|| share * tunnel.root_mean_square(&derivative.name))
     }
@@ -355,7 +375,7 @@ impl<'a> Run<'a> {
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {
-        self.basis.tunnel.value(name, self.maneuver.alpha_deg, self.maneuver.mach).map(|v| v.value)
+        self.basis.tunnel.at(name, &self.maneuver.condition(self.basis.tunnel)).map(|v| v.value)
     }
 
     /// Sorts the axis's derivatives and biases into free and held.
@@ -389,7 +409,7 @@ impl<'a> Run<'a> {
 
     fn held(&self, derivative: &Derivative) -> Result<f64, String> {
         self.tunnel(&derivative.name)
-            .ok_or_else(|| format!("{} is to be held at a wind-tunnel value and has none", derivative.name))
+            .ok_or_else(|| format!("{} is to be held at a wind-tunnel value and has none here", derivative.name))
     }
 
     fn weights(&self) -> Result<[f64; OUTPUTS], String> {

@@ -25,7 +25,8 @@ pub mod segment;
 pub mod estimate;
 pub mod trend;
 pub mod compare;
-pub mod changes;
+pub mod overnight;
+pub mod export;
 pub mod report;
 
 // Studies: is what the stages say of themselves true?
@@ -39,4 +40,5 @@ pub mod config;
 pub mod pipeline;
 pub mod simulation;
 pub mod validation;
+pub mod bench_case;
 pub mod cli;

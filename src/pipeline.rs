@@ -5,14 +5,18 @@
 //! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
 //! the order of flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
 
+mod comparison;
+mod conditioning;
 pub mod diff;
 pub mod explain;
+pub mod export;
 pub mod gc;
 mod inputs;
 pub mod night;
 mod others;
 pub mod show;
 pub mod status;
+mod stretches;
 pub mod verify;
 
 use std::collections::BTreeMap;
@@ -22,38 +26,41 @@ use std::time::Duration;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::changes::Changes;
+use crate::compare::against::Earlier;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
-use crate::flight::Record;
+use crate::flight::{Correction, Record};
+use crate::ingest::Signature;
 use crate::lineage::Lineage;
-use crate::maneuver::{Event, Maneuver};
+use crate::maneuver::{Event, Maneuver, Unknown};
 use crate::output_error::Outcome;
-use crate::segment::Segmented;
+use crate::overnight::Changes;
 use crate::store::archive::FlightFiles;
-use crate::store::contents::digest;
+use crate::store::record_file::RecordFile;
 use crate::store::table::Shelf;
-use crate::store::{Contents, Fingerprint, Nights, Store, archive, atomic, record_file, table};
+use crate::store::{Contents, Digest, Fingerprint, Nights, Store, archive, table};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
-    TrendRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
+    History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
-use crate::{compare, estimate, ingest, report, segment, trend};
+use crate::{estimate, report, trend};
+use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 1;
-const SEGMENT_VERSION: u32 = 1;
-const ESTIMATE_VERSION: u32 = 5;
-const JOINT_VERSION: u32 = 2;
-const PREDICT_VERSION: u32 = 2;
-/// The report's name among the published files.
-const REPORT: &str = "report.html";
-
+const INGEST_VERSION: u32 = 2;
+const SEGMENT_VERSION: u32 = 3;
+const ESTIMATE_VERSION: u32 = 6;
+const JOINT_VERSION: u32 = 3;
+const PREDICT_VERSION: u32 = 3;
 const TREND_VERSION: u32 = 1;
 const COMPARE_VERSION: u32 = 1;
+
+/// The report's names among the published files: on screen and on paper.
+const REPORT: &str = "report.html";
+const PRINTED: &str = "report.pdf";
 
 pub use crate::lineage::Stage;
 
@@ -64,35 +71,41 @@ pub trait Progress: Sync {
     fn end(&self);
 }
 
-/// One flight after ingest: where its record lies, or why there is none.
+/// One stretch of a flight after ingest: where its record lies, or why there is none.
 #[derive(Clone, Debug)]
 pub struct Flight {
     pub flight_id: String,
     fingerprint: String,
     record: PathBuf,
-    /// None where nothing is kept of it: what was refused for now may be read the next time.
-    artefact: Option<PathBuf>,
     ingested: Ingested,
 }
 
-/// What the store keeps of ingest besides the record.
+/// What the store keeps of a stretch besides its record.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Ingested {
     accepted: bool,
-    /// Fingerprint of the record's bytes, where there is one.
-    record: Option<String>,
+    /// What the record's file holds, where there is one.
+    record: Option<Digest>,
     channels: Vec<ChannelRow>,
     checks: Vec<CheckRow>,
+    instruments: Vec<InstrumentRow>,
+    /// What signals are corrected by when the record is read.
+    corrections: Vec<Correction>,
     problems: Vec<Problem>,
+    signature: Signature,
 }
 
 /// What the store keeps of segment.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Found {
     maneuvers: Vec<Maneuver>,
+    unknown: Vec<Unknown>,
     events: Vec<EventRow>,
     problems: Vec<Problem>,
 }
+
+/// A maneuver's estimate, and its time history as the report draws it.
+type Fitted = (Estimated, Option<History>);
 
 /// The campaign as far as it has been brought.
 #[derive(Clone, Debug, Default)]
@@ -100,7 +113,10 @@ pub struct Campaign {
     pub flights: Vec<Flight>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
     pub maneuvers: Vec<Maneuver>,
+    /// Excitation that fits no class.
+    pub unknown: Vec<Unknown>,
     pub events: Vec<EventRow>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
@@ -112,11 +128,24 @@ pub struct Campaign {
     /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
+    /// Time histories, thinned for the report, of the maneuvers that have one.
+    pub histories: Vec<History>,
     pub trends: Vec<TrendRow>,
+    /// Maneuvers far from their trend.
+    pub outliers: Vec<OutlierRow>,
     pub comparison: Vec<ComparisonRow>,
+    /// The comparison in words, with the tunnel and with earlier campaigns.
+    pub verdicts: Vec<VerdictRow>,
+    pub disagreements: Vec<DisagreementRow>,
+    /// Against earlier campaigns, where some are named.
+    pub changes: Vec<ChangeRow>,
     pub problems: Vec<Problem>,
+    /// Rows that an earlier flight has, too: the later flight's id, from when to when, s.
+    pub again: Vec<(String, f64, f64)>,
+    /// Flights that are to be read again the next time, and why they could not be read now.
+    pub unread: BTreeMap<String, String>,
     /// Since the last complete night; nothing before the report.
-    pub changes: Changes,
+    pub overnight: Changes,
 }
 
 impl Campaign {
@@ -168,7 +197,7 @@ fn begin<'a>(config: &'a Config, wait: Duration, progress: &'a dyn Progress) -> 
     let files = archive::find(&config.archive)?;
     let store = Store::open(&config.store, wait)?;
     let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, store, contents, &files, progress);
+    let run = Run::new(config, store, contents, &files, progress)?;
     run.contents.save()?;
     Ok((run, files))
 }
@@ -177,8 +206,11 @@ struct Run<'a> {
     config: &'a Config,
     store: Store,
     progress: &'a dyn Progress,
+    shares: Shares,
     contents: Contents,
     inputs: inputs::Inputs,
+    /// The tables of earlier campaigns to compare with.
+    earlier: Vec<Earlier>,
     lineage: Lineage,
     /// Where each stage's tables go; nowhere unless a night is to be published.
     shelves: BTreeMap<Stage, Shelf>,
@@ -189,7 +221,17 @@ struct Run<'a> {
 impl Run<'_> {
     /// All stages as far as `until`, their tables in tonight's folder.
     fn make(&self, files: &[FlightFiles], until: Stage, nights: &Nights) -> Result<Campaign> {
-        let config = self.config;
+        let mut campaign = self.results(files, until)?;
+        if until >= Stage::Report {
+            campaign.overnight = self.changes(nights, &campaign)?;
+            self.report(&mut campaign)?;
+        }
+        table::publish(&self.shelf(until), &campaign.problems)?;
+        Ok(campaign)
+    }
+
+    /// The stages before the report, as far as `until`.
+    fn results(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
         let mut campaign = Campaign::default();
         self.ingest(files, &mut campaign)?;
         if until >= Stage::Segment {
@@ -202,16 +244,8 @@ impl Run<'_> {
             self.trend(&mut campaign)?;
         }
         if until >= Stage::Compare {
-            let (trends, maneuvers) = (&campaign.trends, &campaign.maneuvers);
-            campaign.comparison =
-                compare::comparison(trends, maneuvers, &config.tunnel, &config.trend, &config.compare);
-            table::publish(&self.shelf(Stage::Compare), &campaign.comparison)?;
+            self.compare(&mut campaign)?;
         }
-        if until >= Stage::Report {
-            campaign.changes = self.changes(nights, &campaign)?;
-            self.report(&campaign)?;
-        }
-        table::publish(&self.shelf(until), &campaign.problems)?;
         Ok(campaign)
     }
 
@@ -237,99 +271,29 @@ impl Run<'_> {
     }
 
     fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
-        campaign.flights = self.each("ingest", files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
         campaign.problems.extend_from_slice(&self.inputs.problems);
+        let done = self.each_flight(files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
+        for (files, done) in files.iter().zip(done) {
+            match done.artefact {
+                Some(artefact) => self.store.need([&artefact]),
+                None => _ = campaign.unread.insert(files.flight_id.clone(), done.reasons()),
+            }
+            campaign.problems.extend(done.problems);
+            campaign.flights.extend(done.stretches);
+        }
+        let recorded = campaign.flights.iter().filter(|f| f.ingested.accepted);
+        self.store.need(recorded.map(|f| &f.record));
+        stretches::same_rows(campaign);
         for flight in &campaign.flights {
             campaign.channels.extend_from_slice(&flight.ingested.channels);
             campaign.checks.extend_from_slice(&flight.ingested.checks);
+            campaign.instruments.extend_from_slice(&flight.ingested.instruments);
             campaign.problems.extend_from_slice(&flight.ingested.problems);
         }
-        let accepted = campaign.flights.iter().filter(|f| f.ingested.accepted);
-        self.store.need(accepted.map(|f| &f.record));
-        self.store.need(campaign.flights.iter().filter_map(|f| f.artefact.as_ref()));
-        table::publish(&self.shelf(Stage::Ingest), &campaign.channels)?;
-        table::publish(&self.shelf(Stage::Ingest), &campaign.checks)
-    }
-
-    /// Where the result of a flight's ingest and its record lie, and the fingerprint that they share.
-    fn ingest_paths(&self, id: &str, content: &str) -> (String, PathBuf, PathBuf) {
-        let config = self.config;
-        let fingerprint = Fingerprint::of("ingest", INGEST_VERSION)
-            .with(&id)
-            .with(&content)
-            .with(&config.channels)
-            .with(&config.constants)
-            .with(&config.aircraft)
-            .with(&config.ingest)
-            .finish();
-        let path = self.store.path("ingest", id, &fingerprint, "json");
-        let record = self.store.path("records", id, &fingerprint, "parquet");
-        (fingerprint, path, record)
-    }
-
-    /// The flight as the store has it: none unless it is up to date and whole.
-    fn ingested(&self, id: &str, content: &str) -> Option<Flight> {
-        let (fingerprint, path, record) = self.ingest_paths(id, content);
-        let ingested: Ingested = self.store.load(&path)?;
-        // A record with other bytes than were written is made again.
-        let is_whole = match &ingested.record {
-            Some(digest) => self.contents.of(&record).is_ok_and(|found| found == *digest),
-            None => !ingested.accepted,
-        };
-        is_whole.then(|| Flight { flight_id: id.to_owned(), fingerprint, record, artefact: Some(path), ingested })
-    }
-
-    fn ingest_flight(&self, files: &FlightFiles) -> Result<Flight> {
-        let config = self.config;
-        let id = &files.flight_id;
-        let content = match self.inputs.content(id) {
-            Ok(content) => content,
-            Err(reason) => return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason))),
-        };
-        if let Some(flight) = self.ingested(id, content) {
-            return Ok(flight);
-        }
-        let (fingerprint, path, record) = self.ingest_paths(id, content);
-        let done = archive::read(files, &config.channels).and_then(|raw| {
-            ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
-        });
-        // What was read must be what the fingerprint is of.
-        if let Some(changed) = files.files.iter().find(|file| !self.contents.is_unchanged(file)) {
-            let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
-            return Ok(self.refused(id, problem("ingest", id, &changed.display().to_string(), reason)));
-        }
-        let flight = match done {
-            Ok(done) => {
-                let mut bytes = Vec::new();
-                record_file::write(&done.record, &mut bytes).map_err(|e| Error::store(&record, &e))?;
-                atomic::place(&record, &bytes)?;
-                self.store.note(&record);
-                let digest = digest(&mut bytes.as_slice()).map_err(Error::io(&record, "cannot read it"))?;
-                let (channels, checks, problems) = (done.channels, done.checks, done.problems);
-                let ingested = Ingested { accepted: true, record: Some(digest), channels, checks, problems };
-                Flight { flight_id: id.clone(), fingerprint, record, artefact: Some(path.clone()), ingested }
-            }
-            Err(problem) => Flight { artefact: Some(path.clone()), fingerprint, ..self.refused(id, problem) },
-        };
-        self.store.save(&path, &flight.ingested)?;
-        Ok(flight)
-    }
-
-    /// A flight without a record, for a reason that is not kept.
-    fn refused(&self, id: &str, problem: Problem) -> Flight {
-        Flight {
-            flight_id: id.to_owned(),
-            fingerprint: String::new(),
-            record: self.store.folder().join("records").join("none"),
-            artefact: None,
-            ingested: Ingested {
-                accepted: false,
-                record: None,
-                channels: vec![],
-                checks: vec![],
-                problems: vec![problem],
-            },
-        }
+        let shelf = self.shelf(Stage::Ingest);
+        table::publish(&shelf, &campaign.channels)?;
+        table::publish(&shelf, &campaign.checks)?;
+        table::publish(&shelf, &campaign.instruments)
     }
 
     fn segment(&self, campaign: &mut Campaign) -> Result<()> {
@@ -339,48 +303,55 @@ impl Run<'_> {
         self.store.need(&paths);
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
+            campaign.unknown.extend(flight.unknown);
             campaign.events.extend(flight.events);
             campaign.problems.extend(flight.problems);
         }
-        let unflown = |flight_id: &str| !campaign.flights.iter().any(|f| f.flight_id == flight_id);
+        stretches::leave_out_same(campaign);
+        let unflown = |flight_id: &str| !campaign.flights.iter().any(|f| f.is_of(flight_id));
         for event in self.config.events.iter().filter(|e| unflown(&e.flight_id)) {
             let place = format!("event {} at {:.1} s", event.class, event.start_s);
             let reason = "the archive has no such flight; the analyst's list names it";
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
-        table::publish(&self.shelf(Stage::Segment), &campaign.maneuvers)?;
-        table::publish(&self.shelf(Stage::Segment), &campaign.events)
+        let shelf = self.shelf(Stage::Segment);
+        table::publish(&shelf, &campaign.maneuvers)?;
+        table::publish(&shelf, &campaign.unknown)?;
+        table::publish(&shelf, &campaign.events)
     }
 
-    fn events_of(&self, flight_id: &str) -> Vec<Event> {
-        self.config.events.iter().filter(|e| e.flight_id == flight_id).cloned().collect()
-    }
-
-    fn segment_path(&self, flight: &Flight) -> PathBuf {
+    fn segment_path(&self, flight: &Flight, events: &[Event]) -> PathBuf {
         let config = self.config;
         let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
         let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
             .with(&flight.fingerprint)
             .with(&rules)
             .with(&config.segment)
-            .with(&self.events_of(&flight.flight_id))
+            .with(&events)
             .finish();
         self.store.path("segment", &flight.flight_id, &fingerprint, "json")
     }
 
+    /// A flight's record, the analyst's events in it, and where what is found in it lies.
+    fn to_segment(&self, flight: &Flight) -> Result<(RecordFile, Vec<Event>, PathBuf)> {
+        let record = flight.open()?;
+        let events = flight.events(&self.config.events, &record.about);
+        let path = self.segment_path(flight, &events);
+        Ok((record, events, path))
+    }
+
+    /// What was found in a flight and where that lies, if it is up to date.
+    fn segmented(&self, flight: &Flight) -> Option<(PathBuf, Found)> {
+        let (_, _, path) = self.to_segment(flight).ok()?;
+        Some((path.clone(), self.store.load(&path)?))
+    }
+
     fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
-        let (config, path, events) = (self.config, self.segment_path(flight), self.events_of(&flight.flight_id));
+        let (record, events, path) = self.to_segment(flight)?;
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
         }
-        let record = record_file::read(&flight.record)?;
-        let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
-        let (Segmented { maneuvers, problems }, events) = if events.is_empty() {
-            (found, Vec::new())
-        } else {
-            segment::with_events(found, &record, &events, &config.classes, &config.aircraft)
-        };
-        let found = Found { maneuvers, events, problems };
+        let found = stretches::segmented(self.config, &record, &events)?;
         self.store.save(&path, &found)?;
         Ok((path, found))
     }
@@ -391,8 +362,11 @@ impl Run<'_> {
         self.progress.begin("estimate", campaign.maneuvers.len());
         let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
         self.progress.end();
-        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
+        let (paths, done): (Vec<PathBuf>, Vec<_>) = done?.into_iter().flatten().unzip();
+        let (estimated, histories): (Vec<Estimated>, Vec<Option<History>>) = done.into_iter().unzip();
+        campaign.histories = histories.into_iter().flatten().collect();
         self.store.need(&paths);
+        self.store.need(&paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>());
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -411,25 +385,30 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
+    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Fitted)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
-        let present: Vec<Option<Estimated>> = paths.iter().map(|path| self.store.load(path)).collect();
-        let record = if present.iter().all(Option::is_some) { None } else { Some(record_file::read(&flight.record)?) };
+        let load =
+            |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
+        let present: Vec<Option<Fitted>> = paths.iter().map(load).collect();
+        let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open()?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()
             .map(|((maneuver, path), present)| {
-                let estimated = match (present, &record) {
-                    (Some(estimated), _) => estimated,
+                let done = match (present, &record) {
+                    (Some(done), _) => done,
                     (None, Some(record)) => {
-                        let estimated = Estimated { history: None, ..self.estimate_maneuver(record, maneuver) };
+                        let record = record.part(None, maneuver.start_s, maneuver.end_s)?;
+                        let mut estimated = self.estimate_maneuver(&record, maneuver);
+                        let history = estimated.history.take().map(|h| report::thinned(&h));
+                        self.store.save(&self.store.beside(&path, "history"), &history)?;
                         self.store.save(&path, &estimated)?;
-                        estimated
+                        (estimated, history)
                     }
                     (None, None) => return Err(Error::store(&path, &"its flight's record was not read")),
                 };
                 self.progress.advance(&maneuver.maneuver_id);
-                Ok((path, estimated))
+                Ok((path, done))
             })
             .collect()
     }
@@ -461,24 +440,17 @@ impl Run<'_> {
     }
 
     fn trend(&self, campaign: &mut Campaign) -> Result<()> {
-        let converged: std::collections::BTreeSet<&str> = campaign
-            .fits
-            .iter()
-            .filter(|f| f.outcome == Outcome::Converged.name())
-            .map(|f| f.maneuver_id.as_str())
-            .collect();
-        let names = self.config.derivative_names();
-        let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
-        let estimates: Vec<EstimateRow> = campaign.estimated().filter(counts).cloned().collect();
-        let (trends, problems) = trend::trends(&estimates, &self.config.trend);
-        campaign.trends = trends;
-        campaign.problems.extend(problems);
+        let estimates = comparison::converged(self.config, campaign);
+        let found = trend::trends(&estimates, &self.config.trend, |name| self.config.tunnel.alphas_deg(name));
+        campaign.trends = found.rows;
+        campaign.problems.extend(found.problems);
+        campaign.outliers = found.outliers;
+        table::publish(&self.shelf(Stage::Trend), &campaign.outliers)?;
         table::publish(&self.shelf(Stage::Trend), &campaign.trends)
     }
 
-    fn report(&self, campaign: &Campaign) -> Result<()> {
+    fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
-        let histories = self.histories(campaign)?;
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
@@ -496,45 +468,51 @@ impl Run<'_> {
             comparison: &campaign.comparison,
             channels: &campaign.channels,
             checks: &campaign.checks,
+            instruments: &campaign.instruments,
             events: &campaign.events,
             problems: &campaign.problems,
-            histories: &histories,
+            histories: &campaign.histories,
+            typical_alpha_deg: config.report.histories_at_alpha_deg,
+            provenance: &self.provenance(),
             order: &config.derivative_names(),
             classes: &classes,
-            changes: &campaign.changes,
-            lineage: &self.lineage,
+            overnight: &campaign.overnight,
         };
         let named = |e| Error::store(&config.reports.join(REPORT), &e);
         let html = report::html(&contents, config.template.as_deref()).map_err(named)?;
-        self.place_tonight(REPORT, html.as_bytes())
+        self.place_tonight(REPORT, html.as_bytes())?;
+        match report::pdf::pdf(&html) {
+            Ok(bytes) => self.place_tonight(PRINTED, &bytes)?,
+            Err(why) => {
+                let reason = format!("not made: the template's page is no well-formed XML: {why}");
+                campaign.problems.push(problem("report", "", PRINTED, &reason));
+            }
+        }
+        Ok(())
     }
 
-    /// Time histories of one maneuver per class: the converged one nearest to the configured angle of attack. They are
-    /// computed again rather than stored: an estimation takes milliseconds, its histories a quarter of a megabyte.
-    fn histories(&self, campaign: &Campaign) -> Result<Vec<History>> {
-        let at = self.config.report.histories_at_alpha_deg;
-        let shown: Vec<&Maneuver> = self
-            .config
-            .classes
-            .iter()
-            .filter_map(|class| {
-                let fits = campaign.maneuvers.iter().zip(&campaign.fits);
-                fits.filter(|(m, f)| m.class == class.name && f.outcome == Outcome::Converged.name())
-                    .map(|(m, _)| m)
-                    .min_by(|a, b| (a.alpha_deg - at).abs().total_cmp(&(b.alpha_deg - at).abs()))
-            })
-            .collect();
-        let histories = self.each(
-            "report",
-            &shown,
-            |m| &m.maneuver_id,
-            |maneuver| {
-                let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
-                let record = flight.map(|f| record_file::read(&f.record)).transpose()?;
-                Ok(record.and_then(|record| self.estimate_maneuver(&record, maneuver).history))
-            },
-        )?;
-        Ok(histories.into_iter().flatten().collect())
+    /// Everything that decided the results, enough to do it again.
+    fn provenance(&self) -> report::Provenance {
+        let config = self.config;
+        let versions = format!(
+            "ingest {INGEST_VERSION}, segment {SEGMENT_VERSION}, estimate {ESTIMATE_VERSION}, joint {JOINT_VERSION}, predict \
+             {PREDICT_VERSION}"
+        );
+        report::Provenance {
+            program: format!(
+                "harvest {} (sources {}), methods: {versions}",
+                env!("CARGO_PKG_VERSION"),
+                env!("HARVEST_SOURCE")
+            ),
+            command: format!(
+                "harvest run {} --archive '{}' --wind-tunnel '{}'",
+                config.name,
+                config.archive,
+                config.wind_tunnel.display()
+            ),
+            data: self.inputs.sources.clone(),
+            configuration: config.files.clone(),
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::aero::Output;
 
@@ -16,10 +16,22 @@ pub struct ChannelRow {
     pub signal: String,
     /// Samples on the record's clock.
     pub samples: usize,
-    /// Of them: bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
+    /// How often the channel is recorded; the record's rate unless the channel is slower.
+    pub rate_hz: Option<f64>,
+    /// Of the samples: on the line between two samples of a slower channel.
+    pub between: usize,
+    /// Bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
     pub bridged: usize,
     pub despiked: usize,
     pub missing: usize,
+    /// Left out because the channel stood still.
+    pub stuck: usize,
+    /// How often the value wrapped around.
+    pub wraps: usize,
+    /// The step of the recorder's numbers and the standard deviation of the noise, in the signal's unit. Of the clock: the
+    /// jitter of its time stamps, s.
+    pub quantisation: Option<f64>,
+    pub noise: Option<f64>,
     /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in words.
     pub verdict: String,
 }
@@ -36,6 +48,29 @@ pub struct CheckRow {
     pub slope: Option<f64>,
     pub correlation: Option<f64>,
     /// `ok`, `not excited`, `wrong sign`, `wrong scale`, `does not agree`.
+    pub verdict: String,
+}
+
+/// `instruments`: what the kinematic equations say of one instrument of one flight, y = (scale) x(t − delay) + bias. Empty
+/// where the flight does not tell it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InstrumentRow {
+    pub flight_id: String,
+    pub channel: String,
+    pub signal: String,
+    /// Of the bias and its bound.
+    pub unit: String,
+    pub bias: Option<f64>,
+    /// Standard deviations.
+    pub bias_bound: Option<f64>,
+    pub scale: Option<f64>,
+    pub scale_bound: Option<f64>,
+    /// Against the other channels.
+    pub delay_s: Option<f64>,
+    pub delay_bound_s: Option<f64>,
+    /// What the record was corrected by: `bias scale delay`, some of them or none.
+    pub applied: String,
+    /// `ok`, `not excited`, or what is wrong in words.
     pub verdict: String,
 }
 
@@ -200,12 +235,38 @@ pub struct TrendRow {
     pub standard_error: f64,
     pub lower_95: f64,
     pub upper_95: f64,
+    /// Where one more maneuver's estimate is expected.
+    pub prediction_lower_95: f64,
+    pub prediction_upper_95: f64,
     /// How many maneuvers the trend is fitted through.
     pub maneuvers: usize,
-    /// Order of the polynomial that the criterion chose.
+    /// How many of them lie far from it: rows of `outliers`.
+    pub outliers: usize,
+    /// `polynomial`, or `spline` with its knots.
+    pub curve: String,
+    /// Order of the polynomial, or of the spline between its knots, that the criterion chose.
     pub order: usize,
     /// Standard deviation between maneuvers beyond their bounds.
     pub scatter: f64,
+}
+
+/// `outliers`: one maneuver's estimate that lies far from the trend of its group.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OutlierRow {
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub maneuver_id: String,
+    pub class: String,
+    pub alpha_deg: f64,
+    pub value: f64,
+    pub bound: f64,
+    /// The trend there.
+    pub trend: f64,
+    /// Value minus trend over its standard deviation.
+    pub z: f64,
+    /// What is left of the maneuver's weight in the trend: below one.
+    pub weight_share: f64,
 }
 
 /// `comparison`: flight against tunnel for one derivative at one angle of attack.
@@ -216,16 +277,178 @@ pub struct ComparisonRow {
     /// The trend's group that speaks for flight.
     pub group: String,
     pub alpha_deg: f64,
+    /// At which the tunnel is read.
+    pub mach: Option<f64>,
     pub flight: f64,
     pub standard_error: f64,
     pub wind_tunnel: Option<f64>,
     pub difference: Option<f64>,
+    /// Standard error of the difference.
+    pub uncertainty: Option<f64>,
     /// Of the tunnel's value.
     pub difference_pct: Option<f64>,
     /// Difference over its standard error.
     pub z: Option<f64>,
     /// `agrees`, `flight higher`, `flight lower`, `sign differs`, `no tunnel value`.
     pub verdict: String,
+}
+
+/// `maneuver_comparison`: one derivative of one maneuver against the tunnel at the maneuver's own α and Mach number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ManeuverComparisonRow {
+    pub maneuver_id: String,
+    pub class: String,
+    pub derivative: String,
+    pub unit: String,
+    pub alpha_deg: f64,
+    pub mach: f64,
+    pub flight: f64,
+    /// The corrected bound, where there is one.
+    pub bound: f64,
+    pub wind_tunnel: Option<f64>,
+    pub difference: Option<f64>,
+    /// Standard error of the difference.
+    pub uncertainty: Option<f64>,
+    pub difference_pct: Option<f64>,
+    pub z: Option<f64>,
+    /// As in `comparison`.
+    pub verdict: String,
+}
+
+/// `verdicts`: neighbouring angles of attack at which one derivative has the same verdict, in words.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VerdictRow {
+    /// `wind tunnel`, or the folder of an earlier campaign.
+    pub against: String,
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub alpha_from_deg: f64,
+    pub alpha_to_deg: f64,
+    /// As in `comparison` and `changes`.
+    pub verdict: String,
+    /// Median over the range.
+    pub difference_pct: Option<f64>,
+    /// `flight lower than tunnel from 35° to 60°, by 30%`.
+    pub words: String,
+}
+
+/// `disagreements`: where flight and tunnel, or flight and an earlier campaign, are furthest apart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DisagreementRow {
+    pub rank: usize,
+    pub against: String,
+    pub derivative: String,
+    pub unit: String,
+    /// Where in the range of the verdict it is worst.
+    pub alpha_deg: f64,
+    pub flight: f64,
+    /// The tunnel's or the earlier value.
+    pub other: f64,
+    pub difference: f64,
+    pub z: Option<f64>,
+    /// The difference's magnitude in percent of the derivative's typical size.
+    pub size_pct: Option<f64>,
+    pub words: String,
+}
+
+/// `changes`: a trend against the one of an earlier campaign.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChangeRow {
+    pub against: String,
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub alpha_deg: f64,
+    pub flight: f64,
+    pub standard_error: f64,
+    pub before: Option<f64>,
+    pub before_standard_error: Option<f64>,
+    pub difference: Option<f64>,
+    pub difference_pct: Option<f64>,
+    pub z: Option<f64>,
+    /// `agrees`, `higher than before`, `lower than before`, `sign differs`, `not there before`.
+    pub verdict: String,
+}
+
+/// A number of a published table; one that does not exist is an empty field there, and no number here.
+fn published<'de, D: Deserializer<'de>>(field: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
+}
+
+/// A row of published `trends`, as far as it is compared with: an earlier campaign's or another night's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PublishedTrend {
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub alpha_deg: f64,
+    #[serde(deserialize_with = "published")]
+    pub value: f64,
+    #[serde(deserialize_with = "published")]
+    pub standard_error: f64,
+}
+
+impl From<&TrendRow> for PublishedTrend {
+    fn from(row: &TrendRow) -> PublishedTrend {
+        PublishedTrend {
+            derivative: row.derivative.clone(),
+            unit: row.unit.clone(),
+            group: row.group.clone(),
+            alpha_deg: row.alpha_deg,
+            value: row.value,
+            standard_error: row.standard_error,
+        }
+    }
+}
+
+/// A row of published `comparison`, as far as nights are compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PublishedVerdict {
+    pub derivative: String,
+    pub alpha_deg: f64,
+    pub verdict: String,
+}
+
+impl From<&ComparisonRow> for PublishedVerdict {
+    fn from(row: &ComparisonRow) -> PublishedVerdict {
+        let (derivative, verdict) = (row.derivative.clone(), row.verdict.clone());
+        PublishedVerdict { derivative, alpha_deg: row.alpha_deg, verdict }
+    }
+}
+
+/// `flight_updated`: one derivative at one grid point of the export.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExportRow {
+    pub derivative: String,
+    pub alpha_deg: f64,
+    pub mach: Option<f64>,
+    /// The third variable of the tables; its column has its name.
+    pub third: Option<f64>,
+    pub value: f64,
+    pub unit: String,
+    /// Standard uncertainty, where it is known.
+    pub uncertainty: Option<f64>,
+    pub source: String,
+    /// 1 where the value is flight's, 0 where it is the tunnel's.
+    pub is_flight: usize,
+}
+
+/// `beyond_tunnel`: where a tunnel table was to be read beyond its ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BeyondRow {
+    /// Empty for the comparison of trends.
+    pub maneuver_id: String,
+    pub alpha_deg: f64,
+    pub mach: f64,
+    /// `alpha_deg`, `mach`, or the third variable.
+    pub variable: String,
+    pub read_at: f64,
+    pub tabulated_from: f64,
+    pub tabulated_to: f64,
+    /// `clamped`: the value at the end was taken; `refused`: none was.
+    pub treatment: String,
+    pub derivatives: String,
 }
 
 /// The time histories of one maneuver, measured against computed, as in the paper's Figures 4 and 12.
@@ -245,10 +468,18 @@ pub struct History {
 pub struct HistoryOutput {
     pub label: String,
     pub unit: String,
+    #[serde(deserialize_with = "with_missing")]
     pub measured: Vec<f64>,
+    #[serde(deserialize_with = "with_missing")]
     pub computed: Vec<f64>,
     /// Samples left out of the cost.
     pub marked: Vec<bool>,
+}
+
+/// Numbers of which some are missing: JSON has no word for a number that is none.
+fn with_missing<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let values = Vec::<Option<f64>>::deserialize(deserializer)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
 }
 
 /// `coverage`: what the bounds of one derivative are worth in one maneuver recorded many times.

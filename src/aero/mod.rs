@@ -3,8 +3,10 @@
 
 pub mod buildup;
 pub mod derivative;
+pub mod interpolation;
 pub mod wind_tunnel;
 
 pub use buildup::{Bias, Buildup, Combined};
 pub use derivative::{Axis, Coefficient, Derivative, DerivativeUnit, Output, Regressor};
-pub use wind_tunnel::WindTunnel;
+pub use interpolation::Interpolation;
+pub use wind_tunnel::{Condition, WindTunnel};

@@ -1,8 +1,15 @@
-//! The wind-tunnel database: derivatives tabulated over angle of attack and, where the tunnel has it, Mach number.
+//! The wind-tunnel database: derivatives tabulated over angle of attack and, where the tunnel has them, Mach number and a
+//! third variable.
+//!
+//! A table is read along α at the Mach numbers and third values on either side, then across Mach, then across the third
+//! variable, linearly or by a monotone cubic ([`super::interpolation`]). Beyond its ends it stays as at the end (clamped)
+//! or has no value (refused), as the analyst decides; [`WindTunnel::beyond`] tells where that was so.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+
+use super::interpolation::{Interpolation, linear, monotone, place};
 
 /// One tabulated value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,11 +31,76 @@ pub struct TunnelValue {
     pub uncertainty: Option<f64>,
 }
 
+/// Where the tables are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    pub alpha_deg: f64,
+    pub mach: f64,
+    /// The third variable; `None` where it is not known, and [`Third::at`] is taken.
+    pub third: Option<f64>,
+}
+
+/// What the analyst decides about reading the tables.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Between the points. Default `linear`.
+    #[serde(default)]
+    pub interpolation: Interpolation,
+    /// Beyond the ends. Default `clamp`.
+    #[serde(default)]
+    pub extrapolation: Extrapolation,
+    /// The variable of the tables besides α and Mach, where they have one.
+    #[serde(default)]
+    pub third: Option<Third>,
+}
+
+/// What a table says beyond its ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Extrapolation {
+    /// The value at the end.
+    #[default]
+    Clamp,
+    /// Nothing.
+    Refuse,
+}
+
+/// The third variable of the tables.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Third {
+    /// Its column in CSV and Parquet, its variable in DAVE-ML. A mean flight condition of the maneuvers (`altitude_ft`,
+    /// `qbar_psf`, `velocity_ft_s`, `mass_slug`, `x_cg_ft`) is read at each maneuver's own.
+    pub name: String,
+    /// Where the tables are read otherwise, in the variable's own unit.
+    pub at: f64,
+}
+
+/// A reading beyond the ends of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beyond {
+    /// `alpha_deg`, `mach`, or the third variable's name.
+    pub variable: String,
+    pub read_at: f64,
+    /// The table's ends.
+    pub from: f64,
+    pub to: f64,
+}
+
+/// A point with its third variable; `None` for a table that does not depend on it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Entry {
+    third: Option<f64>,
+    point: TunnelPoint,
+}
+
 /// The tables, by derivative name. Names are compared without underscores, so a database may write `CNalpha`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WindTunnel {
-    /// Points sorted by Mach, then α.
-    tables: BTreeMap<String, Vec<TunnelPoint>>,
+    /// Entries sorted by the third variable, then Mach, then α.
+    tables: BTreeMap<String, Vec<Entry>>,
+    settings: Settings,
 }
 
 fn key(derivative: &str) -> String {
@@ -36,12 +108,39 @@ fn key(derivative: &str) -> String {
 }
 
 impl WindTunnel {
+    /// Without tables yet, to be read as the settings say.
+    #[must_use]
+    pub fn new(settings: Settings) -> WindTunnel {
+        WindTunnel { tables: BTreeMap::new(), settings }
+    }
+
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The same tables, constant beyond their ends.
+    #[must_use]
+    pub fn clamped(&self) -> WindTunnel {
+        let settings = Settings { extrapolation: Extrapolation::Clamp, ..self.settings.clone() };
+        WindTunnel { tables: self.tables.clone(), settings }
+    }
+
     /// Adds one point; points may come in any order.
     pub fn insert(&mut self, derivative: &str, point: TunnelPoint) {
+        self.insert_at(derivative, None, point);
+    }
+
+    /// Adds one point at a value of the third variable; points may come in any order.
+    pub fn insert_at(&mut self, derivative: &str, third: Option<f64>, point: TunnelPoint) {
+        let entry = Entry { third, point };
         let table = self.tables.entry(key(derivative)).or_default();
-        let place = |p: &TunnelPoint| (p.mach.unwrap_or(0.0), p.alpha_deg);
-        let at = table.partition_point(|p| place(p) < place(&point));
-        table.insert(at, point);
+        let at = table.partition_point(|e| e.place() < entry.place());
+        table.insert(at, entry);
+    }
+
+    fn table(&self, derivative: &str) -> &[Entry] {
+        self.tables.get(&key(derivative)).map_or(&[][..], Vec::as_slice)
     }
 
     #[must_use]
@@ -52,58 +151,170 @@ impl WindTunnel {
     /// Where the values come from, as far as the database says: every source once, sorted.
     #[must_use]
     pub fn sources(&self) -> Vec<&str> {
-        let mut sources: Vec<&str> = self.tables.values().flatten().filter_map(|p| p.source.as_deref()).collect();
+        let mut sources: Vec<&str> = self.tables.values().flatten().filter_map(|e| e.point.source.as_deref()).collect();
         sources.sort_unstable();
         sources.dedup();
         sources
     }
 
+    /// The source of a derivative's first value that states one.
+    #[must_use]
+    pub fn source_of(&self, derivative: &str) -> Option<&str> {
+        self.table(derivative).iter().find_map(|e| e.point.source.as_deref())
+    }
+
     /// The α at which a derivative is tabulated (at any Mach), ascending.
     #[must_use]
     pub fn alphas_deg(&self, derivative: &str) -> Vec<f64> {
-        let mut alphas: Vec<f64> =
-            self.tables.get(&key(derivative)).into_iter().flatten().map(|p| p.alpha_deg).collect();
-        alphas.sort_by(f64::total_cmp);
-        alphas.dedup();
-        alphas
+        breakpoints(self.table(derivative), |e| Some(e.point.alpha_deg))
+    }
+
+    /// The Mach numbers at which a derivative is tabulated, ascending; empty for one that does not depend on Mach.
+    #[must_use]
+    pub fn machs(&self, derivative: &str) -> Vec<f64> {
+        breakpoints(self.table(derivative), |e| e.point.mach)
+    }
+
+    /// The values of the third variable at which a derivative is tabulated, ascending; empty for one that does not depend
+    /// on it.
+    #[must_use]
+    pub fn thirds(&self, derivative: &str) -> Vec<f64> {
+        breakpoints(self.table(derivative), |e| e.third)
     }
 
     /// Root mean square of a derivative's tabulated values: its typical size. Zero for one without a table.
     #[must_use]
     pub fn root_mean_square(&self, derivative: &str) -> f64 {
-        let table = self.tables.get(&key(derivative)).map_or(&[][..], Vec::as_slice);
-        let square: f64 = table.iter().map(|p| p.value * p.value).sum();
+        let table = self.table(derivative);
+        let square: f64 = table.iter().map(|e| e.point.value * e.point.value).sum();
         (square / table.len().max(1) as f64).sqrt()
     }
 
-    /// The value at an angle of attack and Mach number: linear between the tabulated points, constant beyond the ends.
+    /// The value at an angle of attack and Mach number, at the settings' third variable.
     #[must_use]
     pub fn value(&self, derivative: &str, alpha_deg: f64, mach: f64) -> Option<TunnelValue> {
+        self.at(derivative, &Condition { alpha_deg, mach, third: None })
+    }
+
+    /// The value at a flight condition; none without a table, or where extrapolation would be needed and is refused.
+    #[must_use]
+    pub fn at(&self, derivative: &str, condition: &Condition) -> Option<TunnelValue> {
         let table = self.tables.get(&key(derivative))?;
-        let rows: Vec<&[TunnelPoint]> = table.chunk_by(|a, b| a.mach == b.mach).collect();
-        let upper = rows.partition_point(|row| row[0].mach.unwrap_or(0.0) < mach).min(rows.len() - 1);
-        let lower = upper.saturating_sub(usize::from(rows[upper][0].mach.unwrap_or(0.0) > mach));
-        let (low, high) = (along_alpha(rows[lower], alpha_deg), along_alpha(rows[upper], alpha_deg));
-        let (m0, m1) = (rows[lower][0].mach.unwrap_or(0.0), rows[upper][0].mach.unwrap_or(0.0));
-        Some(between(low, high, fraction(m0, m1, mach)))
+        let refused = self.settings.extrapolation == Extrapolation::Refuse;
+        if refused && !self.beyond(derivative, condition).is_empty() {
+            return None;
+        }
+        let scheme = self.settings.interpolation;
+        let blocks: Vec<&[Entry]> = table.chunk_by(|a, b| a.third == b.third).collect();
+        let third = |i: usize| blocks[i][0].third.unwrap_or(0.0);
+        let across_mach = |i: usize| {
+            let rows = rows_of_mach(blocks[i]);
+            let mach = |j: usize| rows[j][0].point.mach.unwrap_or(0.0);
+            let along_alpha = |j: usize| {
+                let row = rows[j];
+                let alpha = |k: usize| row[k].point.alpha_deg;
+                along(row.len(), alpha, |k| row[k].value(), condition.alpha_deg, scheme)
+            };
+            along(rows.len(), mach, along_alpha, condition.mach, scheme)
+        };
+        Some(along(blocks.len(), third, across_mach, self.third_at(condition), scheme))
+    }
+
+    fn third_at(&self, condition: &Condition) -> f64 {
+        condition.third.or(self.settings.third.as_ref().map(|t| t.at)).unwrap_or(0.0)
+    }
+
+    /// In which variables a reading lies beyond a derivative's table: beyond the rows on either side of it, which may be
+    /// of different length.
+    #[must_use]
+    pub fn beyond(&self, derivative: &str, condition: &Condition) -> Vec<Beyond> {
+        let table = self.table(derivative);
+        let third = self.third_at(condition);
+        let mut beyond = Vec::new();
+        let mut note = |variable: &str, read_at: f64, (from, to): (f64, f64)| {
+            let known = beyond.iter().any(|b: &Beyond| b.variable == variable);
+            if !known && !(from..=to).contains(&read_at) {
+                beyond.push(Beyond { variable: variable.to_owned(), read_at, from, to });
+            }
+        };
+        let thirds = breakpoints(table, |e| e.third);
+        if let (Some(range), Some(name)) = (ends(&thirds), self.settings.third.as_ref().map(|t| t.name.as_str())) {
+            note(name, third, range);
+        }
+        let blocks: Vec<&[Entry]> = table.chunk_by(|a, b| a.third == b.third).collect();
+        for block in either_side(&blocks, |b| b[0].third.unwrap_or(0.0), third) {
+            if let Some(range) = ends(&breakpoints(block, |e| e.point.mach)) {
+                note("mach", condition.mach, range);
+            }
+            let rows = rows_of_mach(block);
+            for row in either_side(&rows, |r| r[0].point.mach.unwrap_or(0.0), condition.mach) {
+                if let Some(range) = ends(&breakpoints(row, |e| Some(e.point.alpha_deg))) {
+                    note("alpha_deg", condition.alpha_deg, range);
+                }
+            }
+        }
+        beyond
     }
 }
 
-fn along_alpha(row: &[TunnelPoint], alpha_deg: f64) -> TunnelValue {
-    let upper = row.partition_point(|p| p.alpha_deg < alpha_deg).min(row.len() - 1);
-    let lower = upper.saturating_sub(usize::from(row[upper].alpha_deg > alpha_deg));
-    let at = |i: usize| TunnelValue { value: row[i].value, uncertainty: row[i].uncertainty };
-    between(at(lower), at(upper), fraction(row[lower].alpha_deg, row[upper].alpha_deg, alpha_deg))
+impl Entry {
+    fn place(&self) -> (f64, f64, f64) {
+        (self.third.unwrap_or(0.0), self.point.mach.unwrap_or(0.0), self.point.alpha_deg)
+    }
+
+    fn value(&self) -> TunnelValue {
+        TunnelValue { value: self.point.value, uncertainty: self.point.uncertainty }
+    }
 }
 
-/// Where `x` lies from `a` (0) to `b` (1), kept inside; 0 where the two coincide.
-fn fraction(a: f64, b: f64, x: f64) -> f64 {
-    if b > a { ((x - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 }
+fn rows_of_mach(block: &[Entry]) -> Vec<&[Entry]> {
+    block.chunk_by(|a, b| a.point.mach == b.point.mach).collect()
 }
 
-fn between(a: TunnelValue, b: TunnelValue, f: f64) -> TunnelValue {
-    let mix = |x: f64, y: f64| x + f * (y - x);
-    TunnelValue { value: mix(a.value, b.value), uncertainty: a.uncertainty.zip(b.uncertainty).map(|(x, y)| mix(x, y)) }
+/// The distinct values of a variable, ascending.
+fn breakpoints(table: &[Entry], of: impl Fn(&Entry) -> Option<f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = table.iter().filter_map(of).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    values
+}
+
+fn ends(ascending: &[f64]) -> Option<(f64, f64)> {
+    Some((*ascending.first()?, *ascending.last()?))
+}
+
+/// The items on either side of `x`; one where it is at an item or beyond the ends.
+fn either_side<T>(items: &[T], x_of: impl Fn(&T) -> f64, x: f64) -> &[T] {
+    if items.is_empty() {
+        return items;
+    }
+    let (low, fraction) = place(items.len(), |i| x_of(&items[i]), x);
+    let high = (low + 1).min(items.len() - 1);
+    if fraction <= 0.0 {
+        &items[low..=low]
+    } else if fraction >= 1.0 {
+        &items[high..=high]
+    } else {
+        &items[low..=high]
+    }
+}
+
+/// The value along one variable; uncertainties are linear whatever the values are.
+fn along(
+    n: usize,
+    x_of: impl Fn(usize) -> f64,
+    value_of: impl Fn(usize) -> TunnelValue,
+    x: f64,
+    scheme: Interpolation,
+) -> TunnelValue {
+    let (low, fraction) = place(n, &x_of, x);
+    let high = (low + 1).min(n.saturating_sub(1));
+    let (a, b) = (value_of(low), value_of(high));
+    let value = match scheme {
+        Interpolation::Linear => linear(a.value, b.value, fraction),
+        Interpolation::MonotoneCubic => monotone(n, low, fraction, &x_of, |i| value_of(i).value),
+    };
+    TunnelValue { value, uncertainty: a.uncertainty.zip(b.uncertainty).map(|(u, v)| linear(u, v, fraction)) }
 }
 
 #[cfg(test)]
@@ -147,5 +358,74 @@ mod tests {
     #[test]
     fn an_unknown_derivative_has_no_value() {
         assert_eq!(tunnel(&[(10.0, None, 1.0)]).value("CN_q", 10.0, 0.3), None);
+    }
+
+    fn points() -> Vec<(f64, Option<f64>, f64)> {
+        let mach = [0.2, 0.6];
+        mach.iter().flat_map(|&m| (0..4).map(move |k| (10.0 * f64::from(k), Some(m), f64::from(k * k) + m))).collect()
+    }
+
+    #[test]
+    fn a_third_variable_is_interpolated_and_read_at_its_setting_where_it_is_not_known() {
+        let third = Some(Third { name: "altitude_ft".into(), at: 20e3 });
+        let mut t = WindTunnel::new(Settings { third, ..Settings::default() });
+        for (altitude, factor) in [(10e3, 1.0), (30e3, 3.0)] {
+            for (alpha_deg, mach, value) in points() {
+                let point = TunnelPoint { alpha_deg, mach, value: factor * value, uncertainty: None, source: None };
+                t.insert_at("CN_alpha", Some(altitude), point);
+            }
+        }
+        let at = |third: Option<f64>| {
+            t.at("CN_alpha", &Condition { alpha_deg: 15.0, mach: 0.4, third }).expect("tabulated").value
+        };
+        // (1 + 4)/2 + 0.4 at the first altitude.
+        assert_relative_eq!(at(Some(10e3)), 2.9, max_relative = 1e-14);
+        assert_relative_eq!(at(Some(25e3)), 2.5 * 2.9, max_relative = 1e-14);
+        assert_relative_eq!(at(None), 2.0 * 2.9, max_relative = 1e-14);
+        assert_eq!(t.thirds("CN_alpha"), [10e3, 30e3]);
+        assert_eq!(t.machs("CN_alpha"), [0.2, 0.6]);
+    }
+
+    #[test]
+    fn a_monotone_cubic_runs_through_the_points_and_differs_between_them() {
+        let mut cubic =
+            WindTunnel::new(Settings { interpolation: Interpolation::MonotoneCubic, ..Settings::default() });
+        let straight = tunnel(&points());
+        for (alpha_deg, mach, value) in points() {
+            cubic.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });
+        }
+        for (alpha, mach, v) in points() {
+            assert_relative_eq!(value(&cubic, alpha, mach.expect("mach")), v, max_relative = 1e-14);
+        }
+        // Closed form for k² at unit spacing between 1 and 2: chords 1, 3, 5 have the slopes 1.5 and 3.75.
+        let expected = 0.5 * (1.0 + 4.0) + (1.5 - 3.75) / 8.0 + 0.2;
+        assert_relative_eq!(value(&cubic, 15.0, 0.2), expected, max_relative = 1e-14);
+        assert!((value(&straight, 15.0, 0.2) - expected).abs() > 0.1);
+    }
+
+    #[test]
+    fn beyond_the_ends_it_is_clamped_or_refused_and_says_so() {
+        let clamped = tunnel(&points());
+        let mut refusing = WindTunnel::new(Settings { extrapolation: Extrapolation::Refuse, ..Settings::default() });
+        for (alpha_deg, mach, value) in points() {
+            refusing.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });
+        }
+        let beyond = Condition { alpha_deg: 31.0, mach: 0.7, third: None };
+        assert_relative_eq!(clamped.at("CN_alpha", &beyond).expect("clamped").value, 9.6);
+        assert_eq!(refusing.at("CN_alpha", &beyond), None);
+        let named = |variable: &str, read_at, from, to| Beyond { variable: variable.into(), read_at, from, to };
+        let both = [named("mach", 0.7, 0.2, 0.6), named("alpha_deg", 31.0, 0.0, 30.0)];
+        assert_eq!(refusing.beyond("CN_alpha", &beyond), both);
+        let inside = Condition { alpha_deg: 30.0, mach: 0.2, third: None };
+        assert_eq!(refusing.beyond("CN_alpha", &inside), []);
+        assert_eq!(refusing.at("CN_alpha", &inside), clamped.at("CN_alpha", &inside));
+    }
+
+    #[test]
+    fn a_shorter_row_at_one_mach_ends_where_it_ends() {
+        let t = tunnel(&[(0.0, Some(0.2), 0.0), (30.0, Some(0.2), 3.0), (0.0, Some(0.6), 0.0), (10.0, Some(0.6), 1.0)]);
+        let at = |alpha_deg, mach| t.beyond("CN_alpha", &Condition { alpha_deg, mach, third: None });
+        assert_eq!(at(20.0, 0.2), []);
+        assert_eq!(at(20.0, 0.3), [Beyond { variable: "alpha_deg".into(), read_at: 20.0, from: 0.0, to: 10.0 }]);
     }
 }

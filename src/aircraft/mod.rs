@@ -5,7 +5,7 @@
 mod earth;
 mod vanes;
 
-pub use earth::gravity_ft_s2;
+pub use earth::{gravity_at, gravity_ft_s2};
 pub use vanes::{Flow, Reading};
 
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::{Bars, Options, Patience, start_threads};
-use crate::changes::{Changes, Moved};
+use crate::overnight::{Changes, Moved};
 use crate::pipeline::{diff, explain, gc, status, verify};
 
 /// Something moved, or is stale: not wrong, but somebody should look.

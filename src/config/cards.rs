@@ -9,7 +9,7 @@ use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
 use crate::simulate::cards::Cards;
 use crate::simulate::{Card, Program, Simulator, Tables};
-use crate::store::files::{self, TunnelRow};
+use crate::store::files::TunnelRow;
 
 /// A campaign to be simulated, checked.
 #[derive(Clone, Debug)]
@@ -37,7 +37,8 @@ impl Simulation {
         };
         let overrides = Overrides { wind_tunnel: Some(cards.truth.clone()), ..Overrides::default() };
         let config = Config::load(&folder, overrides)?;
-        let truth = files::tunnel_rows(&cards.truth)?.into_iter().map(|(_, row)| row).collect();
+        let truth = super::check::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
+        let truth = truth.into_iter().map(|(_, row)| row).collect();
         let simulator =
             Simulator::new(&config.aircraft, &config.buildup, config.tunnel.clone(), cards.aircraft.clone())
                 .map_err(|what| source.error("aircraft", what))?;

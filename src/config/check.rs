@@ -1,33 +1,95 @@
 //! The checks of a configuration that its types cannot make: names resolve, units fit, nothing is missing.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::Config;
 use super::source::{Files, Source};
-use crate::aero::{Buildup, Output, WindTunnel};
+use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Hold;
 use crate::flight::signal;
 use crate::maneuver::{Class, Event, Status};
-use crate::store::files;
+use crate::store;
+use crate::store::files::{self, TunnelRow};
 use crate::units::Unit;
 
-/// Reads the tunnel's table; units must be those of the model's derivatives.
-pub(super) fn tunnel(path: &Path, buildup: &Buildup) -> Result<WindTunnel> {
-    let plain = |name: &str| name.replace('_', "");
-    let mut tunnel = WindTunnel::default();
-    for (line, row) in files::tunnel_rows(path)? {
+/// Reads the tunnel's tables, in the units of the model's derivatives.
+pub(super) fn tunnel(path: &Path, buildup: &Buildup, settings: &wind_tunnel::Settings) -> Result<WindTunnel> {
+    let mut tunnel = WindTunnel::new(settings.clone());
+    let mut seen = Seen::default();
+    for (line, mut row) in tunnel_rows(path, buildup, settings)? {
         let error = |what: String| Err(Error::config(path, Some(line), what));
-        let derivative = buildup.derivatives.iter().find(|d| plain(&d.name) == plain(&row.derivative));
-        if let Some(unit) = derivative.map(|d| d.unit().name()).filter(|unit| *unit != row.unit) {
-            return error(format!("`{}` is in `{}`, the model's unit is `{unit}`", row.derivative, row.unit));
-        }
-        if !(row.alpha_deg.is_finite() && row.value.is_finite()) {
+        let numbers = [Some(row.alpha_deg), Some(row.value), row.mach, row.uncertainty, row.third];
+        if numbers.iter().flatten().any(|v| !v.is_finite()) {
             return error(format!("`{}` has a value that is no number", row.derivative));
         }
-        tunnel.insert(&row.derivative, row.point());
+        if let Some(derivative) = buildup.derivatives.iter().find(|d| plain(&d.name) == plain(&row.derivative)) {
+            let unit = derivative.unit();
+            let Some(factor) = unit.factor_from(&row.unit) else {
+                let (name, written, unit) = (&row.derivative, &row.unit, unit.name());
+                return error(format!("`{name}` is in `{written}`, which cannot become the model's `{unit}`"));
+            };
+            row.value *= factor;
+            row.uncertainty = row.uncertainty.map(|u| u * factor);
+        }
+        seen.add(&row).map_err(|what| Error::config(path, Some(line), what))?;
+        tunnel.insert_at(&row.derivative, row.third, row.point());
+    }
+    if let Some(third) = settings.third.as_ref().filter(|_| !seen.third) {
+        let what = format!("no table depends on `{}`, which pipeline.yaml names (tunnel: third:)", third.name);
+        return Err(Error::config(path, None, what));
     }
     Ok(tunnel)
+}
+
+/// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's derivatives and sums.
+pub(super) fn tunnel_rows(
+    path: &Path,
+    buildup: &Buildup,
+    settings: &wind_tunnel::Settings,
+) -> Result<Vec<(usize, TunnelRow)>> {
+    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+    let names: Vec<String> = derivatives.chain(buildup.combined.iter().map(|c| &c.name)).map(|n| plain(n)).collect();
+    let third = settings.third.as_ref().map(|third| third.name.as_str());
+    store::tunnel::rows(path, third, |variable| names.contains(&plain(variable)))
+}
+
+/// A name as tunnels are compared by.
+fn plain(name: &str) -> String {
+    name.replace('_', "")
+}
+
+/// What the tunnel's rows have given so far: each point once, and of each derivative always the same variables.
+#[derive(Default)]
+struct Seen {
+    points: BTreeSet<(String, [Option<u64>; 3])>,
+    variables: BTreeMap<String, (bool, bool)>,
+    third: bool,
+}
+
+impl Seen {
+    fn add(&mut self, row: &TunnelRow) -> std::result::Result<(), String> {
+        let name = plain(&row.derivative);
+        let given = (row.mach.is_some(), row.third.is_some());
+        self.third |= given.1;
+        if *self.variables.entry(name.clone()).or_insert(given) != given {
+            let what = "has Mach number or third variable in some rows and not in others: give it in all or in none";
+            return Err(format!("`{}` {what}", row.derivative));
+        }
+        // Adding zero makes one of the two zeros.
+        let bits = |v: f64| (v + 0.0).to_bits();
+        let point = [Some(bits(row.alpha_deg)), row.mach.map(bits), row.third.map(bits)];
+        if self.points.insert((name, point)) {
+            return Ok(());
+        }
+        let mach = row.mach.map_or_else(String::new, |m| format!(", Mach {m}"));
+        Err(format!(
+            "`{}` has a second value at alpha {} deg{mach}; a table over a third variable needs its name in \
+             pipeline.yaml (tunnel: third:)",
+            row.derivative, row.alpha_deg
+        ))
+    }
 }
 
 /// Reads the analyst's events, where there are any.
@@ -219,24 +281,94 @@ fn word(output: Output) -> String {
 
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     let rule = &class.recognition;
-    for name in rule.flags.keys().chain(rule.steps.keys()) {
+    let error = |name: &str, what: String| Err(source.error_under("recognise", name, what));
+    for name in rule.flags.keys().chain(rule.counted()) {
         known_signal(config, source, name, &format!("class {}", class.name))?;
     }
     for (name, count) in &rule.steps {
         if count.at_least > count.at_most {
-            return Err(source.error(name, format!("class {}: `{name}` steps at least more than at most", class.name)));
+            return error(name, format!("class {}: `{name}` steps at least more than at most", class.name));
         }
+    }
+    for name in rule.counted() {
         if !config.segment.steps.contains_key(name) {
             let what =
                 format!("class {}: `segment: steps:` of pipeline.yaml says no size for steps of `{name}`", class.name);
-            return Err(source.error(name, what));
+            return error(name, what);
         }
     }
+    if rule.inputs().is_empty() {
+        let what = format!(
+            "class {}: nothing makes this maneuver; `steps` with `at_least`, `pulses` or `sweep` name its inputs",
+            class.name
+        );
+        return error("recognise", what);
+    }
+    patterns(class, source)?;
     for (name, time_s) in [("lead_in_s", rule.lead_in_s), ("decay_s", rule.decay_s)] {
         if !(time_s.is_finite() && time_s >= 0.0) {
-            return Err(
-                source.error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name))
-            );
+            return error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name));
+        }
+    }
+    Ok(())
+}
+
+/// Lengths of pulses and rising frequencies that can be.
+fn patterns(class: &Class, source: &Source) -> Result<()> {
+    let error =
+        |name: &str, what: &str| Err(source.error_under("recognise", name, format!("class {}: {what}", class.name)));
+    for pulses in class.recognition.pulses.values() {
+        if pulses.widths.len() < 2 || !pulses.widths.iter().all(|w| w.is_finite() && *w > 0.0) {
+            return error("widths", "`widths` are the lengths of two pulses or more, all greater than zero");
+        }
+        if !(pulses.unit_s.0 >= 0.0 && pulses.unit_s.1 > pulses.unit_s.0) {
+            return error("unit_s", "`unit_s` is the shortest unit and the longest, in s: [0.2, 2]");
+        }
+        if !(pulses.tolerance > 0.0 && pulses.tolerance.is_finite()) {
+            return error("tolerance", "`tolerance` must be greater than zero");
+        }
+    }
+    for sweep in class.recognition.sweep.values() {
+        if sweep.at_least < 4 {
+            return error("at_least", "a sweep has at least 4 swings");
+        }
+        if !(sweep.ratio > 1.0 && sweep.ratio.is_finite()) {
+            return error("ratio", "the frequency of a sweep rises: `ratio` must be greater than 1");
+        }
+    }
+    Ok(())
+}
+
+/// What segment is told of signals, and its limits.
+fn segment(config: &Config, source: &Source) -> Result<()> {
+    let settings = &config.segment;
+    let named = settings.steps.keys().chain(&settings.pilot_controls).chain(settings.quality.actuators.keys());
+    for name in std::iter::once(&settings.excitation_flag).chain(named) {
+        known_signal(config, source, name, "segment")?;
+    }
+    if let Some(name) = settings.pilot_controls.iter().find(|name| !settings.steps.contains_key(*name)) {
+        let what = format!("segment: `steps` says no size for steps of the pilot control `{name}`");
+        return Err(source.error_under("pilot_controls", name, what));
+    }
+    for (name, actuator) in &settings.quality.actuators {
+        if !(actuator.lower_deg < actuator.upper_deg && actuator.rate_deg_s > 0.0) {
+            let what = format!("the actuator of `{name}` needs lower_deg < upper_deg and a rate greater than zero");
+            return Err(source.error_under("actuators", name, what));
+        }
+    }
+    let q = &settings.quality;
+    let limits = [
+        ("lead_in_motion", q.lead_in_motion),
+        ("alpha_rms_deg", q.alpha_rms_deg),
+        ("other_axis", q.other_axis),
+        ("signal_to_noise", q.signal_to_noise),
+        ("saturated_share", q.saturated_share),
+        ("rate_limited_share", q.rate_limited_share),
+        ("marked_share", q.marked_share),
+    ];
+    for (name, limit) in limits {
+        if limit.is_nan() || limit < 0.0 {
+            return Err(source.error_under("quality", name, format!("`{name}` must not be negative, not {limit}")));
         }
     }
     Ok(())
@@ -261,10 +393,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
         return Err(source.error_under("estimate", "joint", what));
     }
     calibration(config, source)?;
-    let segment = std::iter::once(&config.segment.excitation_flag).chain(config.segment.steps.keys());
-    for name in segment {
-        known_signal(config, source, name, "segment")?;
-    }
+    segment(config, source)?;
     let angles = config.estimate.joint.iter().map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
     let distances = config.estimate.prediction.iter().map(|p| ("alpha_distance_deg", p.alpha_distance_deg));
     for (name, angle_deg) in angles.chain(distances) {
@@ -272,6 +401,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             return Err(source.error(name, format!("`{name}` must be greater than zero, not {angle_deg}")));
         }
     }
+    trends_and_tunnel(config, source)?;
     let names = config.derivative_names();
     let known = names.iter().map(String::as_str);
     let in_groups = config.trend.groups.iter().flat_map(|g| &g.derivatives);
@@ -286,6 +416,39 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
             let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
             return Err(source.error(name, format!("unknown class `{name}`{near}")));
         }
+    }
+    Ok(())
+}
+
+/// Numbers of trends and tunnel that would make no sense.
+fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
+    let (trend, compare) = (&config.trend, &config.compare);
+    let knots = trend.knots_deg.iter().chain(trend.groups.iter().flat_map(|g| g.knots_deg.iter().flatten()));
+    if let Some(knot) = knots.copied().find(|k| !k.is_finite()) {
+        return Err(source.error_under(
+            "trend",
+            "knots_deg",
+            format!("a knot is an angle of attack in deg, not {knot}"),
+        ));
+    }
+    let positive = [
+        ("trend", "outlier_z", trend.outlier_z),
+        ("trend", "alpha_step_deg", trend.alpha_step_deg),
+        ("compare", "agreement_z", compare.agreement_z),
+    ];
+    for (key, name, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
+        }
+    }
+    if let Some(third) = config.tunnel.settings().third.as_ref().filter(|third| !third.at.is_finite()) {
+        return Err(source.error_under("tunnel", "at", format!("`at` must be a number, not {}", third.at)));
+    }
+    let mut given = config.export.jsbsim_properties.keys();
+    let used = || config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    if let Some(signal) = given.find(|signal| !used().any(|s| s == signal.as_str())) {
+        let near = did_you_mean(signal, used());
+        return Err(source.error(signal, format!("export: no derivative is of the signal `{signal}`{near}")));
     }
     Ok(())
 }

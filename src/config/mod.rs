@@ -16,7 +16,7 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{compare, estimate, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 pub use cards::Simulation;
 pub use written::ReportSettings;
@@ -45,9 +45,12 @@ pub struct Config {
     pub estimate: estimate::Settings,
     pub trend: trend::Settings,
     pub compare: compare::Settings,
+    pub export: export::Settings,
     pub report: ReportSettings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
+    /// The pipeline's files as they are: name and text.
+    pub files: Vec<(String, String)>,
 }
 
 /// What the command line says instead of the pipeline's YAML.
@@ -58,6 +61,10 @@ pub struct Overrides {
     pub store: Option<PathBuf>,
     pub reports: Option<PathBuf>,
     pub events: Option<PathBuf>,
+    /// Folders of earlier campaigns' tables; the pipeline's own where it is empty.
+    pub against: Vec<PathBuf>,
+    /// What reading may hold in memory at once, MB.
+    pub memory_mb: Option<f64>,
 }
 
 impl Config {
@@ -76,7 +83,7 @@ impl Config {
         let events = overrides.events.or(pipeline.events);
         let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
         let config = Config {
-            tunnel: check::tunnel(&wind_tunnel, &buildup)?,
+            tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
             events: check::events(events.as_deref(), &classes)?,
             title: pipeline.title,
             archive: overrides.archive.unwrap_or(pipeline.archive),
@@ -89,13 +96,18 @@ impl Config {
             constants: aircraft.constants,
             buildup,
             classes,
-            ingest: pipeline.ingest,
+            ingest: ingest::Settings {
+                memory_mb: overrides.memory_mb.unwrap_or(pipeline.ingest.memory_mb),
+                ..pipeline.ingest
+            },
             segment: pipeline.segment,
             estimate: pipeline.estimate,
             trend: pipeline.trend,
-            compare: pipeline.compare,
+            compare: against(pipeline.compare, overrides.against),
+            export: pipeline.export,
             report: pipeline.report,
             template,
+            files: files.all().map(|file| file.named(folder)).collect(),
         };
         check::whole(&config, &files)?;
         Ok(config)
@@ -112,6 +124,11 @@ impl Config {
         let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
         derivatives.chain(self.buildup.combined.iter().map(|c| &c.name)).cloned().collect()
     }
+}
+
+/// The comparison's settings with the earlier campaigns that the command line names, where it names some.
+fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
+    if named.is_empty() { settings } else { compare::Settings { against: named, ..settings } }
 }
 
 #[cfg(test)]

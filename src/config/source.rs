@@ -32,6 +32,12 @@ impl Source {
         Ok(Source { path, text })
     }
 
+    /// Its name within a pipeline's folder, and its text.
+    pub fn named(&self, folder: &Path) -> (String, String) {
+        let name = self.path.strip_prefix(folder).unwrap_or(&self.path).display();
+        (name.to_string(), self.text.clone())
+    }
+
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
             let line = e.location().map(|l| l.line());
@@ -77,6 +83,11 @@ fn said(parser: &str) -> String {
 }
 
 impl Files {
+    /// All of them, in the order in which they are explained.
+    pub fn all(&self) -> impl Iterator<Item = &Source> {
+        [&self.pipeline, &self.aircraft, &self.model].into_iter().chain(&self.classes)
+    }
+
     pub fn read(folder: &Path) -> Result<Files> {
         if !folder.join("pipeline.yaml").is_file() {
             let what =

@@ -316,6 +316,66 @@ fn recognition_by_steps_of_no_stated_size_is_named() {
 }
 
 #[test]
+fn an_unknown_word_of_recognition_is_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/3211.yaml", "{widths: [", "{width: [");
+    let e = copy.error();
+    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `widths`?"), "{e}");
+    let copy = Copy::new();
+    copy.spoil("maneuvers/3211.yaml", "  pulses:", "  pulse:");
+    let e = copy.error();
+    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `pulses`?"), "{e}");
+}
+
+#[test]
+fn patterns_that_cannot_be_are_named_with_their_line() {
+    for (from, to, said) in [
+        ("widths: [3, 2, 1, 1]", "widths: [3]", "`widths` are the lengths of two pulses or more"),
+        ("unit_s: [0.2, 2]", "unit_s: [2, 0.2]", "`unit_s` is the shortest unit and the longest"),
+        ("tolerance: 0.35", "tolerance: 0", "`tolerance` must be greater than zero"),
+    ] {
+        let copy = Copy::new();
+        let line = copy.spoil("maneuvers/3211.yaml", from, to);
+        let e = copy.error();
+        assert!(e.starts_with(&format!("maneuvers/3211.yaml:{line}: class 3211: {said}")), "{e}");
+    }
+    for (sweep, said) in
+        [("{at_least: 3}", "at least 4 swings"), ("{at_least: 9, ratio: 0.5}", "`ratio` must be greater")]
+    {
+        let copy = Copy::new();
+        let line =
+            copy.spoil("maneuvers/olon.yaml", "  lead_in_s:", &format!("  sweep: {{de_deg: {sweep}}}\n  lead_in_s:"));
+        let e = copy.error();
+        assert!(e.contains(said) && e.starts_with("maneuvers/olon.yaml:"), "{line}: {e}");
+    }
+}
+
+#[test]
+fn a_class_that_nothing_makes_is_named() {
+    let copy = Copy::new();
+    copy.spoil("maneuvers/ppss.yaml", "{at_least: 7, at_most: 12}", "{at_most: 12}");
+    let e = copy.error();
+    assert!(e.contains("class PPSS: nothing makes this maneuver"), "{e}");
+}
+
+#[test]
+fn pilot_controls_and_actuators_of_no_signal_are_answered_with_the_one_that_was_meant() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "[stick_pitch_in, stick_lat_in, pedal_in]", "[stick_pitch_in, pedal_inn]");
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: segment: no channel gives the signal `pedal_inn`; did you mean `pedal_in`?")
+    );
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "lower_deg: -24, upper_deg: 10.5", "lower_deg: 24, upper_deg: 10.5");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("pipeline.yaml:{line}: the actuator of `de_deg` needs")), "{e}");
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "other_axis: 1 ", "other_axis: -1 ");
+    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: `other_axis` must not be negative, not -1"));
+}
+
+#[test]
 fn a_trend_group_of_an_unknown_derivative_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "derivatives: [CN_q, Cm_q]", "derivatives: [CN_q, Cm_qq]");
@@ -395,8 +455,8 @@ fn an_event_with_a_time_that_is_no_number_is_named_by_line_and_column() {
 #[test]
 fn a_tunnel_table_in_another_unit_is_named() {
     assert_eq!(
-        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,per_rad\n"),
-        "tunnel.csv:3: `CN_alpha` is in `per_rad`, the model's unit is `per_deg`"
+        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,lbf\n"),
+        "tunnel.csv:3: `CN_alpha` is in `lbf`, which cannot become the model's `per_deg`"
     );
 }
 
@@ -435,4 +495,54 @@ fn a_pipeline_without_classes_says_so() {
         fs::remove_file(file.unwrap().path()).unwrap();
     }
     assert_eq!(copy.error(), "maneuvers: no maneuver class: each is a file `<class>.yaml` here");
+}
+
+#[test]
+fn a_tunnel_per_radian_becomes_one_per_degree() {
+    let copy = Copy::new();
+    let table = fs::read_to_string("data/demo/wt_tables.csv").unwrap();
+    let path = copy.write("tunnel.csv", &table.replace("CNalpha,5,0.0968867536,per_deg", "CNalpha,5,5.0,1/rad"));
+    let config = copy.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap();
+    let value = config.tunnel.value("CN_alpha", 5.0, 0.3).unwrap().value;
+    approx::assert_relative_eq!(value, 5.0_f64.to_radians(), max_relative = 1e-14);
+}
+
+#[test]
+fn a_second_value_at_one_place_and_a_mach_number_in_some_rows_only_are_named() {
+    let e = Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCNalpha,10,0.09,per_deg\n");
+    assert!(e.starts_with("tunnel.csv:3: `CNalpha` has a second value at alpha 10 deg"), "{e}");
+    let copy = Copy::new();
+    let rows = "derivative,alpha_deg,mach,value,unit\nCN_q,10,0.3,4.0,per_rad\nCN_q,15,,4.0,per_rad\n";
+    let path = copy.write("mach.csv", rows);
+    let e = copy.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap_err();
+    assert!(e.starts_with("mach.csv:3: `CN_q` has Mach number or third variable in some rows"), "{e}");
+}
+
+#[test]
+fn a_third_variable_without_a_column_is_named() {
+    let copy = Copy::new();
+    copy.spoil("pipeline.yaml", "  # third: {", "  third: {");
+    let e = copy.error();
+    assert_eq!(
+        e,
+        "data/demo/wt_tables.csv: no table depends on `altitude_ft`, which pipeline.yaml names (tunnel: third:)"
+    );
+}
+
+#[test]
+fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "interpolation: linear", "interpolation: cubic");
+    let e = copy.error();
+    assert!(e.starts_with(&format!("pipeline.yaml:{line}: ")) && e.contains("monotone_cubic"), "{e}");
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "outlier_z: 3", "outlier_z: 0");
+    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: `outlier_z` must be greater than zero, not 0"));
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "# export:\n", "export: { jsbsim_properties: { de_dg: fcs/de } }\n");
+    let e = copy.error();
+    assert!(
+        e.starts_with(&format!("pipeline.yaml:{line}: export: no derivative is of the signal `de_dg`; did you mean")),
+        "{e}"
+    );
 }

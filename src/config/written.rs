@@ -5,12 +5,12 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor};
+use crate::aero::{Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
-use crate::{compare, estimate, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]
@@ -26,6 +26,9 @@ pub struct PipelineFile {
     /// CSV of the analyst's events.
     #[serde(default)]
     pub events: Option<PathBuf>,
+    /// How the tunnel's tables are read.
+    #[serde(default)]
+    pub tunnel: wind_tunnel::Settings,
     #[serde(default)]
     pub ingest: ingest::Settings,
     pub segment: segment::Settings,
@@ -35,6 +38,8 @@ pub struct PipelineFile {
     pub trend: trend::Settings,
     #[serde(default)]
     pub compare: compare::Settings,
+    #[serde(default)]
+    pub export: export::Settings,
     #[serde(default)]
     pub report: ReportSettings,
 }

@@ -4,30 +4,32 @@
 //! The longitudinal specific forces f_x, f_z are taken as measured, brought to the c.g.; in 3.1 they stand as C_D sin β
 //! and T cos α sin β (minus: thrust pulls the nose back into the wind's direction). Moments: Euler's equations about x and
 //! z for a symmetric airframe with the engines' momentum H along +x, whose yawing moment is +q H.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
 
 use super::lever::lever;
+use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
 /// The lateral-directional axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Lateral;
 
-/// What is known at one instant.
+/// What the rates know at one instant.
 #[derive(Clone, Debug)]
 pub struct Known {
-    velocity: f64,
-    alpha: f64,
+    /// 1/V.
+    per_speed: f64,
     sin_alpha: f64,
     cos_alpha: f64,
     q: f64,
-    q_dot: f64,
     sin_theta: f64,
     cos_theta: f64,
+    tan_theta: f64,
     /// f_x cos α + f_z sin α, ft/s²: the measured specific force along the wind's projection on the plane of symmetry.
     along: f64,
     /// q̄S/m, ft/s².
@@ -38,8 +40,19 @@ pub struct Known {
     /// ṗ, ṙ = `coupling` (p, r) + `gyroscopic`, rad/s².
     coupling: [[f64; 2]; 2],
     gyroscopic: [f64; 2],
+}
+
+/// What the sensors know besides.
+#[derive(Clone, Debug)]
+pub struct Sensed {
+    velocity: f64,
+    alpha: f64,
+    q_dot: f64,
+    /// Arm of the accelerometer from the c.g., ft forward, right, down.
+    ay: [f64; 3],
     cg: Position,
-    sensors: Sensors,
+    vane: Vane,
+    model: VaneModel,
 }
 
 const BETA: usize = 0;
@@ -52,22 +65,43 @@ const CN: usize = 2;
 
 impl Known {
     /// ṗ and ṙ, rad/s².
+    #[inline(always)]
     fn angular(&self, p: f64, r: f64, c: &[f64; COEFFICIENTS]) -> [f64; 2] {
-        [0, 1].map(|i| {
-            self.coupling[i][0] * p
-                + self.coupling[i][1] * r
-                + self.gyroscopic[i]
-                + self.moment[i][0] * c[CL]
-                + self.moment[i][1] * c[CN]
-        })
+        let ([p_dot, r_dot], [cl, cn]) = (self.coupling, [c[CL], c[CN]]);
+        [
+            p_dot[0] * p + p_dot[1] * r + self.gyroscopic[0] + self.moment[0][0] * cl + self.moment[0][1] * cn,
+            r_dot[0] * p + r_dot[1] * r + self.gyroscopic[1] + self.moment[1][0] * cl + self.moment[1][1] * cn,
+        ]
     }
 }
 
 impl Equations<4> for Lateral {
     type Known = Known;
+    type Sensed = Sensed;
 
     const AXIS: Axis = Axis::Lateral;
     const STATES: [&'static str; 4] = ["beta", "p", "r", "phi"];
+
+    const FOLLOWED: &'static [usize] = &[BETA, P, R];
+    const RATES_BY_STATE: &'static [(usize, usize)] = &[
+        (BETA, BETA),
+        (BETA, P),
+        (BETA, R),
+        (BETA, PHI),
+        (P, BETA),
+        (P, P),
+        (P, R),
+        (R, BETA),
+        (R, P),
+        (R, R),
+        (PHI, P),
+        (PHI, R),
+        (PHI, PHI),
+    ];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(BETA, CY), (P, CL), (P, CN), (R, CL), (R, CN)];
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)] =
+        &[(0, BETA), (0, P), (0, R), (1, P), (2, R), (3, PHI), (4, BETA), (4, P), (4, R)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(4, CY), (4, CL), (4, CN)];
 
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let determinant = m.ix * m.iz - m.ixz * m.ixz;
@@ -78,28 +112,48 @@ impl Equations<4> for Lateral {
         let turning = [[q * m.ixz, q * (m.iy - m.iz)], [q * (m.ix - m.iy), -q * m.ixz]];
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
         let times = |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
+        let ((sin_alpha, cos_alpha), (sin_theta, cos_theta)) = (m.alpha.sin_cos(), m.theta.sin_cos());
         Known {
-            velocity: m.velocity,
-            alpha: m.alpha,
-            sin_alpha: m.alpha.sin(),
-            cos_alpha: m.alpha.cos(),
+            per_speed: 1.0 / m.velocity,
+            sin_alpha,
+            cos_alpha,
             q,
-            q_dot: m.accelerations[1],
-            sin_theta: m.theta.sin(),
-            cos_theta: m.theta.cos(),
-            along: m.force_x * m.alpha.cos() + m.force_z * m.alpha.sin(),
+            sin_theta,
+            cos_theta,
+            tan_theta: sin_theta / cos_theta,
+            along: m.force_x * cos_alpha + m.force_z * sin_alpha,
             force: m.qbar * aircraft.wing_area_ft2 / m.mass,
             gravity: m.gravity,
             moment: inverse.map(|row| row.map(|v| pressure * v)),
             coupling: [[times(0, 0), times(0, 1)], [times(1, 0), times(1, 1)]],
             gyroscopic: inverse.map(|row| row[1] * q * m.engine_momentum),
+        }
+    }
+
+    fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
+        let sensors = &aircraft.sensors;
+        Sensed {
+            velocity: m.velocity,
+            alpha: m.alpha,
+            q_dot: m.accelerations[1],
+            ay: sensors.ay.arm(m.cg),
             cg: m.cg,
-            sensors: aircraft.sensors.clone(),
+            vane: sensors.beta_vane,
+            model: sensors.vane_model,
         }
     }
 
     fn measured_state(m: &Motion) -> SVector<f64, 4> {
         SVector::from([m.beta, m.rates[0], m.rates[2], m.phi])
+    }
+
+    fn state_of(regressor: &Regressor) -> Option<usize> {
+        match regressor {
+            Regressor::Beta => Some(BETA),
+            Regressor::RollRate => Some(P),
+            Regressor::YawRate => Some(R),
+            _ => None,
+        }
     }
 
     fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
@@ -122,21 +176,23 @@ impl Equations<4> for Lateral {
         [m.force_y / k.force, roll / pressure, yaw / pressure]
     }
 
+    #[inline(always)]
     fn rates(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
-        let ((sb, cb), (sp, cp)) = (x[BETA].sin_cos(), x[PHI].sin_cos());
-        let (side, per_speed) = (k.force * c[CY], 1.0 / k.velocity);
+        let [(sb, cb), (sp, cp)] = sin_cos([x[BETA], x[PHI]]);
+        let per_speed = k.per_speed;
         let weight = k.cos_theta * cp * k.sin_alpha - k.sin_theta * k.cos_alpha;
-        let beta_dot = x[P] * k.sin_alpha - x[R] * k.cos_alpha
-            + per_speed * (side * cb - k.along * sb + k.gravity * (cb * k.cos_theta * sp - sb * weight));
+        // 3.1 sorted by what cos β and sin β multiply.
+        let by_cos = per_speed * (k.force * c[CY] + k.gravity * k.cos_theta * sp);
+        let by_sin = -per_speed * (k.along + k.gravity * weight);
+        let beta_dot = sb.mul_add(by_sin, cb.mul_add(by_cos, x[P] * k.sin_alpha - x[R] * k.cos_alpha));
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
-        let tan_theta = k.sin_theta / k.cos_theta;
+        let tan_theta = k.tan_theta;
         let mut out = Rates {
             rates: SVector::from([beta_dot, p_dot, r_dot, x[P] + tan_theta * (x[R] * cp + k.q * sp)]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::zeros(),
         };
-        out.by_state[(BETA, BETA)] =
-            per_speed * (-side * sb - k.along * cb + k.gravity * (-sb * k.cos_theta * sp - cb * weight));
+        out.by_state[(BETA, BETA)] = cb * by_sin - sb * by_cos;
         out.by_state[(BETA, P)] = k.sin_alpha;
         out.by_state[(BETA, R)] = -k.cos_alpha;
         out.by_state[(BETA, PHI)] = per_speed * k.gravity * k.cos_theta * (cb * cp + sb * sp * k.sin_alpha);
@@ -153,12 +209,13 @@ impl Equations<4> for Lateral {
         out
     }
 
-    fn outputs(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Outputs<4> {
+    #[inline(always)]
+    fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Outputs<4> {
         let rates = [x[P], k.q, x[R]];
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
-        let flow = Flow { alpha: k.alpha, beta: x[BETA], velocity: k.velocity, rates };
-        let vane = k.sensors.beta_reading(&flow, k.cg);
-        let right = lever(1, k.sensors.ay.arm(k.cg), rates, [p_dot, k.q_dot, r_dot]);
+        let flow = Flow { alpha: sensed.alpha, beta: x[BETA], velocity: sensed.velocity, rates };
+        let vane = sensed.vane.beta_reading(sensed.model, &flow, sensed.cg);
+        let right = lever(1, sensed.ay, rates, [p_dot, sensed.q_dot, r_dot]);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([

@@ -2,6 +2,7 @@
 //!
 //! Eqs. 2.7, 2.8 and 3.7 are this with the products of two different rates dropped; those reach 0.005 g at high roll rate,
 //! so they are kept.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
 /// One body-axis component of the lever acceleration, ft/s², with its slopes along ω and ω̇.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,9 +13,10 @@ pub(crate) struct Lever {
 }
 
 /// Component `i` (0 forward, 1 right, 2 down) at an arm in body axes (ft), for ω in rad/s and ω̇ in rad/s².
+#[inline(always)]
 pub(crate) fn lever(i: usize, arm: [f64; 3], rates: [f64; 3], accelerations: [f64; 3]) -> Lever {
     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-    let along: f64 = arm.iter().zip(rates).map(|(r, w)| r * w).sum();
+    let along = arm[0] * rates[0] + arm[1] * rates[1] + arm[2] * rates[2];
     let across2 = rates[j] * rates[j] + rates[k] * rates[k];
     let mut by_accelerations = [0.0; 3];
     by_accelerations[j] = arm[k];

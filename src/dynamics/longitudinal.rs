@@ -4,45 +4,58 @@
 //! V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S CA)/m. The paper's 2.1 with
 //! C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y for a symmetric airframe (I_xy = I_yz = 0) with
 //! the engines' momentum H along +x, whose moment is −r H.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
 
 use super::lever::lever;
+use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
 /// The longitudinal axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Longitudinal;
 
-/// What is known at one instant.
+/// What the rates know at one instant.
 #[derive(Clone, Debug)]
 pub struct Known {
-    velocity: f64,
-    beta: f64,
     /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
     slip_cos: f64,
     slip_sin: f64,
-    /// 1/(V cos β).
-    per_speed: f64,
-    /// q̄S/m and T/m, ft/s².
+    /// q̄S/m, T/m and g over V cos β, 1/s.
     force: f64,
     thrust: f64,
-    gravity: f64,
-    sin_phi: f64,
+    weight: f64,
     cos_phi: f64,
-    r: f64,
-    p: f64,
+    /// r sin φ.
+    turn: f64,
     /// Pitch acceleration that is known, rad/s², and q̄Sc̄/I_y.
     pitch: f64,
     moment: f64,
+}
+
+/// What the sensors know besides.
+#[derive(Clone, Debug)]
+pub struct Sensed {
+    velocity: f64,
+    beta: f64,
+    r: f64,
+    p: f64,
     /// ṗ and ṙ as measured.
     p_dot: f64,
     r_dot: f64,
+    /// Arms of the accelerometers from the c.g., ft forward, right, down.
+    an: [f64; 3],
+    ax: [f64; 3],
+    /// q̄S/m, and T/m where the accelerometer feels it, ft/s².
+    force: f64,
+    thrust: f64,
     cg: Position,
-    sensors: Sensors,
+    vane: Vane,
+    model: VaneModel,
 }
 
 const ALPHA: usize = 0;
@@ -54,38 +67,67 @@ const CA: usize = 2;
 
 impl Equations<3> for Longitudinal {
     type Known = Known;
+    type Sensed = Sensed;
 
     const AXIS: Axis = Axis::Longitudinal;
     const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
 
+    const FOLLOWED: &'static [usize] = &[ALPHA, Q];
+    const RATES_BY_STATE: &'static [(usize, usize)] =
+        &[(ALPHA, ALPHA), (ALPHA, Q), (ALPHA, THETA), (Q, ALPHA), (Q, Q), (THETA, Q)];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(ALPHA, CN), (ALPHA, CA), (Q, CM)];
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)] =
+        &[(0, ALPHA), (0, Q), (1, Q), (2, THETA), (3, ALPHA), (3, Q), (4, ALPHA), (4, Q)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(3, CN), (3, CM), (4, CM), (4, CA)];
+
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
+        let ((sin_beta, cos_beta), (sin_phi, cos_phi)) = (m.beta.sin_cos(), m.phi.sin_cos());
+        let per_speed = 1.0 / (m.velocity * cos_beta);
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
         Known {
-            velocity: m.velocity,
-            beta: m.beta,
-            slip_cos: m.beta.tan() * p,
-            slip_sin: m.beta.tan() * r,
-            per_speed: 1.0 / (m.velocity * m.beta.cos()),
-            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
-            thrust: m.thrust / m.mass,
-            gravity: m.gravity,
-            sin_phi: m.phi.sin(),
-            cos_phi: m.phi.cos(),
-            r,
-            p,
+            slip_cos: sin_beta / cos_beta * p,
+            slip_sin: sin_beta / cos_beta * r,
+            force: per_speed * m.qbar * aircraft.wing_area_ft2 / m.mass,
+            thrust: per_speed * m.thrust / m.mass,
+            weight: per_speed * m.gravity,
+            cos_phi,
+            turn: r * sin_phi,
             pitch: (coupling + gyroscopic) / m.iy,
             moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft / m.iy,
+        }
+    }
+
+    fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
+        let sensors = &aircraft.sensors;
+        Sensed {
+            velocity: m.velocity,
+            beta: m.beta,
+            r: m.rates[2],
+            p: m.rates[0],
             p_dot: m.accelerations[0],
             r_dot: m.accelerations[2],
+            an: sensors.an.arm(m.cg),
+            ax: sensors.ax.arm(m.cg),
+            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
+            thrust: if sensors.thrust_in_ax { m.thrust / m.mass } else { 0.0 },
             cg: m.cg,
-            sensors: aircraft.sensors.clone(),
+            vane: sensors.alpha_vane,
+            model: sensors.vane_model,
         }
     }
 
     fn measured_state(m: &Motion) -> SVector<f64, 3> {
         SVector::from([m.alpha, m.rates[1], m.theta])
+    }
+
+    fn state_of(regressor: &Regressor) -> Option<usize> {
+        match regressor {
+            Regressor::Alpha => Some(ALPHA),
+            Regressor::PitchRate => Some(Q),
+            _ => None,
+        }
     }
 
     fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
@@ -98,24 +140,28 @@ impl Equations<3> for Longitudinal {
 
     fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
         let k = Self::known(aircraft, m);
-        [-m.force_z / k.force, (m.accelerations[1] - k.pitch) / k.moment, (k.thrust - m.force_x) / k.force]
+        let (force, thrust) = (m.qbar * aircraft.wing_area_ft2 / m.mass, m.thrust / m.mass);
+        [-m.force_z / force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) / force]
     }
 
+    #[inline(always)]
     fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
-        let ((sa, ca), (st, ct)) = (x[ALPHA].sin_cos(), x[THETA].sin_cos());
-        let (normal, axial) = (k.force * c[CN], k.thrust - k.force * c[CA]);
-        let weight = k.gravity * (ct * k.cos_phi * ca + st * sa);
-        let alpha_dot = x[Q] - k.slip_cos * ca - k.slip_sin * sa + k.per_speed * (-normal * ca - axial * sa + weight);
-        let by_alpha = k.slip_cos * sa - k.slip_sin * ca
-            + k.per_speed * (normal * sa - axial * ca + k.gravity * (-ct * k.cos_phi * sa + st * ca));
-        let by_theta = k.per_speed * k.gravity * (-st * k.cos_phi * ca + ct * sa);
+        let [(sa, ca), (st, ct)] = sin_cos([x[ALPHA], x[THETA]]);
+        // 2.1 sorted by what cos α and sin α multiply, the latter's forces along the body's x axis.
+        let by_cos = ct.mul_add(k.weight * k.cos_phi, (-k.force).mul_add(c[CN], -k.slip_cos));
+        let by_sin = st.mul_add(k.weight, k.force.mul_add(c[CA], -k.thrust - k.slip_sin));
+        let alpha_dot = sa.mul_add(by_sin, ca.mul_add(by_cos, x[Q]));
+        let by_alpha = ca * by_sin - sa * by_cos;
+        let by_theta = k.weight * (ct * sa - st * k.cos_phi * ca);
+        let q_dot = k.moment.mul_add(c[CM], k.pitch);
+        let theta_dot = k.cos_phi.mul_add(x[Q], -k.turn);
         Rates {
-            rates: SVector::from([alpha_dot, k.pitch + k.moment * c[CM], x[Q] * k.cos_phi - k.r * k.sin_phi]),
+            rates: SVector::from([alpha_dot, q_dot, theta_dot]),
             by_state: SMatrix::from_row_slice(&[by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0]),
             by_coefficient: SMatrix::from_row_slice(&[
-                -k.per_speed * k.force * ca,
+                -k.force * ca,
                 0.0,
-                k.per_speed * k.force * sa,
+                k.force * sa,
                 0.0,
                 k.moment,
                 0.0,
@@ -126,22 +172,22 @@ impl Equations<3> for Longitudinal {
         }
     }
 
-    fn outputs(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
-        let rates = [k.p, x[Q], k.r];
-        let accelerations = [k.p_dot, k.pitch + k.moment * c[CM], k.r_dot];
-        let flow = Flow { alpha: x[ALPHA], beta: k.beta, velocity: k.velocity, rates };
-        let vane = k.sensors.alpha_reading(&flow, k.cg);
-        let down = lever(2, k.sensors.an.arm(k.cg), rates, accelerations);
-        let forward = lever(0, k.sensors.ax.arm(k.cg), rates, accelerations);
-        let thrust = if k.sensors.thrust_in_ax { k.thrust } else { 0.0 };
+    #[inline(always)]
+    fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
+        let rates = [sensed.p, x[Q], sensed.r];
+        let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
+        let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
+        let vane = sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg);
+        let down = lever(2, sensed.an, rates, accelerations);
+        let forward = lever(0, sensed.ax, rates, accelerations);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([
                 DEG * vane.angle,
                 DEG * x[Q],
                 DEG * x[THETA],
-                g * (k.force * c[CN] - down.value),
-                g * (thrust - k.force * c[CA] + forward.value),
+                g * (sensed.force * c[CN] - down.value),
+                g * (sensed.thrust - sensed.force * c[CA] + forward.value),
             ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),
@@ -152,9 +198,9 @@ impl Equations<3> for Longitudinal {
         out.by_state[(2, THETA)] = DEG;
         out.by_state[(3, Q)] = -g * down.by_rates[1];
         out.by_state[(4, Q)] = g * forward.by_rates[1];
-        out.by_coefficient[(3, CN)] = g * k.force;
+        out.by_coefficient[(3, CN)] = g * sensed.force;
         out.by_coefficient[(3, CM)] = -g * down.by_accelerations[1] * k.moment;
-        out.by_coefficient[(4, CA)] = -g * k.force;
+        out.by_coefficient[(4, CA)] = -g * sensed.force;
         out.by_coefficient[(4, CM)] = g * forward.by_accelerations[1] * k.moment;
         out
     }

@@ -12,8 +12,10 @@ mod lever;
 mod longitudinal;
 pub mod motion;
 pub mod runge_kutta;
+mod trig;
 
 pub use lateral::Lateral;
+pub(crate) use lever::lever;
 pub use longitudinal::Longitudinal;
 pub use motion::Motion;
 
@@ -44,21 +46,38 @@ pub struct Outputs<const NX: usize> {
 
 /// The equations of one axis with `NX` states.
 pub trait Equations<const NX: usize> {
-    /// What is known at one instant, prepared for the inner loop.
+    /// What the rates need to know at one instant, prepared for the inner loop.
     type Known: Clone + std::fmt::Debug + Send + Sync;
+    /// What the outputs need to know besides.
+    type Sensed: Clone + std::fmt::Debug + Send + Sync;
 
     const AXIS: Axis;
     /// Names of the states with the unit in which they are reported, deg.
     const STATES: [&'static str; NX];
 
+    /// The states that regressors can be proportional to.
+    const FOLLOWED: &'static [usize];
+    /// Where the slopes of the rates along states can be other than zero, also through coefficients: (rate, state).
+    const RATES_BY_STATE: &'static [(usize, usize)];
+    /// Where those along coefficients can be: (rate, coefficient).
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)];
+    /// The same of the outputs: (output, state) and (output, coefficient).
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)];
+
     /// Prepares what is known at one instant.
     fn known(aircraft: &Aircraft, motion: &Motion) -> Self::Known;
+
+    /// Prepares what is known besides at one sample.
+    fn sensed(aircraft: &Aircraft, motion: &Motion) -> Self::Sensed;
 
     /// The state as measured, from which an integration may start.
     fn measured_state(motion: &Motion) -> SVector<f64, NX>;
 
-    /// The state that a regressor is proportional to and the factor of proportion, or none when it is not a state of this
-    /// axis.
+    /// The state that a regressor is proportional to, or none when it is not a state of this axis.
+    fn state_of(regressor: &Regressor) -> Option<usize>;
+
+    /// That state and the factor of proportion.
     fn state_regressor(aircraft: &Aircraft, motion: &Motion, regressor: &Regressor) -> Option<(usize, f64)>;
 
     /// The coefficients that the measured motion implies: its accelerations put into the equations.
@@ -66,7 +85,12 @@ pub trait Equations<const NX: usize> {
 
     fn rates(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Rates<NX>;
 
-    fn outputs(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Outputs<NX>;
+    fn outputs(
+        known: &Self::Known,
+        sensed: &Self::Sensed,
+        x: &SVector<f64, NX>,
+        c: &[f64; COEFFICIENTS],
+    ) -> Outputs<NX>;
 }
 
 #[cfg(test)]

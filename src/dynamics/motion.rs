@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::lever::lever;
-use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
 use crate::flight::{Record, signal};
 use crate::units::{DEG, G0_FT_S2};
 
@@ -120,54 +120,80 @@ impl Window {
         window
     }
 
-    /// The motion at every point.
-    #[must_use]
-    pub fn motion(&self, aircraft: &Aircraft) -> Vec<Motion> {
-        let named = |name: &str| self.signal(name);
-        let rates = [signal::P, signal::Q, signal::R].map(named);
-        let slopes = [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name)));
-        let [alpha_vane, beta_vane, velocity, theta, phi] =
-            [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY, signal::THETA, signal::PHI].map(named);
-        let [an, ax, ay] = [signal::AN, signal::AX, signal::AY].map(named);
-        let [altitude, qbar, mass, thrust] = [signal::ALTITUDE, signal::QBAR, signal::MASS, signal::THRUST].map(named);
-        let [ix, iy, iz, ixz] = [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(named);
-        let [x_cg, y_cg, z_cg] = [signal::X_CG, signal::Y_CG, signal::Z_CG].map(named);
-        let [left_rpm, right_rpm] = [signal::RPM_LEFT, signal::RPM_RIGHT].map(named);
-        let sensors = &aircraft.sensors;
-        let at = |i: usize| {
-            let rates = rates.map(|rate| rate[i] / DEG);
-            let accelerations = slopes.map(|slope| slope[i] / DEG);
-            let cg = Position { x_ft: x_cg[i], y_ft: y_cg[i], z_ft: z_cg[i] };
-            let (alpha, beta) = (alpha_vane[i] / DEG, beta_vane[i] / DEG);
-            let flow = sensors.flow_at_cg(&Flow { alpha, beta, velocity: velocity[i], rates }, cg);
-            let felt = |axis: usize, sensor: Position| lever(axis, sensor.arm(cg), rates, accelerations).value;
-            let rpm = left_rpm[i] + right_rpm[i];
-            // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
-            let unfelt = if sensors.thrust_in_ax { 0.0 } else { thrust[i] / mass[i] };
-            Motion {
-                alpha: flow.alpha,
-                beta: flow.beta,
-                velocity: flow.velocity,
-                rates,
-                accelerations,
-                theta: theta[i] / DEG,
-                phi: phi[i] / DEG,
-                force_x: G0_FT_S2 * ax[i] - felt(0, sensors.ax) + unfelt,
-                force_y: G0_FT_S2 * ay[i] - felt(1, sensors.ay),
-                force_z: -G0_FT_S2 * an[i] - felt(2, sensors.an),
-                gravity: gravity_ft_s2(aircraft.latitude_deg, altitude[i]),
-                qbar: qbar[i],
-                mass: mass[i],
-                thrust: thrust[i],
-                ix: ix[i],
-                iy: iy[i],
-                iz: iz[i],
-                ixz: ixz[i],
-                engine_momentum: aircraft.engine_inertia_slug_ft2 * rpm * (2.0 * std::f64::consts::PI / 60.0),
-                cg,
-            }
+    /// The motion at every point in order.
+    pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> impl Iterator<Item = Motion> + 'a {
+        let signals = Signals {
+            flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY].map(|name| self.signal(name)),
+            rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
+            slopes: [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name))),
+            attitude: [signal::THETA, signal::PHI].map(|name| self.signal(name)),
+            forces: [signal::AX, signal::AY, signal::AN].map(|name| self.signal(name)),
+            air: [signal::ALTITUDE, signal::QBAR].map(|name| self.signal(name)),
+            engines: [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT].map(|name| self.signal(name)),
+            mass: self.signal(signal::MASS),
+            cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
+            inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(|name| self.signal(name)),
         };
-        (0..self.len()).map(at).collect()
+        let gravity = gravity_at(aircraft.latitude_deg);
+        (0..self.len()).map(move |i| signals.at(aircraft, &gravity, i))
+    }
+}
+
+/// The signals of a window by what they are for.
+struct Signals<'a> {
+    flow: [&'a [f64]; 3],
+    rates: [&'a [f64]; 3],
+    slopes: [&'a [f64]; 3],
+    attitude: [&'a [f64]; 2],
+    forces: [&'a [f64]; 3],
+    air: [&'a [f64]; 2],
+    engines: [&'a [f64]; 3],
+    mass: &'a [f64],
+    cg: [&'a [f64]; 3],
+    inertia: [&'a [f64]; 4],
+}
+
+impl Signals<'_> {
+    fn at(&self, aircraft: &Aircraft, gravity: impl Fn(f64) -> f64, i: usize) -> Motion {
+        let rates = self.rates.map(|s| s[i] / DEG);
+        let accelerations = self.slopes.map(|s| s[i] / DEG);
+        let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
+        let cg = Position { x_ft, y_ft, z_ft };
+        let [alpha, beta, velocity] = self.flow.map(|s| s[i]);
+        let read = Flow { alpha: alpha / DEG, beta: beta / DEG, velocity, rates };
+        let flow = aircraft.sensors.flow_at_cg(&read, cg);
+        let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
+        let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
+        let [altitude, qbar] = self.air.map(|s| s[i]);
+        let [ix, iy, iz, ixz] = self.inertia.map(|s| s[i]);
+        let [ax, ay, an] = self.forces.map(|s| s[i]);
+        let mass = self.mass[i];
+        // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
+        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { thrust / mass };
+        Motion {
+            alpha: flow.alpha,
+            beta: flow.beta,
+            velocity: flow.velocity,
+            rates,
+            accelerations,
+            theta: self.attitude[0][i] / DEG,
+            phi: self.attitude[1][i] / DEG,
+            force_x: G0_FT_S2 * ax - felt(0, aircraft.sensors.ax) + unfelt,
+            force_y: G0_FT_S2 * ay - felt(1, aircraft.sensors.ay),
+            force_z: -G0_FT_S2 * an - felt(2, aircraft.sensors.an),
+            gravity: gravity(altitude),
+            qbar,
+            mass,
+            thrust,
+            ix,
+            iy,
+            iz,
+            ixz,
+            engine_momentum: aircraft.engine_inertia_slug_ft2
+                * (rpm_left + rpm_right)
+                * (2.0 * std::f64::consts::PI / 60.0),
+            cg,
+        }
     }
 }
 

@@ -1,71 +1,24 @@
-//! The classical fourth-order Runge-Kutta step for a state and its sensitivities together.
+//! The classical fourth-order Runge-Kutta step, for a state and for its sensitivities alike.
 //!
 //! The sensitivities are those of the discrete integration, not of the continuous equation: each stage's slope is
-//! differentiated as it is computed, so a Gauss-Newton step sees the exact gradient of what was integrated.
+//! differentiated where the state's own was taken, so a Gauss-Newton step sees the exact gradient of what was integrated.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
-use nalgebra::SVector;
-
-/// Sensitivities of `NX` states to the parameters: one row per state, one column per parameter.
-pub type Rows<const NX: usize> = [Vec<f64>; NX];
-
-/// Where in the step a slope is wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    Start,
-    Middle,
-    End,
-}
-
-/// A state with its sensitivities, and the working space of a step. Nothing is allocated after `new`.
-#[derive(Clone, Debug)]
-pub struct Integrator<const NX: usize> {
-    pub state: SVector<f64, NX>,
-    pub sensitivity: Rows<NX>,
-    stage: Rows<NX>,
-    slope: Rows<NX>,
-    sum: Rows<NX>,
-}
-
-impl<const NX: usize> Integrator<NX> {
-    /// An integrator at a state whose sensitivities to `parameters` parameters are all zero.
-    #[must_use]
-    pub fn new(state: SVector<f64, NX>, parameters: usize) -> Self {
-        let rows = || std::array::from_fn(|_| vec![0.0; parameters]);
-        Integrator { state, sensitivity: rows(), stage: rows(), slope: rows(), sum: rows() }
-    }
-
-    /// One step of `step_s`. `slope(stage, x, s, ds)` returns the rates at state `x` and writes the rates of its
-    /// sensitivities `s` to `ds`.
-    pub fn step(
-        &mut self,
-        step_s: f64,
-        mut slope: impl FnMut(Stage, &SVector<f64, NX>, &Rows<NX>, &mut Rows<NX>) -> SVector<f64, NX>,
-    ) {
-        let k1 = slope(Stage::Start, &self.state, &self.sensitivity, &mut self.slope);
-        self.advance(0.5 * step_s, step_s / 6.0, true);
-        let k2 = slope(Stage::Middle, &(self.state + k1 * (0.5 * step_s)), &self.stage, &mut self.slope);
-        self.advance(0.5 * step_s, step_s / 3.0, false);
-        let k3 = slope(Stage::Middle, &(self.state + k2 * (0.5 * step_s)), &self.stage, &mut self.slope);
-        self.advance(step_s, step_s / 3.0, false);
-        let k4 = slope(Stage::End, &(self.state + k3 * step_s), &self.stage, &mut self.slope);
-        for ((s, sum), d) in self.sensitivity.iter_mut().zip(&self.sum).zip(&self.slope) {
-            for ((s, sum), d) in s.iter_mut().zip(sum).zip(d) {
-                *s += sum + step_s / 6.0 * d;
-            }
-        }
-        self.state += (k1 + (k2 + k3) * 2.0 + k4) * (step_s / 6.0);
-    }
-
-    /// Adds `share` of the last slope to the sum, and puts the sensitivities `ahead` of the start along it.
-    fn advance(&mut self, ahead: f64, share: f64, first: bool) {
-        let rows = self.sensitivity.iter().zip(&self.slope).zip(self.stage.iter_mut().zip(self.sum.iter_mut()));
-        for ((s, d), (stage, sum)) in rows {
-            for ((s, d), (stage, sum)) in s.iter().zip(d).zip(stage.iter_mut().zip(sum.iter_mut())) {
-                *stage = s + ahead * d;
-                *sum = if first { share * d } else { *sum + share * d };
-            }
-        }
-    }
+/// Slopes that a step takes.
+pub const STAGES: usize = 4;
+/// Which of start (0), middle (1) and end (2) of the step each slope is taken at.
+pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
+/// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and `along(x, h, slope)` is
+/// x + h slope.
+#[inline(always)]
+pub fn step<X: Copy>(x: X, step_s: f64, mut slope: impl FnMut(usize, X) -> X, along: impl Fn(X, f64, X) -> X) -> X {
+    let half = 0.5 * step_s;
+    let k1 = slope(0, x);
+    let k2 = slope(1, along(x, half, k1));
+    let k3 = slope(2, along(x, half, k2));
+    let k4 = slope(3, along(x, step_s, k3));
+    let (sixth, third) = (step_s / 6.0, step_s / 3.0);
+    along(along(along(along(x, sixth, k1), third, k2), third, k3), sixth, k4)
 }
 
 #[cfg(test)]
@@ -73,16 +26,28 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
+    fn along(x: f64, h: f64, slope: f64) -> f64 {
+        x + h * slope
+    }
+
     /// x' = a x² with x(0) = 1: x(t) = 1/(1 − a t); one parameter, a.
     fn integrate(a: f64, steps: u32) -> (f64, f64) {
-        let mut it = Integrator::new(SVector::from([1.0]), 1);
+        let (mut x, mut s, h) = (1.0, 0.0, 1.0 / f64::from(steps));
         for _ in 0..steps {
-            it.step(1.0 / f64::from(steps), |_, x, s, ds| {
-                ds[0][0] = 2.0 * a * x[0] * s[0][0] + x[0] * x[0];
-                SVector::from([a * x[0] * x[0]])
-            });
+            let mut at = [0.0; STAGES];
+            let next = step(
+                x,
+                h,
+                |stage, x| {
+                    at[stage] = x;
+                    a * x * x
+                },
+                along,
+            );
+            s = step(s, h, |stage, s| 2.0 * a * at[stage] * s + at[stage] * at[stage], along);
+            x = next;
         }
-        (it.state[0], it.sensitivity[0][0])
+        (x, s)
     }
 
     #[test]

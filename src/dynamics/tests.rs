@@ -3,7 +3,7 @@
 use approx::assert_abs_diff_eq;
 use nalgebra::SVector;
 
-use super::{COEFFICIENTS, Equations, Lateral, Longitudinal, Motion};
+use super::{COEFFICIENTS, Equations, Lateral, Longitudinal, Motion, OUTPUTS};
 use crate::aero::Regressor;
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
@@ -63,16 +63,17 @@ fn lively() -> Motion {
 const C: [f64; COEFFICIENTS] = [1.4, -0.05, 0.1];
 
 fn slopes_match<const NX: usize, E: Equations<NX>>() {
-    let known = E::known(&aircraft(), &lively());
+    let (known, sensed) = (E::known(&aircraft(), &lively()), E::sensed(&aircraft(), &lively()));
     let x = E::measured_state(&lively());
-    let (rates, outputs) = (E::rates(&known, &x, &C), E::outputs(&known, &x, &C));
+    let (rates, outputs) = (E::rates(&known, &x, &C), E::outputs(&known, &sensed, &x, &C));
     let h = 1e-6;
     for j in 0..NX {
         let (mut up, mut down) = (x, x);
         up[j] += h;
         down[j] -= h;
         let rate = (E::rates(&known, &up, &C).rates - E::rates(&known, &down, &C).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &up, &C).outputs - E::outputs(&known, &down, &C).outputs) / (2.0 * h);
+        let output =
+            (E::outputs(&known, &sensed, &up, &C).outputs - E::outputs(&known, &sensed, &down, &C).outputs) / (2.0 * h);
         assert_abs_diff_eq!(rates.by_state.column(j).into_owned(), rate, epsilon = 1e-7);
         assert_abs_diff_eq!(outputs.by_state.column(j).into_owned(), output, epsilon = 1e-6);
     }
@@ -81,7 +82,8 @@ fn slopes_match<const NX: usize, E: Equations<NX>>() {
         up[j] += h;
         down[j] -= h;
         let rate = (E::rates(&known, &x, &up).rates - E::rates(&known, &x, &down).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &x, &up).outputs - E::outputs(&known, &x, &down).outputs) / (2.0 * h);
+        let output =
+            (E::outputs(&known, &sensed, &x, &up).outputs - E::outputs(&known, &sensed, &x, &down).outputs) / (2.0 * h);
         assert_abs_diff_eq!(rates.by_coefficient.column(j).into_owned(), rate, epsilon = 1e-7);
         assert_abs_diff_eq!(outputs.by_coefficient.column(j).into_owned(), output, epsilon = 1e-6);
     }
@@ -97,16 +99,49 @@ fn lateral_slopes_are_those_of_finite_differences() {
     slopes_match::<4, Lateral>();
 }
 
+/// Slopes that are not zero stand where the axis says they can, those through coefficients that follow every regressor
+/// among them.
+fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
+    let (known, sensed) = (E::known(&aircraft(), &lively()), E::sensed(&aircraft(), &lively()));
+    let x = E::measured_state(&lively());
+    let (rates, outputs) = (E::rates(&known, &x, &C), E::outputs(&known, &sensed, &x, &C));
+    let regressors = [Regressor::Alpha, Regressor::Beta, Regressor::RollRate, Regressor::PitchRate, Regressor::YawRate];
+    let along = regressors.iter().filter_map(|r| E::state_regressor(&aircraft(), &lively(), r));
+    let mut c_by_state = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::zeros();
+    for (state, factor) in along {
+        assert!(E::FOLLOWED.contains(&state));
+        c_by_state.column_mut(state).fill(factor);
+    }
+    let nonzero = |rows: usize, columns: usize, at: &dyn Fn(usize, usize) -> f64| {
+        let all = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+        all.filter(|&(i, j)| at(i, j) != 0.0).collect::<std::collections::BTreeSet<_>>()
+    };
+    let said = |list: &[(usize, usize)]| list.iter().copied().collect::<std::collections::BTreeSet<_>>();
+    let (a, c) =
+        (rates.by_state + rates.by_coefficient * c_by_state, outputs.by_state + outputs.by_coefficient * c_by_state);
+    assert!(nonzero(NX, NX, &|i, j| a[(i, j)]).is_subset(&said(E::RATES_BY_STATE)));
+    assert!(nonzero(NX, COEFFICIENTS, &|i, j| rates.by_coefficient[(i, j)]).is_subset(&said(E::RATES_BY_COEFFICIENT)));
+    assert!(nonzero(OUTPUTS, NX, &|i, j| c[(i, j)]).is_subset(&said(E::OUTPUTS_BY_STATE)));
+    let by_coefficient = nonzero(OUTPUTS, COEFFICIENTS, &|i, j| outputs.by_coefficient[(i, j)]);
+    assert!(by_coefficient.is_subset(&said(E::OUTPUTS_BY_COEFFICIENT)));
+}
+
+#[test]
+fn slopes_that_are_not_zero_stand_where_each_axis_says() {
+    slopes_stand_where_said::<3, Longitudinal>();
+    slopes_stand_where_said::<4, Lateral>();
+}
+
 fn longitudinal(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 3>, SVector<f64, 5>) {
-    let known = Longitudinal::known(&aircraft(), motion);
+    let (known, sensed) = (Longitudinal::known(&aircraft(), motion), Longitudinal::sensed(&aircraft(), motion));
     let x = Longitudinal::measured_state(motion);
-    (Longitudinal::rates(&known, &x, &c).rates, Longitudinal::outputs(&known, &x, &c).outputs)
+    (Longitudinal::rates(&known, &x, &c).rates, Longitudinal::outputs(&known, &sensed, &x, &c).outputs)
 }
 
 fn lateral(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 4>, SVector<f64, 5>) {
-    let known = Lateral::known(&aircraft(), motion);
+    let (known, sensed) = (Lateral::known(&aircraft(), motion), Lateral::sensed(&aircraft(), motion));
     let x = Lateral::measured_state(motion);
-    (Lateral::rates(&known, &x, &c).rates, Lateral::outputs(&known, &x, &c).outputs)
+    (Lateral::rates(&known, &x, &c).rates, Lateral::outputs(&known, &sensed, &x, &c).outputs)
 }
 
 /// The change of one number when a coefficient or a part of the motion changes.

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::{Ready, Run};
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::calibration::{Fitted, Misreading};
-use crate::output_error::{Diverged, Fit, Response, cramer_rao};
+use crate::output_error::{Diverged, Fit, cramer_rao};
 
 /// What a fit is told when it cannot be said what errors of calibration do to it.
 pub(super) const NOT_COUNTED: &str =
@@ -17,7 +17,7 @@ impl<'a> Run<'a> {
         if fit.covariance_corrected.is_none() || self.basis.settings.calibration.is_empty() {
             return;
         }
-        match self.gradient_shifts(ready, &fit.values, &fit.response, &fit.weights) {
+        match self.gradient_shifts(ready, &fit.values, &fit.weights) {
             Ok(shifts) => cramer_rao::miscalibrated(&ready.case, &shifts, fit),
             Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
         }
@@ -29,7 +29,6 @@ impl<'a> Run<'a> {
         &self,
         ready: &Ready<'a, NX, E>,
         values: &[f64],
-        response: &Response,
         weights: &[f64; OUTPUTS],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
         let calibration = self.basis.settings.calibration.iter();
@@ -38,6 +37,6 @@ impl<'a> Run<'a> {
         let errors: Vec<Misreading> = used.flat_map(|(signal, c)| c.misreadings(signal)).collect();
         let aircraft = self.basis.aircraft;
         let Ready { window, model, case, .. } = ready;
-        Fitted { aircraft, window, model, case, values, response, weights }.gradient_shifts(&errors)
+        Fitted { aircraft, window, model, case, values, weights }.gradient_shifts(&errors)
     }
 }

@@ -16,7 +16,7 @@ use super::{Basis, Estimated, Ready, Run, calibration, covariance, values_of};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
-use crate::maneuver::{Class, Maneuver, Status};
+use crate::maneuver::{Class, Maneuver, Quality, Recognised, Status};
 use crate::output_error::cramer_rao::{self, Considered};
 use crate::output_error::{Case, Fit, Joint, Likelihood, Outcome, Response, mean, newton_raphson};
 use crate::tables::{EstimateRow, JointRow};
@@ -266,10 +266,10 @@ fn miscalibrate<const NX: usize, E: Equations<NX>>(
         return;
     }
     let mut together: Vec<DVector<f64>> = vec![];
-    for (i, (part, response)) in parts.iter().zip(&fit.response).enumerate() {
+    for (i, part) in parts.iter().enumerate() {
         let places = joint.places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
-        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, response, &fit.weights) else {
+        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, &fit.weights) else {
             fit.reason.push_str(calibration::NOT_COUNTED);
             return;
         };
@@ -306,6 +306,8 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
         x_cg_ft: mean(|m| m.x_cg_ft),
         samples: maneuvers.iter().map(|m| m.samples).sum(),
         origin: "joint".to_owned(),
+        recognised: Recognised::default(),
+        quality: Quality::default(),
     }
 }
 

@@ -43,7 +43,7 @@ impl Run<'_> {
         if fit.final_cost.is_none() {
             return;
         }
-        let information = cost::sums(&case.measurements, &fit.response, &fit.weights, case.parameters()).information;
+        let information = cost::sums(&fit.response, &fit.weights).information;
         let settings = self.basis.settings;
         let limits = &settings.identifiability;
         let Some(measured) = collinearity(&information, settings.iteration.max_condition_number, limits) else {

@@ -106,7 +106,7 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
     if case.parameters() == 0 {
         let mut response = case.response();
         let diverged = case.respond(&[], &mut response).is_err();
-        let cost = cost::sums(&case.measurements, &response, &weights, 0).cost();
+        let cost = cost::sums(&response, &weights).cost();
         return if diverged {
             Err("the integration diverges".into())
         } else {

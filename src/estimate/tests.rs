@@ -96,6 +96,8 @@ fn maneuver(id: &str, alpha_deg: f64) -> Maneuver {
         x_cg_ft: 38.2,
         samples: SAMPLES,
         origin: "found".into(),
+        recognised: crate::maneuver::Recognised::default(),
+        quality: crate::maneuver::Quality::default(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! A record: the signals of one flight on one uniform clock, each sample marked where it is not what the recorder wrote.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,10 @@ pub enum Mark {
     Despiked = 2,
     /// Nothing to bridge it with: the value is NaN.
     Missing = 3,
+    /// The channel stood still where it should have moved: the value is NaN.
+    Stuck = 4,
+    /// Between two samples of a channel that is recorded more slowly than the record: on the line through them.
+    Between = 5,
 }
 
 impl Mark {
@@ -26,8 +31,17 @@ impl Mark {
             0 => Mark::Measured,
             1 => Mark::Bridged,
             2 => Mark::Despiked,
+            4 => Mark::Stuck,
+            5 => Mark::Between,
             _ => Mark::Missing,
         }
+    }
+
+    /// Whether something went wrong with the sample. A slow channel's in-between samples are no measurements, but
+    /// nothing is wrong with them.
+    #[must_use]
+    pub fn is_fault(self) -> bool {
+        !matches!(self, Mark::Measured | Mark::Between)
     }
 }
 
@@ -71,6 +85,38 @@ impl Record {
         self.signals.get(signal).map(|s| s.values.as_slice())
     }
 
+    /// The share of samples, among all of these signals from one time to another, with which something went wrong; a
+    /// signal that the record does not have counts as missing throughout.
+    #[must_use]
+    pub fn marked_share<'a>(&self, signals: impl IntoIterator<Item = &'a str>, start_s: f64, end_s: f64) -> f64 {
+        let (from, to) = (self.sample_at(start_s), (self.sample_at(end_s) + 1).min(self.samples));
+        let (mut faults, mut all) = (0_usize, 0_usize);
+        for signal in signals {
+            let length = to.saturating_sub(from);
+            all += length;
+            let marks = self.signals.get(signal).and_then(|s| s.marks.get(from..to));
+            faults += marks.map_or(length, |marks| marks.iter().filter(|m| m.is_fault()).count());
+        }
+        faults as f64 / all.max(1) as f64
+    }
+
+    /// A range of samples of some signals, or of all; signals that the record does not have are left out.
+    #[must_use]
+    pub fn cut(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Record {
+        let cut = |s: &Series| Series {
+            values: s.values.get(samples.clone()).unwrap_or_default().to_vec(),
+            marks: s.marks.get(samples.clone()).unwrap_or_default().to_vec(),
+        };
+        let wanted = self.signals.iter().filter(|(name, _)| signals.is_none_or(|s| s.contains(*name)));
+        Record {
+            flight_id: self.flight_id.clone(),
+            start_s: self.time_s(samples.start),
+            step_s: self.step_s,
+            samples: samples.len(),
+            signals: wanted.map(|(name, series)| (name.clone(), cut(series))).collect(),
+        }
+    }
+
     /// The part of the record from one time to another, with a few samples more on each side: slopes of signals at the
     /// ends of the part are those of the whole. Sample times are unchanged.
     #[must_use]
@@ -78,16 +124,6 @@ impl Record {
         const MARGIN: usize = 10;
         let from = self.sample_at(start_s).saturating_sub(MARGIN);
         let to = (self.sample_at(end_s) + MARGIN + 1).min(self.samples);
-        let cut = |s: &Series| Series {
-            values: s.values.get(from..to).unwrap_or_default().to_vec(),
-            marks: s.marks.get(from..to).unwrap_or_default().to_vec(),
-        };
-        Record {
-            flight_id: self.flight_id.clone(),
-            start_s: self.time_s(from),
-            step_s: self.step_s,
-            samples: to.saturating_sub(from),
-            signals: self.signals.iter().map(|(name, series)| (name.clone(), cut(series))).collect(),
-        }
+        self.cut(None, from..to)
     }
 }

@@ -67,11 +67,12 @@ pub struct Fit {
 
 /// All relations whose signals the record has.
 pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
-    let motion: Vec<Option<Motion>> = (0..blocks.count).map(|k| Motion::of(blocks, k, aircraft, settings)).collect();
     let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
+    let relations: Vec<Relation> = relations::all(settings).into_iter().filter(possible).collect();
+    let windows = windows(&relations, blocks, aircraft, settings);
     // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
-    let check = |relation: Relation| {
-        let pairs = chosen(&relation, windows(&relation, &motion, blocks.block_s, settings));
+    let check = |(relation, pairs): (Relation, Vec<(f64, f64)>)| {
+        let pairs = chosen(&relation, pairs);
         if pairs.len() < settings.least_windows.max(2) {
             return Check { relation, verdict: Verdict::NotExcited, fit: None };
         }
@@ -83,7 +84,7 @@ pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check
         let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
         Check { relation, verdict, fit }
     };
-    relations::all(settings).into_iter().filter(possible).map(check).collect()
+    relations.into_iter().zip(windows).map(check).collect()
 }
 
 /// The signals that some relation confirms.
@@ -92,15 +93,24 @@ pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
     good.flat_map(|c| c.relation.dominant()).copied().collect()
 }
 
-/// (predicted, measured) in every window in which both are known.
-fn windows(relation: &Relation, motion: &[Option<Motion>], block_s: f64, settings: &Checks) -> Vec<(f64, f64)> {
-    let length = super::gaps::longest(settings.window_s, block_s).max(1);
-    let pair = |start: usize| {
-        let window = motion.get(start..=start + length)?;
-        let value = |side: &Side| over(side, window, block_s).map(|v| v * relation.unit);
-        Some((value(&relation.predicted)?, value(&relation.measured)?))
-    };
-    (0..motion.len()).step_by(length).filter_map(pair).collect()
+/// (predicted, measured) of each relation in every window in which both are known. The motion is computed window by
+/// window: that of a whole flight would be the largest thing in memory.
+fn windows(relations: &[Relation], blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Vec<(f64, f64)>> {
+    let length = super::gaps::longest(settings.window_s, blocks.block_s).max(1);
+    let mut pairs = vec![Vec::new(); relations.len()];
+    let mut motion: Vec<Option<Motion>> = Vec::new();
+    for start in (0..blocks.count.saturating_sub(length)).step_by(length) {
+        // The last block of a window is the first of the next.
+        let last = motion.pop().unwrap_or_else(|| Motion::of(blocks, start, aircraft, settings));
+        motion.clear();
+        motion.push(last);
+        motion.extend((start + 1..=start + length).map(|k| Motion::of(blocks, k, aircraft, settings)));
+        for (relation, pairs) in relations.iter().zip(&mut pairs) {
+            let value = |side: &Side| over(side, &motion, blocks.block_s).map(|v| v * relation.unit);
+            pairs.extend(value(&relation.predicted).zip(value(&relation.measured)));
+        }
+    }
+    pairs
 }
 
 /// A side over a window of blocks, per second: the change of its state plus the trapezoidal integral of its rate. The mean

@@ -21,6 +21,8 @@ pub struct Guilty {
     pub signal: String,
     /// What is probably wrong with it, where a correction makes the relations hold.
     pub cause: Option<String>,
+    /// What the signal is to be multiplied by to set it right.
+    pub factor: Option<f64>,
     /// Whether others explain the failed relations as well.
     pub alone: bool,
 }
@@ -120,6 +122,7 @@ impl Trial<'_> {
             channel: self.name.to_owned(),
             signal: self.channel.signal.clone(),
             cause: Some(self.cause.clone()),
+            factor: Some(self.factor),
             alone,
         }
     }
@@ -208,6 +211,7 @@ fn accused(
             channel: name.clone(),
             signal: channel.signal.clone(),
             cause: blocks.still(&channel.signal).then(|| "it never changes".to_owned()),
+            factor: None,
             alone: true,
         })
         .collect();

@@ -3,10 +3,11 @@
 //! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the angles at the c.g.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::Checks;
 use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
-use crate::flight::{Record, signal};
+use crate::flight::{Correction, signal};
 use crate::units::{DEG, G0_FT_S2};
 
 /// The signals that the relations use.
@@ -31,20 +32,71 @@ const USED: &[&str] = &[
     signal::Z_CG,
 ];
 
-/// The signals averaged over short blocks; a block with fewer than half of its samples is NaN.
+/// Averages a signal over short blocks as its samples come by; a block with fewer than half of its samples is NaN.
+#[derive(Clone, Debug)]
+pub struct Averaging {
+    length: usize,
+    sum: f64,
+    known: usize,
+    seen: usize,
+    means: Vec<f64>,
+}
+
+impl Averaging {
+    /// For a signal that a relation uses; none for the others.
+    #[must_use]
+    pub fn of(signal: &str, step_s: f64, settings: &Checks) -> Option<Averaging> {
+        let length = block_length(step_s, settings);
+        USED.contains(&signal).then(|| Averaging { length, sum: 0.0, known: 0, seen: 0, means: Vec::new() })
+    }
+
+    /// The next samples.
+    pub fn push(&mut self, values: &[f64]) {
+        for value in values {
+            if value.is_finite() {
+                self.sum += value;
+                self.known += 1;
+            }
+            self.seen += 1;
+            if self.seen == self.length {
+                let mean = if 2 * self.known >= self.length { self.sum / self.known as f64 } else { f64::NAN };
+                self.means.push(mean);
+                (self.sum, self.known, self.seen) = (0.0, 0, 0);
+            }
+        }
+    }
+
+    /// The same for a signal that is one value throughout.
+    #[must_use]
+    pub fn constant(signal: &str, value: f64, samples: usize, step_s: f64, settings: &Checks) -> Option<Averaging> {
+        let mut averaging = Averaging::of(signal, step_s, settings)?;
+        averaging.means = vec![value; samples / averaging.length];
+        Some(averaging)
+    }
+}
+
+fn block_length(step_s: f64, settings: &Checks) -> usize {
+    super::gaps::longest(settings.block_s, step_s).max(1)
+}
+
+/// The signals averaged over short blocks.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     pub block_s: f64,
     pub count: usize,
-    values: BTreeMap<&'static str, Vec<f64>>,
+    /// With the factor that a trial multiplies a signal by.
+    values: BTreeMap<&'static str, (Arc<Vec<f64>>, f64)>,
 }
 
 impl Blocks {
-    pub fn of(record: &Record, settings: &Checks) -> Blocks {
-        let samples = super::gaps::longest(settings.block_s, record.step_s).max(1);
-        let means = |values: &[f64]| values.chunks_exact(samples).map(mean).collect::<Vec<f64>>();
-        let values = USED.iter().filter_map(|name| Some((*name, means(record.values(name)?)))).collect();
-        Blocks { block_s: samples as f64 * record.step_s, count: record.samples / samples, values }
+    /// Of signals averaged over all samples of a record.
+    #[must_use]
+    pub fn of(averaged: BTreeMap<String, Averaging>, samples: usize, step_s: f64, settings: &Checks) -> Blocks {
+        let length = block_length(step_s, settings);
+        let mut averaged = averaged;
+        let mut value = |name: &&'static str| Some((*name, (Arc::new(averaged.remove(*name)?.means), 1.0)));
+        let values = USED.iter().filter_map(&mut value).collect();
+        Blocks { block_s: length as f64 * step_s, count: samples / length, values }
     }
 
     pub fn has(&self, signal: &str) -> bool {
@@ -53,33 +105,35 @@ impl Blocks {
 
     /// Whether a signal never changes: a dead sensor's does not, noise makes every other's.
     pub fn still(&self, signal: &str) -> bool {
-        let mut known = self.values.get(signal).into_iter().flatten().filter(|v| v.is_finite());
+        let means = self.values.get(signal).map(|(means, _)| means.iter());
+        let mut known = means.into_iter().flatten().filter(|v| v.is_finite());
         known.next().is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
     }
 
     /// These blocks with one signal multiplied: what the record would say if that channel were wrong by the factor.
     pub fn with(&self, signal: &str, factor: f64) -> Blocks {
         let mut changed = self.clone();
-        if let Some(values) = changed.values.get_mut(signal) {
-            for value in values.iter_mut() {
-                *value *= factor;
+        if let Some((_, own)) = changed.values.get_mut(signal) {
+            *own *= factor;
+        }
+        changed
+    }
+
+    /// These blocks with signals corrected.
+    pub fn corrected(&self, corrections: &[Correction]) -> Blocks {
+        let mut changed = self.clone();
+        for correction in corrections {
+            if let Some((means, _)) = changed.values.get_mut(correction.signal.as_str()) {
+                *means = Arc::new(correction.of_values(means, self.block_s));
             }
         }
         changed
     }
 
     fn at(&self, signal: &str, block: usize) -> f64 {
-        self.values.get(signal).and_then(|v| v.get(block)).copied().unwrap_or(f64::NAN)
+        let value = self.values.get(signal).and_then(|(means, factor)| Some(means.get(block)? * factor));
+        value.unwrap_or(f64::NAN)
     }
-}
-
-fn mean(samples: &[f64]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for value in samples.iter().filter(|v| v.is_finite()) {
-        sum += value;
-        count += 1;
-    }
-    if 2 * count >= samples.len() { sum / count as f64 } else { f64::NAN }
 }
 
 /// The motion in one block.
@@ -183,7 +237,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
-fn atmosphere(altitude_ft: f64) -> (f64, f64) {
+pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
     const FT: f64 = 0.304_8;
     const KG_M3: f64 = 515.378_818;
     const GAS: f64 = 287.052_87;
@@ -216,7 +270,12 @@ mod tests {
 
     #[test]
     fn a_block_with_fewer_than_half_its_samples_has_no_mean() {
-        assert!(mean(&[1.0, f64::NAN, f64::NAN]).is_nan());
-        assert_relative_eq!(mean(&[1.0, f64::NAN, 3.0, f64::NAN]), 2.0);
+        let settings = Checks { block_s: 0.1, ..Checks::default() };
+        let mut averaging = Averaging::of(signal::Q, 0.025, &settings).unwrap();
+        averaging.push(&[1.0, f64::NAN, f64::NAN]);
+        averaging.push(&[f64::NAN, 1.0, f64::NAN, 3.0, f64::NAN, 7.0]);
+        assert!(averaging.means[0].is_nan());
+        assert_relative_eq!(averaging.means[1], 2.0);
+        assert_eq!(averaging.means.len(), 2);
     }
 }

@@ -1,5 +1,6 @@
 //! What the analyst may decide about ingest, with defaults reasoned from recorders and flight mechanics.
 
+use super::compatibility::Compatibility;
 use serde::{Deserialize, Serialize};
 
 /// The settings of ingest.
@@ -11,12 +12,25 @@ pub struct Settings {
     /// The longest gap of a channel that a straight line bridges, s. A quarter of a second is short against the
     /// short period and the Dutch roll of a fighter; anything longer would be invention.
     pub longest_bridge_s: f64,
-    /// The longest gap of the clock that is kept as missing samples, s; a longer one is two flights in one file.
+    /// The longest gap of the clock that is kept as missing samples, s; a longer one ends the stretch of the flight, and
+    /// what follows is the next. No maneuver lasts as long.
     pub longest_clock_gap_s: f64,
+    /// A stretch shorter than this holds no maneuver with its lead-in and decay, s; it is left out.
+    pub least_stretch_s: f64,
+    /// A stretch longer than this goes on as another one, h.
+    pub longest_stretch_h: f64,
+    /// What reading and conditioning may hold in memory at once, MB (10⁶ bytes), over all flights in work. It decides how
+    /// many flights are in work at once and in what pieces they are read; results do not depend on it, so it is not among
+    /// what decides them (fingerprints).
+    #[serde(skip_serializing)]
+    pub memory_mb: f64,
     pub spikes: Spikes,
+    pub stuck: Stuck,
     /// What happens to a flight when a required channel fails its checks.
     pub on_failed_check: OnFailedCheck,
     pub checks: Checks,
+    /// Biases, scale errors and delays of the instruments from the kinematic equations.
+    pub compatibility: Compatibility,
 }
 
 impl Default for Settings {
@@ -24,10 +38,15 @@ impl Default for Settings {
         Settings {
             sampling_rate_hz: None,
             longest_bridge_s: 0.25,
-            longest_clock_gap_s: 600.0,
+            longest_clock_gap_s: 60.0,
+            least_stretch_s: 10.0,
+            longest_stretch_h: 24.0,
+            memory_mb: 200.0,
             spikes: Spikes::default(),
+            stuck: Stuck::default(),
             on_failed_check: OnFailedCheck::Refuse,
             checks: Checks::default(),
+            compatibility: Compatibility::default(),
         }
     }
 }
@@ -41,6 +60,26 @@ pub enum OnFailedCheck {
     Refuse,
     /// The problem is reported and the flight goes on.
     Report,
+}
+
+/// When a channel that stands still is stuck.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stuck {
+    /// Whether stuck values are looked for at all.
+    pub find: bool,
+    /// A channel whose noise changes most of its samples is stuck when it does not change for this long, s: forty samples
+    /// of a usual recorder, while noise of half a quantisation step repeats a value a few times.
+    pub least_s: f64,
+    /// The most samples in which the noise may leave the value as it is, a share: above it the recorder is so coarse that
+    /// standing still is nothing unusual.
+    pub most_repeats: f64,
+}
+
+impl Default for Stuck {
+    fn default() -> Stuck {
+        Stuck { find: true, least_s: 1.0, most_repeats: 0.5 }
+    }
 }
 
 /// When a single sample is a spike.

@@ -25,31 +25,51 @@ const LINES: f64 = 0.75;
 /// How far the two lines may miss each other by noise alone, in its standard deviations (the difference has √10).
 const LINES_NOISE: f64 = 3.0;
 
-/// Replaces single-sample spikes by their neighbours' mean and returns where they were.
-pub fn remove(values: &mut [f64], step_s: f64, settings: &Spikes) -> Vec<usize> {
+/// Every so many samples are enough to tell the noise of thousands.
+const EVERY: usize = 4;
+
+/// What a spike is measured against, and the noise's standard deviation alone.
+pub fn floors(values: &[f64]) -> (f64, f64) {
+    let mut roughness: Vec<f64> =
+        (1..values.len()).step_by(EVERY).map(|k| off_mean(values, k).abs()).filter(|r| r.is_finite()).collect();
+    if roughness.is_empty() {
+        return (0.0, f64::NAN);
+    }
+    let noise = MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5);
+    (noise.max(rounding(values, roughness)), noise)
+}
+
+/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floor` says for a sample what a
+/// spike is measured against.
+pub fn remove(values: &mut [f64], step_s: f64, floor: impl Fn(usize) -> f64, settings: &Spikes) -> Vec<usize> {
     if !settings.remove {
         return Vec::new();
     }
-    let roughness: Vec<f64> = (0..values.len()).map(|k| off_mean(values, k).abs()).collect();
-    let floor = deviation(roughness.iter().copied()).max(rounding(values, &roughness));
     let window = super::gaps::longest(settings.window_s, step_s).max(4);
-    let is_spike = |&k: &usize| {
-        let Some(height) = height(values, k) else { return false };
-        if height.off_mean <= settings.deviations * floor {
-            return false;
+    let mut spikes = Vec::new();
+    for (k, three) in values.windows(3).enumerate().map(|(i, three)| (i + 1, three)) {
+        let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
+        let floor = floor(k);
+        // Also false beside a gap.
+        if off_mean > settings.deviations * floor && stands_off(values, k, floor, window, settings) {
+            spikes.push(k);
         }
-        let noise = floor.max(local(&roughness, k, window));
-        let meets = settings.agreement * height.off_mean + LINES_NOISE * noise;
-        height.off_mean > settings.deviations * noise
-            && height.off_lines > LINES * settings.deviations * noise
-            && height.lines_miss <= meets
-    };
-    let spikes: Vec<usize> = (0..values.len()).filter(is_spike).collect();
+    }
     let repaired: Vec<f64> = spikes.iter().map(|&k| values[k] - off_mean(values, k)).collect();
     for (&k, value) in spikes.iter().zip(repaired) {
         values[k] = value;
     }
     spikes
+}
+
+/// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike does.
+fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Spikes) -> bool {
+    let Some(height) = height(values, k) else { return false };
+    let noise = floor.max(local(values, k, window));
+    let meets = settings.agreement * height.off_mean + LINES_NOISE * noise;
+    height.off_mean > settings.deviations * noise
+        && height.off_lines > LINES * settings.deviations * noise
+        && height.lines_miss <= meets
 }
 
 /// A sample minus the mean of its neighbours; NaN at the ends and beside a gap.
@@ -81,27 +101,23 @@ fn height(values: &[f64], k: usize) -> Option<Height> {
 }
 
 /// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left out.
-fn local(roughness: &[f64], k: usize, window: usize) -> f64 {
-    let from = k.saturating_sub(window);
-    let around = roughness.iter().enumerate().skip(from).take(k + window + 1 - from);
-    deviation(around.filter(|(i, _)| i.abs_diff(k) > 1).map(|(_, r)| *r))
-}
-
-/// The noise's standard deviation from absolute deviations off the neighbours' mean, by their median.
-fn deviation(roughness: impl Iterator<Item = f64>) -> f64 {
-    MAD / MEAN_VARIANCE.sqrt() * quantile(roughness.filter(|r| r.is_finite()).collect(), 0.5)
+fn local(values: &[f64], k: usize, window: usize) -> f64 {
+    let around = k.saturating_sub(window)..(k + window + 1).min(values.len());
+    let mut roughness: Vec<f64> =
+        around.filter(|i| i.abs_diff(k) > 1).map(|i| off_mean(values, i).abs()).filter(|r| r.is_finite()).collect();
+    MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5)
 }
 
 /// What rounding alone puts a sample off its neighbours' mean: half the recorder's quantisation step, the least that is not
 /// nothing. A low quantile, as a repaired or converted sample may lie off the grid; a channel that hardly ever changes has
 /// too few of them to say.
-fn rounding(values: &[f64], roughness: &[f64]) -> f64 {
+fn rounding(values: &[f64], mut roughness: Vec<f64>) -> f64 {
     let largest = values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let steps: Vec<f64> = roughness.iter().copied().filter(|r| r.is_finite() && *r > EXACT * largest).collect();
-    if steps.len() < FEW_STEPS { 0.0 } else { quantile(steps, 0.05) }
+    roughness.retain(|r| *r > EXACT * largest);
+    if roughness.len() < FEW_STEPS { 0.0 } else { quantile(&mut roughness, 0.05) }
 }
 
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
@@ -114,8 +130,13 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn despike(values: &mut [f64]) -> Vec<usize> {
+        let floor = floors(values).0;
+        remove(values, 0.025, |_| floor, &Spikes::default())
+    }
+
     fn spikes(values: &[f64]) -> Vec<usize> {
-        remove(&mut values.to_vec(), 0.025, &Spikes::default())
+        despike(&mut values.to_vec())
     }
 
     /// Noise of a standard deviation near one, the same on every run.
@@ -138,7 +159,7 @@ mod tests {
         let mut values = noisy(400, 0.02, f64::sin);
         let clean = values.clone();
         values[200] += 0.6;
-        assert_eq!(remove(&mut values, 0.025, &Spikes::default()), [200]);
+        assert_eq!(despike(&mut values), [200]);
         assert!((values[200] - 0.5 * (clean[199] + clean[201])).abs() < 1e-12);
         assert_eq!(values[201..], clean[201..]);
     }

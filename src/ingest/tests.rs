@@ -2,6 +2,7 @@
 
 use approx::assert_relative_eq;
 
+use super::compatibility::Compatibility;
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::channel::RawColumn;
@@ -75,7 +76,10 @@ impl Flight {
         for (name, signal, unit, value) in steady() {
             add(name, signal, unit, vec![value; ROWS]);
         }
-        Flight { raw, channels, constants: BTreeMap::new(), settings: Settings::default() }
+        // What the instruments are off by has tests of its own, and takes longer than all of these.
+        let compatibility = Compatibility { reconstruct: false, ..Compatibility::default() };
+        let settings = Settings { compatibility, ..Settings::default() };
+        Flight { raw, channels, constants: BTreeMap::new(), settings }
     }
 
     fn values(&mut self, name: &str) -> &mut Vec<f64> {
@@ -84,6 +88,42 @@ impl Flight {
 
     fn channel(&mut self, name: &str) -> &mut Channel {
         self.channels.get_mut(name).unwrap()
+    }
+
+    /// Every channel noisy, each with noise of its own: rows that can be told from each other.
+    fn noisy() -> Flight {
+        let mut flight = Flight::steady();
+        let mut state = 1_u64;
+        for (name, column) in flight.raw.columns.iter_mut().filter(|(name, _)| *name != "time") {
+            let flag = name == "flag";
+            for value in column.values.iter_mut().filter(|_| !flag) {
+                let mut sum = 0.0;
+                for _ in 0..4 {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+                }
+                *value += 0.01 * ((sum - 2.0) * 20.0).round() / 10.0;
+            }
+        }
+        flight
+    }
+
+    /// Another file of the flight: some of its rows.
+    fn part(&self, rows: std::ops::Range<usize>) -> RawFlight {
+        let mut part = self.raw.clone();
+        part.columns.values_mut().for_each(|c| c.values = c.values[rows.clone()].to_vec());
+        part
+    }
+
+    fn of_files(&self, files: &[RawFlight], piece: usize) -> Vec<Ingested> {
+        let aircraft = aircraft();
+        let basis = Basis {
+            channels: &self.channels,
+            constants: &self.constants,
+            aircraft: &aircraft,
+            settings: &self.settings,
+        };
+        records(files, &basis, piece).unwrap().into_iter().map(Result::unwrap).collect()
     }
 
     fn ingest(&self) -> Result<Ingested, Problem> {
@@ -170,14 +210,28 @@ fn another_missing_or_empty_channel_is_a_problem_and_the_rest_goes_on() {
 }
 
 #[test]
-fn time_backwards_standing_still_or_absent_is_refused_and_named() {
+fn a_time_that_fits_nowhere_or_stands_still_costs_its_row_and_is_named() {
     let mut flight = Flight::steady();
     flight.values("time")[100] = 1.0;
+    flight.values("time")[300] = flight.values("time")[299];
+    flight.values("time")[500] = f64::NAN;
+    let ingested = flight.ingest().unwrap();
+    let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
+    assert_eq!(places, ["channel `time`", "channel `time`"]);
+    assert!(ingested.problems[0].reason.starts_with("2 rows have a time that is not a number or fits nowhere"));
+    assert!(ingested.problems[1].reason.starts_with("time stands still in 1 rows, the first is row 301 of part 1"));
+    let velocity = &ingested.record.signals[signal::VELOCITY];
+    let bridged: Vec<usize> = (0..ROWS).filter(|&k| velocity.marks[k] == Mark::Bridged).collect();
+    assert_eq!(bridged, [100, 300, 500]);
+}
+
+#[test]
+fn a_clock_that_cannot_be_followed_or_is_absent_is_refused_and_named() {
+    let mut flight = Flight::steady();
+    flight.values("time")[500..900].fill(f64::NAN);
     let problem = flight.refused();
     assert_eq!(problem.place, "channel `time`");
-    assert!(problem.reason.starts_with("time runs backwards in row 101: from 2.4750 s to 1.0000 s"));
-    flight.values("time")[100] = 2.475;
-    assert!(flight.refused().reason.starts_with("time stands still in row 101 at 2.4750 s"));
+    assert!(problem.reason.starts_with("of 2000 rows 400 have a time that is not a number"), "{}", problem.reason);
     flight.raw.columns.remove("time");
     assert!(flight.refused().reason.contains("is not in the file"));
     flight.channels.remove("time");
@@ -247,4 +301,177 @@ fn a_channel_of_nothing_but_zeros_is_among_those_that_never_change() {
     let problem = flight.refused();
     assert!(problem.place.contains("`an`"), "{}", problem.place);
     assert!(problem.reason.contains("`an`: it never changes"), "{}", problem.reason);
+}
+
+fn reasons(ingested: &Ingested) -> Vec<&str> {
+    ingested.problems.iter().map(|p| p.reason.as_str()).collect()
+}
+
+/// Signals alike to the bit, and all else.
+fn assert_same(a: &Ingested, b: &Ingested) {
+    for (name, series) in &a.record.signals {
+        let bits = |s: &Series| s.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(series.marks, b.record.signals[name].marks, "{name}");
+        assert_eq!(bits(series), bits(&b.record.signals[name]), "{name}");
+    }
+    assert_eq!((&a.channels, &a.checks, &a.problems), (&b.channels, &b.checks, &b.problems));
+}
+
+#[test]
+fn a_record_does_not_depend_on_the_pieces_it_was_read_in() {
+    let mut flight = Flight::noisy();
+    for column in flight.raw.columns.values_mut() {
+        let once = column.values.clone();
+        (0..24).for_each(|_| column.values.extend_from_slice(&once));
+    }
+    let rows = flight.values("time").len();
+    flight.values("time").iter_mut().enumerate().for_each(|(k, t)| *t = k as f64 * STEP_S);
+    flight.values("V")[16_380..16_390].fill(f64::NAN);
+    flight.values("V")[30_000] += 5.0;
+    flight.values("psi").iter_mut().enumerate().for_each(|(k, v)| *v = (*v + 0.01 * k as f64) % 360.0);
+    flight.channel("psi").wraps_at = Some(360.0);
+    flight.values("theta")[20_000..20_600].fill(20.01);
+    flight.raw.columns.values_mut().for_each(|c| drop(c.values.drain(40_000..40_003)));
+    let files = std::slice::from_ref(&flight.raw);
+    let whole = flight.of_files(files, usize::MAX);
+    assert_eq!(whole[0].record.samples, rows);
+    assert_eq!(whole[0].channels.iter().find(|c| c.channel == "theta").unwrap().stuck, 600);
+    for piece in [1000, 16_384, 20_000] {
+        assert_same(&whole[0], &flight.of_files(files, piece)[0]);
+    }
+}
+
+#[test]
+fn rows_that_are_there_twice_are_used_once_and_named() {
+    let flight = Flight::noisy();
+    let mut twice = flight.raw.clone();
+    for column in twice.columns.values_mut() {
+        let again = column.values[700..900].to_vec();
+        column.values.splice(900..900, again);
+    }
+    let plain = flight.ingest().unwrap();
+    let [once] = &flight.of_files(&[twice], usize::MAX)[..] else { panic!("one stretch") };
+    assert_eq!(once.record, plain.record);
+    assert!(reasons(once)[0].starts_with("rows from row 901 on"), "{:?}", once.problems);
+}
+
+#[test]
+fn overlapping_files_and_copies_are_used_once_and_named() {
+    let flight = Flight::noisy();
+    let plain = flight.ingest().unwrap();
+    let cases = [vec![flight.part(0..1200), flight.part(800..ROWS)], vec![flight.raw.clone(), flight.raw.clone()]];
+    for files in cases {
+        let [once] = &flight.of_files(&files, usize::MAX)[..] else { panic!("one stretch") };
+        assert_eq!(once.record, plain.record);
+        assert_eq!(once.problems.len(), 1, "{:?}", once.problems);
+        assert!(reasons(once)[0].contains("are there already"), "{:?}", once.problems);
+    }
+}
+
+#[test]
+fn files_in_the_wrong_order_are_one_flight() {
+    let flight = Flight::noisy();
+    let files = [flight.part(1000..ROWS), flight.part(0..1000)];
+    assert_eq!(flight.of_files(&files, usize::MAX)[0].record, flight.ingest().unwrap().record);
+}
+
+#[test]
+fn a_clock_that_starts_anew_or_a_long_gap_makes_a_stretch_with_an_id_of_its_own() {
+    for (back, word) in [(-20.0, "time jumps back from"), (500.0, "the clock lacks 500.0 s")] {
+        let mut flight = Flight::noisy();
+        flight.values("time")[1000..].iter_mut().for_each(|t| *t += back);
+        let stretches = flight.of_files(std::slice::from_ref(&flight.raw), usize::MAX);
+        let ids: Vec<&str> = stretches.iter().map(|s| s.record.flight_id.as_str()).collect();
+        assert_eq!(ids, ["007", "007.2"]);
+        assert_eq!((stretches[0].record.samples, stretches[1].record.samples), (1000, 1000));
+        assert!(reasons(&stretches[0])[0].contains(word), "{:?}", stretches[0].problems);
+        assert!(reasons(&stretches[0])[0].ends_with("what follows is a record of its own, `007.2`"));
+        assert_eq!(reasons(&stretches[1]), Vec::<&str>::new());
+    }
+}
+
+#[test]
+fn a_slow_channel_is_measured_where_it_is_recorded_and_on_a_line_between() {
+    let recorded = |k: usize| 20.0 + 0.3 * (0.02 * k as f64).sin() + 0.01 * ((k * k % 17) as f64);
+    for held in [false, true] {
+        let mut flight = Flight::noisy();
+        let slow = |(k, v): (usize, &mut f64)| {
+            *v = if k % 4 == 1 || held { recorded(k - (k + 3) % 4 % k.max(1)) } else { f64::NAN };
+        };
+        flight.values("theta").iter_mut().enumerate().for_each(slow);
+        let ingested = flight.ingest().unwrap();
+        let theta = &ingested.record.signals[signal::THETA];
+        let measured: Vec<usize> = (8..60).filter(|&k| theta.marks[k] == Mark::Measured).collect();
+        assert_eq!(measured, (9..60).step_by(4).collect::<Vec<_>>(), "held {held}");
+        assert!((10..60).all(|k| k % 4 == 1 || theta.marks[k] == Mark::Between));
+        assert_relative_eq!(theta.values[11], 0.5 * (recorded(9) + recorded(13)), max_relative = 1e-12);
+        let row = ingested.channels.iter().find(|c| c.channel == "theta").unwrap();
+        assert_relative_eq!(row.rate_hz.unwrap(), 10.0, max_relative = 1e-6);
+        assert_eq!((row.bridged, row.despiked, row.stuck), (0, 0, 0));
+    }
+}
+
+#[test]
+fn a_channel_in_a_file_of_its_own_is_brought_to_the_record_s_clock() {
+    let mut flight = Flight::noisy();
+    let mut own = RawFlight { flight_id: "007".to_owned(), columns: BTreeMap::new() };
+    // 10 Hz, 7 ms late, of a value that rises slowly.
+    let times: Vec<f64> = (0..500).map(|k| f64::from(k) * 0.1 + 0.007).collect();
+    own.columns
+        .insert("psi".to_owned(), RawColumn { unit: None, values: times.iter().map(|t| 100.0 + 0.2 * t).collect() });
+    own.columns.insert("time".to_owned(), RawColumn { unit: None, values: times });
+    flight.raw.columns.remove("psi");
+    for files in [[flight.raw.clone(), own.clone()], [own, flight.raw.clone()]] {
+        let [one] = &flight.of_files(&files, 700)[..] else { panic!("one stretch") };
+        let psi = &one.record.signals[signal::PSI];
+        let own: Vec<usize> = (100..120).filter(|&k| psi.marks[k] == Mark::Measured).collect();
+        assert_eq!(own, [100, 104, 108, 112, 116]);
+        for k in [100, 101, 102, 103] {
+            assert_relative_eq!(psi.values[k], 100.0 + 0.2 * k as f64 * STEP_S, max_relative = 1e-9);
+        }
+        assert_eq!(psi.marks[101], Mark::Between);
+        assert_eq!(one.problems, []);
+    }
+}
+
+#[test]
+fn a_stuck_channel_is_left_out_from_its_first_repetition_and_named() {
+    let mut flight = Flight::noisy();
+    flight.values("alpha")[600..800].fill(20.013);
+    let ingested = flight.ingest().unwrap();
+    let alpha = &ingested.record.signals[signal::ALPHA_VANE];
+    assert!((600..800).all(|k| alpha.marks[k] == Mark::Stuck && alpha.values[k].is_nan()));
+    assert_eq!(alpha.marks[599], Mark::Measured);
+    assert_eq!((reasons(&ingested).len(), ingested.problems[0].place.as_str()), (1, "channel `alpha`"));
+    assert!(reasons(&ingested)[0].starts_with("its value is stuck from 15.0 s to 20.0 s"), "{:?}", ingested.problems);
+}
+
+#[test]
+fn a_control_at_rest_and_a_coarse_channel_are_not_stuck() {
+    let mut flight = Flight::noisy();
+    // A stick without noise that moves now and then, and a surface in steps much larger than its noise.
+    let moved = |k: usize| if (400..460).contains(&k) { (k - 400) as f64 * 0.05 } else { 0.0 };
+    flight.values("de").iter_mut().enumerate().for_each(|(k, v)| *v = moved(k));
+    flight.values("mach").iter_mut().for_each(|v| *v = (*v * 20.0).round() / 20.0);
+    let ingested = flight.ingest().unwrap();
+    assert_eq!(ingested.problems, []);
+}
+
+#[test]
+fn noise_and_quantisation_are_estimated_and_wraps_counted() {
+    let mut flight = Flight::noisy();
+    flight
+        .values("phi_deg")
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, v)| *v = (*v + 0.7 * k as f64 + 180.0) % 360.0 - 180.0);
+    flight.settings.on_failed_check = OnFailedCheck::Report;
+    let ingested = flight.ingest().unwrap();
+    let row = |name: &str| ingested.channels.iter().find(|c| c.channel == name).unwrap();
+    assert_relative_eq!(row("V").quantisation.unwrap(), 0.001, max_relative = 1e-6);
+    let noise = row("V").noise.unwrap();
+    assert!((0.008..0.016).contains(&noise), "{noise}");
+    assert_eq!(row("phi_deg").wraps, 4);
+    assert!(ingested.record.values(signal::PHI).unwrap().windows(2).all(|p| (p[1] - p[0]).abs() < 1.0));
+    assert_eq!(row("time").samples, ROWS);
 }

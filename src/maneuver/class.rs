@@ -1,6 +1,6 @@
 //! A maneuver class: how it is recognised in a record, what is estimated from it, with which weights.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -43,19 +43,86 @@ fn any_number() -> usize {
     usize::MAX
 }
 
-/// How a class is recognised: flags that are up or down, and signals that step. All of it must hold.
+/// Pulses of one signal to one side and the other, whose lengths stand in a proportion: 3-2-1-1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pulses {
+    /// The length of each pulse, in units.
+    pub widths: Vec<f64>,
+    /// The shortest and the longest unit, s. Default: any.
+    #[serde(default = "any_unit")]
+    pub unit_s: (f64, f64),
+    /// By how many units a pulse may be longer or shorter. Default 0.5: nearer to its own number than to the next.
+    #[serde(default = "half_a_unit")]
+    pub tolerance: f64,
+}
+
+fn any_unit() -> (f64, f64) {
+    (0.0, f64::INFINITY)
+}
+fn half_a_unit() -> f64 {
+    0.5
+}
+
+/// An oscillation of one signal whose frequency rises: a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// The fewest swings from one side to the other.
+    pub at_least: usize,
+    /// By what factor the frequency rises at least from the first third of the swings to the last. Default 2.
+    #[serde(default = "an_octave")]
+    pub ratio: f64,
+}
+
+fn an_octave() -> f64 {
+    2.0
+}
+
+/// How a class is recognised. What its inputs do must all hold; flags are evidence, for they may be missing, stuck or late.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recognition {
-    /// Flag signal → whether it is up for most of the maneuver.
+    /// Flag signal → whether it is up for most of the maneuver. Evidence: it raises or lowers the confidence, and decides
+    /// only between classes that differ in nothing else that is recorded.
     #[serde(default)]
     pub flags: BTreeMap<String, bool>,
     /// Signal → how often it steps. A signal that is not named may do as it likes.
+    #[serde(default)]
     pub steps: BTreeMap<String, StepCount>,
-    /// How long before the first step the maneuver begins, s: trimmed flight to start from.
+    /// Signal → whether it moves at all during the maneuver (a thrust-vectoring vane). One that is not recorded decides
+    /// nothing.
+    #[serde(default)]
+    pub moves: BTreeMap<String, bool>,
+    /// Signal → the pulses that it makes.
+    #[serde(default)]
+    pub pulses: BTreeMap<String, Pulses>,
+    /// Signal → the sweep that it makes.
+    #[serde(default)]
+    pub sweep: BTreeMap<String, Sweep>,
+    /// How long before the first input the maneuver begins, s: trimmed flight to start from.
     pub lead_in_s: f64,
-    /// How long after the end of the excitation the maneuver ends, s: the response's decay.
+    /// How long after the last input the maneuver ends, s: the response's decay.
     pub decay_s: f64,
+}
+
+impl Recognition {
+    /// The signals that make the maneuver: those that must step, pulse or sweep.
+    #[must_use]
+    pub fn inputs(&self) -> BTreeSet<&str> {
+        let stepping = self.steps.iter().filter(|(_, count)| count.at_least > 0).map(|(signal, _)| signal);
+        stepping.chain(self.pulses.keys()).chain(self.sweep.keys()).map(String::as_str).collect()
+    }
+
+    /// The signals that it asks something of.
+    pub fn signals(&self) -> impl Iterator<Item = &str> {
+        self.counted().chain(self.flags.keys()).map(String::as_str)
+    }
+
+    /// The signals that need a smallest step, for something of theirs is counted.
+    pub fn counted(&self) -> impl Iterator<Item = &String> {
+        self.steps.keys().chain(self.moves.keys()).chain(self.pulses.keys()).chain(self.sweep.keys())
+    }
 }
 
 /// Settings that hold for part of the α range instead of the class's own.

@@ -3,5 +3,5 @@
 pub mod class;
 pub mod found;
 
-pub use class::{Class, Overrides, Recognition, Status, StepCount};
-pub use found::{Event, Maneuver};
+pub use class::{Class, Overrides, Pulses, Recognition, Status, StepCount, Sweep};
+pub use found::{Event, Maneuver, Quality, Recognised, Unknown};

@@ -2,6 +2,7 @@
 //!
 //! Found from autocovariances by the recursion of Levinson and Durbin, in the order of least information criterion
 //! (Akaike's, corrected for few samples). White noise is order 0.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 /// An autoregressive process.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,22 +71,28 @@ impl Autoregression {
     }
 
     /// u = s/A of a series at rest before its first sample, `width` values a sample.
+    #[inline(always)]
     pub fn filter(&self, series: &mut [f64], width: usize) {
         for k in 1..series.len() / width {
             let (past, now) = series.split_at_mut(k * width);
             for (a, past) in self.coefficients.iter().zip(past.rchunks_exact(width)) {
-                now.iter_mut().zip(past).for_each(|(now, past)| *now -= a * past);
+                for i in 0..width {
+                    now[i] = (-a).mul_add(past[i], now[i]);
+                }
             }
         }
     }
 
     /// The same backwards in time, at rest after the last sample.
+    #[inline(always)]
     pub fn filter_back(&self, series: &mut [f64], width: usize) {
         for k in (1..series.len() / width).rev() {
             let (now, later) = series.split_at_mut(k * width);
             let now = &mut now[(k - 1) * width..];
             for (a, later) in self.coefficients.iter().zip(later.chunks_exact(width)) {
-                now.iter_mut().zip(later).for_each(|(now, later)| *now -= a * later);
+                for i in 0..width {
+                    now[i] = (-a).mul_add(later[i], now[i]);
+                }
             }
         }
     }

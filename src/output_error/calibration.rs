@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::case::{Case, InitialState, Model};
-use super::response::{Diverged, Response};
+use super::response::{Diverged, Sensitivities};
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -49,7 +49,6 @@ pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
     pub model: &'a Model<'a>,
     pub case: &'a Case<NX, E>,
     pub values: &'a [f64],
-    pub response: &'a Response,
     pub weights: &'a [f64; OUTPUTS],
 }
 
@@ -61,7 +60,8 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
     pub fn gradient_shifts(&self, errors: &[Misreading]) -> Result<Vec<DVector<f64>>, Diverged> {
         let held = self.all_held();
         let right = self.computed(self.window, &held)?;
-        errors.iter().map(|error| self.gradient_shift(error, &held, &right)).collect()
+        let sensitivities = self.case.sensitivities(self.values)?;
+        errors.iter().map(|error| self.gradient_shift(error, &held, &right, &sensitivities)).collect()
     }
 
     fn gradient_shift(
@@ -69,6 +69,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         error: &Misreading,
         held: &[(&Derivative, f64)],
         right: &[[f64; OUTPUTS]],
+        sensitivities: &Sensitivities,
     ) -> Result<DVector<f64>, Diverged> {
         let misread = self.window.misread(error.signal, error.scale, error.bias);
         let computed = self.computed(&misread, held)?;
@@ -79,8 +80,8 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
             for o in (0..OUTPUTS).filter(|&o| measurements.used[k][o]) {
                 let measured = if read[o] { error.scale * measurements.values[k][o] + error.bias } else { 0.0 };
                 let factor = self.weights[o] * (measured - (now[o] - before[o]));
-                for (g, s) in shift.iter_mut().zip(self.response.sensitivity(k, o)) {
-                    *g += factor * s;
+                for (j, g) in shift.iter_mut().enumerate() {
+                    *g += factor * sensitivities.at(k, o, j);
                 }
             }
         }

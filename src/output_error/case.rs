@@ -1,9 +1,11 @@
 //! One maneuver made ready for estimation: everything that does not depend on the parameters, laid out for the inner loop.
 //!
-//! Each coefficient is linear in the derivatives: c = offset + slope · x + Σ ξ_j r_j. Held derivatives are summed once into
-//! offset and slope; a free one keeps its regressor r_j at every point, or its factor where r_j is proportional to a state.
+//! Each coefficient is linear in the derivatives: c = Σ ξ_j r_j, where r_j is known at every point or proportional to a
+//! state: c = offset + slope · x. Held derivatives are summed once into offset and slope, free ones once per iteration.
 //!
 //! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states if they are free.
+#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -11,6 +13,7 @@ use std::ops::Range;
 use nalgebra::SVector;
 
 use super::input_noise::NoisySurface;
+use super::lanes::{Aligned, Lanes};
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -26,11 +29,88 @@ pub enum InitialState {
     Measured,
 }
 
-/// The part of a coefficient that the held derivatives make: offset and slopes along the states.
+/// The three coefficients at every point as functions of the state: c = offset + slope · x.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Coefficients<const NX: usize> {
+    offset: [Vec<f64>; COEFFICIENTS],
+    slope: [[Vec<f64>; NX]; COEFFICIENTS],
+}
+
+impl<const NX: usize> Coefficients<NX> {
+    fn zero(points: usize) -> Self {
+        // A step needs three points, also the one that would follow the last sample.
+        let none = || vec![0.0; points + 2];
+        Coefficients {
+            offset: std::array::from_fn(|_| none()),
+            slope: std::array::from_fn(|_| std::array::from_fn(|_| none())),
+        }
+    }
+
+    /// Adds a derivative of this value.
+    fn add(&mut self, value: f64, acting: Acting, column: &[f64]) {
+        let sum = match acting.along {
+            Some(state) => &mut self.slope[acting.coefficient][state],
+            None => &mut self.offset[acting.coefficient],
+        };
+        sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += value * r);
+    }
+
+    /// Those of a point.
+    #[inline(always)]
+    pub(super) fn at(&self, point: usize) -> At<NX> {
+        self.near::<1>(point)[0]
+    }
+
+    /// Those of some points from one on.
+    #[inline(always)]
+    pub(super) fn near<const N: usize>(&self, point: usize) -> [At<NX>; N] {
+        let mut near = [At { offset: [0.0; COEFFICIENTS], slope: [[0.0; NX]; COEFFICIENTS] }; N];
+        for k in 0..COEFFICIENTS {
+            let offset = &self.offset[k][point..point + N];
+            for n in 0..N {
+                near[n].offset[k] = offset[n];
+            }
+            for i in 0..NX {
+                if let Some(slope) = self.slope[k][i].get(point..point + N) {
+                    for n in 0..N {
+                        near[n].slope[k][i] = slope[n];
+                    }
+                }
+            }
+        }
+        near
+    }
+}
+
+/// The coefficients at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct HeldPart<const NX: usize> {
-    pub offset: f64,
-    pub slope: SVector<f64, NX>,
+pub(super) struct At<const NX: usize> {
+    offset: [f64; COEFFICIENTS],
+    pub(super) slope: [[f64; NX]; COEFFICIENTS],
+}
+
+impl<const NX: usize> At<NX> {
+    /// Their values when the state is x.
+    #[inline(always)]
+    pub(super) fn with(&self, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+        let mut values = self.offset;
+        for k in 0..COEFFICIENTS {
+            // The first state last: it is the one that the sum would wait for.
+            for i in (0..NX).rev() {
+                values[k] = self.slope[k][i].mul_add(x[i], values[k]);
+            }
+        }
+        values
+    }
+}
+
+/// How a derivative acts: on which coefficient, along which state (where its regressor is one), and which column of
+/// regressors or factors of proportion is its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Acting {
+    pub coefficient: usize,
+    pub along: Option<usize>,
+    pub column: usize,
 }
 
 /// What the outputs read, deg, deg/s and g, and which samples count.
@@ -54,11 +134,16 @@ pub struct Model<'a> {
 pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(super) step_s: f64,
     pub(super) known: Vec<E::Known>,
-    pub(super) held: Vec<[HeldPart<NX>; COEFFICIENTS]>,
-    /// Regressor or factor of each free derivative at each point, point by point.
-    pub(super) regressors: Vec<f64>,
-    /// Free derivatives whose regressor is a state: (parameter, state).
-    pub(super) along_state: Vec<(usize, usize)>,
+    pub(super) sensed: Vec<E::Sensed>,
+    /// What the held derivatives make of the coefficients.
+    held: Coefficients<NX>,
+    /// The distinct regressors and factors of proportion, each at every point.
+    columns: Vec<Vec<f64>>,
+    /// How each free derivative acts.
+    pub(super) acting: Vec<Acting>,
+    /// The same columns point by point in the order of the lanes ([`Lanes`]).
+    pub(super) regressors: Aligned,
+    pub(super) lanes: Lanes,
     /// The free derivatives of each coefficient.
     pub(super) ranges: [Range<usize>; COEFFICIENTS],
     /// The output that each free bias shifts.
@@ -80,19 +165,26 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Makes a maneuver ready. `window` must contain the surfaces of the model's derivatives.
     #[must_use]
     pub fn new(aircraft: &Aircraft, window: &Window, measurements: Measurements, model: &Model) -> Self {
-        let motion = window.motion(aircraft);
         let mut free = model.free.clone();
         free.sort_by_key(|d| d.coefficient.index());
-        let regressor = |d: &Derivative, i: usize| regressor::<NX, E>(aircraft, window, &motion[i], d, i);
-        let mut regressors = Vec::with_capacity(motion.len() * free.len());
-        for i in 0..motion.len() {
-            regressors.extend(free.iter().map(|d| regressor(d, i).1));
+        let mut columns = Columns::<NX, E>::new(aircraft, window);
+        let acting: Vec<Acting> = free.iter().map(|d| columns.acting(d)).collect();
+        let held: Vec<(Acting, f64)> = model.held.iter().map(|(d, value)| (columns.acting(d), *value)).collect();
+        let mut along = Along::<NX, E>::default();
+        for (point, motion) in window.motion(aircraft).enumerate() {
+            along.known.push(E::known(aircraft, &motion));
+            columns.take(point, &motion);
+            if point % 2 == 0 {
+                along.sensed.push(E::sensed(aircraft, &motion));
+                along.states.push(E::measured_state(&motion));
+                along.implied.push(E::coefficients(aircraft, &motion));
+            }
         }
-        let held = (0..motion.len()).map(|i| held_parts(&model.held, |d| regressor(d, i))).collect();
-        let state_of = |d: &Derivative| {
-            motion.first().and_then(|m| E::state_regressor(aircraft, m, &d.regressor)).map(|(state, _)| state)
-        };
-        let along_state = free.iter().enumerate().filter_map(|(j, d)| state_of(d).map(|state| (j, state))).collect();
+        let columns = columns.values;
+        let mut held_part = Coefficients::zero(window.len());
+        for (acting, value) in held {
+            held_part.add(value, acting, &columns[acting.column]);
+        }
         let before = |k: usize| free.iter().filter(|d| d.coefficient.index() < k).count();
         let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
         names.extend(model.biases.iter().map(|b| b.name.clone()));
@@ -100,23 +192,36 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             names.extend(E::STATES.iter().map(|s| format!("initial {s}")));
         }
         let outputs = E::AXIS.outputs();
+        let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
+        let biased: Vec<usize> =
+            model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect();
+        let initial = if model.initial_state == InitialState::Estimated { NX } else { 0 };
+        let lanes = Lanes::new(&acting, E::FOLLOWED, initial, biased.len());
         Case {
             step_s: window.step_s,
-            known: motion.iter().map(|m| E::known(aircraft, m)).collect(),
-            held,
-            regressors,
-            along_state,
-            ranges: std::array::from_fn(|k| before(k)..before(k + 1)),
-            biased: model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect(),
-            start: start_state::<NX, E>(&motion),
+            known: along.known,
+            sensed: along.sensed,
+            held: held_part,
+            regressors: lanes.spread(&acting, &columns, window.len()),
+            columns,
+            acting,
+            lanes,
+            ranges,
+            biased,
+            start: mean(along.states.iter().take(TRIMMED)),
             initial_state: model.initial_state,
-            states: motion.iter().step_by(2).map(E::measured_state).collect(),
-            implied: motion.iter().step_by(2).map(|m| E::coefficients(aircraft, m)).collect(),
+            states: along.states,
+            implied: along.implied,
             noisy_surfaces: vec![],
             measurements,
             names,
             equations: PhantomData,
         }
+    }
+
+    /// Starts the integration at the measured state averaged over the first samples.
+    pub fn start_from_mean_of(&mut self, samples: usize) {
+        self.start = mean(self.states.iter().take(samples));
     }
 
     #[must_use]
@@ -145,13 +250,28 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// rad of a reduced rate, for a vane deg over q̄S (and the reference length).
     #[must_use]
     pub fn regressor_as_flown(&self, derivative: usize) -> Vec<f64> {
-        let n = self.derivatives();
-        let along = self.along_state.iter().find(|(j, _)| *j == derivative).map(|(_, state)| *state);
+        let acting = self.acting[derivative];
         let at = |(sample, state): (usize, &SVector<f64, NX>)| {
-            let factor = self.regressors[2 * sample * n + derivative];
-            along.map_or(factor, |i| factor * state[i])
+            let factor = self.columns[acting.column][2 * sample];
+            acting.along.map_or(factor, |i| factor * state[i])
         };
         self.states.iter().enumerate().map(at).collect()
+    }
+
+    /// The coefficients with these parameters, at every point.
+    pub(super) fn with(&self, parameters: &[f64]) -> Coefficients<NX> {
+        let mut sum = self.held.clone();
+        for (acting, value) in self.acting.iter().zip(parameters) {
+            sum.add(*value, *acting, &self.columns[acting.column]);
+        }
+        sum
+    }
+
+    /// The regressor of each free derivative at a point and state.
+    pub(super) fn regressors_at(&self, point: usize, x: &SVector<f64, NX>, regressors: &mut [f64]) {
+        for (r, acting) in regressors.iter_mut().zip(&self.acting) {
+            *r = self.columns[acting.column][point] * acting.along.map_or(1.0, |i| x[i]);
+        }
     }
 
     /// The parameters to start from: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
@@ -166,39 +286,88 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     }
 }
 
-/// The state a derivative acts along in this axis and its regressor at a point; for a state the factor of proportion.
+/// What a case keeps of the motion.
+struct Along<const NX: usize, E: Equations<NX>> {
+    known: Vec<E::Known>,
+    sensed: Vec<E::Sensed>,
+    states: Vec<SVector<f64, NX>>,
+    implied: Vec<[f64; COEFFICIENTS]>,
+}
+
+impl<const NX: usize, E: Equations<NX>> Default for Along<NX, E> {
+    fn default() -> Self {
+        Along { known: vec![], sensed: vec![], states: vec![], implied: vec![] }
+    }
+}
+
+/// Distinct columns of regressors.
+struct Columns<'a, const NX: usize, E: Equations<NX>> {
+    aircraft: &'a Aircraft,
+    window: &'a Window,
+    /// Of each column a derivative that has it, and its surface's deflections.
+    asked: Vec<(&'a Derivative, &'a [f64])>,
+    values: Vec<Vec<f64>>,
+    equations: PhantomData<E>,
+}
+
+impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
+    fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
+        Columns { aircraft, window, asked: vec![], values: vec![], equations: PhantomData }
+    }
+
+    /// How a derivative acts. Two share a column when they have the same regressor, but a vane's moment is not its force.
+    fn acting(&mut self, derivative: &'a Derivative) -> Acting {
+        let moment = |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
+        let same = |d: &Derivative| d.regressor == derivative.regressor && moment(d) == moment(derivative);
+        let column = self.asked.iter().position(|(d, _)| same(d)).unwrap_or_else(|| {
+            let deflections = derivative.regressor.surface().map_or::<&[f64], _>(&[], |name| self.window.signal(name));
+            self.asked.push((derivative, deflections));
+            self.values.push(Vec::with_capacity(self.window.len()));
+            self.values.len() - 1
+        });
+        Acting { coefficient: derivative.coefficient.index(), along: E::state_of(&derivative.regressor), column }
+    }
+
+    /// Adds a point to every column.
+    fn take(&mut self, point: usize, motion: &Motion) {
+        for ((derivative, deflections), values) in self.asked.iter().zip(&mut self.values) {
+            values.push(regressor::<NX, E>(self.aircraft, motion, derivative, deflections, point));
+        }
+    }
+}
+
+/// A derivative's regressor at a point; where it is a state the factor of proportion.
 fn regressor<const NX: usize, E: Equations<NX>>(
     aircraft: &Aircraft,
-    window: &Window,
     motion: &Motion,
     derivative: &Derivative,
+    deflections: &[f64],
     point: usize,
-) -> (Option<usize>, f64) {
-    if let Some((state, factor)) = E::state_regressor(aircraft, motion, &derivative.regressor) {
-        return (Some(state), factor);
+) -> f64 {
+    if let Some((_, factor)) = E::state_regressor(aircraft, motion, &derivative.regressor) {
+        return factor;
     }
     let [p, q, r] = motion.rates;
     let rate = |length: f64, rate: f64| rate * length / (2.0 * motion.velocity);
-    let value = match &derivative.regressor {
+    match &derivative.regressor {
         Regressor::Constant => 1.0,
         Regressor::Alpha => motion.alpha * DEG,
         Regressor::Beta => motion.beta * DEG,
         Regressor::RollRate => rate(aircraft.span_ft, p),
         Regressor::PitchRate => rate(aircraft.chord_ft, q),
         Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(name) | Regressor::Vane(name) => {
-            window.signal(name)[point] * surface_factor(aircraft, motion, derivative)
+        Regressor::Surface(_) | Regressor::Vane(_) => {
+            deflections[point] * surface_factor(aircraft, motion.qbar, derivative)
         }
-    };
-    (None, value)
+    }
 }
 
 /// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and moment are made coefficients.
-pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &Derivative) -> f64 {
+pub(super) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
     if !matches!(derivative.regressor, Regressor::Vane(_)) {
         return 1.0;
     }
-    let force = motion.qbar * aircraft.wing_area_ft2;
+    let force = qbar * aircraft.wing_area_ft2;
     let length = match derivative.coefficient.axis() {
         crate::aero::Axis::Longitudinal => aircraft.chord_ft,
         crate::aero::Axis::Lateral => aircraft.span_ft,
@@ -206,25 +375,10 @@ pub(super) fn surface_factor(aircraft: &Aircraft, motion: &Motion, derivative: &
     1.0 / if derivative.coefficient.is_moment() { force * length } else { force }
 }
 
-fn held_parts<const NX: usize>(
-    held: &[(&Derivative, f64)],
-    regressor: impl Fn(&Derivative) -> (Option<usize>, f64),
-) -> [HeldPart<NX>; COEFFICIENTS] {
-    let mut parts = [HeldPart { offset: 0.0, slope: SVector::zeros() }; COEFFICIENTS];
-    for (derivative, value) in held {
-        let part = &mut parts[derivative.coefficient.index()];
-        match regressor(derivative) {
-            (Some(state), factor) => part.slope[state] += value * factor,
-            (None, r) => part.offset += value * r,
-        }
-    }
-    parts
-}
+/// Samples from which the initial state is averaged: there the maneuver is still trimmed.
+const TRIMMED: usize = 10;
 
-/// The measured state averaged over the first samples, where the maneuver is still trimmed.
-fn start_state<const NX: usize, E: Equations<NX>>(motion: &[Motion]) -> SVector<f64, NX> {
-    const TRIMMED: usize = 10;
-    let states: Vec<SVector<f64, NX>> = motion.iter().step_by(2).take(TRIMMED).map(E::measured_state).collect();
-    let sum = states.iter().fold(SVector::zeros(), |sum: SVector<f64, NX>, x| sum + x);
-    sum / states.len().max(1) as f64
+fn mean<'a, const NX: usize>(states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>) -> SVector<f64, NX> {
+    let count = states.len().max(1) as f64;
+    states.fold(SVector::zeros(), |sum: SVector<f64, NX>, x| sum + x) / count
 }

@@ -11,10 +11,15 @@
 //! coefficients even where it is far slower; what moves faster is white within the blocks. Parameters act slower than a
 //! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
 
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
 use nalgebra::DMatrix;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::autoregression::Autoregression;
-use super::cost::add_square;
+use super::kernel::load;
+use super::lanes::{Aligned, VECTOR};
+use super::normal::Rows;
 
 /// Length of a block, s: the short period and the test inputs are several times longer.
 const BLOCK_S: f64 = 0.2;
@@ -26,18 +31,24 @@ const ROUNDS: usize = 30;
 /// R is settled when no output's long-run variance changes by more than this share.
 const SETTLED: f64 = 0.01;
 
-/// One output of one maneuver.
-#[derive(Clone, Debug, PartialEq)]
+/// One output of one maneuver, seen through blocks of samples.
+#[derive(Clone, Debug)]
 pub struct Series {
-    pub step_s: f64,
-    pub weight: f64,
-    /// Of the residuals, were they white.
-    pub variance: f64,
-    /// Zero where a sample does not count.
-    pub residuals: Vec<f64>,
-    pub used: Vec<bool>,
-    /// ∂(output)/∂(parameters), sample by sample; zero where a sample does not count.
-    pub sensitivities: Vec<f64>,
+    /// Of a sample.
+    weight: f64,
+    /// Samples of a block.
+    block: usize,
+    parameters: usize,
+    /// Which blocks have a sample that counts, and the means of their residuals.
+    used: Vec<bool>,
+    residuals: Vec<f64>,
+    /// Variance of the samples about their block's mean.
+    fast: f64,
+    /// Means of the sensitivities over the blocks, a row of whole vectors for each; of a block that does not count whole
+    /// they are less.
+    sensitivities: Aligned,
+    /// Σ s sᵀ of the samples' sensitivities about their block's mean.
+    within: DMatrix<f64>,
 }
 
 /// The noise of each output.
@@ -65,17 +76,29 @@ pub fn noise(root: &DMatrix<f64>, outputs: Vec<Series>) -> Noise {
     settled(&transformed(root, outputs))
 }
 
+/// The variance of white noise that is as strong as the slowest part of these values, NaN where one does not count, and
+/// never weaker than the values are.
+#[must_use]
+pub fn level(values: &[f64], step_s: f64) -> f64 {
+    let used: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
+    let count = used.iter().filter(|used| **used).count().max(1) as f64;
+    let residuals: Vec<f64> = values.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
+    let variance = residuals.iter().map(|v| v * v).sum::<f64>() / count;
+    let series = Series::new(step_s, 1.0, &residuals, &used, DMatrix::zeros(1, 1), |_, _| ());
+    let slow = series.fitted(&series.autocovariances()).long_run_variance();
+    (slow * series.block as f64).max(variance)
+}
+
 /// Σ Sᵀ W R W S: what noise does to the gradient.
 #[must_use]
 pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
-    let n = outputs.first().map_or(0, Series::parameters);
-    let mut scatter = DMatrix::zeros(n, n);
+    let mut scatter = Scatter::zeros(outputs.first().map_or(0, |o| o.parameters));
+    let mut filtered = Vec::new();
     for (output, noise) in outputs.iter().zip(&noise.0) {
-        output.add_fast(noise.fast, &mut scatter);
-        output.blocks().spread(&noise.slow, &mut scatter);
+        scatter.add(&output.within, output.weight * output.weight * noise.fast);
+        output.filter(&noise.slow, &mut filtered, &mut scatter);
     }
-    scatter.fill_upper_triangle_with_lower_triangle();
-    scatter
+    scatter.whole()
 }
 
 fn transformed(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> Vec<Series> {
@@ -87,24 +110,27 @@ fn transformed(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> Vec<Series> {
 
 /// The noise of outputs whose H is the unit matrix, when what the parameters took is added back.
 fn settled(outputs: &[Series]) -> Noise {
-    let blocks: Vec<Series> = outputs.iter().map(Series::blocks).collect();
-    let observed: Vec<Vec<f64>> = blocks.iter().map(Series::autocovariances).collect();
-    let fitted = |o: &Series, covariances: &[f64]| Autoregression::fitted(covariances, o.count());
-    let mut slow: Vec<_> = blocks.iter().zip(&observed).map(|(o, seen)| fitted(o, seen)).collect();
-    let n = outputs.first().map_or(0, Series::parameters);
-    let mut fast = DMatrix::zeros(n, n);
+    let observed: Vec<Vec<f64>> = outputs.iter().map(Series::autocovariances).collect();
+    let pairs: Vec<Vec<f64>> = outputs.iter().map(Series::pairs).collect();
+    let mut slow: Vec<_> = outputs.iter().zip(&observed).map(|(o, seen)| o.fitted(seen)).collect();
+    let mut fast = Scatter::zeros(outputs.first().map_or(0, |o| o.parameters));
     for output in outputs {
-        output.add_fast(output.fast_variance(), &mut fast);
+        fast.add(&output.within, output.weight * output.weight * output.fast);
     }
+    let mut spread: Vec<Vec<f64>> = vec![Vec::new(); outputs.len()];
     for _ in 0..ROUNDS {
         let mut scatter = fast.clone();
-        let spread: Vec<_> = blocks.iter().zip(&slow).map(|(o, noise)| o.spread(noise, &mut scatter)).collect();
-        scatter.fill_upper_triangle_with_lower_triangle();
-        let whole = |(o, (seen, spread)): (&Series, (&Vec<f64>, &Vec<f64>))| {
-            let whole: Vec<f64> = seen.iter().zip(o.taken(spread, &scatter)).map(|(s, t)| s + t).collect();
-            fitted(o, &whole)
-        };
-        let next: Vec<_> = blocks.iter().zip(observed.iter().zip(&spread)).map(whole).collect();
+        for ((output, noise), spread) in outputs.iter().zip(&slow).zip(&mut spread) {
+            output.filter(noise, spread, &mut scatter);
+            output.filter_back(noise, spread);
+        }
+        scatter.mirror();
+        let mut next = Vec::with_capacity(slow.len());
+        for (((output, seen), pairs), spread) in outputs.iter().zip(&observed).zip(&pairs).zip(&spread) {
+            let taken = output.taken(spread, &scatter);
+            let whole: Vec<f64> = seen.iter().zip(taken.iter().zip(pairs)).map(|(s, (t, n))| s + t / n).collect();
+            next.push(output.fitted(&whole));
+        }
         let settled = slow.iter().zip(&next).all(|(a, b)| {
             let (a, b) = (a.long_run_variance(), b.long_run_variance());
             (a - b).abs() <= SETTLED * b
@@ -114,153 +140,313 @@ fn settled(outputs: &[Series]) -> Noise {
             break;
         }
     }
-    Noise(outputs.iter().zip(slow).map(|(o, slow)| OutputNoise { slow, fast: o.fast_variance() }).collect())
+    Noise(outputs.iter().zip(slow).map(|(o, slow)| OutputNoise { slow, fast: o.fast }).collect())
+}
+
+/// Parameters padded to whole vectors.
+fn width(parameters: usize) -> usize {
+    parameters.next_multiple_of(VECTOR)
 }
 
 impl Series {
-    /// S to S T.
-    fn transform(&mut self, root: &DMatrix<f64>) {
-        let n = root.nrows();
-        let mut before = vec![0.0; n];
-        for row in self.sensitivities.chunks_exact_mut(n) {
-            before.copy_from_slice(row);
-            for (new, column) in row.iter_mut().zip(root.column_iter()) {
-                *new = dot(&before, column.as_slice());
-            }
-        }
-    }
-
-    /// Samples of a block.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
-    fn block(&self) -> usize {
-        (BLOCK_S / self.step_s).round().max(1.0) as usize
-    }
-
-    /// Means of residuals and sensitivities over blocks, with the weight that a block has. Of a block that does not count
-    /// whole the sensitivities are less.
-    fn blocks(&self) -> Series {
-        let (block, n) = (self.block(), self.parameters());
-        let mut blocks = Series {
-            step_s: self.step_s * block as f64,
-            weight: self.weight * block as f64,
-            variance: self.variance / block as f64,
-            residuals: Vec::new(),
-            used: Vec::new(),
-            sensitivities: Vec::new(),
+    /// Sees one output through blocks. `residuals` are zero where a sample does not count, `add_sum` adds the
+    /// sensitivities of some samples' to a row, zero those of what does not count, and `squares` is Σ s sᵀ over all.
+    #[must_use]
+    pub fn new(
+        step_s: f64,
+        weight: f64,
+        residuals: &[f64],
+        used: &[bool],
+        squares: DMatrix<f64>,
+        add_sum: impl Fn(std::ops::Range<usize>, &mut [f64]),
+    ) -> Series {
+        let (block, parameters) = (samples_of_block(step_s), squares.nrows());
+        let blocks = used.len().div_ceil(block);
+        let mut series = Series {
+            weight,
+            block,
+            parameters,
+            used: Vec::with_capacity(blocks),
+            residuals: Vec::with_capacity(blocks),
+            fast: fast_variance(residuals, used, block),
+            sensitivities: Aligned::zeros(blocks * width(parameters)),
+            within: squares,
         };
-        for (k, used) in self.used.chunks(block).enumerate() {
+        let rows = series.sensitivities.slice_mut().chunks_exact_mut(width(parameters).max(1));
+        for ((k, used), row) in used.chunks(block).enumerate().zip(rows) {
             let count = used.iter().filter(|used| **used).count();
             let samples = k * block..k * block + used.len();
-            blocks.used.push(count > 0);
-            blocks.residuals.push(self.residuals[samples.clone()].iter().sum::<f64>() / count.max(1) as f64);
-            let first = blocks.sensitivities.len();
-            blocks.sensitivities.resize(first + n, 0.0);
-            for row in self.sensitivities[samples.start * n..samples.end * n].chunks_exact(n) {
-                for (mean, s) in blocks.sensitivities[first..].iter_mut().zip(row) {
-                    *mean += s / block as f64;
-                }
+            series.used.push(count > 0);
+            series.residuals.push(residuals[samples.clone()].iter().sum::<f64>() / count.max(1) as f64);
+            add_sum(samples, row);
+            for (j, mut column) in series.within.column_iter_mut().enumerate() {
+                let factor = row[j] / count.max(1) as f64;
+                column.iter_mut().zip(row.iter()).for_each(|(within, s)| *within -= factor * s);
             }
-        }
-        blocks
-    }
-
-    /// Variance of the residuals about their block's mean.
-    fn fast_variance(&self) -> f64 {
-        let (mut square, mut freedom) = (0.0, 0);
-        for (v, used) in self.residuals.chunks(self.block()).zip(self.used.chunks(self.block())) {
-            let counted = || v.iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| *v);
-            let count = counted().count();
-            let mean = counted().sum::<f64>() / count.max(1) as f64;
-            square += counted().map(|v| (v - mean) * (v - mean)).sum::<f64>();
-            freedom += count.saturating_sub(1);
-        }
-        square / freedom.max(1) as f64
-    }
-
-    /// Adds to the lower triangle of the scatter what white noise within the blocks does.
-    fn add_fast(&self, variance: f64, scatter: &mut DMatrix<f64>) {
-        let (block, n) = (self.block(), self.parameters());
-        let factor = self.weight * self.weight * variance;
-        let mut deviation = vec![0.0; n];
-        for (rows, used) in self.sensitivities.chunks(block * n).zip(self.used.chunks(block)) {
-            let count = used.iter().filter(|used| **used).count().max(1) as f64;
-            let mut mean = vec![0.0; n];
-            for row in rows.chunks_exact(n) {
-                mean.iter_mut().zip(row).for_each(|(mean, s)| *mean += s / count);
+            for s in row.iter_mut() {
+                *s /= block as f64;
             }
-            for (row, _) in rows.chunks_exact(n).zip(used).filter(|(_, used)| **used) {
-                for (deviation, (s, mean)) in deviation.iter_mut().zip(row.iter().zip(&mean)) {
-                    *deviation = s - mean;
-                }
-                add_square(scatter, factor, &deviation);
-            }
-        }
-    }
-
-    fn count(&self) -> usize {
-        self.used.iter().filter(|used| **used).count()
-    }
-
-    fn parameters(&self) -> usize {
-        self.sensitivities.len() / self.used.len().max(1)
-    }
-
-    /// Σ_k f(k, k + lag) over the pairs of samples that count, per pair, at lags 0, 1, …
-    fn per_pair(&self, f: impl Fn(usize, usize) -> f64) -> Vec<f64> {
-        let samples = self.used.len();
-        let mean = |lag: usize| {
-            let pairs = (0..samples - lag).map(|k| (k, k + lag)).filter(|&(k, l)| self.used[k] && self.used[l]);
-            let (sum, count) = pairs.fold((0.0, 0_usize), |(sum, count), (k, l)| (sum + f(k, l), count + 1));
-            sum / count.max(1) as f64
-        };
-        (0..=ORDER.min(samples / BLOCKS_PER_COEFFICIENT)).map(mean).collect()
-    }
-
-    fn autocovariances(&self) -> Vec<f64> {
-        self.per_pair(|k, l| self.residuals[k] * self.residuals[l])
-    }
-
-    /// R S; adds Sᵀ W R W S to the lower triangle of the scatter.
-    fn spread(&self, noise: &Autoregression, scatter: &mut DMatrix<f64>) -> Vec<f64> {
-        let n = self.parameters();
-        let mut series = self.sensitivities.clone();
-        series.resize(series.len() + n * noise.memory(self.used.len()), 0.0);
-        noise.filter(&mut series, n);
-        let factor = self.weight * self.weight * noise.innovation;
-        series.chunks_exact(n).for_each(|row| add_square(scatter, factor, row));
-        noise.filter_back(&mut series, n);
-        series.truncate(self.sensitivities.len());
-        for s in &mut series {
-            *s *= noise.innovation;
         }
         series
     }
 
-    /// What the parameters have taken out of the noise's autocovariances: R − (I − P) R (I − P)ᵀ along its diagonals.
-    fn taken(&self, spread: &[f64], scatter: &DMatrix<f64>) -> Vec<f64> {
-        let n = self.parameters();
-        let mut scattered = Vec::with_capacity(self.sensitivities.len());
-        for row in self.sensitivities.chunks_exact(n) {
-            scattered.extend(scatter.column_iter().map(|column| dot(row, column.as_slice())));
+    /// The same with other parameters: `places` says where each stands among them.
+    #[must_use]
+    pub fn widened(&self, places: &[usize], parameters: usize) -> Series {
+        let (own, wide) = (width(self.parameters).max(1), width(parameters).max(1));
+        let mut sensitivities = Aligned::zeros(self.used.len() * wide);
+        let rows = sensitivities.slice_mut().chunks_exact_mut(wide).zip(self.sensitivities.slice().chunks_exact(own));
+        for (wide, own) in rows {
+            places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
         }
-        let s = |k: usize| &self.sensitivities[k * n..(k + 1) * n];
-        let at = |rows: &[f64], k: usize, l: usize| dot(&rows[k * n..(k + 1) * n], s(l));
-        self.per_pair(|k, l| self.weight * (at(spread, k, l) + at(spread, l, k)) - at(&scattered, k, l))
+        let mut within = DMatrix::zeros(parameters, parameters);
+        for (j, &column) in places.iter().enumerate() {
+            for (i, &row) in places.iter().enumerate() {
+                within[(row, column)] = self.within[(i, j)];
+            }
+        }
+        Series { parameters, sensitivities, within, ..self.clone() }
+    }
+
+    /// The weight of a block's mean.
+    fn block_weight(&self) -> f64 {
+        self.weight * self.block as f64
+    }
+
+    /// S to S T.
+    fn transform(&mut self, root: &DMatrix<f64>) {
+        let width = width(self.parameters);
+        let mut rows = Aligned::zeros(self.parameters * width);
+        for (i, row) in rows.slice_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            row.iter_mut().zip(root.row(i).iter()).for_each(|(row, root)| *row = *root);
+        }
+        let before = std::mem::replace(&mut self.sensitivities, Aligned::zeros(self.used.len() * width));
+        let (rows, from) = (rows.slice(), before.slice());
+        Arch::new().dispatch(Product { from, matrix: rows, to: self.sensitivities.slice_mut(), width });
+        self.within = root.transpose() * &self.within * root;
+    }
+
+    fn fitted(&self, autocovariances: &[f64]) -> Autoregression {
+        Autoregression::fitted(autocovariances, self.used.iter().filter(|used| **used).count())
+    }
+
+    fn lags(&self) -> usize {
+        1 + ORDER.min(self.used.len() / BLOCKS_PER_COEFFICIENT)
+    }
+
+    /// Pairs of blocks that count, at lags 0, 1, …, at least one.
+    fn pairs(&self) -> Vec<f64> {
+        let count = |lag: usize| self.used.iter().zip(&self.used[lag..]).filter(|(a, b)| **a && **b).count();
+        (0..self.lags()).map(|lag| count(lag).max(1) as f64).collect()
+    }
+
+    fn autocovariances(&self) -> Vec<f64> {
+        let sum = |lag: usize| self.residuals.iter().zip(&self.residuals[lag..]).map(|(a, b)| a * b).sum::<f64>();
+        self.pairs().iter().enumerate().map(|(lag, pairs)| sum(lag) / pairs).collect()
+    }
+
+    /// S filtered by the noise; adds Sᵀ W R W S to the lower triangle of the scatter.
+    fn filter(&self, noise: &Autoregression, filtered: &mut Vec<f64>, scatter: &mut Scatter) {
+        let width = width(self.parameters);
+        filtered.clear();
+        filtered.extend_from_slice(self.sensitivities.slice());
+        filtered.resize(filtered.len() + width * noise.memory(self.used.len()), 0.0);
+        Arch::new().dispatch(Filter { noise, series: filtered, width, back: false });
+        scatter.add_squares(filtered, self.block_weight().powi(2) * noise.innovation);
+    }
+
+    /// R S of blocks that count, from S filtered.
+    fn filter_back(&self, noise: &Autoregression, filtered: &mut Vec<f64>) {
+        let width = width(self.parameters);
+        Arch::new().dispatch(Filter { noise, series: filtered, width, back: true });
+        filtered.truncate(self.used.len() * width);
+        for (row, used) in filtered.chunks_exact_mut(width.max(1)).zip(&self.used) {
+            let factor = if *used { noise.innovation } else { 0.0 };
+            for s in row.iter_mut() {
+                *s *= factor;
+            }
+        }
+    }
+
+    /// What the parameters have taken out of the noise's autocovariances: R − (I − P) R (I − P)ᵀ summed along its
+    /// diagonals.
+    fn taken(&self, spread: &[f64], scatter: &Scatter) -> Vec<f64> {
+        let width = width(self.parameters);
+        let mut scattered = Aligned::zeros(self.used.len() * width);
+        let s = self.sensitivities.slice();
+        Arch::new().dispatch(Product { from: s, matrix: scatter.rows.slice(), to: scattered.slice_mut(), width });
+        for (scattered, spread) in scattered.slice_mut().iter_mut().zip(spread) {
+            *scattered = self.block_weight() * spread - *scattered;
+        }
+        let of = |lag: usize| {
+            let shifted = |rows: &[f64], other: &[f64]| {
+                Arch::new().dispatch(Dot { a: &rows[..rows.len() - lag * width], b: &other[lag * width..] })
+            };
+            shifted(scattered.slice(), s) + self.block_weight() * shifted(s, spread)
+        };
+        (0..self.lags()).map(of).collect()
     }
 }
 
-/// a·b, summed in lanes: one running sum would keep the processor from multiplying several at once.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let (mut a, mut b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.by_ref().zip(b.by_ref()) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
+/// Samples of a block.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+fn samples_of_block(step_s: f64) -> usize {
+    (BLOCK_S / step_s).round().max(1.0) as usize
+}
+
+/// Variance of the residuals about their block's mean.
+fn fast_variance(residuals: &[f64], used: &[bool], block: usize) -> f64 {
+    let (mut square, mut freedom) = (0.0, 0);
+    for (v, used) in residuals.chunks(block).zip(used.chunks(block)) {
+        let counted = || v.iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| *v);
+        let count = counted().count();
+        let mean = counted().sum::<f64>() / count.max(1) as f64;
+        square += counted().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+        freedom += count.saturating_sub(1);
+    }
+    square / freedom.max(1) as f64
+}
+
+/// Σ Sᵀ W R W S, rows of whole vectors.
+#[derive(Clone, Debug)]
+struct Scatter {
+    parameters: usize,
+    rows: Aligned,
+}
+
+impl Scatter {
+    fn zeros(parameters: usize) -> Scatter {
+        Scatter { parameters, rows: Aligned::zeros(width(parameters) * width(parameters)) }
+    }
+
+    fn add(&mut self, matrix: &DMatrix<f64>, factor: f64) {
+        let width = width(self.parameters);
+        for (row, own) in self.rows.slice_mut().chunks_exact_mut(width.max(1)).zip(matrix.column_iter()) {
+            row.iter_mut().zip(own.iter()).for_each(|(sum, v)| *sum += factor * v);
         }
     }
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
+
+    /// Adds factor Σ s sᵀ of rows to the lower triangle.
+    fn add_squares(&mut self, rows: &[f64], factor: f64) {
+        let width = width(self.parameters);
+        if width == 0 {
+            return;
+        }
+        let mut sum = Aligned::zeros(width * width);
+        let squares = Squares { rows, parameters: self.parameters, matrix: sum.slice_mut(), width };
+        Arch::new().dispatch(squares);
+        self.rows.slice_mut().iter_mut().zip(sum.slice()).for_each(|(total, s)| *total += factor * s);
+    }
+
+    /// Copies the lower triangle to the upper one.
+    fn mirror(&mut self) {
+        let width = width(self.parameters);
+        let rows = self.rows.slice_mut();
+        for i in 0..self.parameters {
+            for j in 0..i {
+                rows[j * width + i] = rows[i * width + j];
+            }
+        }
+    }
+
+    fn whole(&self) -> DMatrix<f64> {
+        let width = width(self.parameters);
+        let at = |i: usize, j: usize| self.rows.slice()[i.max(j) * width + i.min(j)];
+        DMatrix::from_fn(self.parameters, self.parameters, at)
+    }
+}
+
+/// Σ s sᵀ of rows into the lower triangle of a matrix.
+struct Squares<'a> {
+    rows: &'a [f64],
+    parameters: usize,
+    matrix: &'a mut [f64],
+    width: usize,
+}
+
+impl WithSimd for Squares<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let used: Vec<usize> = (0..self.width / VECTOR).map(|v| (self.parameters - v * VECTOR).min(VECTOR)).collect();
+        let rows = Rows { values: self.rows, stride: self.width, samples: self.rows.len() / self.width };
+        rows.add_squares(simd, &used, self.matrix, self.width);
+    }
+}
+
+/// Rows times a matrix, all of `width`; of the matrix there are as many rows as count.
+struct Product<'a> {
+    from: &'a [f64],
+    matrix: &'a [f64],
+    to: &'a mut [f64],
+    width: usize,
+}
+
+impl WithSimd for Product<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        if self.width == 0 {
+            return;
+        }
+        for (from, to) in self.from.chunks_exact(self.width).zip(self.to.chunks_exact_mut(self.width)) {
+            for lane in (0..self.width).step_by(S::F64_LANES) {
+                let mut sum = simd.splat_f64s(0.0);
+                for (i, row) in self.matrix.chunks_exact(self.width).enumerate() {
+                    sum = simd.mul_add_f64s(simd.splat_f64s(from[i]), load::<S>(row, lane), sum);
+                }
+                super::kernel::store::<S>(to, lane, sum);
+            }
+        }
+    }
+}
+
+/// Rows filtered by a process in place.
+struct Filter<'a> {
+    noise: &'a Autoregression,
+    series: &'a mut [f64],
+    width: usize,
+    back: bool,
+}
+
+impl WithSimd for Filter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        if self.width == 0 {
+        } else if self.back {
+            self.noise.filter_back(self.series, self.width);
+        } else {
+            self.noise.filter(self.series, self.width);
+        }
+    }
+}
+
+/// Σ a b, lane by lane and then over the lanes in one order whatever the processor's vectors.
+struct Dot<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+}
+
+impl WithSimd for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        const SUMS: usize = 4 * VECTOR;
+        let mut sums = [0.0; SUMS];
+        let (a, b) = (self.a.chunks_exact(SUMS), self.b.chunks_exact(SUMS));
+        let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+        for (a, b) in a.zip(b) {
+            for i in 0..SUMS {
+                sums[i] = a[i].mul_add(b[i], sums[i]);
+            }
+        }
+        sums.iter().sum::<f64>() + rest
+    }
 }
 
 #[cfg(test)]
@@ -276,14 +462,11 @@ mod tests {
         let count = used.iter().filter(|used| **used).count() as f64;
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
         let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
-        let series = Series {
-            step_s: 0.1,
-            weight,
-            variance: 0.0,
-            residuals: values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect(),
-            used: used.to_vec(),
-            sensitivities: used.iter().map(|used| of(*used, 1.0)).collect(),
-        };
+        let residuals: Vec<f64> = values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect();
+        let squares = DMatrix::from_element(1, 1, count);
+        let series = Series::new(0.1, weight, &residuals, used, squares, |samples, row| {
+            row[0] += used[samples].iter().map(|used| of(*used, 1.0)).sum::<f64>();
+        });
         covariance(&DMatrix::from_element(1, 1, 1.0 / (weight * count).sqrt()), vec![series])[(0, 0)]
     }
 

@@ -34,28 +34,16 @@ pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; 
     rows.map(|((z, used), y)| std::array::from_fn(|o| if used[o] { z[o] - y[o] } else { 0.0 })).collect()
 }
 
-/// Sums for weights W (on residuals in deg, deg/s and g).
+/// Sums of a response to the case's parameters for weights W (on residuals in deg, deg/s and g).
 #[must_use]
-pub fn sums(measurements: &Measurements, response: &Response, weights: &[f64; OUTPUTS], parameters: usize) -> Sums {
-    let mut sums = Sums {
-        weighted_square: 0.0,
-        gradient: DVector::zeros(parameters),
-        information: DMatrix::zeros(parameters, parameters),
-        count: 0,
-    };
-    for (sample, v) in residuals(measurements, response).iter().enumerate() {
-        for o in (0..OUTPUTS).filter(|&o| measurements.used[sample][o]) {
-            sums.count += 1;
-            sums.weighted_square += weights[o] * v[o] * v[o];
-            let s = response.sensitivity(sample, o);
-            for (g, s) in sums.gradient.iter_mut().zip(s) {
-                *g += weights[o] * v[o] * s;
-            }
-            add_square(&mut sums.information, weights[o], s);
-        }
+pub fn sums(response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
+    let normal = &response.normal;
+    Sums {
+        weighted_square: (0..OUTPUTS).map(|o| weights[o] * normal.square(o)).sum(),
+        gradient: normal.gradient(weights),
+        information: normal.information(weights),
+        count: (0..OUTPUTS).map(|o| normal.count(o)).sum(),
     }
-    sums.information.fill_upper_triangle_with_lower_triangle();
-    sums
 }
 
 /// Adds w s sᵀ to the lower triangle.

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::coloured;
-use super::cost::{add_square, sums};
+use super::cost::sums;
 use super::likelihood::Likelihood;
 use super::outcome::Fit;
 use crate::dynamics::{Equations, OUTPUTS};
@@ -85,22 +85,17 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
-/// Bounds of a fit whose information matrix has the inverse T Tᵀ.
+/// Bounds of a fit whose information matrix has the inverse T Tᵀ; none where the integration diverges.
 #[must_use]
-pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
-    let series = data.series(&fit.response, &fit.weights);
-    let n = root.nrows();
-    let mut white = DMatrix::zeros(n, n);
-    for output in &series {
-        let factor = output.weight * output.weight * output.variance;
-        output.sensitivities.chunks_exact(n).for_each(|s| add_square(&mut white, factor, s));
-    }
-    white.fill_upper_triangle_with_lower_triangle();
+pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Option<Bounds> {
+    let sensitivities = data.sensitivities(&fit.values).ok()?;
+    let series = data.series(&fit.response, &sensitivities, &fit.weights);
+    let white = data.white_covariance(&fit.response, &fit.weights);
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
-    let inputs = data.input_covariance(&fit.values, &fit.response, &fit.weights);
+    let inputs = data.input_covariance(&fit.values, &sensitivities, &fit.weights);
     let corrected = never_below(coloured::covariance(root, series), &covariance) + &inverse * inputs * &inverse;
-    Bounds { covariance, corrected }
+    Some(Bounds { covariance, corrected })
 }
 
 /// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
@@ -108,7 +103,10 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
 pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
     let information = data.sums(&fit.response, &fit.weights).information;
     match identified(&information, max_condition_number) {
-        Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
+        Identified::Determined { root, .. } => {
+            let sensitivities = data.sensitivities(&fit.values).ok()?;
+            Some(coloured::noise(&root, data.series(&fit.response, &sensitivities, &fit.weights)))
+        }
         Identified::Undetermined { .. } => None,
     }
 }
@@ -160,7 +158,7 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
         if wide.respond(&start, &mut response).is_err() {
             return;
         }
-        let information = sums(&wide.measurements, &response, &fit.weights, wide.parameters()).information;
+        let information = sums(&response, &fit.weights).information;
         let at = |name: &str| wide.names.iter().position(|n| n == name);
         let names = member.case.names.iter().zip(&member.places);
         let free: Vec<(usize, usize)> = names.filter_map(|(name, place)| Some((at(name)?, *place))).collect();

@@ -38,9 +38,11 @@ fn regress<const NX: usize, E: Equations<NX>>(
 ) -> Option<DVector<f64>> {
     let range = case.ranges[coefficient].clone();
     let mut regressors = vec![0.0; case.derivatives()];
+    let coefficients = case.with(prior);
     let (mut normal, mut right) = (DMatrix::zeros(range.len(), range.len()), DVector::zeros(range.len()));
     for (sample, (state, implied)) in case.states.iter().zip(&case.implied).enumerate() {
-        let (computed, _) = case.coefficients(2 * sample, prior, state, &mut regressors);
+        let computed = coefficients.at(2 * sample).with(state);
+        case.regressors_at(2 * sample, state, &mut regressors);
         let error = implied[coefficient] - computed[coefficient];
         let row = &regressors[range.clone()];
         add_square(&mut normal, 1.0, row);
@@ -109,9 +111,11 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
 /// At every sample the regressors of a coefficient, then the held part of it, then what the measured motion implies.
 fn rows<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usize, none: &[f64]) -> Vec<Vec<f64>> {
     let mut regressors = vec![0.0; case.derivatives()];
+    let coefficients = case.with(none);
     let samples = case.states.iter().zip(&case.implied).enumerate();
     let row = samples.map(|(sample, (state, implied))| {
-        let (held, _) = case.coefficients(2 * sample, none, state, &mut regressors);
+        let held = coefficients.at(2 * sample).with(state);
+        case.regressors_at(2 * sample, state, &mut regressors);
         let mut row = regressors[case.ranges[coefficient].clone()].to_vec();
         row.extend([held[coefficient], implied[coefficient]]);
         row

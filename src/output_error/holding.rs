@@ -76,8 +76,9 @@ impl Candidates {
     ) -> Option<Candidates> {
         let mut response = case.response();
         case.respond(values, &mut response).ok()?;
-        let information = sums(&case.measurements, &response, weights, case.parameters()).information;
-        let scatter = coloured::gradient_covariance(&case.series(&response, weights), noise);
+        let information = sums(&response, weights).information;
+        let sensitivities = case.sensitivities(values).ok()?;
+        let scatter = coloured::gradient_covariance(&case.series(&response, &sensitivities, weights), noise);
         Some(Candidates { information, scatter, uncertainty, max_condition_number })
     }
 

@@ -4,17 +4,24 @@
 //!
 //! The gradient Σ Sᵀ W v answers to an error of one sample of a surface through the outputs at once and through the states
 //! that it leaves behind: an adjoint λ = ∂(gradient)/∂(state), run backwards, has both. White noise of variance σ² then
-//! adds σ² Σ_k g_k g_kᵀ to the gradient's covariance.
+//! adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. However many surfaces there are, they reach the aircraft through three
+//! coefficients, so three vectors g a sample are enough.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
-use nalgebra::{DMatrix, DVector, Dyn, OMatrix, SMatrix};
+use nalgebra::{DMatrix, SMatrix};
+use pulp::{Arch, Simd, WithSimd};
 
-use super::case::{Case, surface_factor};
-use super::cost::add_square;
-use super::response::Response;
+use super::case::{Case, Coefficients, surface_factor};
+use super::kernel::{CHUNK, load, store};
+use super::lanes::{Aligned, VECTOR};
+use super::normal::Rows;
+use super::response::Sensitivities;
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::flight::signal;
 
 /// A surface with noise: how much, and what it acts on.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +54,7 @@ pub fn noisy_surfaces(
     free: &[&Derivative],
     held: &[(&Derivative, f64)],
 ) -> Vec<NoisySurface> {
-    let motion = window.motion(aircraft);
+    let qbar = window.signal(signal::QBAR);
     let free = free.iter().enumerate().map(|(j, d)| (*d, Value::Free(j)));
     let all: Vec<(&Derivative, Value)> = free.chain(held.iter().map(|(d, v)| (*d, Value::Held(*v)))).collect();
     let mut names: Vec<&str> = all.iter().filter_map(|(d, _)| d.regressor.surface()).collect();
@@ -60,7 +67,7 @@ pub fn noisy_surfaces(
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
-            factors: motion.iter().step_by(2).map(|m| surface_factor(aircraft, m, d)).collect(),
+            factors: qbar.iter().step_by(2).map(|qbar| surface_factor(aircraft, *qbar, d)).collect(),
         };
         (variance > 0.0).then(|| NoisySurface { variance, effects: acting.map(effect).collect() })
     };
@@ -74,8 +81,8 @@ pub fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
     let mut sizes: Vec<f64> =
         samples.windows(4).map(|u| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs()).filter(|d| d.is_finite()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let middle = sizes.len() / 2;
+    let median = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 
@@ -84,80 +91,177 @@ pub fn white_variance(samples: &[f64]) -> f64 {
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
-    response: &Response,
+    sensitivities: &Sensitivities,
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
-    let n = case.parameters();
-    let mut scatter = DMatrix::zeros(n, n);
-    if case.noisy_surfaces.is_empty() {
-        return scatter;
+    let (n, width) = (case.parameters(), sensitivities.width);
+    if case.noisy_surfaces.is_empty() || n == 0 {
+        return DMatrix::zeros(n, n);
     }
-    let mut regressors = vec![0.0; case.derivatives()];
-    let mut adjoint = OMatrix::<f64, nalgebra::Const<NX>, Dyn>::zeros(n);
-    for k in (0..case.samples()).rev() {
-        let x = &case.states[k];
-        let (c, c_by_state) = case.coefficients(2 * k, parameters, x, &mut regressors);
-        let rates = E::rates(&case.known[2 * k], x, &c);
-        let read = E::outputs(&case.known[2 * k], x, &c);
-        let weighted = weighted(case, response, weights, k);
-        let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * case.step_s;
-        let transition = SMatrix::<f64, NX, NX>::identity() + by_state + by_state * by_state * 0.5;
-        let later = transition.transpose() * &adjoint;
-        let now = (read.by_state + read.by_coefficient * c_by_state).transpose() * &weighted;
-        // A deflection is linear between samples: half of what it leaves behind is there at its own sample.
-        let by_coefficient = rates.by_coefficient.transpose() * (&later + &now * 0.5) * case.step_s
-            + read.by_coefficient.transpose() * &weighted;
-        for surface in &case.noisy_surfaces {
-            let answer = surface.answer(k, parameters, &by_coefficient);
-            add_square(&mut scatter, surface.variance, answer.as_slice());
-        }
-        adjoint = later + now;
-    }
-    scatter.fill_upper_triangle_with_lower_triangle();
-    scatter
+    let coefficients = case.with(parameters);
+    let mut scatter = Aligned::zeros(width * width);
+    let adjoint = Adjoint { case, coefficients, parameters, sensitivities, weights, scatter: scatter.slice_mut() };
+    Arch::new().dispatch(adjoint);
+    let at = |i: usize, j: usize| scatter.slice()[i.max(j) * width + i.min(j)];
+    DMatrix::from_fn(n, n, |i, j| at(sensitivities.lanes[i], sensitivities.lanes[j]))
 }
 
-/// W S of a sample, zero for outputs that do not count.
-fn weighted<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    response: &Response,
-    weights: &[f64; OUTPUTS],
-    sample: usize,
-) -> OMatrix<f64, nalgebra::Const<OUTPUTS>, Dyn> {
-    let used = &case.measurements.used[sample];
-    OMatrix::<f64, nalgebra::Const<OUTPUTS>, Dyn>::from_fn(case.parameters(), |o, j| {
-        if used[o] { weights[o] * response.sensitivity(sample, o)[j] } else { 0.0 }
-    })
+/// The adjoint's run from the last sample to the first.
+struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
+    case: &'a Case<NX, E>,
+    coefficients: Coefficients<NX>,
+    parameters: &'a [f64],
+    sensitivities: &'a Sensitivities,
+    weights: &'a [f64; OUTPUTS],
+    scatter: &'a mut [f64],
 }
 
-impl NoisySurface {
-    /// What the gradient does per deflection at one sample.
-    fn answer(
-        &self,
-        sample: usize,
-        parameters: &[f64],
-        by_coefficient: &OMatrix<f64, nalgebra::Const<COEFFICIENTS>, Dyn>,
-    ) -> DVector<f64> {
-        let mut answer = DVector::zeros(by_coefficient.ncols());
-        for effect in &self.effects {
-            let value = match effect.value {
-                Value::Free(j) => parameters[j],
-                Value::Held(value) => value,
-            };
-            let share = value * effect.factors[sample];
-            for (a, g) in answer.iter_mut().zip(by_coefficient.row(effect.coefficient).iter()) {
-                *a += share * g;
+/// What the adjoint needs to know of one sample.
+struct At<const NX: usize> {
+    /// How a state leaves its mark on that of the next sample.
+    transition: SMatrix<f64, NX, NX>,
+    /// Slopes of the outputs along states and coefficients, times the outputs' weights.
+    read: SMatrix<f64, OUTPUTS, NX>,
+    direct: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
+    /// What a coefficient leaves in the state over one step.
+    driven: SMatrix<f64, NX, COEFFICIENTS>,
+}
+
+impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let width = self.sensitivities.width;
+        let mut adjoint = Aligned::zeros(NX * width);
+        let adjoint = adjoint.slice_mut();
+        let mut rows = Aligned::zeros(CHUNK * COEFFICIENTS * width);
+        let rows = rows.slice_mut();
+        let whole = vec![VECTOR; width / VECTOR];
+        let samples = self.case.samples();
+        for k in (0..samples).rev() {
+            let at = self.at(k);
+            let root = root(&self.noise(k));
+            let row = k % CHUNK * COEFFICIENTS * width;
+            for lane in (0..width).step_by(S::F64_LANES) {
+                let mut by_coefficient = [simd.splat_f64s(0.0); COEFFICIENTS];
+                let (mut later, mut now) = ([simd.splat_f64s(0.0); NX], [simd.splat_f64s(0.0); NX]);
+                for o in 0..OUTPUTS {
+                    let s = load::<S>(self.sensitivities.row(k, o), lane);
+                    for i in 0..NX {
+                        now[i] = simd.mul_add_f64s(simd.splat_f64s(at.read[(o, i)]), s, now[i]);
+                    }
+                    for c in 0..COEFFICIENTS {
+                        let slope = simd.splat_f64s(at.direct[(o, c)]);
+                        by_coefficient[c] = simd.mul_add_f64s(slope, s, by_coefficient[c]);
+                    }
+                }
+                for j in 0..NX {
+                    let s = load::<S>(adjoint, j * width + lane);
+                    for i in 0..NX {
+                        later[i] = simd.mul_add_f64s(simd.splat_f64s(at.transition[(j, i)]), s, later[i]);
+                    }
+                }
+                for i in 0..NX {
+                    // A deflection is linear between samples: half of what it leaves behind is there at its own sample.
+                    let left = simd.mul_add_f64s(simd.splat_f64s(0.5), now[i], later[i]);
+                    for c in 0..COEFFICIENTS {
+                        let slope = simd.splat_f64s(at.driven[(i, c)]);
+                        by_coefficient[c] = simd.mul_add_f64s(slope, left, by_coefficient[c]);
+                    }
+                    store::<S>(adjoint, i * width + lane, simd.add_f64s(later[i], now[i]));
+                }
+                for c in 0..COEFFICIENTS {
+                    let mut answer = simd.splat_f64s(0.0);
+                    for d in c..COEFFICIENTS {
+                        answer = simd.mul_add_f64s(simd.splat_f64s(root[d][c]), by_coefficient[d], answer);
+                    }
+                    store::<S>(rows, row + c * width + lane, answer);
+                }
+            }
+            if k % CHUNK == 0 {
+                let samples = COEFFICIENTS * CHUNK.min(samples - k);
+                Rows { values: rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
             }
         }
-        answer
     }
+}
+
+impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
+    #[inline(always)]
+    fn at(&self, k: usize) -> At<NX> {
+        let case = self.case;
+        let x = &case.states[k];
+        let coefficients = self.coefficients.at(2 * k);
+        let c = coefficients.with(x);
+        let mut c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::zeros();
+        for k in 0..COEFFICIENTS {
+            for i in 0..NX {
+                c_by_state[(k, i)] = coefficients.slope[k][i];
+            }
+        }
+        let rates = E::rates(&case.known[2 * k], x, &c);
+        let read = E::outputs(&case.known[2 * k], &case.sensed[k], x, &c);
+        let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * case.step_s;
+        let mut at = At {
+            transition: SMatrix::identity() + by_state + by_state * by_state * 0.5,
+            read: read.by_state + read.by_coefficient * c_by_state,
+            direct: read.by_coefficient,
+            driven: rates.by_coefficient * case.step_s,
+        };
+        for o in 0..OUTPUTS {
+            at.read.row_mut(o).scale_mut(self.weights[o]);
+            at.direct.row_mut(o).scale_mut(self.weights[o]);
+        }
+        at
+    }
+
+    /// Covariance of the coefficients' errors at a sample: each surface's noise acts on all of them together.
+    #[inline(always)]
+    fn noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+        let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
+        for surface in &self.case.noisy_surfaces {
+            let mut shares = [0.0; COEFFICIENTS];
+            for effect in &surface.effects {
+                let value = match effect.value {
+                    Value::Free(j) => self.parameters[j],
+                    Value::Held(value) => value,
+                };
+                shares[effect.coefficient] += value * effect.factors[k];
+            }
+            for (c, row) in covariance.iter_mut().enumerate() {
+                for (d, v) in row.iter_mut().enumerate() {
+                    *v += surface.variance * shares[c] * shares[d];
+                }
+            }
+        }
+        covariance
+    }
+}
+
+/// L with L Lᵀ = a covariance (Cholesky), zero in a column where nothing is left.
+#[inline(always)]
+fn root(covariance: &[[f64; COEFFICIENTS]; COEFFICIENTS]) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+    let mut root = [[0.0; COEFFICIENTS]; COEFFICIENTS];
+    for j in 0..COEFFICIENTS {
+        for i in j..COEFFICIENTS {
+            let done: f64 = root[i].iter().zip(&root[j]).take(j).map(|(a, b)| a * b).sum();
+            let left = covariance[i][j] - done;
+            if i == j {
+                // Of fewer surfaces than coefficients rounding is all that is left.
+                root[j][j] = if left > 1e-14 * covariance[j][j] { left.sqrt() } else { 0.0 };
+            } else if root[j][j] > 0.0 {
+                root[i][j] = left / root[j][j];
+            }
+        }
+    }
+    root
 }
 
 #[cfg(test)]
 mod tests {
     use approx::assert_relative_eq;
 
-    use super::super::cost::sums;
     use super::super::tests::{Noise, SAMPLES, TABLE, nothing_measured, record, truth};
     use super::super::{InitialState, Model};
     use super::*;
@@ -213,16 +317,21 @@ mod tests {
         let mut response = case.response();
         case.respond(&parameters, &mut response).unwrap();
         case.measurements.values.clone_from(&response.outputs);
+        let sensitivities = case.sensitivities(&parameters).unwrap();
         let mut scatter = vec![0.0; parameters.len()];
         let mut flown = case.response();
         for _ in 0..draws {
             let other =
                 Case::<NX, E>::new(&aircraft(), &window(&noisy(sd_deg, &mut noise)), nothing_measured(), &model);
             other.respond(&parameters, &mut flown).unwrap();
-            let mut moved = response.clone();
-            moved.outputs.clone_from(&flown.outputs);
-            let gradient = sums(&case.measurements, &moved, &TABLE, parameters.len()).gradient;
-            for (s, g) in scatter.iter_mut().zip(gradient.iter()) {
+            let mut gradient = vec![0.0; parameters.len()];
+            for (k, (y, moved)) in response.outputs.iter().zip(&flown.outputs).enumerate() {
+                for o in 0..OUTPUTS {
+                    let v = y[o] - moved[o];
+                    gradient.iter_mut().enumerate().for_each(|(j, g)| *g += TABLE[o] * v * sensitivities.at(k, o, j));
+                }
+            }
+            for (s, g) in scatter.iter_mut().zip(&gradient) {
                 *s += g * g / f64::from(draws);
             }
         }
@@ -230,7 +339,7 @@ mod tests {
             case.names.iter().filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name)).collect();
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
-        let said = gradient_covariance(&case, &parameters, &response, &TABLE);
+        let said = gradient_covariance(&case, &parameters, &sensitivities, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
             let ratio = (scatter[j] / said[(j, j)]).sqrt();

@@ -11,7 +11,7 @@ use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::likelihood::Likelihood;
-use super::response::{Diverged, Response};
+use super::response::{Diverged, Response, Sensitivities};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Maneuvers with shared derivatives.
@@ -33,16 +33,6 @@ struct Member<'a, const NX: usize, E: Equations<NX>> {
 impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
     fn parameters(&self, joint: &[f64]) -> Vec<f64> {
         self.places.iter().map(|&place| joint[place]).collect()
-    }
-
-    /// A series with the sensitivities to all joint parameters, zero to those of other members.
-    fn widened(&self, series: Series, parameters: usize) -> Series {
-        let mut sensitivities = vec![0.0; series.used.len() * parameters];
-        let own = series.sensitivities.chunks_exact(self.places.len());
-        for (wide, own) in sensitivities.chunks_exact_mut(parameters).zip(own) {
-            self.places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
-        }
-        Series { sensitivities, ..series }
     }
 
     fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
@@ -120,6 +110,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 
 impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     type Response = Vec<Response>;
+    type Sensitivities = Vec<Sensitivities>;
 
     fn names(&self) -> &[String] {
         &self.names
@@ -140,12 +131,16 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         Ok(())
     }
 
+    fn sensitivities(&self, parameters: &[f64]) -> Result<Vec<Sensitivities>, Diverged> {
+        self.members.iter().map(|m| m.case.sensitivities(&m.parameters(parameters))).collect()
+    }
+
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
         let n = self.names.len();
         let mut sums =
             Sums { weighted_square: 0.0, gradient: DVector::zeros(n), information: DMatrix::zeros(n, n), count: 0 };
         for (member, response) in self.members.iter().zip(response) {
-            let own = cost::sums(&member.case.measurements, response, weights, member.case.parameters());
+            let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
             sums.count += own.count;
             for (g, &place) in own.gradient.iter().zip(&member.places) {
@@ -169,17 +164,37 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         std::array::from_fn(|o| squares[o] / f64::max(counts[o], 1.0))
     }
 
-    fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<Series> {
-        let members = self.members.iter().zip(response);
+    fn series(
+        &self,
+        response: &Vec<Response>,
+        sensitivities: &Vec<Sensitivities>,
+        weights: &[f64; OUTPUTS],
+    ) -> Vec<Series> {
+        let members = self.members.iter().zip(response.iter().zip(sensitivities));
         members
-            .flat_map(|(m, r)| m.case.series(r, weights).into_iter().map(|s| m.widened(s, self.names.len())))
+            .flat_map(|(m, (r, s))| {
+                m.case.series(r, s, weights).into_iter().map(|s| s.widened(&m.places, self.names.len()))
+            })
             .collect()
     }
 
-    fn input_covariance(&self, parameters: &[f64], response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+    fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
-        for (member, response) in self.members.iter().zip(response) {
-            member.add(&member.case.input_covariance(&member.parameters(parameters), response, weights), &mut sum);
+        for (member, own) in self.members.iter().zip(response) {
+            member.add(&member.case.white_covariance(own, weights), &mut sum);
+        }
+        sum
+    }
+
+    fn input_covariance(
+        &self,
+        parameters: &[f64],
+        sensitivities: &Vec<Sensitivities>,
+        weights: &[f64; OUTPUTS],
+    ) -> DMatrix<f64> {
+        let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
+        for (member, own) in self.members.iter().zip(sensitivities) {
+            member.add(&member.case.input_covariance(&member.parameters(parameters), own, weights), &mut sum);
         }
         sum
     }

@@ -16,8 +16,11 @@ pub mod holding;
 pub mod identifiability;
 pub mod input_noise;
 mod joint;
+mod kernel;
+mod lanes;
 pub mod mean;
 pub mod newton_raphson;
+mod normal;
 mod outcome;
 mod response;
 pub mod theil;
@@ -26,7 +29,7 @@ pub use case::{Case, InitialState, Measurements, Model};
 pub use joint::Joint;
 pub use likelihood::Likelihood;
 pub use outcome::{Fit, Outcome};
-pub use response::{Diverged, Response};
+pub use response::{Diverged, Response, Sensitivities};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -69,7 +69,7 @@ pub fn estimate<D: Likelihood>(
     resolution: [f64; OUTPUTS],
     settings: &Settings,
 ) -> Fit<D::Response> {
-    let mut fit = iterate(data, start, table, settings);
+    let mut fit = minimise(data, start, table, settings);
     if weights == Weights::Estimated {
         for _ in 0..WEIGHT_ROUNDS {
             if fit.outcome != Outcome::Converged {
@@ -81,7 +81,7 @@ pub fn estimate<D: Likelihood>(
                 break;
             }
             let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
-            fit = iterate(data, fit.values, next, settings);
+            fit = minimise(data, fit.values, next, settings);
             fit.iterations += iterations;
             fit.initial_cost = initial_cost;
         }
@@ -95,8 +95,14 @@ fn residual_weights<D: Likelihood>(data: &D, fit: &Fit<D::Response>, resolution:
     std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
 }
 
-/// The iteration from a start with fixed weights.
-fn iterate<D: Likelihood>(data: &D, start: Vec<f64>, weights: [f64; OUTPUTS], settings: &Settings) -> Fit<D::Response> {
+/// The iteration from a start with fixed weights, without bounds.
+#[must_use]
+pub fn minimise<D: Likelihood>(
+    data: &D,
+    start: Vec<f64>,
+    weights: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit<D::Response> {
     let (mut response, mut trial) = (data.response(), data.response());
     let mut fit = Fit {
         outcome: Outcome::NotConverged,
@@ -211,8 +217,7 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
         Identified::Determined { root, condition_number, .. } => {
             fit.condition_number = Some(condition_number);
             let bounds = cramer_rao::bounds(&root, data, fit);
-            fit.covariance = Some(bounds.covariance);
-            fit.covariance_corrected = Some(bounds.corrected);
+            (fit.covariance, fit.covariance_corrected) = bounds.map(|b| (b.covariance, b.corrected)).unzip();
         }
         Identified::Undetermined { condition_number, parameters } => {
             fit.condition_number = condition_number;

@@ -1,8 +1,8 @@
 //! The morning's question: what changed from one published night to another, and why.
 
-use crate::changes::{self, Changes};
 use crate::config::Config;
 use crate::error::{Error, Result};
+use crate::overnight::{self, Changes};
 use crate::store::{Night, Nights};
 
 use super::night::Published;
@@ -40,7 +40,7 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
         None => return Ok(Diff { night: night.name, changes: Changes::default() }),
     };
     let (a, b) = (Published::read(&nights, &before)?, Published::read(&nights, &night)?);
-    Ok(Diff { changes: changes::between(&before.name, &a.tables(), &b.tables()), night: night.name })
+    Ok(Diff { changes: overnight::between(&before.name, &a.tables(), &b.tables()), night: night.name })
 }
 
 /// Whether the changes of a night have been told already; from now on they have.

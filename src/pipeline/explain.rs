@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Flight, Found, Progress, Run};
+use super::{Flight, Progress, Run};
 use crate::config::Config;
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Estimated;
@@ -21,19 +21,21 @@ use crate::tables::EstimateRow;
 pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<String> {
     let files = archive::find(&config.archive)?;
     let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, Store::look(&config.store), contents, &files, progress);
+    let run = Run::new(config, Store::look(&config.store), contents, &files, progress)?;
     let mut known = Vec::new();
     // Ids begin with the flight's: of most flights nothing needs to be read.
     let (likely, others): (Vec<&FlightFiles>, Vec<&FlightFiles>) =
         files.iter().partition(|f| id.starts_with(f.flight_id.as_str()));
     for files in likely.into_iter().chain(others) {
         let Ok(content) = run.inputs.content(&files.flight_id) else { continue };
-        let Some(flight) = run.ingested(&files.flight_id, content) else { continue };
-        let Some(found) = run.store.load::<Found>(&run.segment_path(&flight)) else { continue };
-        if let Some(maneuver) = found.maneuvers.iter().find(|m| m.maneuver_id == id) {
-            return Ok(run.story(files, content, &flight, maneuver));
+        let Some(conditioned) = run.ingested(&files.flight_id, content) else { continue };
+        for flight in conditioned.stretches.iter().filter(|f| f.ingested.accepted) {
+            let Some((segment, found)) = run.segmented(flight) else { continue };
+            if let Some(maneuver) = found.maneuvers.iter().find(|m| m.maneuver_id == id) {
+                return Ok(run.story(files, content, flight, &segment, maneuver));
+            }
+            known.extend(found.maneuvers.into_iter().map(|m| m.maneuver_id));
         }
-        known.extend(found.maneuvers.into_iter().map(|m| m.maneuver_id));
     }
     let near = did_you_mean(id, known.iter().map(String::as_str));
     let what = format!("the store knows no maneuver `{id}`{near}; `harvest status` says whether it is up to date");
@@ -41,7 +43,14 @@ pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<Str
 }
 
 impl Run<'_> {
-    fn story(&self, files: &FlightFiles, content: &str, flight: &Flight, maneuver: &Maneuver) -> String {
+    fn story(
+        &self,
+        files: &FlightFiles,
+        content: &str,
+        flight: &Flight,
+        segment: &Path,
+        maneuver: &Maneuver,
+    ) -> String {
         let path = self.estimate_path(flight, maneuver);
         let mut text = String::new();
         origin(&mut text, self.config, maneuver);
@@ -60,7 +69,7 @@ impl Run<'_> {
         }
         line(&mut text, "content", content);
         line(&mut text, "record", &name(&flight.record));
-        line(&mut text, "segment", &name(&self.segment_path(flight)));
+        line(&mut text, "segment", &name(segment));
         line(&mut text, "estimate", &name(&path));
         let code = &self.lineage.code;
         line(&mut text, "code", &format!("harvest {} ({})", code.version, code.source));

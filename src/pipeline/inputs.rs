@@ -9,19 +9,23 @@ use serde_json::{Value, json};
 
 use super::{
     COMPARE_VERSION, ESTIMATE_VERSION, INGEST_VERSION, JOINT_VERSION, PREDICT_VERSION, Progress, Run, SEGMENT_VERSION,
-    TREND_VERSION, problem,
+    Shares, TREND_VERSION, comparison, problem,
 };
+use crate::compare::against::Earlier;
 use crate::config::Config;
-use crate::error::Problem;
+use crate::error::{Error, Problem, Result};
 use crate::lineage::{Code, Lineage, Stage};
+use crate::report::SourceFile;
 use crate::store::archive::FlightFiles;
-use crate::store::{Contents, Fingerprint, Store};
+use crate::store::{Contents, Digest, Fingerprint, Store};
 
 /// The content of the archive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inputs {
     /// Fingerprint of each flight's content, or why there is none.
-    contents: BTreeMap<String, Result<String, String>>,
+    contents: BTreeMap<String, std::result::Result<String, String>>,
+    /// All files that could be read, the tunnel's table at the end.
+    pub sources: Vec<SourceFile>,
     /// Files that are no flight of their own.
     pub problems: Vec<Problem>,
 }
@@ -38,6 +42,11 @@ impl Inputs {
         let contents: Vec<_> = files.par_iter().map(of_flight).collect();
         progress.end();
         let mut inputs = Inputs::default();
+        let contents = contents.into_iter().zip(files).map(|(digests, flight)| {
+            inputs.sources.extend(flight.files.iter().zip(digests.iter().flatten()).map(|(f, d)| source_file(f, d)));
+            digests.map(|digests| Fingerprint::of("flight", 1).with(&digests).finish())
+        });
+        let contents: Vec<std::result::Result<String, String>> = contents.collect();
         let mut first: BTreeMap<String, &str> = BTreeMap::new();
         for (flight, content) in files.iter().zip(contents) {
             let id = flight.flight_id.as_str();
@@ -56,8 +65,13 @@ impl Inputs {
 
     /// A flight of which there are two records: where they are the same bytes one is left out, else nobody knows which
     /// is right.
-    fn among_rivals(&mut self, flight: &FlightFiles, content: String, known: &Contents) -> Result<String, String> {
-        let own: Vec<String> = flight.files.iter().filter_map(|file| known.of(file).ok()).collect();
+    fn among_rivals(
+        &mut self,
+        flight: &FlightFiles,
+        content: String,
+        known: &Contents,
+    ) -> std::result::Result<String, String> {
+        let own: Vec<Digest> = flight.files.iter().filter_map(|file| known.of(file).ok()).collect();
         for rival in &flight.rivals {
             if !known.of(rival).is_ok_and(|content| own.contains(&content)) {
                 return Err(format!(
@@ -76,7 +90,7 @@ impl Inputs {
     ///
     /// # Errors
     /// Why there is none.
-    pub fn content(&self, flight_id: &str) -> Result<&str, &str> {
+    pub fn content(&self, flight_id: &str) -> std::result::Result<&str, &str> {
         match self.contents.get(flight_id) {
             Some(Ok(content)) => Ok(content),
             Some(Err(reason)) => Err(reason),
@@ -90,13 +104,19 @@ pub(super) fn place(flight: &FlightFiles) -> String {
     flight.files.first().map_or_else(String::new, |file| file.display().to_string())
 }
 
-/// The fingerprint over the contents of a flight's files in their order.
-fn content(flight: &FlightFiles, known: &Contents) -> Result<String, String> {
+/// What a flight's files hold, in their order.
+fn content(flight: &FlightFiles, known: &Contents) -> std::result::Result<Vec<Digest>, String> {
     // Reasons name no folder: they are among what tells nights apart.
-    let name = |file: &Path| file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let of_file = |file: &PathBuf| known.of(file).map_err(|why| format!("the file {} {why}", name(file)));
-    let contents: Vec<String> = flight.files.iter().map(of_file).collect::<Result<_, _>>()?;
-    Ok(Fingerprint::of("flight", 1).with(&contents).finish())
+    flight.files.iter().map(of_file).collect()
+}
+
+fn name(file: &Path) -> String {
+    file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+fn source_file(file: &Path, digest: &Digest) -> SourceFile {
+    SourceFile { name: name(file), bytes: digest.bytes, blake3: digest.blake3.clone() }
 }
 
 impl<'a> Run<'a> {
@@ -106,10 +126,15 @@ impl<'a> Run<'a> {
         contents: Contents,
         files: &[FlightFiles],
         progress: &'a dyn Progress,
-    ) -> Run<'a> {
-        let inputs = Inputs::gather(files, &contents, progress);
-        let lineage = lineage(config, &inputs);
-        Run { config, store, progress, contents, inputs, lineage, shelves: BTreeMap::new(), tonight: None }
+    ) -> Result<Run<'a>> {
+        let earlier = comparison::earlier(config)?;
+        let mut inputs = Inputs::gather(files, &contents, progress);
+        let tunnel = contents.of(&config.wind_tunnel).map_err(|why| Error::config(&config.wind_tunnel, None, why))?;
+        inputs.sources.push(source_file(&config.wind_tunnel, &tunnel));
+        let lineage = lineage(config, &inputs, &earlier);
+        let shares = Shares::of(config.ingest.memory_mb, config.channels.len(), rayon::current_num_threads());
+        let (shelves, tonight) = (BTreeMap::new(), None);
+        Ok(Run { config, store, progress, shares, contents, inputs, earlier, lineage, shelves, tonight })
     }
 }
 
@@ -127,7 +152,7 @@ fn fingerprint(table: &impl Serialize) -> String {
 }
 
 /// What decides this run's results.
-fn lineage(config: &Config, inputs: &Inputs) -> Lineage {
+fn lineage(config: &Config, inputs: &Inputs, earlier: &[Earlier]) -> Lineage {
     let methods = [
         ("ingest", INGEST_VERSION),
         ("segment", SEGMENT_VERSION),
@@ -152,6 +177,10 @@ fn lineage(config: &Config, inputs: &Inputs) -> Lineage {
         configuration: configuration(config),
         flights: flights.chain(copies).collect(),
         tables: [
+            (
+                Stage::Compare,
+                earlier.iter().map(|e| (format!("trends in {}", e.name), fingerprint(&e.trends))).collect(),
+            ),
             (Stage::Segment, [("analyst's list of events".to_owned(), fingerprint(&config.events))].into()),
             (Stage::Estimate, [("wind-tunnel table".to_owned(), fingerprint(&config.tunnel))].into()),
         ]

@@ -3,18 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Deserializer};
-
 use super::{Campaign, REPORT, Run, Stage, inputs};
-use crate::changes::{self, Changes, Window};
 use crate::config::Config;
 use crate::error::{Error, Problem, Result};
 use crate::lineage::Lineage;
 use crate::maneuver::Maneuver;
+use crate::overnight::{self, Changes, Window};
 use crate::store::nights::{Night, Nights, Summary};
 use crate::store::table::{self, Shelf};
-use crate::store::{atomic, files};
-use crate::tables::{ComparisonRow, EstimateRow, FitRow, TrendRow};
+use crate::store::{Fingerprint, atomic, files};
+use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
 
 /// What changed since the night before, for machines: among the published files of a complete night.
 pub const ALERT: &str = "alert.json";
@@ -62,70 +60,8 @@ pub struct Published {
     maneuvers: Vec<Window>,
     fits: Vec<FitRow>,
     estimates: Vec<EstimateRow>,
-    trends: Vec<TrendRow>,
-    comparison: Vec<ComparisonRow>,
-}
-
-/// A number of a published table; one that does not exist is an empty field there, and no number here.
-fn number<'de, D: Deserializer<'de>>(field: D) -> std::result::Result<f64, D::Error> {
-    Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
-}
-
-/// What is compared of a row of `trends`.
-#[derive(Deserialize)]
-struct TrendPoint {
-    derivative: String,
-    group: String,
-    alpha_deg: f64,
-    #[serde(deserialize_with = "number")]
-    value: f64,
-    #[serde(deserialize_with = "number")]
-    standard_error: f64,
-}
-
-/// What is compared of a row of `comparison`.
-#[derive(Deserialize)]
-struct VerdictPoint {
-    derivative: String,
-    group: String,
-    alpha_deg: f64,
-    verdict: String,
-}
-
-impl From<TrendPoint> for TrendRow {
-    fn from(p: TrendPoint) -> TrendRow {
-        TrendRow {
-            derivative: p.derivative,
-            unit: String::new(),
-            group: p.group,
-            alpha_deg: p.alpha_deg,
-            value: p.value,
-            standard_error: p.standard_error,
-            lower_95: f64::NAN,
-            upper_95: f64::NAN,
-            maneuvers: 0,
-            order: 0,
-            scatter: f64::NAN,
-        }
-    }
-}
-
-impl From<VerdictPoint> for ComparisonRow {
-    fn from(p: VerdictPoint) -> ComparisonRow {
-        ComparisonRow {
-            derivative: p.derivative,
-            unit: String::new(),
-            group: p.group,
-            alpha_deg: p.alpha_deg,
-            flight: f64::NAN,
-            standard_error: f64::NAN,
-            wind_tunnel: None,
-            difference: None,
-            difference_pct: None,
-            z: None,
-            verdict: p.verdict,
-        }
-    }
+    trends: Vec<PublishedTrend>,
+    verdicts: Vec<PublishedVerdict>,
 }
 
 impl Published {
@@ -134,31 +70,28 @@ impl Published {
     /// # Errors
     /// [`Error::Io`] or [`Error::Config`] naming the table that cannot be read.
     pub fn read(nights: &Nights, night: &Night) -> Result<Published> {
-        fn rows<T: serde::de::DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
-            files::published(&folder.join(format!("{table}.csv")))
-        }
         let folder = nights.folder(&night.name);
-        let mut estimates: Vec<EstimateRow> = rows(&folder, "estimates")?;
+        let mut estimates: Vec<EstimateRow> = files::published(&folder, "estimates")?;
         estimates.retain(|e| e.flight_id != "joint");
         Ok(Published {
             lineage: night.lineage.clone(),
-            maneuvers: rows(&folder, "maneuvers")?,
-            fits: rows(&folder, "fits")?,
+            maneuvers: files::published(&folder, "maneuvers")?,
+            fits: files::published(&folder, "fits")?,
             estimates,
-            trends: rows::<TrendPoint>(&folder, "trends")?.into_iter().map(TrendRow::from).collect(),
-            comparison: rows::<VerdictPoint>(&folder, "comparison")?.into_iter().map(ComparisonRow::from).collect(),
+            trends: files::published(&folder, "trends")?,
+            verdicts: files::published(&folder, "comparison")?,
         })
     }
 
     #[must_use]
-    pub fn tables(&self) -> changes::Tables<'_> {
-        changes::Tables {
+    pub fn tables(&self) -> overnight::Tables<'_> {
+        overnight::Tables {
             lineage: &self.lineage,
             maneuvers: &self.maneuvers,
             fits: &self.fits,
             estimates: &self.estimates,
             trends: &self.trends,
-            comparison: &self.comparison,
+            verdicts: &self.verdicts,
         }
     }
 }
@@ -203,8 +136,10 @@ pub fn stated(path: &Path) -> Result<(Stage, Lineage)> {
 
 /// What the report prints beside numbers.
 fn shown(config: &Config) -> BTreeMap<String, String> {
-    let tunnel = config.wind_tunnel.display().to_string();
-    [("archive".to_owned(), config.archive.clone()), ("wind tunnel".to_owned(), tunnel)].into()
+    let named = [("archive", config.archive.clone()), ("wind tunnel", config.wind_tunnel.display().to_string())];
+    let named = named.map(|(what, name)| (what.to_owned(), name));
+    let text = |(name, text): &(String, String)| (name.clone(), Fingerprint::of("text", 1).with(text).finish());
+    config.files.iter().map(text).chain(named).collect()
 }
 
 fn window(maneuver: &Maneuver) -> Window {
@@ -220,9 +155,14 @@ fn window(maneuver: &Maneuver) -> Window {
 impl Run<'_> {
     /// Makes tonight's folder the place of all tables.
     pub(super) fn publish_into(&mut self, tonight: PathBuf) {
-        let shelf = |stage: Stage| (stage, Shelf::of(&tonight).with(provenance(&self.lineage, stage)));
+        let shelf = |stage: Stage| (stage, self.shelf_in(&tonight, stage));
         self.shelves = Stage::ALL.into_iter().map(shelf).collect();
         self.tonight = Some(tonight);
+    }
+
+    /// A folder for tables that say what decides this stage.
+    pub(super) fn shelf_in(&self, folder: &Path, stage: Stage) -> Shelf {
+        Shelf::of(folder).with(provenance(&self.lineage, stage))
     }
 
     /// Where the tables of a stage go.
@@ -269,15 +209,17 @@ impl Run<'_> {
             None => Changes::default(),
             Some((before, night)) => {
                 let windows: Vec<Window> = campaign.maneuvers.iter().map(window).collect();
-                let now = changes::Tables {
+                let trends: Vec<PublishedTrend> = campaign.trends.iter().map(PublishedTrend::from).collect();
+                let verdicts: Vec<PublishedVerdict> = campaign.comparison.iter().map(PublishedVerdict::from).collect();
+                let now = overnight::Tables {
                     lineage: &self.lineage,
                     maneuvers: &windows,
                     fits: &campaign.fits,
                     estimates: &campaign.estimates,
-                    trends: &campaign.trends,
-                    comparison: &campaign.comparison,
+                    trends: &trends,
+                    verdicts: &verdicts,
                 };
-                changes::between(&night.name, &before.tables(), &now)
+                overnight::between(&night.name, &before.tables(), &now)
             }
         };
         self.place_tonight(ALERT, &serde_json::to_vec_pretty(&changes).unwrap_or_default())?;
@@ -287,21 +229,19 @@ impl Run<'_> {
     /// Publishes what lies in tonight's folder.
     pub(super) fn publish(&self, nights: &Nights, campaign: &Campaign, until: Stage) -> Result<Done> {
         let mut lineage = self.lineage.clone();
-        for flight in campaign.flights.iter().filter(|f| f.artefact.is_none()) {
-            let reasons: Vec<&str> = flight.ingested.problems.iter().map(|p| p.reason.as_str()).collect();
-            lineage.flights.insert(flight.flight_id.clone(), inputs::refused(&reasons.join("; ")));
-        }
+        let unread = campaign.unread.iter().map(|(flight, why)| (flight.clone(), inputs::refused(why)));
+        lineage.flights.extend(unread);
         let summary = Summary {
             flights: campaign.flights.len(),
             refused: campaign.refused(),
             maneuvers: campaign.maneuvers.len(),
             converged: campaign.converged(),
             problems: campaign.problems.clone(),
-            alert: campaign.changes.alert,
+            alert: campaign.overnight.alert,
         };
         let tonight = Night {
             until,
-            since: campaign.changes.since.clone(),
+            since: campaign.overnight.since.clone(),
             shown: shown(self.config),
             lineage,
             summary,

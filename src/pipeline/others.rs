@@ -16,7 +16,7 @@ use crate::estimate::prediction::{self, Predicted};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
-use crate::store::{record_file, table};
+use crate::store::table;
 use crate::tables::{EstimateRow, FitRow, JointRow, PredictedRow};
 
 /// The name of an artefact, which carries its fingerprint; not where it lies.
@@ -132,7 +132,7 @@ impl Run<'_> {
     }
 }
 
-/// The parts of the records that hold these maneuvers; each flight is read once.
+/// The parts of the records that hold these maneuvers.
 fn parts(campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize, Record>> {
     let of_flight = |id: &str| -> Vec<usize> {
         wanted.iter().copied().filter(|&i| campaign.maneuvers[i].flight_id == id).collect()
@@ -142,12 +142,12 @@ fn parts(campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize
         if wanted.is_empty() {
             return Ok(vec![]);
         }
-        let record = record_file::read(&flight.record)?;
+        let record = flight.open()?;
         let part = |&i: &usize| {
             let maneuver = &campaign.maneuvers[i];
-            (i, record.part(maneuver.start_s, maneuver.end_s))
+            Ok((i, record.part(None, maneuver.start_s, maneuver.end_s)?))
         };
-        Ok(wanted.iter().map(part).collect())
+        wanted.iter().map(part).collect()
     };
     let parts: Result<Vec<Vec<(usize, Record)>>> = flights.par_iter().map(read).collect();
     Ok(parts?.into_iter().flatten().collect())

@@ -7,11 +7,19 @@ use super::{Campaign, Flight, Progress, Run, begin};
 use crate::aero::Regressor;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result, did_you_mean};
+use crate::flight::is_stretch;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::report::chart::{self, FlightView, Groups, ManeuverView};
 use crate::store::archive::FlightFiles;
-use crate::store::{atomic, record_file};
+use crate::store::atomic;
+
+/// A flight of more samples than this is drawn by the smallest and the largest of several: far more than a picture has
+/// columns.
+const DRAWN: usize = 1 << 18;
+
+/// What of the record around a maneuver is at hand for its picture, s.
+const AROUND_S: f64 = 30.0;
 
 /// What is to be seen.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,7 +79,7 @@ fn unknown(config: &Config, what: String) -> Error {
 }
 
 fn known_flight(config: &Config, id: &str, files: &[FlightFiles]) -> Result<()> {
-    if files.iter().any(|f| f.flight_id == id) {
+    if files.iter().any(|f| is_stretch(id, &f.flight_id)) {
         return Ok(());
     }
     let near = did_you_mean(id, files.iter().map(|f| f.flight_id.as_str()));
@@ -92,13 +100,16 @@ fn known_maneuver(config: &Config, id: &str, campaign: &Campaign) -> Result<()> 
 
 impl Run<'_> {
     fn draw_flight(&self, campaign: &Campaign, id: &str) -> Result<String> {
-        let record = record_file::read(&self.flight(campaign, id)?.record)?;
+        let file = self.flight(campaign, id)?.open()?;
+        let (record, recorded) = (file.outline(DRAWN)?, (file.about.samples, file.about.step_s));
         let events: Vec<_> = campaign.events.iter().filter(|e| e.flight_id == id).cloned().collect();
         Ok(chart::flight(&FlightView {
             aircraft: &self.config.aircraft.name,
             record: &record,
+            recorded,
             groups: &groups(self.config),
             maneuvers: &of_flight(campaign, id),
+            unknown: &campaign.unknown.iter().filter(|u| u.flight_id == id).cloned().collect::<Vec<_>>(),
             events: &events,
             problems: &about(campaign, |p| p.flight_id == id),
         }))
@@ -107,7 +118,8 @@ impl Run<'_> {
     fn draw_maneuver(&self, campaign: &Campaign, id: &str) -> Result<String> {
         let of_both = campaign.maneuvers.iter().zip(&campaign.fits).find(|(m, _)| m.maneuver_id == id);
         let (maneuver, fit) = of_both.ok_or_else(|| unknown(self.config, format!("there is no maneuver `{id}`")))?;
-        let record = record_file::read(&self.flight(campaign, &maneuver.flight_id)?.record)?;
+        let file = self.flight(campaign, &maneuver.flight_id)?.open()?;
+        let record = file.part(None, maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S)?;
         // Computed again rather than stored, as for the report.
         let history = if fit.outcome == Outcome::Rejected.name() {
             None

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::{Flight, Found, Progress, Run, Stage, inputs};
+use super::{Campaign, Progress, Run, Stage, inputs, stretches};
 use crate::config::Config;
 use crate::error::Result;
 use crate::estimate::Estimated;
+use crate::flight::is_stretch;
 use crate::lineage::{Lineage, Origin};
-use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::{Contents, Nights, Store};
@@ -60,13 +60,19 @@ impl Status {
 pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
     let files = archive::find(&config.archive)?;
     let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, Store::look(&config.store), contents, &files, progress);
+    let run = Run::new(config, Store::look(&config.store), contents, &files, progress)?;
     let nights = Nights::look(&config.reports);
     let current = nights.current();
     let before = current.as_ref().map(|night| &night.lineage);
-    let (ingest, flights) = run.ingest_status(&files, before);
-    let (segment, maneuvers) = run.segment_status(&flights, before);
-    let estimate = run.estimate_status(&maneuvers, before);
+    let mut campaign = Campaign::default();
+    let ingest = run.ingest_status(&files, &mut campaign, before);
+    let segment = run.segment_status(&ingest, &mut campaign, before);
+    let mut estimate = run.estimate_status(&campaign, before);
+    let there = run.store.artefacts();
+    let needed = current.iter().flat_map(|night| night.artefacts.keys());
+    for gone in needed.filter(|name| !there.contains_key(*name)) {
+        estimate.stale("it is gone from the store", gone);
+    }
     let mut stages = vec![ingest, segment, estimate];
     for stage in [Stage::Trend, Stage::Compare, Stage::Report] {
         let mut status = StageStatus::new(stage);
@@ -94,7 +100,7 @@ impl Run<'_> {
         let Some(before) = before else { return "not made yet".to_owned() };
         let counts = |c: &&crate::lineage::Cause| {
             if c.origin == Origin::Flight {
-                return c.subject == flight_id;
+                return is_stretch(flight_id, &c.subject);
             }
             let mut path = c.subject.split('.');
             let of_class = path.next() == Some("classes");
@@ -105,69 +111,58 @@ impl Run<'_> {
         if words.is_empty() { "its artefact is missing or damaged".to_owned() } else { words.join("; ") }
     }
 
-    fn ingest_status(&self, files: &[FlightFiles], before: Option<&Lineage>) -> (StageStatus, Vec<Option<Flight>>) {
+    fn ingest_status(&self, files: &[FlightFiles], campaign: &mut Campaign, before: Option<&Lineage>) -> StageStatus {
         let mut status = StageStatus::new(Stage::Ingest);
-        let mut flights = Vec::new();
         for file in files {
             let id = &file.flight_id;
             match self.inputs.content(id).map(|content| self.ingested(id, content)) {
                 Err(reason) => status.failed.push((id.clone(), format!("{}: {reason}", inputs::place(file)))),
-                Ok(Some(flight)) => {
+                Ok(Some(conditioned)) => {
                     status.fresh += 1;
-                    if !flight.ingested.accepted {
-                        let reasons = flight.ingested.problems.iter().map(|p| format!("{}: {}", p.place, p.reason));
-                        status.failed.push((id.clone(), reasons.collect::<Vec<_>>().join("; ")));
-                    }
-                    flights.push(Some(flight));
+                    campaign.flights.extend(conditioned.stretches);
                 }
-                Ok(None) => {
-                    status.stale(&self.why(Stage::Ingest, id, None, before), id);
-                    flights.push(None);
-                }
+                Ok(None) => status.stale(&self.why(Stage::Ingest, id, None, before), id),
             }
         }
-        (status, flights)
+        stretches::same_rows(campaign);
+        for flight in campaign.flights.iter().filter(|f| !f.ingested.accepted) {
+            let reasons = flight.ingested.problems.iter().map(|p| format!("{}: {}", p.place, p.reason));
+            status.failed.push((flight.flight_id.clone(), reasons.collect::<Vec<_>>().join("; ")));
+        }
+        status
     }
 
-    fn segment_status(
-        &self,
-        flights: &[Option<Flight>],
-        before: Option<&Lineage>,
-    ) -> (StageStatus, Vec<(Flight, Maneuver)>) {
+    fn segment_status(&self, ingest: &StageStatus, campaign: &mut Campaign, before: Option<&Lineage>) -> StageStatus {
         let mut status = StageStatus::new(Stage::Segment);
+        for id in ingest.stale.values().flatten() {
+            status.stale("its flight is stale", id);
+        }
         let mut maneuvers = Vec::new();
-        for flight in flights {
-            let Some(flight) = flight else {
-                status.stale("its flight is stale", "a flight");
+        for flight in campaign.flights.iter().filter(|f| f.ingested.accepted) {
+            let id = &flight.flight_id;
+            let Some((_, found)) = self.segmented(flight) else {
+                status.stale(&self.why(Stage::Segment, id, None, before), id);
                 continue;
             };
-            if !flight.ingested.accepted {
-                continue;
-            }
-            match self.store.load::<Found>(&self.segment_path(flight)) {
-                Some(found) => {
-                    status.fresh += 1;
-                    status.failed.extend(
-                        found.problems.into_iter().map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason))),
-                    );
-                    maneuvers.extend(found.maneuvers.into_iter().map(|m| (flight.clone(), m)));
-                }
-                None => {
-                    status.stale(&self.why(Stage::Segment, &flight.flight_id, None, before), &flight.flight_id);
-                }
-            }
+            status.fresh += 1;
+            let failed = found.problems.into_iter().map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason)));
+            status.failed.extend(failed);
+            maneuvers.extend(found.maneuvers);
         }
-        (status, maneuvers)
+        campaign.maneuvers = maneuvers;
+        stretches::leave_out_same(campaign);
+        status
     }
 
-    fn estimate_status(&self, maneuvers: &[(Flight, Maneuver)], before: Option<&Lineage>) -> StageStatus {
+    fn estimate_status(&self, campaign: &Campaign, before: Option<&Lineage>) -> StageStatus {
         let mut status = StageStatus::new(Stage::Estimate);
-        for (flight, maneuver) in maneuvers {
+        for maneuver in &campaign.maneuvers {
             let id = &maneuver.maneuver_id;
-            if let Some(estimated) = self.store.load::<Estimated>(&self.estimate_path(flight, maneuver)) {
+            let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
+            let estimated = flight.and_then(|f| self.store.load::<Estimated>(&self.estimate_path(f, maneuver)));
+            if let Some(Estimated { fit, .. }) = estimated {
                 status.fresh += 1;
-                if estimated.fit.outcome != Outcome::Converged.name() {
-                    let fit = estimated.fit;
+                if fit.outcome != Outcome::Converged.name() {
                     status.failed.push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
                 }
             } else {

@@ -1,11 +1,16 @@
 //! Whether what is published still holds: its bytes, what it is made of, and what it was made from.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
 use super::night::stated;
 use super::{Progress, Run};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::{Lineage, Stage};
-use crate::store::{Contents, Nights, Store, archive};
+use crate::store::{Contents, Digest, Night, Nights, Store, archive};
 
 /// What is said of one published file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,7 +52,7 @@ pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress:
         Error::store(&config.reports, &format!("there is no such night here; there are {}", nights.names().join(", ")))
     })?;
     let files = archive::find(&config.archive)?;
-    let run = Run::new(config, Store::look(&config.store), Contents::forgetful(), &files, progress);
+    let run = Run::new(config, Store::look(&config.store), Contents::forgetful(), &files, progress)?;
     let damaged = nights.damaged(&night);
     let stem = |file: &str| file.split('.').next().unwrap_or_default().to_owned();
     if let Some(unknown) = tables.iter().find(|t| !night.files.keys().any(|f| stem(f) == **t || f == *t)) {
@@ -73,9 +78,23 @@ pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress:
     };
     Ok(Verified {
         files: night.files.keys().filter(asked).map(finding).collect(),
-        artefacts: night.artefacts.keys().filter(|name| !run.store.is_whole(name)).cloned().collect(),
+        artefacts: run.damaged(&night),
         night: night.name,
     })
+}
+
+impl Run<'_> {
+    /// The artefacts of a night that are not as they were written; a record is held against its flight's artefact.
+    fn damaged(&self, night: &Night) -> Vec<String> {
+        let records: BTreeMap<PathBuf, Digest> = night.artefacts.keys().flat_map(|name| self.recorded(name)).collect();
+        let is_whole = |name: &String| match name.starts_with("records/") {
+            true => records.get(Path::new(name)).is_some_and(|digest| {
+                Digest::of_file(&self.store.folder().join(name)).is_ok_and(|found| found == *digest)
+            }),
+            false => self.store.is_whole(name),
+        };
+        night.artefacts.par_iter().map(|(name, _)| name).filter(|name| !is_whole(name)).cloned().collect()
+    }
 }
 
 /// What is no longer as a table of a stage states.

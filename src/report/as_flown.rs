@@ -44,7 +44,7 @@ pub fn triangles(contents: &Contents) -> Vec<TriangleView> {
         let alpha = angle(history.alpha_deg);
         (!pairs.is_empty()).then(|| triangle(&history.class, alpha, &pairs, contents.limits.correlation))
     };
-    histories::shown(contents).into_iter().filter_map(view).collect()
+    histories::typical(contents).into_iter().filter_map(view).collect()
 }
 
 fn triangle(class: &str, alpha: String, pairs: &[&CorrelationRow], flag: f64) -> TriangleView {

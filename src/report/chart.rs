@@ -12,7 +12,7 @@ use super::scale::{Scale, extent};
 use super::summary::outcome_in_words;
 use crate::error::Problem;
 use crate::flight::{Mark, Record, signal};
-use crate::maneuver::{Class, Maneuver};
+use crate::maneuver::{Class, Maneuver, Unknown};
 use crate::tables::{EventRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
@@ -64,8 +64,12 @@ pub struct Groups {
 pub struct FlightView<'a> {
     pub aircraft: &'a str,
     pub record: &'a Record,
+    /// How many samples were recorded and the step between them, s: the record at hand may be an outline.
+    pub recorded: (usize, f64),
     pub groups: &'a Groups,
     pub maneuvers: &'a [Maneuver],
+    /// Excitation that fits no class.
+    pub unknown: &'a [Unknown],
     /// The analyst's list against what was found; empty without a list.
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
@@ -91,13 +95,14 @@ pub struct ManeuverView<'a> {
 pub fn flight(view: &FlightView) -> String {
     let record = view.record;
     let (from_s, to_s) = (record.time_s(0), record.time_s(record.samples.saturating_sub(1)));
-    let room = PITCH * view.maneuvers.len() as f64;
+    let room = PITCH * (view.maneuvers.len() + view.unknown.len()) as f64;
     let pen = Pen::new(record, (from_s, to_s), (from_s, to_s), room.clamp(COLUMNS.0, COLUMNS.1));
     let (recorded, lacking): (Vec<_>, Vec<_>) =
         flight_signals(view.groups).into_iter().partition(|(name, _)| record.values(name).is_some());
     let strips: Vec<Strip> = recorded.iter().filter_map(|(name, look)| pen.strip(name, *look, &[])).collect();
     let lacking: Vec<&str> = lacking.iter().map(|l| l.0).collect();
     let mut notes = notes(&lacking, &[], &strips);
+    notes.extend(rejected(view.maneuvers));
     notes.extend(problems(view.problems));
     let maneuvers = super::notation::count(view.maneuvers.len(), "maneuver");
     let lasting = format!("{} to {} s", fixed(from_s, 1), fixed(to_s, 1));
@@ -106,13 +111,13 @@ pub fn flight(view: &FlightView) -> String {
         description: format!("Strip chart of flight {}, {lasting}, with {maneuvers} shaded.", record.flight_id),
         heading: vec![format!(
             "{lasting}, {} samples of {} s, {maneuvers}",
-            record.samples,
-            number(Some(record.step_s), 3)
+            view.recorded.0,
+            number(Some(view.recorded.1), 3)
         )],
         legend: legend(&strips, !view.maneuvers.is_empty(), !view.events.is_empty(), false),
         time: pen.time,
         width: room.max(pen.columns.count as f64),
-        windows: view.maneuvers.iter().map(|m| window(m, view.events)).collect(),
+        windows: windows(view),
         lanes: lanes(view.events),
         strips,
         notes,
@@ -253,7 +258,11 @@ impl Pen<'_> {
             scale,
             traces: vec![self.trace(record.start_s, &series.values, scale, look)],
             dots: vec![],
-            marks: Marks { bridged: of(Mark::Bridged), despiked: of(Mark::Despiked), missing: of(Mark::Missing) },
+            marks: Marks {
+                bridged: of(Mark::Bridged),
+                despiked: of(Mark::Despiked),
+                missing: [of(Mark::Missing), of(Mark::Stuck)].concat(),
+            },
         })
     }
 
@@ -320,7 +329,8 @@ fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
             && e.given_start_s.is_some_and(|s| (s - maneuver.start_s).abs() < 1.0)
     };
     let verdict = events.iter().find(same).map(|e| e.verdict.as_str()).filter(|v| *v != "agrees");
-    let label = format!("{} {}", maneuver.class, maneuver.maneuver_id);
+    let rejected = if maneuver.is_rejected() { ", rejected" } else { "" };
+    let label = format!("{} {}{rejected}", maneuver.class, maneuver.maneuver_id);
     Window {
         maneuver_id: maneuver.maneuver_id.clone(),
         class: maneuver.class.clone(),
@@ -328,6 +338,31 @@ fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
         start_s: maneuver.start_s,
         end_s: maneuver.end_s,
     }
+}
+
+/// Everything that is shaded in a flight, in order of time.
+fn windows(view: &FlightView) -> Vec<Window> {
+    let unknown = view.unknown.iter().map(|u| Window {
+        maneuver_id: String::new(),
+        class: "unknown".to_owned(),
+        label: format!("unknown, nearest to {}", u.nearest_class),
+        start_s: u.start_s,
+        end_s: u.end_s,
+    });
+    let mut windows: Vec<Window> = view.maneuvers.iter().map(|m| window(m, view.events)).chain(unknown).collect();
+    windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    windows
+}
+
+/// Why maneuvers were rejected before they were estimated.
+fn rejected(maneuvers: &[Maneuver]) -> Vec<String> {
+    let rejected: Vec<&Maneuver> = maneuvers.iter().filter(|m| m.is_rejected()).collect();
+    let line = |m: &&Maneuver| format!("{} {} is rejected: {}", m.class, m.maneuver_id, m.quality.reason);
+    let mut lines: Vec<String> = rejected.iter().take(MOST_PROBLEMS).map(line).collect();
+    if rejected.len() > MOST_PROBLEMS {
+        lines.push(format!("and {} more in the table `maneuvers`", rejected.len() - MOST_PROBLEMS));
+    }
+    lines
 }
 
 /// The analyst's list and what was found, where there is a list.

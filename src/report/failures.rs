@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Contents;
 use super::notation::{NOTHING, angle, fixed, number};
 use super::summary::{fits_by_maneuver, outcome_in_words};
-use crate::tables::ChannelRow;
+use crate::tables::{ChannelRow, InstrumentRow};
 
 /// A table of the page: a title that says how much is in it, the heads, and cells of plain text.
 #[derive(Clone, Debug, Serialize)]
@@ -16,13 +16,43 @@ pub struct TableView {
     pub note: String,
     pub heads: Vec<String>,
     pub rows: Vec<Vec<String>>,
+    /// Whether each column is of numbers, which stand right.
+    pub numeric: Vec<bool>,
+    /// Where each row's first cell leads, and the class it is hidden with; empty where no row has any.
+    pub links: Vec<String>,
+    pub classes: Vec<String>,
 }
 
 impl TableView {
     pub fn new(title: &str, note: &str, heads: &[&str], rows: Vec<Vec<String>>) -> TableView {
         let title = format!("{title} ({})", rows.len());
-        TableView { title, note: note.to_owned(), heads: heads.iter().map(|h| (*h).to_owned()).collect(), rows }
+        let numeric = (0..heads.len()).map(|i| is_numeric(rows.iter().filter_map(|row| row.get(i)))).collect();
+        TableView {
+            title,
+            note: note.to_owned(),
+            heads: heads.iter().map(|h| (*h).to_owned()).collect(),
+            rows,
+            numeric,
+            links: vec![],
+            classes: vec![],
+        }
     }
+}
+
+/// Whether cells are numbers or nothing, and one of them a number.
+fn is_numeric<'a>(cells: impl Iterator<Item = &'a String>) -> bool {
+    let is_number = |c: &str| {
+        let bare = c.replace('\u{2212}', "-");
+        bare.trim_end_matches(['%', '°', ' ']).parse::<f64>().is_ok()
+    };
+    let mut some = false;
+    for cell in cells.filter(|c| !c.is_empty() && *c != NOTHING) {
+        if !is_number(cell) {
+            return false;
+        }
+        some = true;
+    }
+    some
 }
 
 /// Whether a check of the records passed, or could not be made for want of excitation.
@@ -34,7 +64,14 @@ pub fn is_check_passed(verdict: &str) -> bool {
 /// The tables of what went wrong; those without rows are left out.
 #[must_use]
 pub fn tables(contents: &Contents) -> Vec<TableView> {
-    let tables = [problems(contents), fits(contents), events(contents), checks(contents), channels(contents)];
+    let tables = [
+        problems(contents),
+        fits(contents),
+        events(contents),
+        checks(contents),
+        instruments(contents),
+        channels(contents),
+    ];
     tables.into_iter().filter(|t| !t.rows.is_empty()).collect()
 }
 
@@ -91,13 +128,50 @@ fn checks(contents: &Contents) -> TableView {
     TableView::new("Checks between channels that failed", note, &heads, rows)
 }
 
+/// What the instruments were found to be off by, over the flights.
+fn instruments(contents: &Contents) -> TableView {
+    let mut of: BTreeMap<(&str, &str), Vec<&InstrumentRow>> = BTreeMap::new();
+    let told = |r: &&InstrumentRow| r.verdict != "not excited";
+    for row in contents.instruments.iter().filter(told) {
+        of.entry((&row.channel, &row.unit)).or_default().push(row);
+    }
+    let rows = of
+        .into_iter()
+        .map(|((channel, unit), rows)| {
+            let range = |value: fn(&InstrumentRow) -> Option<f64>, digits: usize| {
+                let values = || rows.iter().filter_map(|r| value(r));
+                match (values().reduce(f64::min), values().reduce(f64::max)) {
+                    (Some(least), Some(most)) => format!("{} \u{2026} {}", fixed(least, digits), fixed(most, digits)),
+                    _ => NOTHING.to_owned(),
+                }
+            };
+            let corrected = rows.iter().filter(|r| !r.applied.is_empty()).count();
+            let faults = rows.iter().filter(|r| !is_check_passed(&r.verdict)).count();
+            vec![
+                channel.to_owned(),
+                unit.to_owned(),
+                rows.len().to_string(),
+                corrected.to_string(),
+                faults.to_string(),
+                range(|r| r.bias, 3),
+                range(|r| r.scale, 4),
+                range(|r| r.delay_s.map(|d| 1e3 * d), 0),
+            ]
+        })
+        .collect();
+    let heads = ["channel", "unit", "flights", "corrected", "faults", "bias", "scale", "delay, ms"];
+    let note = "From the kinematic equations alone, least and most over the flights; each with its bound is in the table \
+                `instruments`.";
+    TableView::new("Instruments", note, &heads, rows)
+}
+
 /// Channels that were repaired or are not as they should be, summed over the flights with the same verdict.
 fn channels(contents: &Contents) -> TableView {
-    let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 4])> = BTreeMap::new();
+    let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 5])> = BTreeMap::new();
     for c in contents.channels.iter().filter(|c| is_noteworthy(c)) {
         let (flights, counts) = sums.entry((&c.channel, &c.signal, &c.verdict)).or_default();
         *flights += 1;
-        for (sum, n) in counts.iter_mut().zip([c.samples, c.bridged, c.despiked, c.missing]) {
+        for (sum, n) in counts.iter_mut().zip([c.samples, c.bridged, c.despiked, c.missing, c.stuck]) {
             *sum += n;
         }
     }
@@ -108,11 +182,11 @@ fn channels(contents: &Contents) -> TableView {
             [words.to_vec(), counts.map(|n| n.to_string()).to_vec(), vec![verdict.to_owned()]].concat()
         })
         .collect();
-    let heads = ["channel", "signal", "flights", "samples", "bridged", "despiked", "missing", "verdict"];
-    let note = "Short dropouts bridged, single-sample spikes replaced, samples left missing: summed over the flights.";
+    let heads = ["channel", "signal", "flights", "samples", "bridged", "despiked", "missing", "stuck", "verdict"];
+    let note = "Short dropouts bridged, single-sample spikes replaced, samples left missing or left out as stuck: summed over the flights.";
     TableView::new("Channels repaired or in doubt", note, &heads, rows)
 }
 
 fn is_noteworthy(c: &ChannelRow) -> bool {
-    c.bridged + c.despiked + c.missing > 0 || !is_check_passed(&c.verdict)
+    c.bridged + c.despiked + c.missing + c.stuck > 0 || !is_check_passed(&c.verdict)
 }

@@ -1,10 +1,11 @@
 //! The figures, as SVG to stand in the page: the only module that knows the plotting crate. A derivative over angle of
-//! attack in the manner of the paper's Figures 5-7 and 13-16, a panel of a time history as in Figures 4 and 12, and the
-//! strip charts of flights and maneuvers ([`strips`]).
+//! attack in the manner of the paper's Figures 5-7 and 13-16, strips of time histories as in the others ([`stack`]), and
+//! the strip charts of flights and maneuvers ([`strips`]).
 //!
 //! The crate draws paper, axes, lines and band. The marks and bars of the estimates are one path per class in the
 //! crate's own scene: it draws bars over hollow marks otherwise, and each with an element of its own.
 
+pub mod stack;
 pub mod strips;
 
 use std::fmt::Write;
@@ -23,10 +24,9 @@ use super::marks::Mark;
 use super::notation::{Digits, escaped};
 use super::scale::Scale;
 
-/// Width of a figure in its own units. At half a page (90 mm) a unit is 0.67 pt, so that 14 is over 9 pt.
-const WIDTH: f64 = 380.0;
-const HEIGHT: f64 = 256.0;
-const PANEL_HEIGHT: f64 = 164.0;
+/// Width of a figure in its own units. On a page (178 mm) a unit is 0.84 pt, so that 14 is over 11 pt.
+const WIDTH: f64 = 600.0;
+const HEIGHT: f64 = 350.0;
 /// Room above and below the frame: half a line of text for the topmost tick label, and ticks and label of the x axis.
 const MARGINS: (f64, f64) = (9.0, 44.0);
 const TEXT: u32 = 14;
@@ -47,6 +47,8 @@ pub struct DerivativeFigure<'a> {
     /// Unique in the page.
     pub id: &'a str,
     pub title: &'a str,
+    /// What those are told who do not see it.
+    pub description: &'a str,
     pub y_label: String,
     pub alpha: Scale,
     pub scale: Scale,
@@ -61,31 +63,10 @@ pub struct DerivativeFigure<'a> {
 #[derive(Clone, Debug)]
 pub struct ClassEstimates {
     pub mark: Mark,
+    /// What the class is hidden with.
+    pub token: String,
     /// α, value and bound of each.
     pub estimates: Vec<(f64, f64, f64)>,
-}
-
-/// One panel of a time history.
-#[derive(Clone, Debug)]
-pub struct Panel<'a> {
-    pub id: &'a str,
-    pub title: &'a str,
-    pub y_label: String,
-    pub time: Scale,
-    pub scale: Scale,
-    pub lines: Vec<PanelLine>,
-    /// Measured samples, and those of them that were left out of the cost.
-    pub dots: Vec<(f64, f64)>,
-    pub left_out: Vec<(f64, f64)>,
-}
-
-/// One line of a panel.
-#[derive(Clone, Debug)]
-pub struct PanelLine {
-    pub points: Vec<(f64, f64)>,
-    pub colour: &'static str,
-    /// SVG dash array; empty for a solid line.
-    pub dash: &'static str,
 }
 
 /// The figure of a derivative.
@@ -96,22 +77,15 @@ pub fn derivative(figure: &DerivativeFigure) -> String {
     let place = ComputedLayout::from_layout(&layout());
     let pen = Pen { place: &place, scale: figure.scale };
     for class in &figure.classes {
+        scene.add(Primitive::GroupStart {
+            transform: None,
+            title: None,
+            extra_attrs: Some(format!(r#"data-class="{}""#, class.token)),
+        });
         pen.estimates(&mut scene, class.mark, &class.estimates);
+        scene.add(Primitive::GroupEnd);
     }
-    inline(&SvgBackend::new().render_scene(&scene), figure.id, figure.title)
-}
-
-/// A panel of a time history: measured samples as dots, computed ones as a line.
-#[must_use]
-pub fn panel(panel: &Panel) -> String {
-    let layout = || layout("time, s", &panel.y_label, PANEL_HEIGHT, panel.time, panel.scale);
-    let lines = panel.lines.iter().map(|line| Plot::Line(curve(&line.points, line.colour, 1.4, line.dash)));
-    let mut scene = render_multiple(std::iter::once(nothing()).chain(lines).collect(), layout());
-    let place = ComputedLayout::from_layout(&layout());
-    let pen = Pen { place: &place, scale: panel.scale };
-    pen.dots(&mut scene, &panel.left_out, LEFT_OUT_COLOUR, 4.0);
-    pen.dots(&mut scene, &panel.dots, MEASURED_COLOUR, 2.6);
-    inline(&SvgBackend::new().render_scene(&scene), panel.id, panel.title)
+    inline(&SvgBackend::new().render_scene(&scene), figure.id, figure.title, figure.description)
 }
 
 fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layout {
@@ -230,19 +204,6 @@ impl Pen<'_> {
             edge + tail
         );
     }
-
-    /// Dots behind everything else in the plot area: the computed line stays in sight on top of the measured samples.
-    fn dots(&self, scene: &mut Scene, points: &[(f64, f64)], colour: &str, size: f64) {
-        let mut path = String::new();
-        for &(t, value) in points.iter().filter(|p| self.scale.contains(p.1)) {
-            let (x, y, r) = (self.place.map_x(t), self.place.map_y(value), 0.5 * size);
-            let _ = write!(path, "M{:.1} {:.1}h{size}v{size}h-{size}z", x - r, y - r);
-        }
-        let begin = scene.elements.iter().position(|e| matches!(e, Primitive::ClipStart { .. }));
-        if let (Some(begin), false) = (begin, path.is_empty()) {
-            scene.elements.insert(begin + 1, path_of(path, "none", 0.0, Some(colour)));
-        }
-    }
 }
 
 fn stroke(scene: &mut Scene, d: String, colour: &str, width: f64, fill: Option<&str>) {
@@ -264,12 +225,13 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
 
 /// Makes a drawing of the crate fit to stand in a page with others: it scales with its column, says its title to those
 /// who do not see it, has ids of its own, and no digits beyond a hundredth.
-fn inline(svg: &str, id: &str, title: &str) -> String {
+fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);
     let height = svg.split_once(" height=\"").and_then(|(_, rest)| rest.split_once('"')).map_or("0", |(h, _)| h);
     let head = format!(
-        r#"<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{}" font-family="{FONT}">"#,
-        escaped(title)
+        r#"<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-labelledby="{id}-t {id}-d" font-family="{FONT}"><title id="{id}-t">{}</title><desc id="{id}-d">{}</desc>"#,
+        escaped(title),
+        escaped(description)
     );
     head + &shortened(&own_clips(body, id))
 }
@@ -306,6 +268,7 @@ mod tests {
         DerivativeFigure {
             id: "d3",
             title: "CN_alpha <flight>",
+            description: "two estimates",
             y_label: "CN_alpha, per deg".into(),
             alpha: Scale { min: 0.0, max: 60.0, step: 10.0 },
             scale: Scale { min: 0.0, max: 0.1, step: 0.02 },
@@ -313,8 +276,12 @@ mod tests {
             trend: vec![(5.0, 0.05), (60.0, 0.03)],
             tunnel: vec![(5.0, 0.055), (60.0, 0.02)],
             classes: vec![
-                ClassEstimates { mark: Mark::nth(0), estimates: vec![(10.0, 0.05, 0.01), (20.0, 3.0, 0.2)] },
-                ClassEstimates { mark: Mark::nth(1), estimates: vec![] },
+                ClassEstimates {
+                    mark: Mark::nth(0),
+                    token: "c1".into(),
+                    estimates: vec![(10.0, 0.05, 0.01), (20.0, 3.0, 0.2)],
+                },
+                ClassEstimates { mark: Mark::nth(1), token: "c2".into(), estimates: vec![] },
             ],
         }
     }

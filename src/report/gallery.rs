@@ -5,14 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::Contents;
+use super::failures::TableView;
 use super::figure::{self, ClassEstimates, DerivativeFigure};
 use super::marks::{LegendView, Mark, key, line};
 use super::notation::{self, count};
 use super::scale::{Scale, Shown, extent};
 use super::subject::{Subject, by_name};
+use super::verdict;
 use crate::aero::{Axis, Coefficient};
 
-/// A figure with its legend and caption.
+/// A derivative's page: its figure with legend and caption, what flight says against the tunnel, and the numbers of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct FigureView {
     pub anchor: String,
@@ -22,6 +24,9 @@ pub struct FigureView {
     pub svg: String,
     pub legend: Vec<LegendView>,
     pub caption: String,
+    /// The verdicts in words; empty where nothing was compared.
+    pub phrase: String,
+    pub comparison: Option<TableView>,
 }
 
 /// The figures of one coefficient.
@@ -38,21 +43,26 @@ pub fn anchors<'a>(subjects: &[Subject<'a>]) -> BTreeMap<&'a str, String> {
     subjects.iter().enumerate().map(|(i, s)| (s.name, format!("d{}", i + 1))).collect()
 }
 
-/// The classes with their marks, in the order of the configuration: a class's mark is its place among those of its axis.
-fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
+/// The classes with their marks, in the order of the configuration, axis by axis: one mark per class throughout.
+pub fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
     let mut marks: Vec<(&str, Mark)> = Vec::new();
     for axis in [Axis::Longitudinal, Axis::Lateral] {
         let configured = contents.classes.iter().filter(|c| c.2 == axis).map(|c| c.0.as_str());
         let flown: BTreeSet<&str> =
             contents.maneuvers.iter().filter(|m| m.axis == axis).map(|m| m.class.as_str()).collect();
-        let before = marks.len();
         for class in configured.chain(flown) {
             if marks.iter().all(|(known, _)| *known != class) {
-                marks.push((class, Mark::nth(marks.len() - before)));
+                marks.push((class, Mark::nth(marks.len())));
             }
         }
     }
     marks
+}
+
+/// What a class is called in the page where it is hidden: a word that needs no escaping; nothing for an unknown class.
+#[must_use]
+pub fn token(marks: &[(&str, Mark)], class: &str) -> String {
+    marks.iter().position(|m| m.0 == class).map_or_else(String::new, |i| format!("c{}", i + 1))
 }
 
 /// The scale over angle of attack that all figures share, so that they can be laid side by side.
@@ -101,6 +111,7 @@ fn figure_view(subject: &Subject, anchor: String, number: usize, alpha: Scale, m
     let svg = figure::derivative(&DerivativeFigure {
         id: &anchor,
         title: &format!("{} over angle of attack", subject.name),
+        description: &description(subject),
         y_label: label(subject.name, &notation::unit(subject.unit)),
         alpha,
         scale,
@@ -117,6 +128,12 @@ fn figure_view(subject: &Subject, anchor: String, number: usize, alpha: Scale, m
         svg,
         legend: classes.chain(lines_legend(subject)).collect(),
         caption: caption(subject, scale),
+        phrase: if subject.is_compared() {
+            verdict::phrase(&verdict::runs(&subject.comparison))
+        } else {
+            String::new()
+        },
+        comparison: subject.is_compared().then(|| super::comparison(subject)),
         anchor,
     }
 }
@@ -139,9 +156,31 @@ fn drawn<'a>(subject: &'a Subject, marks: &[(&'a str, Mark)]) -> Vec<Drawn<'a>> 
         .filter_map(|(name, mark)| {
             let points = by_class.get(name)?.iter();
             let estimates = points.map(|p| (p.alpha_deg, p.value, p.bound)).collect();
-            Some(Drawn { name, estimates: ClassEstimates { mark, estimates } })
+            Some(Drawn { name, estimates: ClassEstimates { mark, token: token(marks, name), estimates } })
         })
         .collect()
+}
+
+/// The figure for those who do not see it: what is in it, and where trend and tunnel begin and end.
+fn description(subject: &Subject) -> String {
+    let classes: BTreeSet<&str> = subject.points.iter().map(|p| p.class).collect();
+    let classes: Vec<&str> = classes.into_iter().collect();
+    let mut said = vec![format!("{} of {}", count(subject.points.len(), "estimate"), classes.join(", "))];
+    let ends = |name: &str, first: Option<(f64, f64)>, last: Option<(f64, f64)>| {
+        let ((a, from), (b, to)) = (first?, last?);
+        let value = |v: f64| notation::number(Some(v), 3);
+        Some(format!(
+            "{name} from {} at {} to {} at {}",
+            value(from),
+            notation::angle(a),
+            value(to),
+            notation::angle(b)
+        ))
+    };
+    let trend = |row: &&&crate::tables::TrendRow| (row.alpha_deg, row.value);
+    said.extend(ends("trend", subject.trend.first().as_ref().map(trend), subject.trend.last().as_ref().map(trend)));
+    said.extend(ends("wind tunnel", subject.tunnel.first().copied(), subject.tunnel.last().copied()));
+    said.join("; ") + "."
 }
 
 /// The label of an axis.

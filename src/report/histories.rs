@@ -1,75 +1,101 @@
-//! The time histories of a few maneuvers, measured against computed, as in the paper's Figures 4 and 12.
+//! The time history of a maneuver: inputs, and outputs measured and computed with their residuals, as in the paper's
+//! Figures 4 and 12.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
 
 use super::Contents;
-use super::figure::{self, Panel, PanelLine};
-use super::gallery::{finite, label};
+use super::figure::stack::{self, Stack, Strip, StripLine};
+use super::figure::{self};
 use super::marks::{LegendView, key, line};
 use super::notation::{angle, without_unit};
 use super::scale::{Scale, extent};
 use super::subject::by_name;
 use crate::tables::{History, HistoryOutput};
+use crate::units::Unit;
 
-/// So many samples are drawn of one signal at most: more cannot be told apart at half a page.
-const MOST_SAMPLES: usize = 300;
+/// Width of a maneuver's drawing: two columns.
+const WIDTH: f64 = 800.0;
+const OUTPUT: f64 = 48.0;
+const RESIDUAL: f64 = 18.0;
+const INPUT: f64 = 42.0;
+/// An input that moves less than this share of the one that moves most is not drawn.
+const HARDLY: f64 = 0.1;
+/// More inputs than these make the column longer than that of the outputs.
+const MOST_INPUTS: usize = 9;
 
-/// The time history of one maneuver.
-#[derive(Clone, Debug, Serialize)]
-pub struct HistoryView {
-    pub maneuver_id: String,
-    pub class: String,
-    pub alpha: String,
-    pub panels: Vec<String>,
-    pub legend: Vec<LegendView>,
-}
-
+/// The maneuver that stands for its class: the converged one nearest to the configured angle of attack.
 #[must_use]
-pub fn views(contents: &Contents) -> Vec<HistoryView> {
-    shown(contents).into_iter().enumerate().map(|(i, history)| history_view(history, i + 1)).collect()
-}
-
-/// One maneuver of each class: the one whose angle of attack is in the middle of its class.
-#[must_use]
-pub fn shown<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
+pub fn typical<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
+    let outcomes: BTreeMap<&str, &str> =
+        contents.fits.iter().map(|f| (f.maneuver_id.as_str(), f.outcome.as_str())).collect();
+    let has_converged = |h: &&History| outcomes.get(h.maneuver_id.as_str()) == Some(&"converged");
+    let off = |h: &History| (h.alpha_deg - contents.typical_alpha_deg).abs();
     let of_class = by_name(contents.histories, |h| &h.class);
     let configured: Vec<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
     let others = of_class.keys().copied().filter(|c| !configured.contains(c));
-    configured.iter().copied().chain(others).filter_map(|class| middle(of_class.get(class)?)).collect()
+    let nearest = |class: &str| {
+        let own = of_class.get(class)?.iter().copied().filter(has_converged);
+        own.min_by(|a, b| off(a).total_cmp(&off(b)).then_with(|| a.maneuver_id.cmp(&b.maneuver_id)))
+    };
+    configured.iter().copied().chain(others).filter_map(nearest).collect()
 }
 
-fn middle<'a>(histories: &[&'a History]) -> Option<&'a History> {
-    let mut sorted = histories.to_vec();
-    sorted.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg).then_with(|| a.maneuver_id.cmp(&b.maneuver_id)));
-    sorted.get(sorted.len() / 2).copied()
-}
+/// So many samples are kept of one signal at most: more cannot be told apart in a column.
+const MOST_SAMPLES: usize = 240;
 
-fn history_view(history: &History, number: usize) -> HistoryView {
-    let (moved, controls) = controls(history);
-    let outputs = history.outputs.iter().enumerate().map(|(i, output)| output_panel(history, output, number, i));
-    let mut panels: Vec<String> = outputs.collect();
-    let time = time_scale(history);
-    if !moved.is_empty() {
-        let scale = lines_scale(&moved, &[]);
-        let id = format!("h{number}-controls");
-        panels.push(figure::panel(&Panel {
-            id: &id,
-            title: &format!("controls of {}", history.maneuver_id),
-            y_label: "controls, change".to_owned(),
-            time,
-            scale,
-            lines: moved,
-            dots: vec![],
-            left_out: vec![],
-        }));
-    }
-    HistoryView {
+/// A history as the report draws it: every so many samples, with the digits that a drawing can show, and beside them each
+/// sample that was left out of the cost.
+#[must_use]
+pub fn thinned(history: &History) -> History {
+    let step = history.time_s.len().div_ceil(MOST_SAMPLES).max(1);
+    let is_marked = |i: usize| history.outputs.iter().any(|o| o.marked.get(i).copied().unwrap_or(false));
+    let kept: Vec<usize> = (0..history.time_s.len()).filter(|i| i % step == 0 || is_marked(*i)).collect();
+    let of = |values: &[f64]| kept.iter().map(|i| values.get(*i).map_or(f64::NAN, |v| rounded(*v))).collect();
+    let output = |o: &HistoryOutput| HistoryOutput {
+        label: o.label.clone(),
+        unit: o.unit.clone(),
+        measured: of(&o.measured),
+        computed: of(&o.computed),
+        marked: kept.iter().map(|i| o.marked.get(*i).copied().unwrap_or(false)).collect(),
+    };
+    History {
         maneuver_id: history.maneuver_id.clone(),
         class: history.class.clone(),
-        alpha: angle(history.alpha_deg),
-        panels,
-        legend: history_legend(history).into_iter().chain(controls).collect(),
+        alpha_deg: history.alpha_deg,
+        time_s: of(&history.time_s),
+        outputs: history.outputs.iter().map(output).collect(),
+        controls: history.controls.iter().map(|(name, values)| (name.clone(), of(values))).collect(),
     }
+}
+
+/// Six significant digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// The drawing of a maneuver: outputs with residuals on the left, inputs on the right.
+#[must_use]
+pub fn drawing(history: &History, id: String) -> String {
+    let outputs: Vec<Strip> = history.outputs.iter().flat_map(|output| output_strips(history, output)).collect();
+    let mut inputs = inputs(history);
+    inputs.truncate(MOST_INPUTS);
+    let names: Vec<&str> = history.outputs.iter().map(|o| without_unit(&o.label)).collect();
+    let moved: Vec<String> = inputs.iter().map(|s| s.name.clone()).collect();
+    let columns = if inputs.is_empty() { vec![outputs] } else { vec![outputs, inputs] };
+    stack::draw(&Stack {
+        id,
+        title: format!("Time history of {}", history.maneuver_id),
+        description: format!(
+            "{} at alpha {}: measured and computed {}, each with its residual below it; inputs {}.",
+            history.class,
+            angle(history.alpha_deg),
+            names.join(", "),
+            if moved.is_empty() { "none that moved".to_owned() } else { moved.join(", ") },
+        ),
+        width: WIDTH,
+        time: time_scale(history),
+        columns,
+    })
 }
 
 /// Time from the first sample, s.
@@ -78,98 +104,92 @@ fn seconds(history: &History) -> impl Iterator<Item = f64> {
     history.time_s.iter().map(move |t| t - start)
 }
 
-fn time_scale(history: &History) -> Scale {
+/// The time axis of a history.
+#[must_use]
+pub fn time_scale(history: &History) -> Scale {
     let duration_s = extent(seconds(history)).map_or(1.0, |(_, last)| last);
     let scale = Scale::covering(0.0, duration_s.max(1e-3));
     Scale { max: duration_s.max(1e-3), ..scale }
 }
 
-fn output_panel(history: &History, output: &HistoryOutput, number: usize, i: usize) -> String {
-    let step = thinning(history.time_s.len());
-    let of = |values: &[f64]| finite(seconds(history).zip(values.iter().copied()));
-    let every = |points: Vec<(f64, f64)>| points.into_iter().step_by(step).collect::<Vec<_>>();
+/// A signal's samples with their times, those that are numbers.
+#[must_use]
+pub fn points(history: &History, values: &[f64]) -> Vec<(f64, f64)> {
+    super::gallery::finite(seconds(history).zip(values.iter().copied()))
+}
+
+/// A scale for lines in a strip of a few ticks.
+#[must_use]
+pub fn scale_of(lines: &[&[(f64, f64)]], steps: f64) -> Scale {
+    let (low, high) = extent(lines.iter().flat_map(|l| l.iter().map(|p| p.1))).unwrap_or((0.0, 1.0));
+    Scale::in_steps(low, high, steps)
+}
+
+fn output_strips(history: &History, output: &HistoryOutput) -> [Strip; 2] {
     let is_marked = |i: usize| output.marked.get(i).copied().unwrap_or(false);
-    let measured = seconds(history).zip(output.measured.iter().copied()).enumerate();
-    let (left_out, kept): (Vec<_>, Vec<_>) = measured.partition(|(i, _)| is_marked(*i));
-    let bare = |points: Vec<(usize, (f64, f64))>| finite(points.into_iter().map(|(_, p)| p));
-    let (left_out, kept) = (bare(left_out), bare(kept));
-    let lines = vec![PanelLine { points: every(of(&output.computed)), colour: figure::INK, dash: "" }];
-    let scale = lines_scale(&lines, &kept);
-    let id = format!("h{number}-{}", i + 1);
-    figure::panel(&Panel {
-        id: &id,
-        title: &format!("{} of {}", output.label, history.maneuver_id),
-        y_label: label(without_unit(&output.label), &output.unit),
-        time: time_scale(history),
+    let kept: Vec<f64> =
+        output.measured.iter().enumerate().map(|(i, v)| if is_marked(i) { f64::NAN } else { *v }).collect();
+    let left_out: Vec<f64> =
+        output.measured.iter().enumerate().map(|(i, v)| if is_marked(i) { *v } else { f64::NAN }).collect();
+    let residual: Vec<f64> = kept.iter().zip(&output.computed).map(|(z, y)| z - y).collect();
+    let (measured, computed) = (points(history, &kept), points(history, &output.computed));
+    let residual = points(history, &residual);
+    let scale = scale_of(&[&measured, &computed], 3.0);
+    let pale = StripLine { points: measured, colour: figure::MEASURED_COLOUR, width: 2.2, dash: "" };
+    let strip = Strip {
+        name: without_unit(&output.label).to_owned(),
+        unit: output.unit.clone(),
+        height: OUTPUT,
         scale,
-        lines,
-        dots: every(kept),
-        left_out,
-    })
-}
-
-fn lines_scale(lines: &[PanelLine], dots: &[(f64, f64)]) -> Scale {
-    let values = lines.iter().flat_map(|l| l.points.iter().map(|p| p.1)).chain(dots.iter().map(|p| p.1));
-    let (low, high) = extent(values).unwrap_or((0.0, 1.0));
-    Scale::covering(low, high)
-}
-
-fn thinning(samples: usize) -> usize {
-    samples.div_ceil(MOST_SAMPLES).max(1)
-}
-
-const CONTROL_LINES: [(&str, &str); 6] = [
-    ("#111111", ""),
-    ("#0060a8", "7 3"),
-    ("#b34700", "2 2"),
-    ("#6a2c91", "8 3 2 3"),
-    ("#00664b", "12 3"),
-    ("#7a5200", "4 2"),
-];
-
-/// A control of a history: how far it moved, and its change from the first sample.
-struct Moved<'a> {
-    range: f64,
-    name: &'a str,
-    points: Vec<(f64, f64)>,
-}
-
-/// The controls as changes from their first sample, those that moved most first; what hardly moved is not drawn.
-fn controls(history: &History) -> (Vec<PanelLine>, Vec<LegendView>) {
-    let mut moved: Vec<Moved> =
-        history.controls.iter().filter_map(|(name, values)| control(history, name, values)).collect();
-    moved.sort_by(|a, b| b.range.total_cmp(&a.range));
-    let most = moved.first().map_or(0.0, |m| m.range);
-    moved.retain(|m| m.range > 0.1 * most);
-    let styled = moved.into_iter().zip(CONTROL_LINES);
-    styled
-        .map(|(control, (colour, dash))| {
-            let legend = LegendView { key: key(24, &line(colour, dash, 1.6)), label: control.name.to_owned() };
-            (PanelLine { points: control.points, colour, dash }, legend)
-        })
-        .unzip()
-}
-
-fn control<'a>(history: &History, name: &'a str, values: &[f64]) -> Option<Moved<'a>> {
-    let points = finite(seconds(history).zip(values.iter().copied()));
-    let (low, high) = extent(points.iter().map(|p| p.1))?;
-    let first = points.first()?.1;
-    let step = thinning(points.len());
-    let points = points.into_iter().step_by(step).map(|(t, v)| (t, v - first)).collect();
-    Some(Moved { range: high - low, name, points })
-}
-
-fn history_legend(history: &History) -> Vec<LegendView> {
-    let dot = |colour: &str, size: f64| {
-        let place = 6.0 - 0.5 * size;
-        key(12, &format!(r#"<rect x="{place}" y="{place}" width="{size}" height="{size}" fill="{colour}"/>"#))
+        lines: vec![pale, stack::ink(computed, 1.0)],
+        dots: points(history, &left_out),
+        class: String::new(),
     };
+    let scale = scale_of(&[&residual], 1.6);
+    let lines = vec![stack::ink(residual, 0.7)];
+    let below = Strip { name: "residual".to_owned(), height: RESIDUAL, scale, lines, dots: vec![], ..strip.clone() };
+    [strip, below]
+}
+
+/// The inputs that moved, those that moved most first.
+#[must_use]
+pub fn inputs(history: &History) -> Vec<Strip> {
+    let mut moved: Vec<(f64, Strip)> =
+        history.controls.iter().filter_map(|(name, values)| input(history, name, values)).collect();
+    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = moved.first().map_or(0.0, |m| m.0);
+    moved.into_iter().filter(|m| m.0 > HARDLY * most).map(|m| m.1).collect()
+}
+
+/// An input with how far it moved.
+fn input(history: &History, name: &str, values: &[f64]) -> Option<(f64, Strip)> {
+    let points = points(history, values);
+    let (low, high) = extent(points.iter().map(|p| p.1))?;
+    let unit = Unit::of_signal(name).name;
+    Some((
+        high - low,
+        Strip {
+            name: without_unit(name).to_owned(),
+            unit: if unit == "-" { String::new() } else { unit.to_owned() },
+            height: INPUT,
+            scale: scale_of(&[&points], 2.4),
+            lines: vec![stack::ink(points, 1.1)],
+            dots: vec![],
+            class: String::new(),
+        },
+    ))
+}
+
+/// What the lines of a maneuver's drawing are.
+#[must_use]
+pub fn legend(history: &History) -> Vec<LegendView> {
     let mut legend = vec![
-        LegendView { key: dot(figure::MEASURED_COLOUR, 4.0), label: "measured".to_owned() },
-        LegendView { key: key(24, &line(figure::INK, "", 1.6)), label: "computed".to_owned() },
+        LegendView { key: key(24, &line(figure::MEASURED_COLOUR, "", 4.0)), label: "measured".to_owned() },
+        LegendView { key: key(24, &line(figure::INK, "", 1.4)), label: "computed; residual, input".to_owned() },
     ];
     if history.outputs.iter().any(|o| o.marked.contains(&true)) {
-        legend.push(LegendView { key: dot(figure::LEFT_OUT_COLOUR, 6.0), label: "left out of the cost".to_owned() });
+        let dot = format!(r#"<rect x="3" y="3" width="6" height="6" fill="{}"/>"#, figure::LEFT_OUT_COLOUR);
+        legend.push(LegendView { key: key(12, &dot), label: "left out of the cost".to_owned() });
     }
     legend
 }
@@ -180,25 +200,40 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_maneuver_of_each_class_is_shown_the_one_in_the_middle() {
+    fn a_class_is_shown_by_the_converged_maneuver_nearest_to_the_configured_angle() {
         let campaign = samples::campaign();
-        let views = views(&campaign.contents());
-        assert_eq!(views.len(), campaign.classes.len());
-        assert!(views.iter().all(|view| view.alpha == "30°" && view.panels.len() == 2));
+        let contents = Contents { typical_alpha_deg: 12.0, ..campaign.contents() };
+        let shown = typical(&contents);
+        assert_eq!(shown.len(), campaign.classes.len());
+        // The first class's maneuver at 10 deg did not converge.
+        assert_eq!(shown.iter().map(|h| h.alpha_deg).collect::<Vec<_>>(), [20.0, 10.0, 10.0, 10.0]);
     }
 
     #[test]
-    fn the_unit_is_said_once() {
-        assert_eq!(label(without_unit("alpha_vane_deg"), "deg"), "alpha_vane, deg");
-        assert_eq!(label(without_unit("an_g"), "g"), "an, g");
+    fn what_is_kept_is_enough_for_a_drawing_and_every_sample_that_was_left_out() {
+        let history = samples::campaign().histories.remove(0);
+        let thin = thinned(&history);
+        assert_eq!(thin.time_s.len(), 200, "every third; the one that was left out is among them");
+        assert_eq!(thin.outputs[0].marked.iter().filter(|m| **m).count(), 1);
+        assert_eq!(thinned(&thin), thin);
+        let mut longer = history;
+        longer.outputs[0].marked[301] = true;
+        assert_eq!(thinned(&longer).time_s.len(), 201);
+    }
+
+    #[test]
+    fn every_output_has_its_residual_below_it() {
+        let history = samples::campaign().histories.remove(0);
+        let [output, residual] = output_strips(&history, &history.outputs[0]);
+        assert_eq!((output.name.as_str(), residual.name.as_str()), ("alpha_vane", "residual"));
+        assert_eq!(output.dots.len(), 1, "the sample left out");
+        assert!(residual.lines[0].points.iter().all(|p| (p.1 - 0.01).abs() < 1e-9));
     }
 
     #[test]
     fn what_hardly_moved_is_not_drawn() {
         let mut history = samples::campaign().histories.remove(0);
         history.controls.push(("dlef_deg".into(), vec![33.0; history.time_s.len()]));
-        let (lines, legend) = controls(&history);
-        assert_eq!(lines.len(), 1);
-        assert!(legend.iter().all(|entry| entry.label != "dlef_deg"));
+        assert_eq!(inputs(&history).iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["de"]);
     }
 }

@@ -1,8 +1,9 @@
-//! The report stage: one self-contained HTML page (inline SVG and style, no scripts, nothing loaded) that a flight-test
-//! review board reads. Words and numbers are put together here, the looks are the template's.
+//! The report stage: one self-contained HTML page (inline SVG, style and a light script that it does without, nothing
+//! loaded) that a flight-test review board reads, and the same page on paper ([`pdf`]). Words and numbers are put together
+//! here, the looks are the template's.
 
 mod as_flown;
-mod changes;
+mod by_class;
 pub mod chart;
 mod failures;
 mod figure;
@@ -10,11 +11,15 @@ mod gallery;
 mod histories;
 mod marks;
 mod notation;
+mod overnight;
+pub mod pdf;
 mod predictions;
+mod provenance;
 mod reduce;
 #[cfg(test)]
 mod samples;
 mod scale;
+mod sheets;
 mod subject;
 mod summary;
 #[cfg(test)]
@@ -29,17 +34,19 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::aero::Axis;
-use crate::changes::Changes;
 use crate::error::Problem;
-use crate::lineage::Lineage;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
+use crate::overnight::Changes;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, PredictionRow,
-    TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
+    PredictionRow, TrendRow,
 };
+use by_class::ClassFigure;
 use failures::TableView;
+pub use histories::thinned;
 use notation::{Digits, NOTHING, angle, fixed, number};
+pub use provenance::{Provenance, SourceFile};
 use subject::Subject;
 use summary::{ClassView, VerdictGroup};
 
@@ -64,16 +71,20 @@ pub struct Contents<'a> {
     pub comparison: &'a [ComparisonRow],
     pub channels: &'a [ChannelRow],
     pub checks: &'a [CheckRow],
+    pub instruments: &'a [InstrumentRow],
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
+    /// Time histories of the maneuvers, thinned to what a drawing can show.
     pub histories: &'a [History],
+    /// A class is shown by its maneuver nearest to this angle of attack.
+    pub typical_alpha_deg: f64,
+    pub provenance: &'a Provenance,
     /// Derivatives in the order of the model.
     pub order: &'a [String],
     /// Name, title and axis of each configured class.
     pub classes: &'a [(String, String, Axis)],
     /// Since the night that was published before.
-    pub changes: &'a Changes,
-    pub lineage: &'a Lineage,
+    pub overnight: &'a Changes,
 }
 
 /// What the template is given: see the first lines of `report.html` for what each part means.
@@ -86,21 +97,23 @@ struct Page<'a> {
     counts: String,
     changed: String,
     changes: Vec<TableView>,
-    provenance: TableView,
-    headlines: Vec<String>,
+    summary: summary::Summary,
     outcome_heads: Vec<&'static str>,
     classes: Vec<ClassView>,
     verdicts: Vec<VerdictGroup>,
     groups: Vec<gallery::FigureGroup>,
     never_estimated: Vec<&'a str>,
-    comparison: Vec<TableView>,
+    inputs: Vec<ClassFigure>,
+    together: Vec<ClassFigure>,
+    rates: Vec<ClassFigure>,
     maneuvers: TableView,
     predictions: Option<TableView>,
     as_flown: Vec<as_flown::TriangleView>,
     told_apart: Vec<TableView>,
     failures: Vec<TableView>,
-    histories: Vec<histories::HistoryView>,
-    histories_of: usize,
+    sheets: Vec<sheets::Sheet>,
+    provenance: &'a Provenance,
+    data: TableView,
 }
 
 /// The page. `template` replaces the built-in one; it is given the same values.
@@ -126,23 +139,25 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         archive: contents.archive,
         wind_tunnel: contents.wind_tunnel,
         counts: counts(contents, &subjects),
-        changed: changes::headline(contents),
-        changes: changes::tables(contents),
-        provenance: changes::provenance(contents),
-        headlines: summary::headlines(contents, &subjects, &classes),
+        changed: overnight::headline(contents),
+        changes: overnight::tables(contents),
+        summary: summary::summary(contents, &subjects, &classes),
         outcome_heads: summary::outcome_heads(),
         classes,
         verdicts: summary::verdicts(&subjects, &anchors),
         groups: gallery::groups(contents, &subjects, &anchors),
         never_estimated: never_estimated(contents, &subjects),
-        comparison: subjects.iter().filter(|s| s.is_compared()).map(comparison).collect(),
+        inputs: by_class::inputs(contents),
+        together: by_class::together(contents),
+        rates: by_class::rates(contents),
         maneuvers: maneuvers(contents),
         predictions: predictions::table(contents),
         as_flown: as_flown::triangles(contents),
         told_apart: told_apart::tables(contents),
         failures: failures::tables(contents),
-        histories: histories::views(contents),
-        histories_of: contents.histories.len(),
+        sheets: sheets::sheets(contents),
+        provenance: contents.provenance,
+        data: contents.provenance.table(),
     }
 }
 
@@ -182,14 +197,10 @@ fn comparison(subject: &Subject) -> TableView {
             c.verdict.clone(),
         ]
     };
-    let unit = notation::unit(subject.unit);
     let heads = ["α", "flight", "standard error", "wind tunnel", "difference", "%", "z", "verdict"];
-    TableView {
-        title: if unit.is_empty() { subject.name.to_owned() } else { format!("{}, {unit}", subject.name) },
-        note: subject.trend.first().map_or_else(String::new, |t| trend_in_words(t)),
-        heads: heads.map(str::to_owned).to_vec(),
-        rows: rows.iter().map(row).collect(),
-    }
+    let note = subject.trend.first().map_or_else(String::new, |t| trend_in_words(t));
+    let title = "Flight against wind tunnel".to_owned();
+    TableView { title, ..TableView::new("", &note, &heads, rows.iter().map(row).collect()) }
 }
 
 /// What the trend that speaks for flight was fitted through, and how.
@@ -239,5 +250,10 @@ fn maneuvers(contents: &Contents) -> TableView {
         "left out, %",
         "reason",
     ];
-    TableView::new("Maneuvers", "", &heads, contents.maneuvers.iter().map(row).collect())
+    let mut table = TableView::new("Maneuvers", "", &heads, contents.maneuvers.iter().map(row).collect());
+    let (marks, anchors) = (gallery::marks(contents), sheets::anchors(contents));
+    let anchor = |m: &Maneuver| anchors.get(m.maneuver_id.as_str()).cloned().unwrap_or_default();
+    table.links = contents.maneuvers.iter().map(anchor).collect();
+    table.classes = contents.maneuvers.iter().map(|m| gallery::token(&marks, &m.class)).collect();
+    table
 }

@@ -1,15 +1,14 @@
 //! A small campaign with every kind of row, for the tests of the report.
 
-use super::Contents;
+use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
-use crate::changes::Changes;
 use crate::error::Problem;
-use crate::lineage::Lineage;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
+use crate::overnight::Changes;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
-    PredictionRow, TrendRow,
+    InstrumentRow, PredictionRow, TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -25,13 +24,14 @@ pub struct Campaign {
     pub comparison: Vec<ComparisonRow>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
     pub histories: Vec<History>,
+    pub provenance: Provenance,
     pub order: Vec<String>,
     pub classes: Vec<(String, String, Axis)>,
-    pub changes: Changes,
-    pub lineage: Lineage,
+    pub overnight: Changes,
 }
 
 impl Campaign {
@@ -51,13 +51,15 @@ impl Campaign {
             comparison: &self.comparison,
             channels: &self.channels,
             checks: &self.checks,
+            instruments: &self.instruments,
             events: &self.events,
             problems: &self.problems,
             histories: &self.histories,
+            typical_alpha_deg: 30.0,
+            provenance: &self.provenance,
             order: &self.order,
             classes: &self.classes,
-            changes: &self.changes,
-            lineage: &self.lineage,
+            overnight: &self.overnight,
         }
     }
 }
@@ -84,6 +86,12 @@ pub fn campaign() -> Campaign {
             compare(&mut campaign, name, unit, alpha_deg);
         }
     }
+    campaign.provenance = Provenance {
+        program: "harvest 0.0.0, ingest 1".into(),
+        command: "harvest run mine".into(),
+        data: vec![SourceFile { name: "flight_001.parquet".into(), bytes: 123, blake3: "00ff".into() }],
+        configuration: vec![("pipeline.yaml".into(), "title: a campaign\n  deeper: 1\n".into())],
+    };
     campaign.fits[0].outcome = "not_converged".into();
     campaign.estimates[5].value = Some(1e6);
     campaign.checks.push(CheckRow {
@@ -99,9 +107,15 @@ pub fn campaign() -> Campaign {
         channel: "alpha".into(),
         signal: "alpha_vane_deg".into(),
         samples: 100,
+        rate_hz: Some(40.0),
+        between: 0,
         bridged: 3,
         despiked: 1,
         missing: 0,
+        stuck: 0,
+        wraps: 0,
+        quantisation: None,
+        noise: Some(0.02),
         verdict: "ok".into(),
     });
     campaign.problems.push(problem("a file that is no record"));
@@ -140,6 +154,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         x_cg_ft: 20.0,
         samples: 600,
         origin: "found".into(),
+        recognised: Recognised::default(),
+        quality: Quality::default(),
     });
     campaign.fits.push(FitRow {
         maneuver_id: maneuver_id.clone(),
@@ -207,6 +223,10 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         standard_error: 0.001,
         lower_95: value - 0.002,
         upper_95: value + 0.002,
+        prediction_lower_95: value - 0.004,
+        prediction_upper_95: value + 0.004,
+        outliers: 0,
+        curve: "polynomial".into(),
         maneuvers: 10,
         order: 2,
         scatter: 0.001,
@@ -216,10 +236,12 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         unit: unit.into(),
         group: "all".into(),
         alpha_deg,
+        mach: Some(0.3),
         flight: value,
         standard_error: 0.001,
         wind_tunnel: Some(0.05),
         difference: Some(value - 0.05),
+        uncertainty: Some(0.001),
         difference_pct: Some(100.0 * (value - 0.05) / 0.05),
         z: Some(-3.0),
         verdict: if alpha_deg < 25.0 { "agrees" } else { "flight lower" }.into(),

@@ -5,13 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::Contents;
+use super::gallery;
 use super::notation::{self, NOTHING, angle, count, number};
 use super::scale::{extent, quantile};
 use super::subject::Subject;
 use super::verdict::{self, Run};
 use crate::aero::Axis;
 use crate::maneuver::Maneuver;
-use crate::tables::FitRow;
+use crate::tables::{ComparisonRow, FitRow};
 
 /// The outcomes of a fit with their column heads, in the order of the summary's columns.
 const OUTCOMES: [(&str, &str); 4] = [
@@ -34,6 +35,9 @@ pub struct ClassView {
     /// By the order of the outcomes; the last one counts maneuvers without a fit.
     pub outcomes: Vec<usize>,
     pub alpha: String,
+    /// Its mark in the figures, and the word it is hidden with.
+    pub mark: String,
+    pub token: String,
 }
 
 /// One line of the verdict table.
@@ -82,13 +86,18 @@ pub fn outcome_in_words(outcome: &str) -> &str {
 #[must_use]
 pub fn classes(contents: &Contents) -> Vec<ClassView> {
     let fits = fits_by_maneuver(contents);
+    let marks = gallery::marks(contents);
     let configured = contents.classes.iter().map(|(name, title, axis)| (name.as_str(), title.as_str(), *axis));
     let known: BTreeSet<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
     let others: BTreeMap<&str, Axis> =
         contents.maneuvers.iter().map(|m| (m.class.as_str(), m.axis)).filter(|(c, _)| !known.contains(c)).collect();
     configured
         .chain(others.into_iter().map(|(name, axis)| (name, "", axis)))
-        .map(|(name, title, axis)| class(name, title, axis, contents.maneuvers, &fits))
+        .map(|(name, title, axis)| ClassView {
+            mark: marks.iter().find(|m| m.0 == name).map_or_else(String::new, |m| m.1.key()),
+            token: gallery::token(&marks, name),
+            ..class(name, title, axis, contents.maneuvers, &fits)
+        })
         .collect()
 }
 
@@ -105,7 +114,8 @@ fn class(name: &str, title: &str, axis: Axis, flown: &[Maneuver], fits: &BTreeMa
         None => NOTHING.to_owned(),
     };
     let (name, title) = (name.to_owned(), title.to_owned());
-    ClassView { name, title, axis: axis.name().to_owned(), found: of_class.len(), outcomes, alpha }
+    let (mark, token) = (String::new(), String::new());
+    ClassView { name, title, axis: axis.name().to_owned(), found: of_class.len(), outcomes, alpha, mark, token }
 }
 
 /// The verdict tables, one per axis. `anchors` says where each derivative's figure is.
@@ -176,14 +186,48 @@ fn typical_bound(subject: &Subject) -> String {
     format!("±{}{share}", number(Some(bound), 2))
 }
 
-/// The summary in a few sentences.
+/// The summary in a few sentences: what there is, what failed, what disagrees.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    pub flown: Vec<String>,
+    pub failed: Vec<String>,
+    pub disagrees: Vec<String>,
+}
+
+/// The summary.
 #[must_use]
-pub fn headlines(contents: &Contents, subjects: &[Subject], classes: &[ClassView]) -> Vec<String> {
-    let mut lines = vec![flown(contents, classes)];
-    lines.extend(compared(subjects));
-    lines.extend(opposite_signs(subjects));
-    lines.extend(records(contents));
-    lines
+pub fn summary(contents: &Contents, subjects: &[Subject], classes: &[ClassView]) -> Summary {
+    let mut disagrees = compared(subjects);
+    disagrees.extend(opposite_signs(subjects));
+    disagrees.extend(largest(subjects));
+    Summary { flown: vec![flown(contents, classes)], failed: failed(contents), disagrees }
+}
+
+/// So many disagreements, and so many failures, are told in the summary.
+const MOST_TOLD: usize = 5;
+
+/// The row that disagrees most beside its uncertainty, with how much.
+fn worst<'a>(subject: &Subject<'a>) -> Option<(f64, &'a ComparisonRow)> {
+    let rows = subject.comparison.iter().filter(|c| c.verdict != "agrees");
+    let sized = rows.filter_map(|c| Some((c.z.filter(|z| z.is_finite())?.abs(), *c)));
+    sized.max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// The disagreements that are largest beside their uncertainty, each at its worst angle of attack.
+fn largest(subjects: &[Subject]) -> Option<String> {
+    let compared = subjects.iter().filter(|s| s.is_compared());
+    let mut all: Vec<_> = compared.filter_map(|s| Some((s, worst(s)?))).collect();
+    all.sort_by(|a, b| b.1.0.total_cmp(&a.1.0).then_with(|| a.0.name.cmp(b.0.name)));
+    let told: Vec<String> = all
+        .iter()
+        .take(MOST_TOLD)
+        .map(|(s, (z, row))| {
+            let share = row.difference_pct.filter(|p| p.is_finite() && p.abs() < 999.5);
+            let share = share.map_or_else(String::new, |p| format!(" by {} %", notation::fixed(p.abs(), 0)));
+            format!("{} {}{share} at {} (z {})", s.name, row.verdict, angle(row.alpha_deg), notation::fixed(*z, 0))
+        })
+        .collect();
+    (!told.is_empty()).then(|| format!("Largest beside their uncertainty: {}.", told.join("; ")))
 }
 
 fn flown(contents: &Contents, classes: &[ClassView]) -> String {
@@ -239,9 +283,17 @@ fn opposite_signs(subjects: &[Subject]) -> Option<String> {
     (!places.is_empty()).then(|| format!("Opposite sign in flight and tunnel: {}.", places.join(", ")))
 }
 
-/// What the checks of the records, the list of events and the problems say.
-fn records(contents: &Contents) -> Vec<String> {
+/// What the fits, the checks of the records, the list of events and the problems say.
+fn failed(contents: &Contents) -> Vec<String> {
     let mut lines = Vec::new();
+    let of = |f: &&FitRow| format!("{} ({})", f.maneuver_id, outcome_in_words(&f.outcome));
+    let unsound: Vec<String> = contents.fits.iter().filter(|f| f.outcome != "converged").map(|f| of(&f)).collect();
+    if !unsound.is_empty() {
+        let more = unsound.len().saturating_sub(MOST_TOLD);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let told = unsound.get(..MOST_TOLD.min(unsound.len())).unwrap_or_default().join(", ");
+        lines.push(format!("{} without a sound fit: {told}{more}.", count(unsound.len(), "maneuver")));
+    }
     let failed = contents.checks.iter().filter(|c| !super::failures::is_check_passed(&c.verdict)).count();
     if !contents.checks.is_empty() {
         let checks = count(contents.checks.len(), "check");
@@ -257,6 +309,8 @@ fn records(contents: &Contents) -> Vec<String> {
             "{} in flights, channels or maneuvers: see what failed and why.",
             count(contents.problems.len(), "problem")
         ));
+    } else if unsound.is_empty() {
+        lines.push("Every flight was read and every maneuver fitted.".to_owned());
     }
     lines
 }
@@ -289,7 +343,7 @@ mod tests {
         let mut campaign = samples::campaign();
         campaign.comparison[0].verdict = "sign differs".into();
         let contents = campaign.contents();
-        let lines = headlines(&contents, &super::super::subject::gather(&contents), &classes(&contents));
+        let lines = summary(&contents, &super::super::subject::gather(&contents), &classes(&contents)).disagrees;
         let name = &campaign.comparison[0].derivative;
         assert!(lines.iter().any(|l| l.starts_with("Opposite sign") && l.contains(name.as_str())), "{lines:?}");
     }

@@ -9,28 +9,54 @@ fn render(campaign: &Campaign) -> String {
     html(&campaign.contents(), None).expect("a page")
 }
 
-/// The tags of a page in order: name, and whether it opens, closes or does both.
-fn tags(page: &str) -> Vec<(String, bool, bool)> {
-    let mut tags = Vec::new();
-    for (at, _) in page.match_indices('<') {
-        let tag = &page[at + 1..at + page[at..].find('>').expect("an end of the tag")];
-        let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("a name").to_lowercase();
-        tags.push((name, !tag.starts_with('/'), tag.starts_with('/') || tag.ends_with('/')));
-    }
-    tags
-}
+/// Elements that HTML knows as never having content: in HTML these alone may be closed in their own tag.
+const VOID: [&str; 4] = ["meta", "br", "hr", "input"];
+/// What stands in running text: a paragraph can hold nothing else.
+const PHRASING: [&str; 9] = ["a", "b", "i", "small", "sub", "span", "code", "svg", "br"];
 
-fn assert_balanced(page: &str) {
-    let mut open: Vec<String> = Vec::new();
-    for (name, opens, closes) in tags(page) {
-        match (opens, closes) {
-            _ if ["!doctype", "meta"].contains(&name.as_str()) => {}
-            (true, false) => open.push(name),
-            (false, _) => assert_eq!(open.pop().as_deref(), Some(name.as_str()), "closes what is not open"),
-            (true, true) => {}
+/// The page as a strict reader sees it: well-formed, and nested as HTML allows.
+fn assert_valid(page: &str) {
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
+    let document = roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|e| panic!("{e}"));
+    for node in document.descendants().filter(roxmltree::Node::is_element) {
+        let name = node.tag_name().name();
+        let inside = |ancestor: &str| node.ancestors().skip(1).any(|a| a.has_tag_name(ancestor));
+        let children: Vec<&str> =
+            node.children().filter(roxmltree::Node::is_element).map(|c| c.tag_name().name()).collect();
+        let only = |allowed: &[&str]| {
+            let wrong = children.iter().find(|c| !allowed.contains(c));
+            assert!(wrong.is_none(), "<{}> in <{name}>", wrong.unwrap_or(&""));
+        };
+        let source = &page[node.range()];
+        let is_short = source.ends_with("/>") && !source[..source.len() - 2].contains('>');
+        assert!(!is_short || inside("svg") || name == "svg" || VOID.contains(&name), "HTML reads {source} as open");
+        match name {
+            "p" | "h1" | "h2" | "h3" | "h4" | "summary" | "figcaption" | "th" => only(&PHRASING),
+            "ul" => only(&["li"]),
+            "dl" => only(&["dt", "dd"]),
+            "table" => only(&["thead", "tbody"]),
+            "thead" | "tbody" => only(&["tr"]),
+            "tr" => only(&["td", "th"]),
+            "svg" => {
+                let is_hidden = node.attribute("aria-hidden") == Some("true");
+                let says =
+                    |tag| node.children().any(|c| c.has_tag_name(tag) && c.text().is_some_and(|t| !t.is_empty()));
+                assert!(is_hidden || (says("title") && says("desc")), "a drawing says nothing: {}", &source[..120]);
+            }
+            _ => {}
+        }
+        if name == "table" {
+            let widths: BTreeSet<usize> = node
+                .descendants()
+                .filter(|r| r.has_tag_name("tr"))
+                .map(|r| r.children().filter(roxmltree::Node::is_element).count())
+                .collect();
+            assert!(widths.len() <= 1, "rows of {widths:?} cells");
+        }
+        if name == "a" {
+            assert!(!inside("a"), "a link in a link");
         }
     }
-    assert!(open.is_empty(), "left open: {open:?}");
 }
 
 /// The values of an attribute through the page.
@@ -40,9 +66,9 @@ fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn tags_are_balanced_and_numbers_are_numbers() {
+fn the_page_is_valid_and_its_numbers_are_numbers() {
     let page = render(&campaign());
-    assert_balanced(&page);
+    assert_valid(&page);
     assert!(!page.contains("NaN") && !page.contains("inf\""));
 }
 
@@ -66,16 +92,22 @@ fn every_derivative_of_the_comparison_is_linked_to_its_figure() {
     let is_derivative = |name: &&String| notation::coefficient_of(name).is_some();
     for name in campaign.comparison.iter().map(|c| &c.derivative).filter(is_derivative) {
         assert!(page.contains(&format!("title=\"{name}\"")), "{name} is not in the verdict table");
-        assert!(page.contains(&format!("({name})")), "{name} has no figure");
+        assert!(page.contains(&format!("</sub>, {name} <a")), "{name} has no page");
     }
 }
 
 #[test]
-fn the_page_loads_nothing_and_runs_nothing() {
+fn the_page_loads_nothing_and_needs_no_script() {
     let page = render(&campaign());
-    for forbidden in ["http", "<script", "<link", "<img", "@import", "url(//", "javascript:", " src="] {
+    for forbidden in
+        ["http:", "https:", "<link", "<img", "@import", "url(//", "javascript:", " src=", " onclick", " onload"]
+    {
         assert!(!page.contains(forbidden), "{forbidden}");
     }
+    assert_eq!(page.matches("<script").count(), 1, "one that sorts and hides");
+    assert!(page.contains("default-src 'none'"), "a browser is told to load nothing");
+    let (before, _) = page.split_once("<script>").expect("the script");
+    assert!(before.ends_with("</main>\n"), "everything stands before the script");
 }
 
 #[test]
@@ -95,8 +127,9 @@ fn what_stands_in_the_data_cannot_become_markup() {
         row.verdict = hostile.into();
     }
     let page = render(&campaign);
-    assert!(!page.contains("<script") && page.contains("&lt;script&gt;"));
-    assert_balanced(&page);
+    assert_eq!(page.matches("<script").count(), 1, "the page's own");
+    assert!(page.contains("&lt;script&gt;"));
+    assert_valid(&page);
 }
 
 #[test]
@@ -104,7 +137,7 @@ fn an_empty_campaign_has_a_page_that_says_so() {
     let page = render(&Campaign::default());
     assert!(page.contains("No maneuver was found"));
     assert!(page.contains("Nothing to draw"));
-    assert_balanced(&page);
+    assert_valid(&page);
 }
 
 #[test]
@@ -122,7 +155,7 @@ fn a_campaign_where_everything_failed_has_a_page_that_says_why() {
     assert!(page.contains("20 rejected"));
     assert!(page.contains("the vane was stuck"));
     assert!(page.contains("Nothing to draw"));
-    assert_balanced(&page);
+    assert_valid(&page);
 }
 
 #[test]
@@ -146,13 +179,45 @@ fn numbers_that_are_none_do_not_break_the_page() {
         history.controls[0].1.truncate(7);
     }
     let page = render(&campaign);
-    assert_balanced(&page);
-    assert!(!page.contains("NaN") && !page.contains(">inf") && !page.contains("\"inf"));
+    assert_valid(&page);
+    for bad in ["NaN", ">inf<", "\"inf\""] {
+        let around =
+            page.find(bad).map(|at| page.chars().skip(page[..at].chars().count().saturating_sub(80)).take(160));
+        assert_eq!(around.map(String::from_iter), None, "{bad}");
+    }
 }
 
 #[test]
 fn the_same_campaign_is_the_same_bytes() {
     assert_eq!(render(&campaign()), render(&campaign()));
+    let printed = || pdf::pdf(&render(&campaign())).expect("a PDF");
+    assert!(printed() == printed());
+}
+
+#[test]
+fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
+    let campaign = campaign();
+    let page = render(&campaign);
+    assert_eq!(page.matches("class=\"maneuver sheet\"").count(), campaign.maneuvers.len());
+    assert_eq!(page.matches("class=\"derivative").count(), campaign.order.len());
+}
+
+#[test]
+fn the_summary_says_what_is_new_what_failed_and_what_disagrees_before_anything_else() {
+    let page = render(&campaign());
+    let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
+    assert!(at("<h3>What is new</h3>") < at("<h3>What failed</h3>"));
+    assert!(at("1-OLON-10 (did not converge)") < at("<h3>What disagrees</h3>"));
+    assert!(at("Largest beside their uncertainty") < at("id=\"failures\""));
+}
+
+#[test]
+fn the_report_ends_with_what_it_takes_to_do_it_again() {
+    let page = render(&campaign());
+    let (_, end) = page.split_once("id=\"provenance\"").expect("the section");
+    for words in ["harvest 0.0.0, ingest 1", "harvest run mine", "flight_001.parquet", "00ff", "  deeper: 1\n"] {
+        assert!(end.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -1,97 +1,150 @@
-//! Candidates for maneuvers: intervals in which the excitation flag is up, and trains of pilot steps.
+//! Candidates for maneuvers: trains of steps of the surfaces that nobody's stick explains, and trains of pilot steps.
 //!
-//! A class whose recognition wants the excitation flag up is an excited class; every other is a pilot's. The signals
-//! that a class wants at least one step of are its inputs.
+//! The on-board excitation system moves surfaces while the pilot's controls rest. A surface that steps while a control
+//! moves is geared to it, and one that steps soon after a pilot's step answers it by feedback: neither is excitation of its
+//! own. What is left tells excitation from ordinary flying without any flag.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::flight::Record;
 use crate::maneuver::Class;
 
-use super::{Settings, Step, steps};
+use super::steps::{self, Steps};
+use super::{Settings, Step};
 
-/// The steps of a record, by signal.
-pub(super) type Steps = BTreeMap<String, Vec<Step>>;
-
-/// A stretch of a record in which something was put in on purpose, s on the record's clock.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Excitation {
-    pub from_s: f64,
-    pub to_s: f64,
-    pub kind: Kind,
-    /// The record begins or ends inside it.
-    pub cut: bool,
+/// What is looked at in one record.
+#[derive(Clone, Debug)]
+pub(super) struct Scene<'a> {
+    pub record: &'a Record,
+    pub settings: &'a Settings,
+    /// Every step.
+    pub steps: Steps,
+    /// Every step and smaller deflection of the pilot's controls.
+    pub deflections: Steps,
+    /// The steps of surfaces on their own.
+    pub own: Steps,
+    /// Whether one of the pilot's controls is recorded: without any, nothing tells the pilot's hand from the system's.
+    pub sees_pilot: bool,
 }
 
+impl<'a> Scene<'a> {
+    pub fn of(record: &'a Record, settings: &'a Settings) -> Scene<'a> {
+        let (steps, deflections) = steps::of_record(record, settings);
+        let is_known = |name: &&String| record.values(name).is_some_and(|v| v.iter().any(|v| v.is_finite()));
+        let sees_pilot = settings.pilot_controls.iter().any(|name| is_known(&name));
+        let mut scene = Scene { record, settings, own: Steps::default(), steps, deflections, sees_pilot };
+        scene.own = scene.without_the_pilot_s();
+        scene
+    }
+
+    fn without_the_pilot_s(&self) -> Steps {
+        let surfaces = self.steps.of.iter().filter(|(signal, _)| !self.is_pilot_s(signal));
+        let own = |steps: &Vec<Step>| steps.iter().filter(|s| !self.is_answer(s.time_s)).copied().collect();
+        Steps {
+            of: surfaces.map(|(signal, steps)| (signal.clone(), own(steps))).collect(),
+            smallest: self.steps.smallest.clone(),
+        }
+    }
+
+    pub fn is_pilot_s(&self, signal: &str) -> bool {
+        self.settings.pilot_controls.iter().any(|c| c == signal)
+    }
+
+    /// Whether the pilot explains what a surface does at a time: a control of his moves then, or has stepped shortly before.
+    fn is_answer(&self, time_s: f64) -> bool {
+        let settings = self.settings;
+        settings.pilot_controls.iter().any(|control| {
+            let Some(smallest) = self.steps.smallest.get(control) else { return false };
+            let geared = (time_s - settings.gearing_s, time_s + settings.transit_s);
+            let share = settings.geared_share * smallest;
+            !self.steps.between(control, time_s - settings.answer_s, time_s + settings.transit_s).is_empty()
+                || steps::largest_change(self.record, control, settings, geared) >= share
+        })
+    }
+
+    /// How often the pilot's controls step from one time to another.
+    pub fn pilot_steps(&self, from_s: f64, to_s: f64) -> usize {
+        self.settings.pilot_controls.iter().map(|c| self.steps.between(c, from_s, to_s).len()).sum()
+    }
+}
+
+/// One step of a train.
 #[derive(Clone, Debug, PartialEq)]
+pub(super) struct Edge<'a> {
+    pub signal: &'a str,
+    pub time_s: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// The excitation flag is up from beginning to end.
-    Flagged,
-    /// Steps of these pilot controls, from the first to the last.
+    /// Surfaces on their own.
+    Onboard,
+    /// These pilot controls.
     Pilot(BTreeSet<String>),
 }
 
-/// The signals that a class wants steps of.
-pub(super) fn inputs(class: &Class) -> BTreeSet<String> {
-    let counts = class.recognition.steps.iter();
-    counts.filter(|(_, count)| count.at_least > 0).map(|(signal, _)| signal.clone()).collect()
+/// Steps that follow each other closely enough to be of one maneuver, or of several close together.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Train<'a> {
+    pub kind: Kind,
+    /// In order of time.
+    pub edges: Vec<Edge<'a>>,
 }
 
-/// Whether a class is flown by the on-board excitation system.
-pub(super) fn is_excited(class: &Class, settings: &Settings) -> bool {
-    class.recognition.flags.get(&settings.excitation_flag) == Some(&true)
+/// The kind of train that a class is flown as.
+pub(super) fn kind_of(class: &Class, scene: &Scene) -> Kind {
+    let inputs = class.recognition.inputs();
+    if inputs.iter().any(|s| scene.is_pilot_s(s)) {
+        Kind::Pilot(inputs.into_iter().map(str::to_owned).collect())
+    } else {
+        Kind::Onboard
+    }
 }
 
 /// Every candidate of the record.
-pub(super) fn excitations(record: &Record, classes: &[Class], settings: &Settings) -> Vec<Excitation> {
-    let pilots = classes.iter().filter(|c| !is_excited(c, settings));
-    let controls: BTreeSet<BTreeSet<String>> = pilots.map(inputs).filter(|s| !s.is_empty()).collect();
-    let deflections = steps::of_record(record, settings, settings.deflection_share);
-    let trains = controls.into_iter().flat_map(|signals| trains(record, &signals, settings, &deflections));
-    flagged(record, settings).into_iter().chain(trains).collect()
-}
-
-/// Intervals in which the excitation flag is up, with short drop-outs closed. A missing sample holds the last value.
-fn flagged(record: &Record, settings: &Settings) -> Vec<Excitation> {
-    let Some(flag) = record.values(&settings.excitation_flag) else { return Vec::new() };
-    let mut intervals: Vec<(usize, usize)> = Vec::new();
-    let mut up = false;
-    for (k, value) in flag.iter().enumerate() {
-        let was_up = up;
-        up = if value.is_finite() { *value > 0.5 } else { up };
-        match (was_up, up) {
-            (false, true) => intervals.push((k, k + 1)),
-            (true, true) => intervals.iter_mut().last().into_iter().for_each(|i| i.1 = k + 1),
-            _ => {}
+pub(super) fn trains<'a>(scene: &'a Scene, classes: &[Class]) -> Vec<Train<'a>> {
+    let mut trains = onboard(scene);
+    let kinds = classes.iter().map(|c| kind_of(c, scene));
+    let controls: BTreeSet<BTreeSet<String>> =
+        kinds.filter_map(|k| if let Kind::Pilot(signals) = k { Some(signals) } else { None }).collect();
+    for signals in controls {
+        for (from_s, to_s) in pilot(scene, &signals) {
+            let edges = edges(&scene.deflections, |s| signals.contains(s), (from_s, to_s));
+            trains.push(Train { kind: Kind::Pilot(signals.clone()), edges });
         }
     }
-    let mut closed: Vec<(usize, usize)> = Vec::new();
-    for (on, off) in intervals {
-        match closed.last_mut() {
-            Some(last) if (on - last.1) as f64 * record.step_s <= settings.longest_dropout_s => last.1 = off,
-            _ => closed.push((on, off)),
-        }
-    }
-    let excitation = |(on, off): (usize, usize)| Excitation {
-        from_s: record.time_s(on),
-        to_s: record.time_s(off),
-        kind: Kind::Flagged,
-        cut: on == 0 || off == record.samples,
-    };
-    closed.into_iter().map(excitation).collect()
+    trains
 }
 
-/// Trains of steps of some pilot controls, with the deflection from trim that begins them and the one back that ends
-/// them. A train goes on while a control is held away from its trim for no longer than `longest_hold_s`, or while all
-/// rest at trim for no longer than `longest_rest_s`. `deflections` holds the steps and the smaller deflections.
-fn trains(record: &Record, signals: &BTreeSet<String>, settings: &Settings, deflections: &Steps) -> Vec<Excitation> {
-    let of = |signal| deflections.get(signal).into_iter().flatten().map(move |step| (signal, step));
+fn edges<'a>(steps: &'a Steps, wanted: impl Fn(&str) -> bool, (from_s, to_s): (f64, f64)) -> Vec<Edge<'a>> {
+    let signals = steps.of.keys().filter(|s| wanted(s));
+    let of =
+        |signal: &'a String| steps.between(signal, from_s, to_s).iter().map(move |s| Edge { signal, time_s: s.time_s });
+    let mut edges: Vec<Edge> = signals.flat_map(of).collect();
+    edges.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    edges
+}
+
+/// Surfaces on their own, one train as long as no pause is longer than a control may be held away from trim.
+fn onboard<'a>(scene: &'a Scene) -> Vec<Train<'a>> {
+    let all = edges(&scene.own, |_| true, (f64::NEG_INFINITY, f64::INFINITY));
+    let near = |a: &Edge, b: &Edge| b.time_s - a.time_s <= scene.settings.longest_hold_s;
+    let of = |edges: &[Edge<'a>]| Train { kind: Kind::Onboard, edges: edges.to_vec() };
+    all.chunk_by(near).map(of).collect()
+}
+
+/// From when to when pilot controls step, with the deflection from trim that begins a train and the one back that ends it.
+/// A train goes on while a control is held away from its trim for no longer than `longest_hold_s`, or while all rest at trim
+/// for no longer than `longest_rest_s`.
+fn pilot(scene: &Scene, signals: &BTreeSet<String>) -> Vec<(f64, f64)> {
+    let settings = scene.settings;
+    let of = |signal| scene.deflections.of.get(signal).into_iter().flatten().map(move |step| (signal, step));
     let mut all: Vec<(&String, &Step)> = signals.iter().flat_map(of).collect();
     all.sort_by(|a, b| a.1.time_s.total_cmp(&b.1.time_s));
-    let mut trains: Vec<Train> = Vec::new();
+    let mut trains: Vec<Growing> = Vec::new();
     let mut previous: BTreeMap<&str, &Step> = BTreeMap::new();
     for (signal, step) in all {
-        let smallest = settings.steps.get(signal).copied().unwrap_or(f64::INFINITY);
+        let smallest = scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
         let counts = step.change().abs() >= smallest;
         let deflection = settings.deflection_share * smallest;
         let taken_s = trains.last().map_or(f64::NEG_INFINITY, |t| t.to_s);
@@ -107,7 +160,7 @@ fn trains(record: &Record, signals: &BTreeSet<String>, settings: &Settings, defl
                 train.add(signal, step, opening.before, deflection);
             }
             None if counts => {
-                let mut train = Train { from_s: opening.time_s, to_s: step.time_s, controls: BTreeMap::new() };
+                let mut train = Growing { from_s: opening.time_s, to_s: step.time_s, controls: BTreeMap::new() };
                 train.add(signal, step, opening.before, deflection);
                 trains.push(train);
             }
@@ -115,51 +168,54 @@ fn trains(record: &Record, signals: &BTreeSet<String>, settings: &Settings, defl
         }
         previous.insert(signal, step);
     }
-    let end_s = record.time_s(record.samples);
-    let excitation = |train: Train| Excitation {
-        from_s: train.from_s,
-        to_s: train.to_s,
-        kind: Kind::Pilot(signals.clone()),
-        cut: !train.at_trim() && train.to_s + train.longest_quiet(settings) > end_s,
-    };
-    trains.into_iter().map(excitation).collect()
+    trains.iter().map(|t| (t.from_s, t.to_s)).collect()
 }
 
-/// A train of steps as it grows.
-struct Train<'a> {
+/// A train of pilot steps as it grows.
+struct Growing<'a> {
     from_s: f64,
     to_s: f64,
     controls: BTreeMap<&'a str, Control>,
 }
 
-/// Where one control of a train stands.
+/// Where one control of a train stands. Trim drifts in a turn, so a control is back at it by its level or by its steps, which
+/// then cancel.
 struct Control {
     trim: f64,
     now: f64,
+    /// The sum of its steps.
+    moved: f64,
     /// The smallest change that is a deflection.
     deflection: f64,
 }
 
 impl Control {
-    /// Whether a level is trim: no deflection from where the train found the control.
-    fn is_trim(&self, level: f64) -> bool {
-        (level - self.trim).abs() < self.deflection
+    /// Whether a level is trim, no deflection from where the train found the control, or whether its steps cancel.
+    fn is_trim(&self, level: f64, moved: f64) -> bool {
+        (level - self.trim).abs() < self.deflection || moved.abs() < self.deflection
+    }
+
+    fn rests(&self) -> bool {
+        self.is_trim(self.now, self.moved)
     }
 }
 
-impl<'a> Train<'a> {
+impl<'a> Growing<'a> {
     fn add(&mut self, signal: &'a str, step: &Step, trim: f64, deflection: f64) {
         self.to_s = step.time_s;
-        self.controls.entry(signal).or_insert(Control { trim, now: trim, deflection }).now = step.after;
+        let control = self.controls.entry(signal).or_insert(Control { trim, now: trim, moved: 0.0, deflection });
+        control.now = step.after;
+        // The first step that counts may follow the deflection that opens the train.
+        control.moved = if control.moved == 0.0 { step.after - trim } else { control.moved + step.change() };
     }
 
     fn at_trim(&self) -> bool {
-        self.controls.values().all(|c| c.is_trim(c.now))
+        self.controls.values().all(Control::rests)
     }
 
     /// Whether a control of the train that is held away from trim comes back to it with this step.
     fn brings_to_trim(&self, signal: &str, step: &Step) -> bool {
-        self.controls.get(signal).is_some_and(|c| !c.is_trim(c.now) && c.is_trim(step.after))
+        self.controls.get(signal).is_some_and(|c| !c.rests() && c.is_trim(step.after, c.moved + step.change()))
     }
 
     fn longest_quiet(&self, settings: &Settings) -> f64 {

@@ -4,10 +4,30 @@ use std::ops::RangeInclusive;
 
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::flight::{Record, signal};
-use crate::maneuver::{Class, Maneuver};
+use crate::maneuver::{Class, Maneuver, Quality, Recognised};
 use crate::units::DEG;
 
-/// The maneuver of a class in a window (s on the record's clock), cut at the record.
+use super::quality::{self, Limits};
+
+/// The signals that a flight condition is made of.
+pub(super) const SIGNALS: &[&str] = &[
+    signal::ALPHA_VANE,
+    signal::BETA_VANE,
+    signal::VELOCITY,
+    signal::MACH,
+    signal::ALTITUDE,
+    signal::P,
+    signal::Q,
+    signal::R,
+    signal::QBAR,
+    signal::MASS,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
+/// The maneuver of a class in a window (s on the record's clock), cut at the record, with its quality. It was found if it is
+/// known by what.
 ///
 /// # Errors
 /// What keeps its flight condition from being known, in words.
@@ -16,7 +36,8 @@ pub(super) fn maneuver(
     aircraft: &Aircraft,
     class: &Class,
     (start_s, end_s): (f64, f64),
-    origin: &str,
+    recognised: Option<Recognised>,
+    limits: &Limits,
 ) -> Result<Maneuver, String> {
     let (first, last) = (record.sample_at(start_s), record.sample_at(end_s));
     if last <= first {
@@ -24,7 +45,8 @@ pub(super) fn maneuver(
     }
     let mean = |name: &str| mean(record, name, first..=last);
     let start_s = record.time_s(first);
-    Ok(Maneuver {
+    let given = recognised.is_none();
+    let mut maneuver = Maneuver {
         maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),
         flight_id: record.flight_id.clone(),
         class: class.name.clone(),
@@ -39,8 +61,12 @@ pub(super) fn maneuver(
         mass_slug: mean(signal::MASS)?,
         x_cg_ft: mean(signal::X_CG)?,
         samples: last - first + 1,
-        origin: origin.to_owned(),
-    })
+        origin: if given { "given" } else { "found" }.to_owned(),
+        recognised: recognised.unwrap_or_default(),
+        quality: Quality::default(),
+    };
+    maneuver.quality = quality::of(record, class, &maneuver, limits, given);
+    Ok(maneuver)
 }
 
 fn mean(record: &Record, name: &str, window: RangeInclusive<usize>) -> Result<f64, String> {

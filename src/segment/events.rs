@@ -6,12 +6,14 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Event, Maneuver};
 use crate::tables::EventRow;
 
+use super::quality::Limits;
 use super::{Segmented, condition, problem};
 
 /// Start and end of a found maneuver agree with a given event when both are within this, s.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Replaces what was found by the events given for this flight where the two overlap, and says how they compare.
+/// Replaces what was found by the events given for this flight where one covers more than half of the other, and says how they
+/// compare.
 ///
 /// An event of an unknown class or outside the record becomes a problem and replaces nothing. Without any event for any
 /// flight nothing is compared.
@@ -22,15 +24,16 @@ pub fn with_events(
     events: &[Event],
     classes: &[Class],
     aircraft: &Aircraft,
+    limits: &Limits,
 ) -> (Segmented, Vec<EventRow>) {
     if events.is_empty() {
         return (found, Vec::new());
     }
-    let Segmented { maneuvers: found, mut problems } = found;
+    let Segmented { maneuvers: found, unknown, mut problems } = found;
     let mut given = Vec::new();
     let mut rows = Vec::new();
     for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
-        match as_given(event, record, classes, aircraft) {
+        match as_given(event, record, classes, aircraft, limits) {
             Ok(maneuver) => {
                 rows.push(compared(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
@@ -38,18 +41,27 @@ pub fn with_events(
             Err(reason) => problems.push(problem(record, event.start_s, reason)),
         }
     }
-    let is_replaced = |f: &Maneuver| given.iter().any(|g| overlap_s(f, g.start_s, g.end_s) > 0.0);
+    // Windows close together share what is between them: an event replaces what it covers by more than half of either.
+    let shorter_s = |f: &Maneuver, g: &Maneuver| (f.end_s - f.start_s).min(g.end_s - g.start_s);
+    let covers = |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);
+    let is_replaced = |f: &Maneuver| given.iter().any(|g| covers(f, g));
     let kept: Vec<Maneuver> = found.into_iter().filter(|f| !is_replaced(f)).collect();
     rows.extend(kept.iter().map(|f| compared(None, Some(f))));
     let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();
     maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     let time = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-    (Segmented { maneuvers, problems }, rows)
+    (Segmented { maneuvers, unknown, problems }, rows)
 }
 
 /// The maneuver that an event names, or why there is none.
-fn as_given(event: &Event, record: &Record, classes: &[Class], aircraft: &Aircraft) -> Result<Maneuver, String> {
+fn as_given(
+    event: &Event,
+    record: &Record,
+    classes: &[Class],
+    aircraft: &Aircraft,
+    limits: &Limits,
+) -> Result<Maneuver, String> {
     let class = classes.iter().find(|c| c.name == event.class).ok_or_else(|| {
         let near = did_you_mean(&event.class, classes.iter().map(|c| c.name.as_str()));
         format!("an event is of the unknown class `{}`{near}", event.class)
@@ -65,7 +77,7 @@ fn as_given(event: &Event, record: &Record, classes: &[Class], aircraft: &Aircra
             event.class
         ));
     }
-    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), "given")
+    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), None, limits)
 }
 
 fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {

@@ -1,170 +1,399 @@
-//! Recognition: which class an excitation fits, and the window of the maneuver around it.
-
-use std::collections::BTreeMap;
+//! Recognition: which classes the stretches of a train fit, and what fits none.
+//!
+//! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
+//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then into as few as possible,
+//! then at the longest pauses. A stretch that fits
+//! several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one about
+//! counts; where nothing else differs the flags decide.
 
 use crate::error::Problem;
-use crate::flight::Record;
-use crate::maneuver::Class;
+use crate::maneuver::{Class, Recognised, Unknown};
 
-use super::candidates::{Excitation, Kind, Steps, inputs, is_excited};
-use super::{Settings, Step, problem};
+use super::candidates::{Kind, Scene, Train, kind_of};
+use super::seen::{Miss, Seen};
+use super::swings::{self, Swing};
+use super::{patterns, problem};
 
-/// A maneuver's class and window, s on the record's clock.
+/// A stretch is never longer than so many pauses: the search stays linear in a flight's length.
+const MOST_PAUSES: usize = 64;
+
+/// A maneuver's class and inputs, s on the record's clock.
 #[derive(Clone, Debug)]
-pub(super) struct Recognised<'a> {
+pub(super) struct Found<'a> {
     pub class: &'a Class,
-    pub start_s: f64,
-    pub end_s: f64,
-    /// First and last input.
-    excited_s: (f64, f64),
+    pub first_s: f64,
+    pub last_s: f64,
+    pub recognised: Recognised,
 }
 
-/// What the steps and flags of one stretch of a record are.
-struct Seen<'a> {
-    record: &'a Record,
-    steps: &'a Steps,
-    from_s: f64,
-    to_s: f64,
+/// What a record holds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recognition<'a> {
+    pub found: Vec<Found<'a>>,
+    pub unknown: Vec<Unknown>,
 }
 
-impl Seen<'_> {
-    fn steps_of(&self, signal: &str) -> impl Iterator<Item = &Step> {
-        let steps = self.steps.get(signal).into_iter().flatten();
-        steps.filter(|s| (self.from_s..=self.to_s).contains(&s.time_s))
-    }
-
-    /// Whether a flag is up for most of the stretch; unknown where the record has no such flag.
-    fn flag(&self, signal: &str) -> Option<bool> {
-        let (from, to) = (self.record.sample_at(self.from_s), self.record.sample_at(self.to_s));
-        let values = self.record.values(signal)?.get(from..=to)?;
-        let known: Vec<&f64> = values.iter().filter(|v| v.is_finite()).collect();
-        let up = known.iter().filter(|v| ***v > 0.5).count();
-        (!known.is_empty()).then_some(2 * up > known.len())
-    }
-
-    /// Whether the record has every signal that the class wants steps of and they step often enough; `None` when not,
-    /// else whether everything else fits too.
-    fn fits(&self, class: &Class) -> Option<bool> {
-        let counts = || class.recognition.steps.iter().map(|(signal, count)| (self.steps_of(signal).count(), count));
-        if counts().any(|(n, count)| n < count.at_least) {
-            return None;
-        }
-        let flags = class.recognition.flags.iter().all(|(flag, up)| self.flag(flag) == Some(*up));
-        Some(flags && counts().all(|(n, count)| n <= count.at_most))
-    }
-
-    /// First and last step of the class's inputs.
-    fn excited_s(&self, class: &Class) -> Option<(f64, f64)> {
-        let signals = inputs(class);
-        let times = || signals.iter().flat_map(|s| self.steps_of(s)).map(|s| s.time_s);
-        Some((times().min_by(f64::total_cmp)?, times().max_by(f64::total_cmp)?))
-    }
-
-    fn count_all<'b>(&self, signals: impl Iterator<Item = &'b String>) -> BTreeMap<&'b str, usize> {
-        let counted = signals.map(|s| (s.as_str(), self.steps_of(s).count()));
-        counted.filter(|(_, n)| *n > 0).collect()
-    }
+/// The verdict on one stretch.
+enum Verdict<'a> {
+    Fits(&'a Class),
+    /// Several classes alike.
+    Alike(String),
+    None,
 }
 
-/// Recognises every excitation; those that fit no class, several, or are cut by the record become problems.
-pub(super) fn all<'a>(
-    record: &Record,
-    classes: &'a [Class],
-    settings: &Settings,
-    steps: &Steps,
-    excitations: &[Excitation],
-) -> (Vec<Recognised<'a>>, Vec<Problem>) {
-    let (mut recognised, mut problems) = (Vec::new(), Vec::new());
-    for excitation in excitations {
-        match one(record, classes, settings, steps, excitation) {
-            Ok(found) => recognised.extend(found),
-            Err(reason) => problems.push(problem(record, excitation.from_s, reason)),
-        }
+/// Recognises every train, and the sweeps.
+pub(super) fn all<'a>(scene: &Scene, classes: &'a [Class], trains: &[Train]) -> Recognition<'a> {
+    let mut recognition = Recognition::default();
+    for train in trains {
+        let of_its_kind: Vec<&Class> =
+            classes.iter().filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind).collect();
+        one_train(scene, &of_its_kind, train, &mut recognition);
     }
-    (recognised, problems)
-}
-
-/// The class of one excitation: `Ok(None)` when it is none worth a word.
-fn one<'a>(
-    record: &Record,
-    classes: &'a [Class],
-    settings: &Settings,
-    steps: &Steps,
-    excitation: &Excitation,
-) -> Result<Option<Recognised<'a>>, String> {
-    // The detector places a step within half its transit; that much belongs to a train at both ends. The system that the
-    // flag speaks of does nothing before the flag is up; the pilot's last correction before it is none of its steps.
-    let slack_s = settings.transit_s / 2.0;
-    let from_s = if excitation.kind == Kind::Flagged { excitation.from_s } else { excitation.from_s - slack_s };
-    let seen = Seen { record, steps, from_s, to_s: excitation.to_s + slack_s };
-    let of_its_kind = |c: &&Class| match &excitation.kind {
-        Kind::Flagged => is_excited(c, settings),
-        Kind::Pilot(signals) => !is_excited(c, settings) && inputs(c) == *signals,
-    };
-    let candidates: Vec<&Class> = classes.iter().filter(of_its_kind).collect();
-    let fitting: Vec<&Class> = candidates.iter().filter(|c| seen.fits(c) == Some(true)).copied().collect();
-    match fitting[..] {
-        [class] if excitation.cut => Err(format!("a maneuver like {} is cut by the end of the record", class.name)),
-        [class] => Ok(seen.excited_s(class).map(|excited_s| window(class, excitation, excited_s))),
-        [] => nothing_fits(&seen, &candidates, excitation, settings).map_or(Ok(None), Err),
-        _ => {
-            let names: Vec<&str> = fitting.iter().map(|c| c.name.as_str()).collect();
-            Err(format!("excitation that fits {} alike; make their recognition exclude each other", names.join(", ")))
-        }
-    }
-}
-
-/// What to say of an excitation that fits no class. Flagged intervals of a few steps are a flag that flickers; pilot
-/// steps are worth a word only when they are as many as some class wants, for pilots move their controls anyway.
-fn nothing_fits(seen: &Seen, candidates: &[&Class], excitation: &Excitation, settings: &Settings) -> Option<String> {
-    let counts = seen.count_all(candidates.iter().flat_map(|c| c.recognition.steps.keys()));
-    let near_miss = candidates.iter().any(|c| seen.fits(c).is_some());
-    let enough = counts.values().sum::<usize>() >= settings.fewest_steps;
-    let worth = match excitation.kind {
-        Kind::Flagged => enough,
-        Kind::Pilot(_) => near_miss && enough,
-    };
-    let length_s = excitation.to_s - excitation.from_s;
-    let steps: Vec<String> = counts.iter().map(|(signal, n)| format!("{signal} {n}")).collect();
-    worth.then(|| format!("excitation of {length_s:.1} s that fits no class; steps seen: {}", steps.join(", ")))
-}
-
-/// The maneuver's window: from the lead-in before the first input, but not before the flag came on, to the decay after
-/// the last input and the flag's going off.
-fn window<'a>(class: &'a Class, excitation: &Excitation, excited_s: (f64, f64)) -> Recognised<'a> {
-    let lead_in_s = class.recognition.lead_in_s;
-    let (excited_s, start_s, end_s) = match excitation.kind {
-        Kind::Flagged => {
-            let start_s = (excited_s.0 - lead_in_s).max(excitation.from_s);
-            (excited_s, start_s, excited_s.1.max(excitation.to_s))
-        }
-        Kind::Pilot(_) => ((excitation.from_s, excitation.to_s), excitation.from_s - lead_in_s, excitation.to_s),
-    };
-    Recognised { class, start_s, end_s: end_s + class.recognition.decay_s, excited_s }
-}
-
-/// Puts the maneuvers in order of time and keeps them from overlapping. Where the inputs of two overlap, the longer
-/// excitation stands (a flag that flickers during pilot steps is shorter than they are). Otherwise a maneuver ends at
-/// the latest where the next one's inputs begin, and the next one's lead-in gives way to its decay: an aircraft that
-/// still moves is not trimmed.
-pub(super) fn keep_apart(recognised: &mut Vec<Recognised>) {
-    let length = |r: &Recognised| r.excited_s.1 - r.excited_s.0;
-    recognised.sort_by(|a, b| a.excited_s.0.total_cmp(&b.excited_s.0));
-    let mut kept: Vec<Recognised> = Vec::new();
-    for mut r in recognised.drain(..) {
-        match kept.last_mut() {
-            Some(last) if r.excited_s.0 <= last.excited_s.1 => {
-                if length(&r) > length(last) {
-                    *last = r;
-                }
+    for class in classes {
+        for (signal, wanted) in &class.recognition.sweep {
+            let smallest = scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
+            let values = scene.record.values(signal).unwrap_or_default();
+            for run in runs(scene, swings::of_signal(values, smallest)) {
+                recognition.found.extend(one_sweep(scene, class, &run, wanted));
             }
-            Some(last) => {
-                last.end_s = last.end_s.min(r.excited_s.0);
-                r.start_s = r.start_s.max(last.end_s);
-                kept.push(r);
-            }
-            None => kept.push(r),
         }
     }
-    *recognised = kept;
+    recognition
+}
+
+/// A part of a train, between pauses: the range of its edges.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    first: usize,
+    end: usize,
+}
+
+/// The best way to cut a train as far as some block.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    unexplained: usize,
+    /// Steps that rules about lengths of pulses explain.
+    in_pulses: usize,
+    stretches: usize,
+    /// The pauses cut at, s.
+    paused_s: f64,
+    /// The block at which the last stretch begins, and whether it is one.
+    from: usize,
+    is_stretch: bool,
+}
+
+impl Cut {
+    fn is_better_than(&self, other: &Cut) -> bool {
+        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches);
+        key(self) < key(other) || (key(self) == key(other) && self.paused_s > other.paused_s)
+    }
+}
+
+fn one_train<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, into: &mut Recognition<'a>) {
+    let blocks = blocks(train, scene.settings.shortest_pause_s);
+    let mut left: Option<(usize, usize)> = None;
+    for (from, to, is_stretch) in cut(scene, classes, train, &blocks) {
+        let range = (blocks[from].first, blocks[to - 1].end);
+        if is_stretch {
+            leave(scene, classes, train, left.take(), into);
+            stretch(scene, classes, train, range, into);
+        } else {
+            left = Some((left.map_or(range.0, |l| l.0), range.1));
+        }
+    }
+    leave(scene, classes, train, left, into);
+}
+
+fn blocks(train: &Train, pause_s: f64) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    for (k, pair) in train.edges.iter().enumerate() {
+        let pauses = k == 0 || pair.time_s - train.edges[k - 1].time_s >= pause_s;
+        match blocks.last_mut().filter(|_| !pauses) {
+            Some(block) => block.end = k + 1,
+            None => blocks.push(Block { first: k, end: k + 1 }),
+        }
+    }
+    blocks
+}
+
+fn seen<'s>(scene: &'s Scene, train: &'s Train, (first, end): (usize, usize)) -> Seen<'s> {
+    let at = |k: usize| train.edges.get(k).map_or(f64::NAN, |e| e.time_s);
+    Seen { scene, kind: &train.kind, from_s: at(first), to_s: at(end.saturating_sub(1)) }
+}
+
+/// The train's stretches and what is between them, as ranges of blocks.
+fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Vec<(usize, usize, bool)> {
+    let nothing = Cut { unexplained: 0, in_pulses: 0, stretches: 0, paused_s: 0.0, from: 0, is_stretch: false };
+    let mut best: Vec<Cut> = vec![nothing];
+    for end in 1..=blocks.len() {
+        let before = best[end - 1];
+        let block = blocks[end - 1];
+        let mut chosen = Cut {
+            unexplained: before.unexplained + block.end - block.first,
+            from: end - 1,
+            is_stretch: false,
+            ..before
+        };
+        for from in (end.saturating_sub(MOST_PAUSES)..end).rev() {
+            let range = (blocks[from].first, block.end);
+            let Some(explained) = explained(&seen(scene, train, range), classes, train, range) else { continue };
+            let before = best[from];
+            let paused_s = if from == 0 || !before.is_stretch {
+                0.0
+            } else {
+                train.edges[range.0].time_s - train.edges[range.0 - 1].time_s
+            };
+            let candidate = Cut {
+                unexplained: before.unexplained + explained.0,
+                in_pulses: before.in_pulses + explained.1,
+                stretches: before.stretches + 1,
+                paused_s: before.paused_s + paused_s,
+                from,
+                is_stretch: true,
+            };
+            if candidate.is_better_than(&chosen) {
+                chosen = candidate;
+            }
+        }
+        best.push(chosen);
+    }
+    let mut parts = Vec::new();
+    let mut end = blocks.len();
+    while end > 0 {
+        parts.push((best[end].from, end, best[end].is_stretch));
+        end = best[end].from;
+    }
+    parts.reverse();
+    parts
+}
+
+/// How many of a stretch's edges the class that explains most of them leaves, and how many it has in pulses; none where it
+/// fits no class.
+fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<(usize, usize)> {
+    let edges = train.edges.get(first..end)?;
+    let of_class = |class: &&Class| {
+        let inputs = class.recognition.inputs();
+        let left = edges.iter().filter(|e| !inputs.contains(e.signal)).count();
+        let in_pulses = edges.iter().filter(|e| class.recognition.pulses.contains_key(e.signal)).count();
+        (left, in_pulses)
+    };
+    let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
+    fitting.map(of_class).min_by_key(|(left, in_pulses)| (*left, usize::MAX - in_pulses))
+}
+
+fn verdict<'a>(seen: &Seen, classes: &[&'a Class]) -> Verdict<'a> {
+    let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
+    let worth = |c: &Class| (seen.explained(c), !c.recognition.pulses.is_empty());
+    let mut ranked: Vec<(&'a Class, (usize, bool), f64)> =
+        fitting.map(|c| (*c, worth(c), seen.confidence(c))).collect();
+    ranked.sort_by(|a, b| b.1.cmp(&a.1).then(b.2.total_cmp(&a.2)));
+    match ranked[..] {
+        [] => Verdict::None,
+        [best, second, ..] if best.1 == second.1 && best.2 - second.2 < 0.01 => {
+            let alike = ranked.iter().filter(|r| r.1 == best.1 && best.2 - r.2 < 0.01);
+            Verdict::Alike(alike.map(|r| r.0.name.as_str()).collect::<Vec<_>>().join(", "))
+        }
+        [best, ..] => Verdict::Fits(best.0),
+    }
+}
+
+fn stretch<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, range: (usize, usize), into: &mut Recognition<'a>) {
+    let seen = seen(scene, train, range);
+    match verdict(&seen, classes) {
+        Verdict::Fits(class) => {
+            let Some((first_s, last_s)) = seen.excited_s(class) else { return };
+            let first_s = opening(scene, &seen, first_s);
+            let recognised = seen.recognised(class, (first_s, last_s));
+            into.found.push(Found { class, first_s, last_s, recognised });
+        }
+        Verdict::Alike(names) => {
+            let reason = format!("fits {names} alike; make their recognition exclude each other");
+            into.unknown.push(unknown(&seen, classes, names, reason));
+        }
+        Verdict::None => {}
+    }
+}
+
+/// When the first step of a surface was preceded by a smaller one to the other side: a deflection from trim that feedback
+/// made small.
+fn opening(scene: &Scene, seen: &Seen, first_s: f64) -> f64 {
+    if *seen.kind != Kind::Onboard {
+        return first_s;
+    }
+    let at_first = |s: &&super::Step| (s.time_s - first_s).abs() < scene.record.step_s / 2.0;
+    let before = |signal: &String| -> Option<f64> {
+        let steps = scene.own.between(signal, first_s - scene.settings.longest_rest_s, first_s);
+        let first = steps.iter().find(at_first)?;
+        let opens = |s: &&super::Step| s.time_s < first.time_s && s.change() * first.change() < 0.0;
+        let share =
+            |s: &&super::Step| s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs();
+        steps.iter().filter(opens).filter(share).map(|s| s.time_s).next_back()
+    };
+    scene.own.of.keys().filter_map(before).fold(first_s, f64::min)
+}
+
+/// What fits no class: worth a word where a signal goes to one side, to the other by more than ordinary flying does, and
+/// back.
+fn leave<'a>(
+    scene: &Scene,
+    classes: &[&'a Class],
+    train: &Train,
+    range: Option<(usize, usize)>,
+    into: &mut Recognition<'a>,
+) {
+    let Some(range) = range else { return };
+    let seen = seen(scene, train, range);
+    let misses = classes.iter().map(|c| (*c, seen.misses(c)));
+    let nearest = misses.min_by_key(|(c, misses)| (usize::MAX - seen.explained(c), misses.len()));
+    let Some((class, misses)) = nearest else { return };
+    let signals = train.edges.iter().map(|e| e.signal);
+    if !signals.collect::<std::collections::BTreeSet<_>>().into_iter().any(|s| is_excitation(&seen, s)) {
+        return;
+    }
+    // Pilots move their controls anyway: a few steps, or steps among which no class finds one of its inputs complete.
+    if train.kind != Kind::Onboard && misses.iter().filter(|m| m.too_little).count() > 0 && !is_series(&seen, class) {
+        return;
+    }
+    let reason = in_words(scene, class, &misses, &seen);
+    into.unknown.push(unknown(&seen, classes, class.name.clone(), reason));
+}
+
+/// Three steps to alternating sides, one of them a reversal: twice the smallest.
+fn is_excitation(seen: &Seen, signal: &str) -> bool {
+    let steps = seen.steps_of(signal);
+    let turns = steps.windows(2).filter(|s| s[0].change() * s[1].change() < 0.0).count();
+    let smallest = seen.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
+    turns + 1 >= seen.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
+}
+
+/// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants of all its inputs
+/// together, and four reversals.
+fn is_series(seen: &Seen, class: &Class) -> bool {
+    let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
+    seen.explained(class) >= wanted.div_ceil(2).max(4)
+}
+
+fn unknown(seen: &Seen, classes: &[&Class], nearest_class: String, reason: String) -> Unknown {
+    let counted = classes.iter().flat_map(|c| c.recognition.counted()).map(String::as_str);
+    Unknown {
+        flight_id: seen.scene.record.flight_id.clone(),
+        start_s: seen.from_s,
+        end_s: seen.to_s,
+        inputs: seen.count_all(counted),
+        nearest_class,
+        reason,
+    }
+}
+
+fn in_words(scene: &Scene, class: &Class, misses: &[Miss], seen: &Seen) -> String {
+    let reasons: Vec<&str> = misses.iter().map(|m| m.reason.as_str()).collect();
+    let record = scene.record;
+    let ends_s = record.time_s(record.samples.saturating_sub(1));
+    let cut = seen.to_s + scene.settings.longest_hold_s > ends_s || seen.from_s - 1.0 < record.start_s;
+    let broken_off = misses.iter().all(|m| m.too_little);
+    let why = match (broken_off, cut) {
+        (true, true) => "cut by the end of the record, or broken off: ",
+        (true, false) => "broken off? ",
+        (false, _) => "",
+    };
+    format!("nearest to {}; {why}{}", class.name, reasons.join("; "))
+}
+
+/// Runs of swings, each no more than half as long again as the one before, and none longer than a control may be held.
+fn runs(scene: &Scene, swings: Vec<Swing>) -> Vec<Vec<Swing>> {
+    let record = scene.record;
+    let at = |k: f64| record.start_s + k * record.step_s;
+    let mut runs: Vec<Vec<Swing>> = Vec::new();
+    for swing in swings {
+        let swing = Swing { from_s: at(swing.from_s), to_s: at(swing.to_s) };
+        let goes_on = |run: &Vec<Swing>| {
+            let middles: Vec<f64> = run.iter().rev().take(2).map(Swing::middle_s).collect();
+            let apart_s = swing.middle_s() - middles[0];
+            let before_s = middles.get(1).map_or(f64::INFINITY, |b| middles[0] - b);
+            apart_s <= scene.settings.longest_hold_s && apart_s <= 1.5 * before_s
+        };
+        match runs.last_mut().filter(|run| goes_on(run)) {
+            Some(run) => run.push(swing),
+            None => runs.push(vec![swing]),
+        }
+    }
+    runs
+}
+
+fn one_sweep<'a>(scene: &Scene, class: &'a Class, run: &[Swing], wanted: &crate::maneuver::Sweep) -> Option<Found<'a>> {
+    let ratio = patterns::sweep(run, wanted).ok()?;
+    let kind = kind_of(class, scene);
+    let (first_s, last_s) = (run.first()?.from_s, run.last()?.to_s);
+    let seen = Seen { scene, kind: &kind, from_s: first_s, to_s: last_s };
+    if !seen.misses(class).is_empty() {
+        return None;
+    }
+    let mut recognised = seen.recognised(class, (first_s, last_s));
+    let evidence = format!("{} swings that become {ratio:.1} times as fast", run.len());
+    recognised.evidence =
+        if recognised.evidence.is_empty() { evidence } else { format!("{evidence}; {}", recognised.evidence) };
+    Some(Found { class, first_s, last_s, recognised })
+}
+
+/// Puts the maneuvers in order of time and keeps their inputs from overlapping: where they do, the longer excitation stands.
+/// What is unknown within a maneuver, or within something longer unknown, is a part of it.
+pub(super) fn keep_apart(recognition: &mut Recognition) {
+    let Recognition { found, unknown } = recognition;
+    found.sort_by(|a, b| (b.last_s - b.first_s).total_cmp(&(a.last_s - a.first_s)));
+    let mut kept: Vec<Found> = Vec::new();
+    for f in found.drain(..) {
+        if kept.iter().all(|k| f.first_s > k.last_s || f.last_s < k.first_s) {
+            kept.push(f);
+        }
+    }
+    kept.sort_by(|a, b| a.first_s.total_cmp(&b.first_s));
+    unknown.sort_by(|a, b| (b.end_s - b.start_s).total_cmp(&(a.end_s - a.start_s)));
+    let mut left: Vec<Unknown> = Vec::new();
+    for u in unknown.drain(..) {
+        let inside = kept.iter().any(|k| u.start_s <= k.last_s && u.end_s >= k.first_s);
+        if !inside && left.iter().all(|l| u.start_s > l.end_s || u.end_s < l.start_s) {
+            left.push(u);
+        }
+    }
+    left.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    (*found, *unknown) = (kept, left);
+}
+
+/// The windows of maneuvers in order of time: the lead-in before the first input, the decay after the last. A window ends
+/// where the pilot takes over. Of a pause too short for both, the next maneuver has its lead-in as far as half of the pause,
+/// and the decay before it may use a share of that lead-in.
+pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
+    let of = |f: &Found| {
+        let rule = &f.class.recognition;
+        let end_s = f.last_s + rule.decay_s;
+        (f.first_s - rule.lead_in_s, end_s.min(taken_over_s(scene, f.last_s, end_s)))
+    };
+    let mut windows: Vec<(f64, f64)> = found.iter().map(of).collect();
+    for k in 1..windows.len() {
+        let (last_s, next_s) = (found[k - 1].last_s, found[k].first_s);
+        windows[k].0 = windows[k].0.max(f64::midpoint(last_s, next_s));
+        let shared_s = scene.settings.shared_lead_in * (next_s - windows[k].0);
+        windows[k - 1].1 = windows[k - 1].1.min(windows[k].0 + shared_s);
+    }
+    windows
+}
+
+/// When the pilot next steps after the last input, less the time that a step takes.
+fn taken_over_s(scene: &Scene, last_s: f64, end_s: f64) -> f64 {
+    let settings = scene.settings;
+    let clear_s = last_s + settings.transit_s + 2.0 * settings.level_s;
+    let steps =
+        settings.pilot_controls.iter().flat_map(|c| scene.steps.between(c, clear_s, end_s + settings.transit_s));
+    steps.map(|s| s.time_s - settings.transit_s).fold(f64::INFINITY, f64::min)
+}
+
+/// One row of `problems` for everything unknown.
+pub(super) fn problems(scene: &Scene, unknown: &[Unknown]) -> Vec<Problem> {
+    let of = |u: &Unknown| {
+        let lasting_s = u.end_s - u.start_s;
+        let reason =
+            format!("excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}", u.reason, u.inputs);
+        problem(scene.record, u.start_s, reason)
+    };
+    unknown.iter().map(of).collect()
 }

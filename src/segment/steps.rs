@@ -32,22 +32,65 @@ impl Step {
     }
 }
 
-/// The steps of every signal that has a smallest step and is in the record, each in order of time; those of at least
-/// `share` of the smallest step.
-pub(super) fn of_record(record: &Record, settings: &Settings, share: f64) -> BTreeMap<String, Vec<Step>> {
-    let window = Window {
-        half_transit: samples(settings.transit_s / 2.0, record.step_s),
-        level: samples(settings.level_s, record.step_s),
-    };
-    let of = |(signal, smallest): (&String, &f64)| {
-        let values = record.values(signal)?;
-        let mut steps = of_signal(values, share * smallest, window);
-        for step in &mut steps {
-            step.time_s = record.start_s + step.time_s * record.step_s;
+/// The steps of a record by signal, each in order of time, and the smallest change that counts as one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Steps {
+    pub of: BTreeMap<String, Vec<Step>>,
+    pub smallest: BTreeMap<String, f64>,
+}
+
+impl Steps {
+    /// The steps of a signal from one time to another.
+    pub fn between(&self, signal: &str, from_s: f64, to_s: f64) -> &[Step] {
+        let steps = self.of.get(signal).map_or(&[][..], Vec::as_slice);
+        let first = steps.partition_point(|s| s.time_s < from_s);
+        let end = steps.partition_point(|s| s.time_s <= to_s);
+        steps.get(first..end.max(first)).unwrap_or_default()
+    }
+}
+
+/// The steps of every signal that has a smallest step and is in the record, and the deflections: those and all changes of
+/// at least the deflection's share of the smallest step. The smallest step is the one set, or the noise of the signal's own
+/// changes times `steps_over_noise` where that is larger: a surface that works in turbulence.
+pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) {
+    let window = Window::of(record, settings);
+    let (mut steps, mut deflections) = (Steps::default(), Steps::default());
+    for (signal, set) in &settings.steps {
+        let Some(values) = record.values(signal) else { continue };
+        let changes = changes(values, window);
+        let smallest = set.max(settings.steps_over_noise * noise(&changes));
+        for (kept, size) in [(&mut steps, smallest), (&mut deflections, settings.deflection_share * smallest)] {
+            let mut found = of_changes(&changes, size, window);
+            for step in &mut found {
+                step.time_s = record.start_s + step.time_s * record.step_s;
+            }
+            kept.of.insert(signal.clone(), found);
+            kept.smallest.insert(signal.clone(), size);
         }
-        Some((signal.clone(), steps))
-    };
-    settings.steps.iter().filter_map(of).collect()
+    }
+    (steps, deflections)
+}
+
+/// The largest change of a signal, between levels as those of a step, from one time to another; 0 where nothing is known.
+pub(super) fn largest_change(record: &Record, signal: &str, settings: &Settings, (from_s, to_s): (f64, f64)) -> f64 {
+    let window = Window::of(record, settings);
+    let reach = window.half_transit + window.level;
+    let first = record.sample_at(from_s).saturating_sub(reach);
+    let end = (record.sample_at(to_s) + reach).min(record.samples);
+    let values = record.values(signal).and_then(|v| v.get(first..end)).unwrap_or_default();
+    let sizes = changes(values, window).into_iter().flatten().map(|(before, after)| (after - before).abs());
+    sizes.fold(0.0, f64::max)
+}
+
+/// The standard deviation of changes that nobody commanded: from the median of all, of which steps are few.
+fn noise(changes: &[Option<(f64, f64)>]) -> f64 {
+    let mut sizes: Vec<f64> = changes.iter().flatten().map(|(before, after)| (after - before).abs()).collect();
+    let middle = sizes.len() / 2;
+    if middle == 0 {
+        return 0.0;
+    }
+    // Of the normal distribution: standard deviation over median of the magnitude.
+    1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A time in whole samples, at least one.
@@ -64,8 +107,17 @@ struct Window {
     level: usize,
 }
 
-/// The steps of one signal, their times in samples (a step between samples 9 and 10 is at 9.5).
-fn of_signal(values: &[f64], smallest: f64, window: Window) -> Vec<Step> {
+impl Window {
+    fn of(record: &Record, settings: &Settings) -> Window {
+        Window {
+            half_transit: samples(settings.transit_s / 2.0, record.step_s),
+            level: samples(settings.level_s, record.step_s),
+        }
+    }
+}
+
+/// The levels before and after each time, in samples; none where one of them does not exist.
+fn changes(values: &[f64], window: Window) -> Vec<Option<(f64, f64)>> {
     let levels: Vec<Option<f64>> = values.windows(window.level).map(level).collect();
     let reach = window.half_transit + window.level;
     let at = |k: usize| -> Option<(f64, f64)> {
@@ -73,11 +125,17 @@ fn of_signal(values: &[f64], smallest: f64, window: Window) -> Vec<Step> {
         let after = levels.get(k + window.half_transit)?;
         (*before).zip(*after)
     };
+    (0..=values.len()).map(at).collect()
+}
+
+/// The steps among a signal's changes, their times in samples (a step between samples 9 and 10 is at 9.5).
+fn of_changes(changes: &[Option<(f64, f64)>], smallest: f64, window: Window) -> Vec<Step> {
+    let reach = window.half_transit + window.level;
     let mut steps = Vec::new();
     let mut run: Vec<(usize, f64, f64)> = Vec::new();
-    for k in 0..=values.len() {
+    for (k, change) in changes.iter().enumerate() {
         // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a step.
-        let Some((before, after)) = at(k) else { continue };
+        let Some((before, after)) = *change else { continue };
         let big = (after - before).abs() >= smallest;
         let goes_on =
             |last: &(usize, f64, f64)| big && (after - before) * (last.2 - last.1) > 0.0 && k - last.0 <= reach;
@@ -131,7 +189,7 @@ mod tests {
     const WINDOW: Window = Window { half_transit: 3, level: 5 };
 
     fn steps(values: &[f64]) -> Vec<Step> {
-        of_signal(values, 2.0, WINDOW)
+        of_changes(&changes(values, WINDOW), 2.0, WINDOW)
     }
 
     /// A level that jumps at the given samples.

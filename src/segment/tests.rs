@@ -7,7 +7,8 @@ use crate::aero::Axis;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
-use crate::maneuver::{Event, Recognition, StepCount};
+use crate::maneuver::Quality;
+use crate::maneuver::{Event, Pulses, Recognition, StepCount, Sweep};
 
 const STEP_S: f64 = 0.025;
 
@@ -35,7 +36,8 @@ fn aircraft() -> Aircraft {
 
 fn settings() -> Settings {
     serde_yaml::from_str(
-        "{excitation_flag: obes, steps: {de_deg: 2, dsa_deg: 2, stick_pitch_in: 1, stick_lat_in: 1, pedal_in: 1}}",
+        "{excitation_flag: obes, pilot_controls: [stick_pitch_in, stick_lat_in, pedal_in], \
+         steps: {de_deg: 2, dsa_deg: 2, dpv_deg: 2, stick_pitch_in: 1, stick_lat_in: 1, pedal_in: 1}}",
     )
     .expect("settings")
 }
@@ -52,6 +54,7 @@ fn class(name: &str, axis: Axis, flags: &[(&str, bool)], steps: &[(&str, usize, 
             steps: steps.iter().map(count).collect(),
             lead_in_s: 1.0,
             decay_s,
+            ..Recognition::default()
         },
         statuses: BTreeMap::new(),
         weights: BTreeMap::new(),
@@ -65,14 +68,20 @@ fn classes() -> Vec<Class> {
     let vectored = [("obes", false), ("tvcs", true)];
     let pitch = [("stick_pitch_in", 6, any)];
     let yaw_roll = [("pedal_in", 3, any), ("stick_lat_in", 3, any)];
-    vec![
-        class("DOUBLETS", Axis::Longitudinal, &obes, &[("dsa_deg", 3, any), ("de_deg", 3, any)], 1.5),
-        class("SERIES", Axis::Longitudinal, &obes, &[("de_deg", 10, any), ("dsa_deg", 0, 2)], 1.5),
-        class("3211", Axis::Longitudinal, &obes, &[("de_deg", 4, 9), ("dsa_deg", 0, 2)], 1.5),
+    let doublets = [("dsa_deg", 3, 8), ("de_deg", 3, 8)];
+    let mut classes = vec![
+        class("DOUBLETS", Axis::Longitudinal, &obes, &doublets, 1.5),
+        class("SERIES", Axis::Longitudinal, &obes, &[("de_deg", 10, 19), ("dsa_deg", 0, 2)], 1.5),
+        class("3211", Axis::Longitudinal, &obes, &[("dsa_deg", 0, 2)], 4.5),
         class("PITCH", Axis::Longitudinal, &free, &pitch, 2.5),
         class("PITCH_TV", Axis::Longitudinal, &vectored, &pitch, 2.5),
         class("YAW_ROLL", Axis::Lateral, &free, &yaw_roll, 2.5),
-    ]
+    ];
+    let pulses = Pulses { widths: vec![3.0, 2.0, 1.0, 1.0], unit_s: (0.2, 2.0), tolerance: 0.5 };
+    classes[2].recognition.pulses.insert("de_deg".into(), pulses);
+    classes[3].recognition.moves.insert("dpv_deg".into(), false);
+    classes[4].recognition.moves.insert("dpv_deg".into(), true);
+    classes
 }
 
 /// A record of trimmed flight with smooth motion and chatter on every control.
@@ -99,10 +108,12 @@ fn flight(length_s: u32) -> Record {
     for (name, value) in constants {
         put(&mut record, name, |_| value);
     }
-    for (name, trim) in
-        [("de_deg", -9.0), ("dsa_deg", 0.1), ("stick_pitch_in", 0.4), ("stick_lat_in", 0.0), ("pedal_in", 0.0)]
-    {
+    for (name, trim) in [("de_deg", -9.0), ("dsa_deg", 0.1)] {
         put(&mut record, name, |t| trim + 0.4 * (2.0 * t).sin() + 0.3 * (125.0 * t).sin());
+    }
+    put(&mut record, "dpv_deg", |t| 0.03 * (125.0 * t).sin());
+    for (name, trim) in [("stick_pitch_in", 0.4), ("stick_lat_in", 0.0), ("pedal_in", 0.0)] {
+        put(&mut record, name, |t| trim + 0.2 * (2.0 * t).sin() + 0.1 * (125.0 * t).sin());
     }
     record
 }
@@ -150,6 +161,7 @@ fn pilot_steps(record: &mut Record, name: &str, at_s: f64, size: f64, reversals:
     last_s
 }
 
+/// Ends 7 s later.
 fn three_two_one_one(record: &mut Record, at_s: f64) {
     edges(
         record,
@@ -162,12 +174,45 @@ fn found(record: &Record) -> Segmented {
     maneuvers(record, &classes(), &aircraft(), &settings())
 }
 
+fn classes_of(segmented: &Segmented) -> Vec<&str> {
+    segmented.maneuvers.iter().map(|m| m.class.as_str()).collect()
+}
+
+fn assert_window(m: &Maneuver, class: &str, start_s: f64, end_s: f64) {
+    assert_eq!(m.class, class);
+    assert_abs_diff_eq!(m.start_s, start_s, epsilon = 0.2);
+    assert_abs_diff_eq!(m.end_s, end_s, epsilon = 0.2);
+}
+
 fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
-    let Segmented { maneuvers, problems } = found(record);
-    assert_eq!(problems, []);
-    assert_eq!(maneuvers.iter().map(|m| m.class.as_str()).collect::<Vec<_>>(), [class]);
-    assert_abs_diff_eq!(maneuvers[0].start_s, start_s, epsilon = 0.2);
-    assert_abs_diff_eq!(maneuvers[0].end_s, end_s, epsilon = 0.2);
+    let segmented = found(record);
+    assert_eq!((&segmented.problems[..], &segmented.unknown[..]), (&[][..], &[][..]));
+    assert_eq!(classes_of(&segmented), [class]);
+    assert_window(&segmented.maneuvers[0], class, start_s, end_s);
+}
+
+/// Noise that feedback makes of turbulence: white noise through two lags of 0.15 s, of the given standard deviation.
+fn turbulence(record: &mut Record, name: &str, seed: u64, deviation: f64) {
+    let mut state = seed;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let keep = (-STEP_S / 0.15).exp();
+    let (mut first, mut second) = (0.0, 0.0);
+    let mut noise: Vec<f64> = Vec::new();
+    for _ in 0..record.samples {
+        first = keep * first + (0..12).map(|_| uniform()).sum::<f64>();
+        second = keep * second + first;
+        noise.push(second);
+    }
+    let size = (noise.iter().map(|v| v * v).sum::<f64>() / noise.len() as f64).sqrt();
+    let start_s = record.start_s;
+    add(record, name, |t| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sample of the record")]
+        let k = ((t - start_s) / STEP_S).round() as usize;
+        noise[k] * deviation / size
+    });
 }
 
 #[test]
@@ -175,45 +220,121 @@ fn doublets_of_surfaces_are_found_with_their_window_and_condition() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 40.0);
     doublet(&mut r, "dsa_deg", 21.0, 5.0);
-    doublet(&mut r, "de_deg", 30.0, -4.0);
-    assert_one(&r, "DOUBLETS", 20.0, 41.5);
+    doublet(&mut r, "de_deg", 26.0, -4.0);
+    assert_one(&r, "DOUBLETS", 20.0, 29.5);
     let m = &found(&r).maneuvers[0];
     assert_eq!((m.maneuver_id.as_str(), m.origin.as_str()), ("f1_t00020", "found"));
     assert_abs_diff_eq!(m.samples as f64, 1.0 + (m.end_s - m.start_s) / STEP_S, epsilon = 1e-6);
     // The vane reads 1.25 times the angle at the c.g.
     assert_abs_diff_eq!(m.alpha_deg, 20.0, epsilon = 1e-9);
     assert_abs_diff_eq!(m.mass_slug, 1050.0, epsilon = 1e-9);
+    let by = &m.recognised;
+    assert_eq!((by.inputs.as_str(), by.followed.as_str()), ("de_deg 3, dsa_deg 3", ""));
+    assert_abs_diff_eq!(by.first_input_s.unwrap(), 21.0, epsilon = 0.1);
+    assert_abs_diff_eq!(by.last_input_s.unwrap(), 28.0, epsilon = 0.1);
+    assert_abs_diff_eq!(by.confidence.unwrap(), 1.0, epsilon = 1e-9);
 }
 
 #[test]
-fn four_steps_with_a_long_tail_are_not_a_series() {
+fn lengths_of_pulses_tell_a_3_2_1_1_with_its_unit_from_a_series() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    assert_one(&r, "3211", 20.0, 34.5);
+    assert_one(&r, "3211", 20.0, 32.5);
+    let evidence = found(&r).maneuvers[0].recognised.evidence.clone();
+    assert!(evidence.contains("pulses of 1.00 s the unit"), "{evidence}");
 
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
-    pilot_steps(&mut r, "de_deg", 21.0, 4.0, 10, 0.9);
-    assert_one(&r, "SERIES", 20.0, 34.5);
+    let last_s = pilot_steps(&mut r, "de_deg", 21.0, 4.0, 10, 0.9);
+    assert_one(&r, "SERIES", 20.0, last_s + 1.5);
+}
+
+/// A maneuver of the on-board system with the flag as given, and the flag's verdict.
+fn with_flag(flag: impl Fn(&mut Record)) -> Segmented {
+    let mut r = flight(120);
+    three_two_one_one(&mut r, 21.0);
+    doublet(&mut r, "dsa_deg", 60.0, 5.0);
+    doublet(&mut r, "de_deg", 65.0, -4.0);
+    flag(&mut r);
+    let segmented = found(&r);
+    assert_eq!(segmented.maneuvers.len(), 2, "{segmented:?}");
+    assert_window(&segmented.maneuvers[0], "3211", 20.0, 32.5);
+    assert_window(&segmented.maneuvers[1], "DOUBLETS", 59.0, 68.5);
+    assert_eq!(segmented.unknown, []);
+    segmented
 }
 
 #[test]
-fn pilot_steps_begin_and_end_with_the_deflection_and_the_vectoring_flag_tells_the_class() {
-    for (tvcs, class) in [(0.0, "PITCH"), (1.0, "PITCH_TV")] {
+fn a_flag_that_is_right_missing_late_or_stuck_changes_nothing_but_the_confidence() {
+    let confidence = |s: &Segmented| s.maneuvers[0].recognised.confidence.unwrap();
+    let right = with_flag(|r| {
+        up(r, "obes", 20.0, 33.0);
+        up(r, "obes", 59.0, 70.0);
+    });
+    assert_eq!(right.problems, []);
+    let absent = with_flag(|r| drop(r.signals.remove("obes")));
+    let empty = with_flag(|r| put(r, "obes", |_| f64::NAN));
+    for missing in [&absent, &empty] {
+        assert_eq!(missing.problems.len(), 1);
+        assert_eq!(missing.problems[0].place, "obes");
+        assert!(missing.problems[0].reason.contains("recognised by their inputs alone"));
+        assert!(confidence(missing) < confidence(&right));
+    }
+    let late = with_flag(|r| {
+        up(r, "obes", 24.0, 37.0);
+        up(r, "obes", 63.0, 74.0);
+    });
+    assert_eq!(late.problems, []);
+    let down = with_flag(|_| {});
+    assert!(down.problems[0].reason.contains("stuck"), "{:?}", down.problems);
+    assert!(confidence(&down) < confidence(&absent));
+    let up = with_flag(|r| put(r, "obes", |_| 1.0));
+    assert_eq!(up.problems, [], "two maneuvers want it up and none down");
+}
+
+#[test]
+fn a_flag_that_is_stuck_up_makes_no_maneuver_of_ordinary_flying() {
+    let mut r = flight(120);
+    put(&mut r, "obes", |_| 1.0);
+    put(&mut r, "tvcs", |_| 1.0);
+    let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.8);
+    assert_one(&r, "PITCH", 19.0, last_s + 2.5);
+    let evidence = &found(&r).maneuvers[0].recognised.evidence;
+    assert!(evidence.contains("although obes is up; although tvcs is up; dpv_deg rests"), "{evidence}");
+}
+
+#[test]
+fn vanes_that_move_tell_the_class_whatever_the_flag_says() {
+    for (tvcs, moves, class) in
+        [(0.0, false, "PITCH"), (1.0, true, "PITCH_TV"), (1.0, false, "PITCH"), (0.0, true, "PITCH_TV")]
+    {
         let mut r = flight(60);
         put(&mut r, "tvcs", |_| tvcs);
         let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.0, 8, 1.8);
+        pilot_steps(&mut r, "de_deg", 20.05, 3.0, 8, 1.8);
+        if moves {
+            pilot_steps(&mut r, "dpv_deg", 20.05, 4.0, 8, 1.8);
+        }
         assert_one(&r, class, 19.0, last_s + 2.5);
+        let followed = if moves { "de_deg, dpv_deg" } else { "de_deg" };
+        assert_eq!(found(&r).maneuvers[0].recognised.followed, followed);
     }
 }
 
 #[test]
-fn a_vectoring_flag_that_flickers_does_not_change_the_class() {
-    let mut r = flight(60);
-    up(&mut r, "tvcs", 25.0, 29.0);
-    let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.5);
-    assert_one(&r, "PITCH", 19.0, last_s + 2.5);
+fn where_no_vane_is_recorded_the_flag_decides_and_without_both_nothing_does() {
+    for (tvcs, class) in [(0.0, "PITCH"), (1.0, "PITCH_TV")] {
+        let mut r = flight(60);
+        r.signals.remove("dpv_deg");
+        put(&mut r, "tvcs", |_| tvcs);
+        pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.0, 8, 1.8);
+        assert_eq!(classes_of(&found(&r)), [class]);
+        r.signals.remove("tvcs");
+        let neither = found(&r);
+        assert_eq!(neither.maneuvers, []);
+        assert!(neither.unknown[0].reason.contains("fits PITCH, PITCH_TV alike"), "{:?}", neither.unknown);
+    }
 }
 
 #[test]
@@ -222,31 +343,68 @@ fn pedal_then_stick_is_one_maneuver_and_the_recovery_is_left_out() {
     let pedal_s = pilot_steps(&mut r, "pedal_in", 20.0, 1.5, 3, 1.5);
     let last_s = pilot_steps(&mut r, "stick_lat_in", pedal_s + 1.5, -1.5, 3, 1.5);
     edges(&mut r, "stick_lat_in", &[(last_s + 2.5, 1.7), (last_s + 4.0, -1.7)]);
-    assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.5);
+    assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.4);
 }
 
 #[test]
-fn flicker_without_excitation_turns_and_recoveries_are_no_maneuvers() {
-    let mut r = flight(120);
+fn a_window_ends_where_the_pilot_takes_over() {
+    let mut r = flight(60);
+    three_two_one_one(&mut r, 21.0);
+    up(&mut r, "obes", 20.0, 30.0);
+    edges(&mut r, "stick_pitch_in", &[(30.0, -2.0), (31.0, 2.0)]);
+    edges(&mut r, "de_deg", &[(30.1, 6.0), (31.1, -6.0)]);
+    assert_one(&r, "3211", 20.0, 29.9);
+}
+
+#[test]
+fn surfaces_that_follow_the_stick_and_ordinary_flying_are_no_maneuvers() {
+    let mut r = flight(200);
     up(&mut r, "obes", 20.0, 24.0);
     up(&mut r, "tvcs", 30.0, 35.0);
-    for at in [22.0, 50.0, 58.0, 80.0] {
+    for at in [22.0, 50.0, 58.0, 80.0, 83.0, 86.0, 89.0, 92.0] {
         edges(&mut r, "stick_lat_in", &[(at, 1.6), (at + 2.0, -1.6)]);
         edges(&mut r, "stick_pitch_in", &[(at + 0.5, 2.0), (at + 1.0, -2.0)]);
+        edges(&mut r, "de_deg", &[(at + 0.6, -6.0), (at + 1.1, 9.0), (at + 1.6, -3.0)]);
     }
     assert_eq!(found(&r), Segmented::default());
 }
 
 #[test]
-fn excitation_that_fits_no_class_is_said_with_what_was_seen() {
+fn excitation_that_fits_no_class_is_unknown_with_its_times_and_the_reason() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 30.0);
     doublet(&mut r, "de_deg", 21.0, 5.0);
-    let Segmented { maneuvers, problems } = found(&r);
+    let Segmented { maneuvers, unknown, problems } = found(&r);
     assert_eq!(maneuvers, []);
+    assert_eq!(unknown.len(), 1);
+    assert_abs_diff_eq!(unknown[0].start_s, 21.0, epsilon = 0.1);
+    assert_abs_diff_eq!(unknown[0].end_s, 23.0, epsilon = 0.1);
+    assert_eq!((unknown[0].inputs.as_str(), unknown[0].nearest_class.as_str()), ("de_deg 3", "DOUBLETS"));
+    assert!(unknown[0].reason.contains("dsa_deg steps 0 times, at least 3 wanted"), "{unknown:?}");
     assert_eq!(problems.len(), 1);
-    assert_eq!(problems[0].place, "t = 20.0 s");
+    assert_eq!(problems[0].place, "t = 21.1 s");
     assert!(problems[0].reason.contains("de_deg 3"), "{}", problems[0].reason);
+}
+
+#[test]
+fn a_maneuver_broken_off_is_unknown_and_not_of_a_shorter_class() {
+    // The first pulses of each: six steps of a series are not a 3-2-1-1, two pulses of that are no doublet of two surfaces.
+    let mut series = flight(60);
+    pilot_steps(&mut series, "de_deg", 21.0, 4.0, 4, 0.9);
+    let mut pulses = flight(60);
+    edges(&mut pulses, "de_deg", &[(21.0, 6.0), (24.0, -12.0), (26.0, 6.0)]);
+    for (r, nearest) in [(series, "SERIES"), (pulses, "3211")] {
+        let segmented = found(&r);
+        assert_eq!(segmented.maneuvers, []);
+        let unknown = &segmented.unknown[..];
+        assert_eq!(unknown.len(), 1);
+        assert!(unknown[0].reason.contains("broken off?") || unknown[0].nearest_class == nearest, "{unknown:?}");
+    }
+    let mut pilot = flight(60);
+    pilot_steps(&mut pilot, "stick_pitch_in", 20.0, 1.5, 3, 1.5);
+    let segmented = found(&pilot);
+    assert_eq!(segmented.maneuvers, []);
+    assert!(segmented.unknown[0].reason.contains("broken off? stick_pitch_in steps"), "{:?}", segmented.unknown);
 }
 
 #[test]
@@ -256,13 +414,13 @@ fn a_maneuver_that_fits_two_classes_names_them() {
     three_two_one_one(&mut r, 21.0);
     let mut both = classes();
     both.push(Class { name: "TWIN".into(), ..both[2].clone() });
-    let Segmented { maneuvers, problems } = maneuvers(&r, &both, &aircraft(), &settings());
+    let Segmented { maneuvers, unknown, .. } = maneuvers(&r, &both, &aircraft(), &settings());
     assert_eq!(maneuvers, []);
-    assert!(problems[0].reason.contains("3211, TWIN"), "{}", problems[0].reason);
+    assert!(unknown[0].reason.contains("3211, TWIN"), "{unknown:?}");
 }
 
 #[test]
-fn a_short_drop_out_of_the_flag_and_missing_samples_do_not_cut_a_maneuver() {
+fn missing_samples_do_not_cut_a_maneuver() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 24.5);
     up(&mut r, "obes", 24.8, 33.0);
@@ -273,32 +431,89 @@ fn a_short_drop_out_of_the_flag_and_missing_samples_do_not_cut_a_maneuver() {
             series.values[k] = f64::NAN;
         }
     }
-    assert_one(&r, "3211", 20.0, 34.5);
+    assert_one(&r, "3211", 20.0, 32.5);
 }
 
 #[test]
-fn two_maneuvers_close_together_do_not_overlap() {
+fn maneuvers_that_follow_each_other_within_two_seconds_are_two_whether_flags_part_them_or_not() {
+    for flags in [true, false] {
+        let mut r = flight(90);
+        three_two_one_one(&mut r, 21.0);
+        three_two_one_one(&mut r, 29.6);
+        let last_s = pilot_steps(&mut r, "de_deg", 38.4, 4.0, 10, 0.9);
+        doublet(&mut r, "dsa_deg", last_s + 1.8, 5.0);
+        doublet(&mut r, "de_deg", last_s + 5.0, 5.0);
+        if flags {
+            up(&mut r, "obes", 20.0, 70.0);
+        }
+        let segmented = found(&r);
+        assert_eq!(classes_of(&segmented), ["3211", "3211", "SERIES", "DOUBLETS"]);
+        assert_eq!(segmented.unknown, []);
+        for pair in segmented.maneuvers.windows(2) {
+            assert!(pair[1].start_s < pair[0].end_s, "what is between them serves both");
+            let (last_s, next_s) =
+                (pair[0].recognised.last_input_s.unwrap(), pair[1].recognised.first_input_s.unwrap());
+            assert!(pair[0].end_s < next_s, "no input of the next is in the window");
+            assert!(pair[0].end_s - last_s > 0.4 * (next_s - last_s), "some decay is kept");
+            assert!(next_s - pair[1].start_s > 0.4 * (next_s - last_s), "some lead-in is kept");
+        }
+    }
+}
+
+#[test]
+fn pilot_steps_repeated_at_once_are_two_maneuvers() {
+    let mut r = flight(90);
+    let first_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.4);
+    let second_s = pilot_steps(&mut r, "stick_pitch_in", first_s + 3.5, 1.5, 7, 1.4);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["PITCH", "PITCH"]);
+    assert_abs_diff_eq!(segmented.maneuvers[0].end_s, first_s + 2.5, epsilon = 0.2);
+    assert_window(&segmented.maneuvers[1], "PITCH", first_s + 2.5, second_s + 2.5);
+}
+
+#[test]
+fn a_maneuver_against_a_turn_has_the_same_window() {
     let mut r = flight(60);
-    up(&mut r, "obes", 10.0, 19.0);
-    three_two_one_one(&mut r, 11.0);
-    up(&mut r, "obes", 20.0, 29.0);
-    three_two_one_one(&mut r, 21.0);
-    let Segmented { maneuvers, problems } = found(&r);
-    assert_eq!(problems, []);
-    assert_eq!(maneuvers.len(), 2);
-    assert_abs_diff_eq!(maneuvers[0].end_s, 20.5, epsilon = 0.05);
-    assert!(maneuvers[1].start_s >= maneuvers[0].end_s);
-    assert!(maneuvers[1].start_s < 21.05);
-}
-
-#[test]
-fn a_maneuver_that_the_record_cuts_is_a_problem() {
-    let mut r = flight(30);
+    for (name, size) in [("de_deg", 3.0), ("dsa_deg", 2.0), ("stick_pitch_in", 1.0), ("stick_lat_in", 1.5)] {
+        add(&mut r, name, |t| size * (std::f64::consts::TAU * t / 30.0).sin());
+    }
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    let Segmented { maneuvers, problems } = found(&r);
+    assert_one(&r, "3211", 20.0, 32.5);
+    let last_s = pilot_steps(&mut r, "stick_pitch_in", 42.0, 1.5, 7, 1.2);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["3211", "PITCH"]);
+    assert_abs_diff_eq!(segmented.maneuvers[1].end_s, last_s + 2.5, epsilon = 0.2);
+}
+
+#[test]
+fn turbulence_makes_no_maneuver_and_hides_none() {
+    for seed in 1..=6 {
+        let mut r = flight(300);
+        for (k, name) in ["de_deg", "dsa_deg", "dpv_deg"].into_iter().enumerate() {
+            turbulence(&mut r, name, 10 * seed + k as u64, 0.9);
+        }
+        assert_eq!(found(&r), Segmented::default(), "seed {seed}");
+        three_two_one_one(&mut r, 21.0);
+        doublet(&mut r, "dsa_deg", 60.0, 6.0);
+        doublet(&mut r, "de_deg", 65.0, -6.0);
+        up(&mut r, "obes", 20.0, 33.0);
+        up(&mut r, "obes", 59.0, 70.0);
+        let segmented = found(&r);
+        assert_eq!(classes_of(&segmented), ["3211", "DOUBLETS"], "seed {seed}: {:?}", segmented.unknown);
+        assert_window(&segmented.maneuvers[0], "3211", 20.0, 32.5);
+        assert_window(&segmented.maneuvers[1], "DOUBLETS", 59.0, 68.5);
+    }
+}
+
+#[test]
+fn a_maneuver_that_the_record_cuts_is_unknown() {
+    let mut r = flight(27);
+    up(&mut r, "obes", 20.0, 33.0);
+    three_two_one_one(&mut r, 21.0);
+    let Segmented { maneuvers, unknown, .. } = found(&r);
     assert_eq!(maneuvers, []);
-    assert!(problems[0].reason.contains("cut"), "{}", problems[0].reason);
+    assert!(unknown[0].reason.contains("cut by the end of the record"), "{unknown:?}");
 }
 
 #[test]
@@ -306,9 +521,163 @@ fn a_record_without_a_signal_says_which_classes_suffer_and_segments_the_rest() {
     let mut r = flight(60);
     pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.5);
     r.signals.remove("dsa_deg");
-    let Segmented { maneuvers, problems } = found(&r);
+    let Segmented { maneuvers, problems, .. } = found(&r);
     assert_eq!(maneuvers.len(), 1);
     assert_eq!(problems.iter().map(|p| p.place.as_str()).collect::<Vec<_>>(), ["dsa_deg"]);
+}
+
+#[test]
+fn without_pilot_controls_only_a_flag_tells_who_moved_the_surfaces() {
+    let mut r = flight(60);
+    three_two_one_one(&mut r, 21.0);
+    for name in ["stick_pitch_in", "stick_lat_in", "pedal_in"] {
+        r.signals.remove(name);
+    }
+    assert_eq!(found(&r).maneuvers, []);
+    up(&mut r, "obes", 20.0, 33.0);
+    assert_eq!(classes_of(&found(&r)), ["3211"]);
+}
+
+/// A sine whose frequency rises evenly, its size as given, from one time to another.
+fn sweep(record: &mut Record, name: &str, (from_s, to_s): (f64, f64), (from_hz, to_hz): (f64, f64), size: f64) {
+    add(record, name, |t| {
+        let (s, length_s) = (t - from_s, to_s - from_s);
+        let turns = from_hz * s + 0.5 * (to_hz - from_hz) * s * s / length_s;
+        if (0.0..=length_s).contains(&s) { size * (std::f64::consts::TAU * turns).sin() } else { 0.0 }
+    });
+}
+
+#[test]
+fn a_sweep_is_recognised_by_its_rising_frequency() {
+    let mut swept = class("SWEEP", Axis::Longitudinal, &[("obes", true)], &[("dsa_deg", 0, 2)], 2.0);
+    swept.recognition.sweep.insert("de_deg".into(), Sweep { at_least: 10, ratio: 2.0 });
+    let with_sweep: Vec<Class> = classes().into_iter().chain([swept]).collect();
+    let find = |r: &Record| maneuvers(r, &with_sweep, &aircraft(), &settings());
+    let mut rising = flight(90);
+    sweep(&mut rising, "de_deg", (20.0, 50.0), (0.15, 1.65), 4.0);
+    let segmented = find(&rising);
+    assert_eq!((classes_of(&segmented), &segmented.unknown[..]), (vec!["SWEEP"], &[][..]));
+    assert_abs_diff_eq!(segmented.maneuvers[0].start_s, 19.0, epsilon = 0.5);
+    assert_abs_diff_eq!(segmented.maneuvers[0].end_s, 52.0, epsilon = 0.5);
+    let evidence = &segmented.maneuvers[0].recognised.evidence;
+    assert!(evidence.contains("times as fast"), "{evidence}");
+
+    let mut even = flight(90);
+    sweep(&mut even, "de_deg", (20.0, 50.0), (0.9, 0.9), 4.0);
+    assert_ne!(classes_of(&find(&even)), ["SWEEP"]);
+    let mut others = flight(90);
+    three_two_one_one(&mut others, 21.0);
+    pilot_steps(&mut others, "de_deg", 51.0, 4.0, 10, 0.9);
+    assert_eq!(classes_of(&find(&others)), ["3211", "SERIES"]);
+}
+
+/// A maneuver whose pitch rate answers the stabilator, in a record that can be spoiled; its quality.
+fn quality(spoil: impl Fn(&mut Record)) -> Quality {
+    let mut r = flight(60);
+    up(&mut r, "obes", 20.0, 33.0);
+    three_two_one_one(&mut r, 21.0);
+    let answer = |t: f64| if (21.0..32.0).contains(&t) { 5.0 * (1.2 * (t - 21.0)).sin() } else { 0.0 };
+    put(&mut r, signal::Q, |t| answer(t) + 0.05 * (125.0 * t).sin());
+    spoil(&mut r);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["3211"]);
+    segmented.maneuvers[0].quality.clone()
+}
+
+#[test]
+fn a_sound_maneuver_is_accepted() {
+    let sound = quality(|_| {});
+    assert_eq!((sound.verdict.as_str(), sound.reason.as_str()), ("accepted", ""));
+    assert!(sound.signal_to_noise.is_some_and(|v| v > 20.0), "{sound:?}");
+    assert!(sound.lead_in_motion.is_some_and(|v| v < 0.1), "{sound:?}");
+    assert_eq!((sound.other_axis, sound.marked_share), (Some(0.0), Some(0.0)));
+}
+
+fn is_rejected(spoil: impl Fn(&mut Record), because: &str) {
+    let spoiled = quality(spoil);
+    assert_eq!(spoiled.verdict, "rejected", "{spoiled:?}");
+    assert!(spoiled.reason.contains(because) && !spoiled.reason.contains(';'), "{spoiled:?}");
+}
+
+#[test]
+fn each_limit_rejects_with_its_own_reason() {
+    is_rejected(
+        |r| add(r, signal::Q, |t| if (19.5..20.9).contains(&t) { 8.0 * (5.0 * t).sin() } else { 0.0 }),
+        "not trimmed at the start",
+    );
+    is_rejected(|r| add(r, signal::ALPHA_VANE, |t| 8.0 * (0.8 * t).sin()), "α strays by");
+    is_rejected(|r| add(r, signal::P, |t| 9.0 * (1.1 * t).sin()), "the other axis moves");
+    is_rejected(|r| add(r, signal::Q, |t| 1.0 * (125.0 * t).sin()), "times its noise");
+    is_rejected(
+        |r| {
+            for name in ["de_deg", signal::Q, signal::AN, signal::ALPHA_VANE] {
+                if let Some(series) = r.signals.get_mut(name) {
+                    series.marks[900..1200].fill(Mark::Bridged);
+                }
+            }
+        },
+        "of its samples are marked",
+    );
+}
+
+#[test]
+fn samples_between_those_of_a_slow_channel_are_no_fault() {
+    let slow = quality(|r| {
+        for name in ["de_deg", signal::Q, signal::AN, signal::ALPHA_VANE] {
+            if let Some(series) = r.signals.get_mut(name) {
+                series.marks.iter_mut().step_by(2).for_each(|mark| *mark = Mark::Between);
+            }
+        }
+    });
+    assert_eq!((slow.verdict.as_str(), slow.marked_share), ("accepted", Some(0.0)), "{slow:?}");
+}
+
+#[test]
+fn a_slow_turn_is_no_motion_of_the_other_axis() {
+    let turning = quality(|r| add(r, signal::R, |t| 3.0 + 0.1 * t));
+    assert_eq!(turning.verdict, "accepted", "{turning:?}");
+}
+
+#[test]
+fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_limit() {
+    let mut r = flight(60);
+    up(&mut r, "obes", 20.0, 33.0);
+    three_two_one_one(&mut r, 21.0);
+    let mut limited = settings();
+    let of = |lower_deg, rate_deg_s| quality::Actuator { lower_deg, upper_deg: 40.0, rate_deg_s };
+    limited.quality.actuators.insert("de_deg".into(), of(-14.4, 1000.0));
+    let measured = |limited: &Settings| {
+        let segmented = maneuvers(&r, &classes(), &aircraft(), limited);
+        segmented.maneuvers[0].quality.clone()
+    };
+    // Three of seven seconds to the lower side.
+    let at_stop = measured(&limited);
+    assert!(at_stop.saturated_share.is_some_and(|v| (0.2..0.5).contains(&v)), "{at_stop:?}");
+    assert_eq!((at_stop.rate_limited_share, at_stop.verdict.as_str()), (Some(0.0), "accepted"));
+    limited.quality.saturated_share = 0.1;
+    assert!(measured(&limited).reason.contains("rests at its stop"));
+    limited.quality = quality::Limits::default();
+    limited.quality.actuators.insert("de_deg".into(), of(-40.0, 40.0));
+    let fast = measured(&limited);
+    assert!(fast.rate_limited_share.is_some_and(|v| v > 0.02), "{fast:?}");
+    limited.quality.rate_limited_share = 0.01;
+    assert!(measured(&limited).reason.contains("full rate"));
+}
+
+#[test]
+fn what_the_analyst_gave_is_measured_and_never_rejected() {
+    let mut r = flight(60);
+    up(&mut r, "obes", 20.0, 33.0);
+    three_two_one_one(&mut r, 21.0);
+    put(&mut r, signal::Q, |t| (t - 20.0).sin());
+    put(&mut r, signal::P, |t| 5.0 * (1.1 * t).sin());
+    assert!(found(&r).maneuvers[0].is_rejected());
+    let events = [event("3211", 20.0, 32.0)];
+    let (given, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
+    assert_eq!(rows[0].verdict, "agrees");
+    let quality = &given.maneuvers[0].quality;
+    assert_eq!(quality.verdict, "accepted");
+    assert!(quality.reason.contains("the other axis moves"), "{quality:?}");
 }
 
 #[test]
@@ -333,8 +702,8 @@ fn events_replace_what_overlaps_and_are_compared_with_it() {
     up(&mut r, "obes", 90.0, 103.0);
     three_two_one_one(&mut r, 91.0);
     let other_flight = Event { flight_id: "f2".into(), ..event("3211", 1.0, 2.0) };
-    let events = [event("3211", 20.2, 34.0), event("SERIES", 48.0, 64.0), event("PITCH", 70.0, 80.0), other_flight];
-    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft());
+    let events = [event("3211", 20.2, 33.0), event("SERIES", 48.0, 64.0), event("PITCH", 70.0, 80.0), other_flight];
+    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
     assert_eq!(segmented.problems, []);
     let said: Vec<(&str, &str)> = segmented.maneuvers.iter().map(|m| (m.class.as_str(), m.origin.as_str())).collect();
     assert_eq!(said, [("3211", "given"), ("SERIES", "given"), ("PITCH", "given"), ("3211", "found")]);
@@ -349,7 +718,7 @@ fn events_of_unknown_class_or_outside_the_record_become_problems() {
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
     let events = [event("PICH", 20.0, 34.0), event("3211", 50.0, 70.0), event("3211", 30.0, 25.0)];
-    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft());
+    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
     assert_eq!(segmented.problems.len(), 3);
     assert!(segmented.problems[0].reason.contains("did you mean `PITCH`?"), "{}", segmented.problems[0].reason);
     assert_eq!(segmented.maneuvers.len(), 1);
@@ -359,5 +728,8 @@ fn events_of_unknown_class_or_outside_the_record_become_problems() {
 #[test]
 fn without_events_nothing_is_compared() {
     let r = flight(10);
-    assert_eq!(with_events(found(&r), &r, &[], &classes(), &aircraft()), (Segmented::default(), Vec::new()));
+    assert_eq!(
+        with_events(found(&r), &r, &[], &classes(), &aircraft(), &settings().quality),
+        (Segmented::default(), Vec::new())
+    );
 }

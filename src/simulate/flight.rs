@@ -12,7 +12,7 @@ use super::trim::Trim;
 use super::{Card, Flown, Simulator, Tables, TrueDerivative, sensors, turbulence};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::units::DEG;
 
 /// α and β beyond which the build-up means nothing and the maneuver is lost, deg.
@@ -248,6 +248,8 @@ impl<'a> Flight<'a> {
             x_cg_ft: of(signal::X_CG),
             samples: last - first + 1,
             origin: "flown".to_owned(),
+            recognised: Recognised::default(),
+            quality: Quality::default(),
         }
     }
 }

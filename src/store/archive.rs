@@ -1,12 +1,13 @@
 //! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned tree.
 //!
-//! Only the columns of the channel map are read, row group by row group, into numbers; what a file cannot give is a
-//! problem of its flight, never a panic.
+//! Only the columns of the channel map are read, each by itself, row group by row group and page by page, into numbers;
+//! what a file cannot give is a problem of its flight, never a panic.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::panic::{self, UnwindSafe};
+use std::ops::Range;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
@@ -14,11 +15,14 @@ use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, TimeUnit};
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
+};
 
 use crate::error::{Error, Problem};
 use crate::flight::channel::RawColumn;
 use crate::flight::{Channel, RawFlight};
+use crate::ingest::Source;
 use crate::units::Unit;
 
 /// The files of one flight, in the order of its time.
@@ -36,9 +40,9 @@ const DEPTH: usize = 16;
 /// Rows decoded at a time: a few MB, whatever the size of the file's row groups.
 const BATCH_ROWS: usize = 16_384;
 
-/// The most numbers that are read of a flight, rows times mapped columns: 4 GB, ten hours of sixty channels at 200 Hz. A
-/// file of a few kilobytes can claim any number of rows.
-const LARGEST_FLIGHT: u64 = 500_000_000;
+/// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels at 200 Hz. A file of a
+/// few kilobytes can claim any number of rows, and would be read for as long.
+const LARGEST_FILE: u64 = 500_000_000;
 
 /// The field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
@@ -124,37 +128,53 @@ fn identity(file: &Path) -> (String, PathBuf) {
     (stem, file.to_owned())
 }
 
-/// The mapped columns of a flight as numbers, its files one after the other; a column that a file does not have is absent,
-/// or NaN over that file where another has it.
-///
-/// # Errors
-/// A file that cannot be read as Parquet, a column that is not numbers, or files that state different units.
-pub fn read(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<RawFlight, Problem> {
-    let mut flight = RawFlight { flight_id: files.flight_id.clone(), columns: BTreeMap::new() };
-    let mut rows = 0;
-    for file in &files.files {
-        // The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too.
-        let appended = caught(|| decode(file, channels)).unwrap_or_else(|_| {
-            Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned())
-        });
-        let append = appended.and_then(|part| append(&mut flight, part, &mut rows));
-        append.map_err(|reason| Problem {
-            stage: "ingest".to_owned(),
-            flight_id: files.flight_id.clone(),
-            place: file.display().to_string(),
-            reason,
-        })?;
-    }
-    Ok(flight)
-}
-
 thread_local! {
     /// Whether this thread is reading a file of which it need not be said that it made the reader panic.
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` gives, or that it panicked: silently, for the reason goes into a table.
-fn caught<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
+/// The files of a flight, opened: what their footers say. Columns are read from them one at a time, so that memory holds one
+/// page of one column and not of all.
+#[derive(Debug)]
+pub struct Opened {
+    flight_id: String,
+    files: Vec<OpenFile>,
+}
+
+#[derive(Debug)]
+struct OpenFile {
+    path: PathBuf,
+    metadata: ArrowReaderMetadata,
+    columns: BTreeMap<String, OpenColumn>,
+    rows: usize,
+}
+
+#[derive(Debug)]
+struct OpenColumn {
+    at: usize,
+    unit: Option<String>,
+    /// For timestamps and durations, from their ticks to the channel map's unit.
+    clock_factor: Option<f64>,
+}
+
+/// Opens the files of a flight.
+///
+/// # Errors
+/// A file that is no readable Parquet, or a mapped column that is not numbers.
+pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<Opened, Problem> {
+    let refused = |path: &Path, reason: String| Problem {
+        stage: "ingest".to_owned(),
+        flight_id: files.flight_id.clone(),
+        place: path.display().to_string(),
+        reason,
+    };
+    let opened = files.files.iter().map(|path| guarded(|| open_file(path, channels)).map_err(|e| refused(path, e)));
+    Ok(Opened { flight_id: files.flight_id.clone(), files: opened.collect::<Result<_, _>>()? })
+}
+
+/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too; silently, for the reason
+/// goes into a table.
+fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let before = panic::take_hook();
@@ -164,86 +184,140 @@ fn caught<T>(work: impl FnOnce() -> T + UnwindSafe) -> std::thread::Result<T> {
             }
         }));
     });
-    READING.set(true);
-    let result = panic::catch_unwind(work);
-    READING.set(false);
-    result
+    let outside = READING.replace(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(read));
+    READING.set(outside);
+    result.unwrap_or_else(|_| Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned()))
 }
 
-/// The mapped columns of one file, and its number of rows.
-struct Part {
-    columns: BTreeMap<String, RawColumn>,
-    rows: usize,
+fn unreadable(e: &dyn std::fmt::Display) -> String {
+    format!("not a readable Parquet file (truncated, or another format?): {e}")
 }
 
-fn append(flight: &mut RawFlight, part: Part, rows: &mut usize) -> Result<(), String> {
-    let total = *rows + part.rows;
-    for (name, mut column) in part.columns {
-        let whole = flight.columns.entry(name.clone()).or_default();
-        let stated = whole.unit.take();
-        if let (Some(a), Some(b)) = (&stated, &column.unit)
-            && a != b
-        {
-            return Err(format!("column `{name}` is in `{b}` here and in `{a}` in an earlier file of the flight"));
-        }
-        whole.unit = stated.or(column.unit);
-        whole.values.resize(*rows, f64::NAN);
-        whole.values.append(&mut column.values);
-    }
-    flight.columns.values_mut().for_each(|c| c.values.resize(total, f64::NAN));
-    *rows = total;
-    Ok(())
-}
-
-fn decode(file: &Path, channels: &BTreeMap<String, Channel>) -> Result<Part, String> {
-    let opened = File::open(file).map_err(|e| format!("cannot open the file: {e}"))?;
-    let unreadable =
-        |e: &dyn std::fmt::Display| format!("not a readable Parquet file (truncated, or another format?): {e}");
-    let builder = ParquetRecordBatchReaderBuilder::try_new(opened).map_err(|e| unreadable(&e))?;
-    let fields = builder.schema().fields().clone();
-    let wanted: Vec<usize> = (0..fields.len()).filter(|&i| channels.contains_key(fields[i].name())).collect();
+fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
+    let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
+    let metadata = ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?;
     let mut columns = BTreeMap::new();
-    for field in wanted.iter().filter_map(|&i| fields.get(i)) {
-        let channel = channels.get(field.name());
-        refuse_other_types(field, channel)?;
+    for (at, field) in metadata.schema().fields().iter().enumerate() {
+        let Some(channel) = channels.get(field.name()) else { continue };
+        refuse_other_types(field, Some(channel))?;
         let unit = field.metadata().get(UNIT).cloned();
-        if columns.insert(field.name().clone(), RawColumn { unit, values: Vec::new() }).is_some() {
+        let column = OpenColumn { at, unit, clock_factor: clock_factor(field.data_type(), Some(channel)) };
+        if columns.insert(field.name().clone(), column).is_some() {
             return Err(format!("two columns are named `{}`", field.name()));
         }
     }
     let claimed = |rows: i64| u64::try_from(rows).unwrap_or(u64::MAX);
-    let in_groups = builder.metadata().row_groups().iter().map(|g| claimed(g.num_rows()));
-    let rows = in_groups.fold(0, u64::saturating_add).max(claimed(builder.metadata().file_metadata().num_rows()));
-    if rows.saturating_mul(wanted.len() as u64) > LARGEST_FLIGHT {
-        return Err(format!("claims {rows} rows of {} mapped columns, more than any flight has", wanted.len()));
+    let in_groups = metadata.metadata().row_groups().iter().map(|g| claimed(g.num_rows()));
+    let all = claimed(metadata.metadata().file_metadata().num_rows());
+    let most = in_groups.fold(0, u64::saturating_add).max(all);
+    if most.saturating_mul(columns.len() as u64) > LARGEST_FILE {
+        return Err(format!("claims {most} rows of {} mapped columns, more than any recorder writes", columns.len()));
     }
-    let mask = ProjectionMask::roots(builder.parquet_schema(), wanted);
-    let reader = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build().map_err(|e| unreadable(&e))?;
-    let rows = fill(reader, &mut columns, channels).map_err(|e| unreadable(&e))?;
-    Ok(Part { columns, rows })
+    let rows = usize::try_from(all).unwrap_or_default();
+    Ok(OpenFile { path: path.to_owned(), metadata, columns, rows })
 }
 
-fn fill(
-    reader: ParquetRecordBatchReader,
-    columns: &mut BTreeMap<String, RawColumn>,
-    channels: &BTreeMap<String, Channel>,
-) -> Result<usize, arrow::error::ArrowError> {
-    let mut rows = 0;
-    for batch in reader {
-        let batch: RecordBatch = batch?;
-        rows += batch.num_rows();
-        if (rows as u64).saturating_mul(columns.len() as u64) > LARGEST_FLIGHT {
-            return Err(arrow::error::ArrowError::ParquetError("it has more rows than it claims".to_owned()));
-        }
-        let schema = batch.schema();
-        for (field, array) in schema.fields().iter().zip(batch.columns()) {
-            if let Some(column) = columns.get_mut(field.name()) {
-                let numbers = numbers(array, clock_factor(field.data_type(), channels.get(field.name())))?;
-                column.values.extend(numbers);
-            }
-        }
+impl Source for Opened {
+    fn flight_id(&self) -> &str {
+        &self.flight_id
     }
-    Ok(rows)
+
+    fn files(&self) -> usize {
+        self.files.len()
+    }
+
+    fn name(&self, file: usize) -> String {
+        self.files.get(file).map(|f| f.path.display().to_string()).unwrap_or_default()
+    }
+
+    fn rows(&self, file: usize) -> usize {
+        self.files.get(file).map_or(0, |f| f.rows)
+    }
+
+    fn has(&self, file: usize, column: &str) -> bool {
+        self.files.get(file).is_some_and(|f| f.columns.contains_key(column))
+    }
+
+    fn unit(&self, file: usize, column: &str) -> Option<&str> {
+        self.files.get(file)?.columns.get(column)?.unit.as_deref()
+    }
+
+    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
+        let known = self.files.get(file).and_then(|f| Some((f, f.columns.get(column)?)));
+        let (file, column) = known.ok_or_else(|| format!("there is no column `{column}`"))?;
+        guarded(|| file.read(column, rows, sink))
+    }
+}
+
+impl OpenFile {
+    fn read(&self, column: &OpenColumn, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
+        if rows.is_empty() {
+            return Ok(());
+        }
+        let opened = File::open(&self.path).map_err(|e| format!("cannot open the file: {e}"))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(opened, self.metadata.clone());
+        let mask = ProjectionMask::roots(builder.parquet_schema(), [column.at]);
+        let selection = RowSelection::from_consecutive_ranges(std::iter::once(rows.clone()), self.rows);
+        let builder = builder.with_projection(mask).with_row_selection(selection).with_batch_size(BATCH_ROWS);
+        let mut read = 0;
+        for batch in builder.build().map_err(|e| unreadable(&e))? {
+            let batch: RecordBatch = batch.map_err(|e| unreadable(&e))?;
+            let array = batch.columns().first().ok_or_else(|| unreadable(&"a batch without its column"))?;
+            read += array.len();
+            hand_over(array, column.clock_factor, sink).map_err(|e| unreadable(&e))?;
+        }
+        if read == rows.len() { Ok(()) } else { Err(unreadable(&format!("{read} of {} rows", rows.len()))) }
+    }
+}
+
+/// Hands over an array as numbers, a null as NaN.
+fn hand_over(
+    array: &dyn Array,
+    clock_factor: Option<f64>,
+    sink: &mut dyn FnMut(&[f64]),
+) -> Result<(), arrow::error::ArrowError> {
+    if clock_factor.is_none()
+        && array.null_count() == 0
+        && let Some(plain) = array.as_primitive_opt::<Float64Type>()
+    {
+        sink(plain.values());
+        return Ok(());
+    }
+    let plain = if clock_factor.is_some() { cast(array, &DataType::Int64)? } else { cast(array, &DataType::Float64)? };
+    let plain = cast(&plain, &DataType::Float64)?;
+    let factor = clock_factor.unwrap_or(1.0);
+    let mut numbers: Vec<f64> = plain.as_primitive::<Float64Type>().values().iter().map(|v| v * factor).collect();
+    if let Some(nulls) = plain.nulls().filter(|n| n.null_count() > 0) {
+        numbers.iter_mut().zip(nulls).filter(|(_, valid)| !valid).for_each(|(number, _)| *number = f64::NAN);
+    }
+    sink(&numbers);
+    Ok(())
+}
+
+/// The mapped columns of a flight in memory, file by file, for what looks at one flight alone.
+///
+/// # Errors
+/// As [`open`], and what cannot be read.
+pub fn read(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<Vec<RawFlight>, Problem> {
+    let opened = open(files, channels)?;
+    let one = |file: usize| {
+        let mut flight = RawFlight { flight_id: files.flight_id.clone(), columns: BTreeMap::new() };
+        for name in channels.keys().filter(|name| opened.has(file, name)) {
+            let unit = opened.unit(file, name).map(str::to_owned);
+            let mut values = Vec::with_capacity(opened.rows(file));
+            let read = opened.read(file, name, 0..opened.rows(file), &mut |v| values.extend_from_slice(v));
+            read.map_err(|reason| Problem {
+                stage: "ingest".to_owned(),
+                flight_id: files.flight_id.clone(),
+                place: opened.name(file),
+                reason,
+            })?;
+            flight.columns.insert(name.clone(), RawColumn { unit, values });
+        }
+        Ok(flight)
+    };
+    (0..opened.files()).map(one).collect()
 }
 
 fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), String> {
@@ -273,14 +347,6 @@ fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
     };
     let mapped = Unit::parse(&channel?.unit).ok()?;
     Unit::parse(name).ok()?.factor_to(mapped)
-}
-
-/// An array as numbers, a null as NaN.
-fn numbers(array: &dyn Array, clock_factor: Option<f64>) -> Result<Vec<f64>, arrow::error::ArrowError> {
-    let plain = if clock_factor.is_some() { cast(array, &DataType::Int64)? } else { cast(array, &DataType::Float64)? };
-    let plain = cast(&plain, &DataType::Float64)?;
-    let factor = clock_factor.unwrap_or(1.0);
-    Ok(plain.as_primitive::<Float64Type>().iter().map(|v| v.map_or(f64::NAN, |v| v * factor)).collect())
 }
 
 #[cfg(test)]

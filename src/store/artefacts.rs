@@ -8,8 +8,9 @@ use std::time::Duration;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::atomic;
+use super::fingerprint::{sealed, unsealed};
 use super::lock::Lock;
-use super::{atomic, record_file};
 use crate::error::{Error, Result};
 
 /// An opened store. While it lives no other run can open it.
@@ -24,13 +25,10 @@ pub struct Store {
 }
 
 /// The folders of the store, one per kind of artefact.
-pub const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "joint", "predict"];
+pub const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "history", "joint", "predict"];
 
 /// Names the folders of reports that the store serves.
 const SERVED: &str = "serves.json";
-
-/// Digits of the fingerprint at the end of an artefact, which tells whether it is as it was written.
-const SEAL: usize = 16;
 
 impl Store {
     /// Opens or creates a store, waiting up to `wait` for another run to leave it, and removes what a killed run left half
@@ -66,6 +64,12 @@ impl Store {
         self.folder.join(kind).join(format!("{safe}-{fingerprint}.{extension}"))
     }
 
+    /// Where the artefact of another kind under the same name and fingerprint lies.
+    #[must_use]
+    pub fn beside(&self, path: &Path, kind: &str) -> PathBuf {
+        self.folder.join(kind).join(path.file_name().unwrap_or_default())
+    }
+
     /// The artefact at a path, where there is one that is as it was written; a damaged one counts as none and is made again.
     #[must_use]
     pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Option<T> {
@@ -78,10 +82,8 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
     pub fn save(&self, path: &Path, artefact: &impl Serialize) -> Result<()> {
-        let mut bytes = serde_json::to_vec(artefact).map_err(|e| Error::store(path, &e))?;
-        let seal = sealed(&bytes);
-        bytes.extend_from_slice(seal.as_bytes());
-        atomic::place(path, &bytes)?;
+        let text = serde_json::to_vec(artefact).map_err(|e| Error::store(path, &e))?;
+        atomic::place(path, &sealed(text))?;
         self.note(path);
         Ok(())
     }
@@ -118,15 +120,10 @@ impl Store {
         needed.iter().filter_map(name).collect()
     }
 
-    /// Whether an artefact, by its name relative to the store, is as it was written; of a record, as far as its footer
-    /// tells.
+    /// Whether an artefact, by its name relative to the store, is as it was written; not a record, which has no seal.
     #[must_use]
     pub fn is_whole(&self, name: &str) -> bool {
-        let path = self.folder.join(name);
-        if name.starts_with("records/") {
-            return record_file::is_whole(&path);
-        }
-        std::fs::read(&path).is_ok_and(|bytes| unsealed(&bytes).is_some())
+        std::fs::read(self.folder.join(name)).is_ok_and(|bytes| unsealed(&bytes).is_some())
     }
 
     /// Notes that what is published in this folder is made of this store's artefacts, so that none of them is removed.
@@ -143,11 +140,12 @@ impl Store {
         Ok(())
     }
 
-    /// The folders of reports that are made of this store's artefacts.
+    /// The folders of reports that are made of this store's artefacts. Where the list is damaged, a folder that cannot be
+    /// found stands for those that were in it.
     #[must_use]
     pub fn served(&self) -> BTreeSet<PathBuf> {
-        let bytes = std::fs::read(self.folder.join(SERVED)).unwrap_or_default();
-        serde_json::from_slice(&bytes).unwrap_or_default()
+        let Ok(bytes) = std::fs::read(self.folder.join(SERVED)) else { return BTreeSet::new() };
+        serde_json::from_slice(&bytes).unwrap_or_else(|_| [PathBuf::from("unknown: serves.json was damaged")].into())
     }
 
     /// All artefacts, relative to the store, with their sizes.
@@ -171,16 +169,6 @@ impl Store {
         let path = self.folder.join(name);
         std::fs::remove_file(&path).map_err(Error::io(&path, "cannot remove it"))
     }
-}
-
-/// The artefact without its seal; none where the seal is not its.
-fn unsealed(bytes: &[u8]) -> Option<&[u8]> {
-    let (text, seal) = bytes.split_at_checked(bytes.len().checked_sub(SEAL + 1)?)?;
-    (seal == sealed(text).as_bytes()).then_some(text)
-}
-
-fn sealed(text: &[u8]) -> String {
-    format!("\n{}", &blake3::hash(text).to_hex()[..SEAL])
 }
 
 #[cfg(test)]

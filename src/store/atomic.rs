@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
@@ -17,18 +17,66 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
     if fs::read(path).is_ok_and(|present| present == bytes) {
         return Ok(());
     }
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY);
-    // A temporary file is the owner's alone; what is published is for everybody to read.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-    let mut file = builder.tempfile_in(folder).map_err(Error::io(folder, "cannot create a file in it"))?;
-    file.write_all(bytes).map_err(Error::io(path, "cannot write it"))?;
-    file.as_file().sync_all().map_err(Error::io(path, "cannot write it to the disk"))?;
-    file.persist(path).map_err(|e| Error::io(path, "cannot put it in its place")(e.error))?;
-    Ok(())
+    let mut draft = Draft::of(path)?;
+    draft.file.write_all(bytes).map_err(Error::io(path, "cannot write it"))?;
+    draft.place()
+}
+
+/// A file that is being written beside its place; dropped before it is placed, nothing of it remains.
+#[derive(Debug)]
+pub struct Draft {
+    file: tempfile::NamedTempFile,
+    path: PathBuf,
+}
+
+impl Draft {
+    /// Begins a file that is to be at `path`, creating folders as needed.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the folder.
+    pub fn of(path: &Path) -> Result<Draft> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(TEMPORARY);
+        // A temporary file is the owner's alone; what is published is for everybody to read.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+        let file = builder.tempfile_in(folder).map_err(Error::io(folder, "cannot create a file in it"))?;
+        Ok(Draft { file, path: path.to_owned() })
+    }
+
+    /// What is written goes into the draft.
+    pub fn writer(&mut self) -> impl Write + Send {
+        std::io::BufWriter::with_capacity(1 << 20, self.file.as_file_mut())
+    }
+
+    /// Where the draft lies until it is placed.
+    #[must_use]
+    pub fn draft(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Puts the whole file in its place.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the path.
+    pub fn place(self) -> Result<()> {
+        self.file.as_file().sync_all().map_err(Error::io(&self.path, "cannot write it to the disk"))?;
+        self.file.persist(&self.path).map_err(|e| Error::io(&self.path, "cannot put it in its place")(e.error))?;
+        Ok(())
+    }
+}
+
+/// Removes a file, where there is one: what it said is no longer so.
+///
+/// # Errors
+/// [`Error::Io`] naming the path.
+pub fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "cannot remove it")(e)),
+        _ => Ok(()),
+    }
 }
 
 /// Makes sure that the names in a folder are on the disk, as its files' contents are: what is renamed after this cannot

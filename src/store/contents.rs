@@ -7,14 +7,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::atomic;
+use super::fingerprint::{sealed, unsealed};
+use super::{Digest, atomic};
 use crate::error::Result;
 
 /// A file must have been left alone for so long before it was read to be remembered. Clocks of file systems tick at most
@@ -27,7 +27,7 @@ type Stamp = String;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Known {
     stamp: Stamp,
-    content: String,
+    content: Digest,
 }
 
 /// The fingerprints that are known. It can be shared between threads.
@@ -43,7 +43,8 @@ impl Contents {
     /// What was remembered at `path`; nothing where there is nothing or it is damaged.
     #[must_use]
     pub fn load(path: &Path) -> Contents {
-        let known = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+        let known = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(unsealed(&bytes)?).ok());
+        let known = known.unwrap_or_default();
         Contents { path: path.to_owned(), known, seen: Mutex::default() }
     }
 
@@ -53,11 +54,11 @@ impl Contents {
         Contents { path: PathBuf::new(), known: BTreeMap::new(), seen: Mutex::default() }
     }
 
-    /// The fingerprint of a file's content.
+    /// What a file holds.
     ///
     /// # Errors
     /// The reason in words: no regular file, cannot be read, or changes while it is read.
-    pub fn of(&self, path: &Path) -> Result<String, String> {
+    pub fn of(&self, path: &Path) -> Result<Digest, String> {
         let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
         // Anything else may block for ever: a pipe that nobody writes into.
         if !metadata.is_file() {
@@ -78,7 +79,7 @@ impl Contents {
         }
         let begun = SystemTime::now();
         let mut file = File::open(path).map_err(|e| format!("cannot be opened: {e}"))?;
-        let content = digest(&mut file).map_err(|e| format!("cannot be read: {e}"))?;
+        let content = Digest::of(&mut file).map_err(|e| format!("cannot be read: {e}"))?;
         let after = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
         if stamp(&after) != before {
             return Err("changes while it is read: it is still being copied, the next run will read it".to_owned());
@@ -111,29 +112,13 @@ impl Contents {
         if known == self.known {
             return Ok(());
         }
-        atomic::place(&self.path, &serde_json::to_vec(&known).unwrap_or_default())
+        atomic::place(&self.path, &sealed(serde_json::to_vec(&known).unwrap_or_default()))
     }
 
     fn see(&self, path: &Path, stamp: &str, known: Option<Known>) {
         if let Ok(mut seen) = self.seen.lock() {
             seen.insert(path.to_owned(), (stamp.to_owned(), known));
         }
-    }
-}
-
-/// The fingerprint of what a reader gives: sixteen hexadecimal digits of BLAKE3.
-///
-/// # Errors
-/// A disk that says no.
-pub fn digest(reader: &mut impl Read) -> std::io::Result<String> {
-    let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        let n = reader.read(&mut buffer)?;
-        if n == 0 {
-            return Ok(hasher.finalize().to_hex()[..16].to_owned());
-        }
-        hasher.update(&buffer[..n]);
     }
 }
 
@@ -191,19 +176,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (file, cache) = (folder.path().join("f"), folder.path().join("contents.json"));
         std::fs::write(&file, "one").unwrap();
-        let remember = |content: &str| {
+        let remembered = Digest { bytes: 3, blake3: "remembered".into() };
+        let remember = || {
             let stamp = stamp(&std::fs::metadata(&file).unwrap()).unwrap();
-            let known: BTreeMap<PathBuf, Known> = [(file.clone(), Known { stamp, content: content.into() })].into();
-            std::fs::write(&cache, serde_json::to_vec(&known).unwrap()).unwrap();
+            let known: BTreeMap<PathBuf, Known> = [(file.clone(), Known { stamp, content: remembered.clone() })].into();
+            std::fs::write(&cache, sealed(serde_json::to_vec(&known).unwrap())).unwrap();
         };
-        remember("remembered");
-        assert_eq!(Contents::load(&cache).of(&file).unwrap(), "remembered");
+        remember();
+        assert_eq!(Contents::load(&cache).of(&file).unwrap(), remembered);
         // The same size, and the time of the last write put back: the time of the last change gives it away.
         let written = std::fs::metadata(&file).unwrap().modified().unwrap();
         std::thread::sleep(Duration::from_millis(20));
         std::fs::write(&file, "two").unwrap();
         File::options().write(true).open(&file).unwrap().set_modified(written).unwrap();
-        assert_ne!(Contents::load(&cache).of(&file).unwrap(), "remembered");
+        assert_ne!(Contents::load(&cache).of(&file).unwrap(), remembered);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a simulation's truth.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -9,6 +10,7 @@ use super::atomic;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::error::{Error, Result};
 use crate::maneuver::Event;
+use crate::tables::PublishedTrend;
 
 /// A text file whole.
 ///
@@ -43,6 +45,9 @@ pub struct TunnelRow {
     pub uncertainty: Option<f64>,
     #[serde(default)]
     pub source: Option<String>,
+    /// The third variable, whose column the analyst names.
+    #[serde(skip)]
+    pub third: Option<f64>,
 }
 
 impl TunnelRow {
@@ -58,14 +63,6 @@ impl TunnelRow {
     }
 }
 
-/// The rows of a wind-tunnel table, CSV with a header, each with its line.
-///
-/// # Errors
-/// [`Error::Config`] naming file, line and column of what cannot be read.
-pub fn tunnel_rows(path: &Path) -> Result<Vec<(usize, TunnelRow)>> {
-    rows(path)
-}
-
 /// The analyst's events, CSV with columns `flight_id,class,start_s,end_s`, each with its line.
 ///
 /// # Errors
@@ -77,15 +74,39 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
 /// The rows of a table that was published as CSV; columns that the row type does not have are passed over.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Config`] naming the file, and the line where one cannot be read.
-pub fn published<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
-    let file = std::fs::File::open(path).map_err(Error::io(path, "cannot read it"))?;
-    let mut reader = csv::Reader::from_reader(std::io::BufReader::new(file));
-    let rows: std::result::Result<Vec<T>, csv::Error> = reader.deserialize().collect();
-    rows.map_err(|e| {
-        let line = e.position().and_then(|p| usize::try_from(p.line()).ok());
-        Error::config(path, line, e.to_string())
-    })
+/// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
+pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
+    Ok(rows(&folder.join(format!("{table}.csv")))?.into_iter().map(|(_, row)| row).collect())
+}
+
+/// The columns of a CSV of numbers, by the names of its header.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be opened, [`Error::Config`] naming the line of what is no number.
+pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
+    let text = text(path)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let wrong = |e: &csv::Error| Error::config(path, None, e.to_string());
+    let names: Vec<String> = reader.headers().map_err(|e| wrong(&e))?.iter().map(str::to_owned).collect();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    for row in reader.deserialize() {
+        let row: Vec<f64> = row.map_err(|e| wrong(&e))?;
+        columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+    }
+    Ok(names.into_iter().zip(columns).collect())
+}
+
+/// The `trends` that an earlier campaign published in a folder.
+///
+/// # Errors
+/// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no such table.
+pub fn earlier_trends(folder: &Path) -> Result<Vec<PublishedTrend>> {
+    let path = folder.join("trends.csv");
+    if !path.is_file() {
+        let what = "nothing to compare against: an earlier campaign's folder of reports has the table trends.csv";
+        return Err(Error::config(&path, None, what));
+    }
+    published(folder, "trends")
 }
 
 /// Places rows as CSV with a header, whole or not at all.
@@ -101,7 +122,7 @@ pub fn place_rows<T: Serialize>(path: &Path, rows: &[T]) -> Result<()> {
     atomic::place(path, &bytes)
 }
 
-fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
+pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let content = text(path)?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(content.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
@@ -125,28 +146,4 @@ fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
         ));
     }
     Ok(rows)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn error(content: &str) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("tunnel.csv");
-        std::fs::write(&path, content).unwrap();
-        tunnel_rows(&path).unwrap_err().to_string().replace(&*path.to_string_lossy(), "tunnel.csv")
-    }
-
-    #[test]
-    fn a_number_that_is_none_is_named_by_line_and_column() {
-        let e = error("derivative,alpha_deg,value,unit\nCN_q,5,4.0,per_rad\nCN_q,ten,4.0,per_rad\n");
-        assert_eq!(e, "tunnel.csv:3: column `alpha_deg`: invalid float literal");
-    }
-
-    #[test]
-    fn a_missing_column_is_named() {
-        let e = error("derivative,alpha_deg,unit\nCN_q,5,per_rad\n");
-        assert!(e.contains("missing field `value`"), "{e}");
-    }
 }

@@ -4,7 +4,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
@@ -32,26 +32,63 @@ impl Fingerprint {
         self
     }
 
-    /// Adds a file's content.
-    ///
-    /// # Errors
-    /// [`Error::Io`] naming the file.
-    pub fn with_file(mut self, path: &Path) -> Result<Self> {
-        let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
-        let mut buffer = vec![0; 1 << 20];
-        loop {
-            let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
-            if n == 0 {
-                return Ok(self);
-            }
-            self.0.update(&buffer[..n]);
-        }
-    }
-
     #[must_use]
     pub fn finish(self) -> String {
         self.0.finalize().to_hex()[..16].to_owned()
     }
+}
+
+/// What a file holds, in a few words: the same digest is the same content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Digest {
+    pub bytes: u64,
+    /// Hexadecimal.
+    pub blake3: String,
+}
+
+impl Digest {
+    /// # Errors
+    /// [`Error::Io`] naming the file.
+    pub fn of_file(path: &Path) -> Result<Digest> {
+        let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+        Digest::of(&mut file).map_err(Error::io(path, "cannot read it"))
+    }
+
+    /// Of all that a reader gives.
+    ///
+    /// # Errors
+    /// A disk that says no.
+    pub fn of(reader: &mut impl Read) -> std::io::Result<Digest> {
+        let mut hasher = blake3::Hasher::new();
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            let n = reader.read(&mut buffer)?;
+            if n == 0 {
+                return Ok(Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() });
+            }
+            hasher.update(&buffer[..n]);
+        }
+    }
+}
+
+/// Digits of the fingerprint at the end of a sealed text.
+const SEAL: usize = 16;
+
+/// A text with a fingerprint of its bytes in a last line, which tells whether it is as it was written.
+pub(super) fn sealed(mut text: Vec<u8>) -> Vec<u8> {
+    let seal = seal(&text);
+    text.extend_from_slice(seal.as_bytes());
+    text
+}
+
+/// A sealed text without its seal; none where the seal is not its.
+pub(super) fn unsealed(bytes: &[u8]) -> Option<&[u8]> {
+    let (text, end) = bytes.split_at_checked(bytes.len().checked_sub(SEAL + 1)?)?;
+    (end == seal(text).as_bytes()).then_some(text)
+}
+
+fn seal(text: &[u8]) -> String {
+    format!("\n{}", &blake3::hash(text).to_hex()[..SEAL])
 }
 
 #[cfg(test)]

@@ -12,9 +12,10 @@ pub mod nights;
 pub mod record_file;
 pub mod recorder;
 pub mod table;
+pub mod tunnel;
 
 pub use artefacts::Store;
 pub use contents::Contents;
-pub use fingerprint::Fingerprint;
+pub use fingerprint::{Digest, Fingerprint};
 pub use log::Log;
 pub use nights::{Night, Nights};

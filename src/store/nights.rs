@@ -19,7 +19,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::lock::Lock;
-use super::{atomic, contents};
+use super::{Digest, atomic};
 use crate::error::{Error, Problem, Result};
 use crate::lineage::{Lineage, Stage};
 
@@ -56,7 +56,7 @@ pub struct Night {
     /// What it is made of: artefacts of the store with their sizes.
     pub artefacts: BTreeMap<String, u64>,
     /// Its files, with fingerprints of their contents.
-    pub files: BTreeMap<String, String>,
+    pub files: BTreeMap<String, Digest>,
     /// Fingerprint of all of the above.
     pub seal: String,
 }
@@ -149,8 +149,8 @@ impl Nights {
     #[must_use]
     pub fn damaged(&self, night: &Night) -> Vec<String> {
         let folder = self.folder(&night.name);
-        let is_whole = |(name, hash): &(&String, &String)| {
-            fs::File::open(folder.join(name)).and_then(|mut f| contents::digest(&mut f)).is_ok_and(|h| h == **hash)
+        let is_whole = |(name, digest): &(&String, &Digest)| {
+            Digest::of_file(&folder.join(name)).is_ok_and(|found| found == **digest)
         };
         night.files.iter().filter(|file| !is_whole(file)).map(|(name, _)| name.clone()).collect()
     }
@@ -278,14 +278,13 @@ fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
 }
 
 /// The files of a folder but the manifest, with fingerprints of their contents.
-fn digests(folder: &Path) -> Result<BTreeMap<String, String>> {
+fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
     let mut files = BTreeMap::new();
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
     for entry in entries.flatten() {
         let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
         if name != MANIFEST {
-            let digest = fs::File::open(&path).and_then(|mut f| contents::digest(&mut f));
-            files.insert(name, digest.map_err(Error::io(&path, "cannot read it"))?);
+            files.insert(name, Digest::of_file(&path)?);
         }
     }
     Ok(files)

@@ -1,25 +1,32 @@
 //! A record as a Parquet file: per signal a column of values and one of marks, the clock in the file's key-value metadata.
 //!
-//! Writing and reading back returns the record to the bit. Nothing but the record is in the bytes: no time, no host.
+//! It is written row group by row group, the signals of a group in parallel, and read by windows of time and by signals:
+//! nothing ever needs a whole record in memory. Writing and reading back returns the record to the bit. Nothing but the
+//! record is in the bytes: no time, no host, nor the pieces in which it was written.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::Write;
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, RecordBatchOptions, UInt8Array};
+use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, UInt8Array};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, UInt8Type};
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use parquet::arrow::arrow_writer::ArrowWriterOptions;
-use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::metadata::KeyValue;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
+};
+use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
+use parquet::arrow::{ArrowSchemaConverter, ProjectionMask};
+use parquet::basic::{Compression, Encoding};
+use parquet::file::metadata::{KeyValue, PageIndexPolicy};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::ColumnPath;
 
 use crate::error::Error;
 use crate::flight::record::Series;
-use crate::flight::{Mark, Record};
+use crate::flight::{Correction, Mark, Record};
 
 /// The end of the name of a signal's column of marks.
 const MARK: &str = ":mark";
@@ -29,90 +36,390 @@ const START: &str = "start_s";
 const STEP: &str = "step_s";
 const SAMPLES: &str = "samples";
 
-/// Writes a record as Parquet.
+/// The beginning of the key of a signal that is one value throughout.
+const CONSTANT: &str = "constant:";
+
+/// The samples of a row group: what is encoded of one signal is in memory until its group is written.
+pub const GROUP: usize = 1 << 19;
+
+/// The samples of a page: what has to be decoded for one sample.
+const PAGE: usize = 1 << 14;
+
+/// What a record is about: everything but its samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct About {
+    pub flight_id: String,
+    pub start_s: f64,
+    pub step_s: f64,
+    pub samples: usize,
+    /// Signals that are one value throughout.
+    pub constants: BTreeMap<String, f64>,
+}
+
+impl About {
+    fn metadata(&self) -> Vec<KeyValue> {
+        let constants =
+            self.constants.iter().map(|(name, v)| KeyValue::new(format!("{CONSTANT}{name}"), v.to_string()));
+        let own = [
+            KeyValue::new(FLIGHT.to_owned(), self.flight_id.clone()),
+            KeyValue::new(START.to_owned(), self.start_s.to_string()),
+            KeyValue::new(STEP.to_owned(), self.step_s.to_string()),
+            KeyValue::new(SAMPLES.to_owned(), self.samples.to_string()),
+        ];
+        own.into_iter().chain(constants).collect()
+    }
+
+    fn record(&self, samples: &Range<usize>) -> Record {
+        Record {
+            flight_id: self.flight_id.clone(),
+            start_s: self.start_s + samples.start as f64 * self.step_s,
+            step_s: self.step_s,
+            samples: samples.len(),
+            signals: BTreeMap::new(),
+        }
+    }
+}
+
+/// A record that is being written.
+#[expect(missing_debug_implementations, reason = "the writer within has none")]
+pub struct Writer<W: Write + Send> {
+    file: SerializedFileWriter<W>,
+    factory: ArrowRowGroupWriterFactory,
+    groups: usize,
+}
+
+fn refused(e: &dyn std::fmt::Display) -> String {
+    format!("cannot write the record: {e}")
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// Begins a record of these signals.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn create<'s>(about: &About, signals: impl Iterator<Item = &'s str>, out: W) -> Result<Writer<W>, String> {
+        let mut fields = Vec::new();
+        // Uncompressed values: to compress what is mostly noise takes longer than to write it. Marks are long runs.
+        let mut properties = WriterProperties::builder()
+            .set_compression(Compression::UNCOMPRESSED)
+            .set_dictionary_enabled(false)
+            .set_statistics_enabled(EnabledStatistics::None)
+            .set_data_page_row_count_limit(PAGE)
+            .set_key_value_metadata(Some(about.metadata()));
+        for signal in signals {
+            fields.push(Field::new(signal, DataType::Float64, false));
+            let marks = format!("{signal}{MARK}");
+            let path = ColumnPath::from(marks.clone());
+            properties = properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
+            fields.push(Field::new(marks, DataType::UInt8, false));
+        }
+        // Without the serialised Arrow schema, the key-value metadata is all there is and its order is ours.
+        let schema = Arc::new(Schema::new(fields));
+        let parquet = ArrowSchemaConverter::new().convert(&schema).map_err(|e| refused(&e))?;
+        let file = SerializedFileWriter::new(out, parquet.root_schema_ptr(), Arc::new(properties.build()));
+        let file = file.map_err(|e| refused(&e))?;
+        let factory = ArrowRowGroupWriterFactory::new(&file, schema);
+        Ok(Writer { file, factory, groups: 0 })
+    }
+
+    /// The writers of the next row group, one per signal in their order; each takes the group's samples.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn group(&mut self) -> Result<Vec<SignalWriter>, String> {
+        let mut columns = self.factory.create_column_writers(self.groups).map_err(|e| refused(&e))?.into_iter();
+        self.groups += 1;
+        let mut signals = Vec::new();
+        while let (Some(values), Some(marks)) = (columns.next(), columns.next()) {
+            signals.push(SignalWriter { values, marks, pending: Series { values: Vec::new(), marks: Vec::new() } });
+        }
+        Ok(signals)
+    }
+
+    /// Writes the next row group: what its writers made, in batches, in their order.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn append(&mut self, mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String>) -> Result<(), String> {
+        let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
+        while let Some(chunks) = next()? {
+            for column in chunks.into_iter().flat_map(|c| c.0) {
+                column.append_to_row_group(&mut group).map_err(|e| refused(&e))?;
+            }
+        }
+        group.close().map_err(|e| refused(&e))?;
+        Ok(())
+    }
+
+    /// Ends the record.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn finish(self) -> Result<(), String> {
+        self.file.close().map(|_| ()).map_err(|e| refused(&e))
+    }
+}
+
+/// One signal's part of a row group, as it is written.
+#[expect(missing_debug_implementations, reason = "the writers within have none")]
+pub struct SignalWriter {
+    values: ArrowColumnWriter,
+    marks: ArrowColumnWriter,
+    pending: Series,
+}
+
+/// One signal's part of a row group, encoded: its values and its marks.
+#[expect(missing_debug_implementations, reason = "the columns within have none")]
+pub struct SignalChunk([ArrowColumnChunk; 2]);
+
+impl SignalWriter {
+    /// The next samples.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn push(&mut self, series: &Series) -> Result<(), String> {
+        if series.values.len() != series.marks.len() {
+            return Err(refused(&"a series with more values than marks, or fewer"));
+        }
+        self.pending.values.extend_from_slice(&series.values);
+        self.pending.marks.extend_from_slice(&series.marks);
+        // Whole pages, whatever the pieces: so the bytes do not tell them.
+        let whole = self.pending.values.len() / PAGE * PAGE;
+        for from in (0..whole).step_by(PAGE) {
+            self.page(from..from + PAGE)?;
+        }
+        self.pending.values.drain(..whole);
+        self.pending.marks.drain(..whole);
+        Ok(())
+    }
+
+    fn page(&mut self, range: Range<usize>) -> Result<(), String> {
+        let values = self.pending.values.get(range.clone()).unwrap_or_default();
+        let marks = self.pending.marks.get(range).unwrap_or_default();
+        let values: ArrayRef = Arc::new(Float64Array::from(values.to_vec()));
+        let marks: ArrayRef = Arc::new(marks.iter().map(|m| *m as u8).collect::<UInt8Array>());
+        for (writer, array) in [(&mut self.values, values), (&mut self.marks, marks)] {
+            let field = Field::new("", array.data_type().clone(), false);
+            for leaf in compute_leaves(&field, &array).map_err(|e| refused(&e))? {
+                writer.write(&leaf).map_err(|e| refused(&e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The encoded group.
+    ///
+    /// # Errors
+    /// The reason in words.
+    pub fn close(mut self) -> Result<SignalChunk, String> {
+        let rest = self.pending.values.len();
+        if rest > 0 {
+            self.page(0..rest)?;
+        }
+        let close = |writer: ArrowColumnWriter| writer.close().map_err(|e| refused(&e));
+        Ok(SignalChunk([close(self.values)?, close(self.marks)?]))
+    }
+}
+
+/// Writes a record that is in memory.
 ///
 /// # Errors
 /// The reason in words: a series of another length than the record, or a disk that said no.
 pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
-    let batch = batch(record).map_err(|e| format!("cannot lay out the record: {e}"))?;
-    let level = ZstdLevel::try_new(1).map_err(|e| e.to_string())?;
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(level))
-        .set_statistics_enabled(EnabledStatistics::None)
-        .set_key_value_metadata(Some(clock(record)))
-        .build();
-    // Without the serialised Arrow schema, the key-value metadata is all there is and its order is ours.
-    let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
-    let refused = |e: parquet::errors::ParquetError| format!("cannot write the record: {e}");
-    let mut writer = ArrowWriter::try_new_with_options(out, batch.schema(), options).map_err(refused)?;
-    writer.write(&batch).map_err(refused)?;
-    writer.close().map_err(refused)?;
-    Ok(())
-}
-
-fn clock(record: &Record) -> Vec<KeyValue> {
-    vec![
-        KeyValue::new(FLIGHT.to_owned(), record.flight_id.clone()),
-        KeyValue::new(START.to_owned(), record.start_s.to_string()),
-        KeyValue::new(STEP.to_owned(), record.step_s.to_string()),
-        KeyValue::new(SAMPLES.to_owned(), record.samples.to_string()),
-    ]
-}
-
-fn batch(record: &Record) -> Result<RecordBatch, arrow::error::ArrowError> {
-    let (mut fields, mut arrays) = (Vec::new(), Vec::<ArrayRef>::new());
-    for (name, series) in &record.signals {
-        fields.push(Field::new(name, DataType::Float64, false));
-        arrays.push(Arc::new(Float64Array::from(series.values.clone())));
-        fields.push(Field::new(format!("{name}{MARK}"), DataType::UInt8, false));
-        arrays.push(Arc::new(series.marks.iter().map(|m| *m as u8).collect::<UInt8Array>()));
+    let about = About {
+        flight_id: record.flight_id.clone(),
+        start_s: record.start_s,
+        step_s: record.step_s,
+        samples: record.samples,
+        constants: BTreeMap::new(),
+    };
+    let whole = |s: &Series| s.values.len() == record.samples && s.marks.len() == record.samples;
+    if let Some((name, _)) = record.signals.iter().find(|(_, s)| !whole(s)) {
+        return Err(refused(&format!("signal `{name}` has not {} samples", record.samples)));
     }
-    let schema = Arc::new(Schema::new(fields));
-    RecordBatch::try_new_with_options(schema, arrays, &RecordBatchOptions::new().with_row_count(Some(record.samples)))
+    let mut writer = Writer::create(&about, record.signals.keys().map(String::as_str), out)?;
+    for from in (0..record.samples).step_by(GROUP) {
+        let to = (from + GROUP).min(record.samples);
+        let mut parts = writer.group()?.into_iter().zip(record.signals.values());
+        writer.append(|| {
+            let Some((mut signal, series)) = parts.next() else { return Ok(None) };
+            signal
+                .push(&Series { values: series.values[from..to].to_vec(), marks: series.marks[from..to].to_vec() })?;
+            Ok(Some(vec![signal.close()?]))
+        })?;
+    }
+    writer.finish()
 }
 
-/// Whether a record lies here whole, as far as its footer tells: one that was cut short or overwritten has none.
-#[must_use]
-pub fn is_whole(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| {
-        ParquetRecordBatchReaderBuilder::try_new(file).is_ok_and(|r| r.schema().metadata().contains_key(SAMPLES))
-    })
+/// A record on the disk: read by windows of time and by signals.
+#[derive(Clone, Debug)]
+pub struct RecordFile {
+    path: PathBuf,
+    metadata: ArrowReaderMetadata,
+    pub about: About,
+    /// Applied to what is read.
+    corrections: Vec<Correction>,
 }
 
-/// Reads a record back.
+/// Opens a record.
 ///
 /// # Errors
 /// The file cannot be opened, is no Parquet file, or is not a record.
-pub fn read(path: &Path) -> Result<Record, Error> {
+pub fn open(path: &Path) -> Result<RecordFile, Error> {
     let file = File::open(path).map_err(Error::io(path, "cannot open the record"))?;
-    let bad =
-        |what: &dyn std::fmt::Display| Error::store(path, &format!("not a record; remove it and run again: {what}"));
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| bad(&e))?;
-    let metadata = reader.schema().metadata().clone();
-    let text = |key: &str| metadata.get(key).ok_or_else(|| bad(&format!("its metadata has no `{key}`")));
+    let bad = |what: &dyn std::fmt::Display| not_a_record(path, what);
+    let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
+    let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| bad(&e))?;
+    let keys = metadata.schema().metadata();
+    let text = |key: &str| keys.get(key).ok_or_else(|| bad(&format!("its metadata has no `{key}`")));
     let number = |key: &str| text(key)?.parse::<f64>().map_err(|e| bad(&format!("`{key}`: {e}")));
-    let samples = text(SAMPLES)?.parse::<usize>().map_err(|e| bad(&format!("`{SAMPLES}`: {e}")))?;
-    let mut record = Record {
+    let mut constants = BTreeMap::new();
+    for (key, name) in keys.keys().filter_map(|key| Some((key, key.strip_prefix(CONSTANT)?))) {
+        constants.insert(name.to_owned(), number(key)?);
+    }
+    let about = About {
         flight_id: text(FLIGHT)?.clone(),
         start_s: number(START)?,
         step_s: number(STEP)?,
-        samples,
-        signals: BTreeMap::new(),
+        samples: text(SAMPLES)?.parse::<usize>().map_err(|e| bad(&format!("`{SAMPLES}`: {e}")))?,
+        constants,
     };
-    for batch in reader.build().map_err(|e| bad(&e))? {
-        add(&mut record, &batch.map_err(|e| bad(&e))?).map_err(|e| bad(&e))?;
+    Ok(RecordFile { path: path.to_owned(), metadata, about, corrections: vec![] })
+}
+
+fn not_a_record(path: &Path, what: &dyn std::fmt::Display) -> Error {
+    Error::store(path, &format!("not a record; remove it and run again: {what}"))
+}
+
+/// Reads a whole record; a flight's is better read by windows.
+///
+/// # Errors
+/// As [`open`], and samples that cannot be read.
+pub fn read(path: &Path) -> Result<Record, Error> {
+    let file = open(path)?;
+    file.window(None, 0..file.about.samples)
+}
+
+impl RecordFile {
+    /// The same record, signals corrected as it is read.
+    #[must_use]
+    pub fn corrected(self, corrections: Vec<Correction>) -> RecordFile {
+        RecordFile { corrections, ..self }
     }
-    let whole = |s: &Series| s.values.len() == samples && s.marks.len() == samples;
-    match record.signals.iter().find(|(_, s)| !whole(s)) {
-        Some((name, _)) => Err(bad(&format!("signal `{name}` has not {samples} samples"))),
-        None => Ok(record),
+
+    /// The sample nearest to a time, kept inside the record.
+    #[must_use]
+    pub fn sample_at(&self, time_s: f64) -> usize {
+        self.about.record(&(0..self.about.samples)).sample_at(time_s)
+    }
+
+    /// The part of the record from one time to another with a few samples more on each side, as [`Record::part`] cuts it.
+    ///
+    /// # Errors
+    /// As [`RecordFile::window`].
+    pub fn part(&self, signals: Option<&BTreeSet<String>>, start_s: f64, end_s: f64) -> Result<Record, Error> {
+        const MARGIN: usize = 10;
+        let from = self.sample_at(start_s).saturating_sub(MARGIN);
+        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.about.samples);
+        self.window(signals, from..to)
+    }
+
+    /// A range of samples of some signals, or of all; signals that the record does not have are left out.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Store`] naming the file.
+    pub fn window(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Result<Record, Error> {
+        let samples = samples.start.min(self.about.samples)..samples.end.min(self.about.samples);
+        let reach = self.corrections.iter().map(|c| c.reach(self.about.step_s)).max().unwrap_or(0);
+        let wide = samples.start.saturating_sub(reach)..(samples.end + reach).min(self.about.samples);
+        let mut record = self.as_written(signals, wide.clone())?;
+        self.corrections.iter().for_each(|correction| correction.apply(&mut record));
+        if wide == samples {
+            return Ok(record);
+        }
+        let inside = samples.start - wide.start..samples.end - wide.start;
+        Ok(Record { start_s: self.about.record(&samples).start_s, ..record.cut(None, inside) })
+    }
+
+    fn as_written(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Result<Record, Error> {
+        let mut record = self.about.record(&samples);
+        let wanted = |name: &str| signals.is_none_or(|s| s.contains(name));
+        for (name, value) in self.about.constants.iter().filter(|(name, _)| wanted(name)) {
+            let constant = Series { values: vec![*value; samples.len()], marks: vec![Mark::Measured; samples.len()] };
+            record.signals.insert(name.clone(), constant);
+        }
+        let bad = |what: &dyn std::fmt::Display| not_a_record(&self.path, what);
+        let file = File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let fields = builder.schema().fields().iter().enumerate();
+        let columns: Vec<usize> =
+            fields.filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name()))).map(|(i, _)| i).collect();
+        if samples.is_empty() || columns.is_empty() {
+            return Ok(record);
+        }
+        let mask = ProjectionMask::roots(builder.parquet_schema(), columns);
+        let selection = RowSelection::from_consecutive_ranges(std::iter::once(samples.clone()), self.about.samples);
+        let reader = builder.with_projection(mask).with_row_selection(selection).with_batch_size(PAGE).build();
+        for batch in reader.map_err(|e| bad(&e))? {
+            add(&mut record, &batch.map_err(|e| bad(&e))?, samples.len()).map_err(|e| bad(&e))?;
+        }
+        let whole = |s: &Series| s.values.len() == samples.len() && s.marks.len() == samples.len();
+        match record.signals.iter().find(|(_, s)| !whole(s)) {
+            Some((name, _)) => Err(bad(&format!("signal `{name}` has not {} samples", self.about.samples))),
+            None => Ok(record),
+        }
     }
 }
 
-fn add(record: &mut Record, batch: &RecordBatch) -> Result<(), String> {
+impl RecordFile {
+    /// The whole record for a picture: where it has more samples than `most`, the smallest and the largest of each of
+    /// several samples in their order. Signals are read one at a time.
+    ///
+    /// # Errors
+    /// As [`RecordFile::window`].
+    pub fn outline(&self, most: usize) -> Result<Record, Error> {
+        let all = 0..self.about.samples;
+        if all.len() <= most {
+            return self.window(None, all);
+        }
+        let width = (2 * all.len()).div_ceil(most.max(2)).max(2);
+        let mut outline = self.about.record(&(0..2 * all.len().div_ceil(width)));
+        outline.step_s = self.about.step_s * width as f64 / 2.0;
+        let fields = self.metadata.schema().fields().iter().map(|f| f.name());
+        let recorded = fields.filter(|name| !name.ends_with(MARK)).chain(self.about.constants.keys());
+        for name in recorded {
+            let signals = BTreeSet::from([name.clone()]);
+            for (name, series) in self.window(Some(&signals), all.clone())?.signals {
+                outline.signals.insert(name, extremes(&series, width));
+            }
+        }
+        Ok(outline)
+    }
+}
+
+/// The smallest and the largest of each so many samples, in their order; the mark of one with a fault, if there is one.
+fn extremes(series: &Series, width: usize) -> Series {
+    let mut outline = Series { values: Vec::new(), marks: Vec::new() };
+    for (values, marks) in series.values.chunks(width).zip(series.marks.chunks(width)) {
+        let finite = || values.iter().copied().enumerate().filter(|(_, v)| v.is_finite());
+        let low = finite().min_by(|a, b| a.1.total_cmp(&b.1));
+        let high = finite().max_by(|a, b| a.1.total_cmp(&b.1));
+        let pair = match (low, high) {
+            (Some(low), Some(high)) if low.0 <= high.0 => [low.1, high.1],
+            (Some(low), Some(high)) => [high.1, low.1],
+            _ => [f64::NAN; 2],
+        };
+        outline.values.extend(pair);
+        let mark = marks.iter().find(|m| m.is_fault()).copied().unwrap_or(Mark::Measured);
+        outline.marks.extend([mark; 2]);
+    }
+    outline
+}
+
+fn add(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result<(), String> {
     for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
         let name = field.name().strip_suffix(MARK).unwrap_or(field.name());
-        let empty = || Series { values: Vec::new(), marks: Vec::new() };
+        let empty = || Series { values: Vec::with_capacity(samples), marks: Vec::with_capacity(samples) };
         let series = record.signals.entry(name.to_owned()).or_insert_with(empty);
         let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
         if field.name().ends_with(MARK) {
@@ -176,13 +483,68 @@ mod tests {
         assert_eq!(bytes(&record()), bytes(&record()));
     }
 
+    /// A signal long enough for several row groups and pages.
+    fn long() -> Record {
+        let samples = GROUP + 3 * PAGE + 77;
+        let values: Vec<f64> = (0..samples).map(|k| (k as f64 * 0.01).sin()).collect();
+        let mark = |k: usize| if k % 1000 == 3 { Mark::Bridged } else { Mark::Measured };
+        let q = Series { values, marks: (0..samples).map(mark).collect() };
+        Record { samples, signals: [("q_deg_s".to_owned(), q)].into(), ..record() }
+    }
+
+    #[test]
+    fn a_window_is_the_part_of_the_record() {
+        let (given, (_folder, path)) = (long(), saved(&bytes(&long())));
+        let file = open(&path).expect("a record");
+        let (start_s, end_s) = (given.time_s(GROUP - 40), given.time_s(GROUP + 90));
+        let (part, own) = (given.part(start_s, end_s), file.part(None, start_s, end_s).expect("a part"));
+        assert_eq!(own.signals, part.signals);
+        assert_eq!((own.samples, own.start_s.to_bits()), (part.samples, part.start_s.to_bits()));
+        let none = BTreeSet::from(["mach".to_owned()]);
+        assert!(file.window(Some(&none), 0..10).expect("a window").signals.is_empty());
+        assert_eq!(file.window(None, given.samples - 5..given.samples + 5).expect("a window").samples, 5);
+    }
+
+    #[test]
+    fn an_outline_keeps_the_extremes_and_the_marks() {
+        let mut given = long();
+        given.signals.values_mut().for_each(|s| s.values[300_001] = 40.0);
+        let (_folder, path) = saved(&bytes(&given));
+        let outline = open(&path).expect("a record").outline(5000).expect("an outline");
+        let q = &outline.signals["q_deg_s"];
+        assert!((4000..=5000).contains(&outline.samples) && q.values.len() == outline.samples);
+        let k = q.values.iter().position(|v| *v > 2.0).expect("the peak");
+        assert!((outline.time_s(k) - given.time_s(300_001)).abs() < 2.0 * outline.step_s);
+        assert!(q.marks.contains(&Mark::Bridged));
+    }
+
+    #[test]
+    fn constants_come_back_in_every_window() {
+        let about = About { samples: 3, step_s: 0.1, constants: [("mach".to_owned(), 0.3)].into(), ..About::default() };
+        let mut out = Vec::new();
+        let mut writer = Writer::create(&about, ["obes"].into_iter(), &mut out).expect("a writer");
+        let mut parts = writer.group().expect("a group").into_iter();
+        let flag = Series { values: vec![0.0; 3], marks: vec![Mark::Measured; 3] };
+        let mut next = || {
+            let Some(mut signal) = parts.next() else { return Ok(None) };
+            signal.push(&flag)?;
+            Ok(Some(vec![signal.close()?]))
+        };
+        writer.append(&mut next).expect("appended");
+        writer.finish().expect("finished");
+        let (_folder, path) = saved(&out);
+        let window = open(&path).expect("a record").window(None, 1..3).expect("a window");
+        assert_eq!(window.values("mach"), Some(&[0.3, 0.3][..]));
+        assert_eq!(window.values("obes"), Some(&[0.0, 0.0][..]));
+    }
+
     #[test]
     fn a_series_of_another_length_is_refused() {
         let mut short = record();
         if let Some(series) = short.signals.get_mut("obes") {
             series.values.pop();
         }
-        assert!(write(&short, Vec::new()).expect_err("refused").starts_with("cannot lay out the record"));
+        assert!(write(&short, Vec::new()).expect_err("refused").contains("has not 5 samples"));
     }
 
     #[test]

@@ -11,10 +11,11 @@ use polars::prelude::{
 use super::atomic;
 use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Unknown};
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, EstimateRow, EventRow, FitRow, JointRow,
-    PredictedRow, PredictionRow, StartRow, TrendRow,
+    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow,
+    EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow,
+    PredictionRow, StartRow, TrendRow, VerdictRow,
 };
 
 /// Where tables are published, and what their Parquet files say about where they come from.
@@ -71,9 +72,11 @@ where
     Series::new(name.into(), values).into()
 }
 
+/// Empty is absent: a CSV cannot tell the two apart.
 impl Cell for String {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[&str], _>(name, cells.map(String::as_str).collect::<Vec<_>>())
+        let text = cells.map(|text| (!text.is_empty()).then_some(text.as_str()));
+        column::<[Option<&str>], _>(name, text.collect::<Vec<_>>())
     }
 }
 
@@ -126,25 +129,56 @@ macro_rules! table {
     };
 }
 
-table!(Maneuver, "maneuvers", maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s
-    altitude_ft mass_slug x_cg_ft samples origin);
+table!(Unknown, "unknown", flight_id start_s end_s inputs nearest_class reason);
 table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial_cost final_cost condition_number left_out
     largest_condition_index confounded);
 table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
     bound_held bound_calibration bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error
     held_because);
 table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
-table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 maneuvers order scatter);
-table!(ComparisonRow, "comparison", derivative unit group alpha_deg flight standard_error wind_tunnel difference
-    difference_pct z verdict);
-table!(ChannelRow, "channels", flight_id channel signal samples bridged despiked missing verdict);
+table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95
+    prediction_upper_95 maneuvers outliers curve order scatter);
+table!(OutlierRow, "outliers", derivative unit group maneuver_id class alpha_deg value bound trend z weight_share);
+table!(ComparisonRow, "comparison", derivative unit group alpha_deg mach flight standard_error wind_tunnel difference
+    uncertainty difference_pct z verdict);
+table!(ManeuverComparisonRow, "maneuver_comparison", maneuver_id class derivative unit alpha_deg mach flight bound
+    wind_tunnel difference uncertainty difference_pct z verdict);
+table!(VerdictRow, "verdicts", against derivative unit group alpha_from_deg alpha_to_deg verdict difference_pct words);
+table!(DisagreementRow, "disagreements", rank against derivative unit alpha_deg flight other difference z size_pct words);
+table!(ChangeRow, "changes", against derivative unit group alpha_deg flight standard_error before before_standard_error
+    difference difference_pct z verdict);
+table!(BeyondRow, "beyond_tunnel", maneuver_id alpha_deg mach variable read_at tabulated_from tabulated_to treatment
+    derivatives);
+table!(ChannelRow, "channels", flight_id channel signal samples rate_hz between bridged despiked missing
+    stuck wraps quantisation noise verdict);
 table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
+table!(InstrumentRow, "instruments", flight_id channel signal unit bias bias_bound scale scale_bound delay_s delay_bound_s
+    applied verdict);
 table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
 table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative unit truth realisations converged bias scatter
     bias_over_scatter scatter_over_bound coverage_68 coverage_95 scatter_over_corrected corrected_coverage_68
     corrected_coverage_95);
 table!(StartRow, "starts", class alpha_deg start records alone reached);
 table!(Problem, "problems", stage flight_id place reason);
+
+/// What it was recognised by and what it is worth follow the maneuver's own columns.
+impl Table for Maneuver {
+    const NAME: &'static str = "maneuvers";
+    fn columns(rows: &[Self]) -> Vec<Column> {
+        macro_rules! columns {
+            ($($($part:ident).+)*) => { vec![$(Cell::column(last!($($part)+), rows.iter().map(|row| &row.$($part).+))),*] };
+        }
+        macro_rules! last {
+            ($name:ident) => { stringify!($name) };
+            ($first:ident $($rest:ident)+) => { last!($($rest)+) };
+        }
+        columns!(maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s altitude_ft mass_slug
+            x_cg_ft samples origin recognised.confidence recognised.first_input_s recognised.last_input_s
+            recognised.inputs recognised.followed recognised.evidence quality.verdict quality.reason
+            quality.lead_in_motion quality.alpha_rms_deg quality.other_axis quality.signal_to_noise
+            quality.saturated_share quality.rate_limited_share quality.marked_share)
+    }
+}
 
 table!(PredictionRow, "predictions", maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias
     theil_variance theil_covariance r_squared);
@@ -182,6 +216,20 @@ pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) 
     let mut columns = FitRow::columns(fits);
     columns.extend(PredictedRow::columns(&beside));
     place(shelf, FitRow::NAME, fits.len(), columns)
+}
+
+/// Publishes the export's rows; the third variable, where the tables have one, is a column of its name.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn publish_export(shelf: &Shelf, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
+    macro_rules! columns {
+        ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
+    }
+    let mut columns = columns!(derivative alpha_deg mach);
+    columns.extend(third.map(|name| Cell::column(name, rows.iter().map(|row| &row.third))));
+    columns.extend(columns!(value unit uncertainty source is_flight));
+    place(shelf, "flight_updated", rows.len(), columns)
 }
 
 /// Publishes rows as `<name>.parquet` and `<name>.csv` on a shelf, each placed whole.

@@ -1,21 +1,32 @@
-//! Weighted least squares of a polynomial in α, its order, and the scatter between maneuvers.
+//! Weighted least squares of a polynomial or spline in α, its order, and the scatter between maneuvers.
 //!
-//! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(xᵢ) + maneuver's own deviation +
-//! error, with Pⱼ Legendre polynomials of the α range scaled to −1..1, deviations of standard deviation τ, errors of
-//! standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value at which the weighted residuals come out as large as
-//! their degrees of freedom, Σ r²/(b² + τ²) = n − p (Paule and Mandel 1982), or zero where they are smaller already.
+//! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) + maneuver's own deviation +
+//! error, with the functions of [`Basis`], deviations of standard deviation τ, errors of standard deviation bᵢ. Weights are
+//! 1/(bᵢ² + τ²). τ² is the value at which the weighted residuals come out as large as their degrees of freedom,
+//! Σ r²/(b² + τ²) = n − p (Paule and Mandel 1982), or zero where they are smaller already.
 //!
 //! One wild estimate must bend neither the trend nor τ: a residual beyond `HUBER` standard deviations counts as if it
 //! were just that far (Huber's weights in the fit, his proposal 2 for τ). And no maneuver is trusted beyond a share
 //! `BOUND_FLOOR` of the group's median bound: bounds are themselves only known to a factor of a few.
 //!
+//! The covariance of the coefficients is that of an M-estimate (Huber 1981, section 7.6),
+//!
+//! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
+//!
+//! with u the residuals over their standard deviations, ψ cutting them at `HUBER`, m the share that is not cut and
+//! V = b² + τ². The bracket is what makes few data honest: it scales by the residuals as they are, not by what bounds and
+//! τ say they should be, and the interval takes Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is
+//! never smaller than what the bounds alone say.
+//!
 //! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not chosen count in the
 //! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance), each with its own
-//! variance and its distance from the chosen trend.
+//! variance and its distance from the chosen trend. And a criterion smooths: it leaves a bias as large as the errors. So no
+//! standard error is smaller than that of one coefficient more (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::basis::Basis;
 use super::{Criterion, Settings};
 
 /// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit then bears a quarter
@@ -47,12 +58,25 @@ impl Point {
 /// A fitted trend.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
-    range: (f64, f64),
+    basis: Basis,
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
+    /// The covariance if the bounds were all there is.
+    of_bounds: DMatrix<f64>,
     scatter2: f64,
     degrees_of_freedom: usize,
     criterion: f64,
+    /// Of each point, in its order.
+    residuals: Vec<Residual>,
+}
+
+/// How one maneuver's estimate lies to the trend.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Residual {
+    /// Over its standard deviation, with what the estimate itself pulls the trend counted.
+    pub z: f64,
+    /// What is left of its weight: one, less for a wild one.
+    pub share: f64,
 }
 
 /// The trend of the order that the criterion likes best, with the other orders' doubts about it.
@@ -65,8 +89,8 @@ pub(super) struct Trend {
 
 impl Trend {
     /// The trend through points sorted by α: the lower order on a tie, none where no order has a solution.
-    pub(super) fn through(points: &[Point], settings: &Settings) -> Option<Trend> {
-        let fits = Fit::all(points, settings);
+    pub(super) fn through(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Option<Trend> {
+        let fits = Fit::all(points, settings, knots_deg);
         let best = fits.iter().reduce(|best, next| if next.criterion < best.criterion { next } else { best })?.clone();
         let likelihood = |fit: &Fit| (0.5 * (best.criterion - fit.criterion)).exp();
         let total: f64 = fits.iter().map(likelihood).sum();
@@ -80,7 +104,15 @@ impl Trend {
             let (other, error) = fit.at(alpha_deg);
             weight * (error * error + (other - value).powi(2))
         };
-        (value, self.orders.iter().map(variance).sum::<f64>().sqrt())
+        let averaged = self.orders.iter().map(variance).sum::<f64>().sqrt();
+        (value, averaged.max(self.error_of_the_next_order(alpha_deg)))
+    }
+
+    /// The standard error of the fit with one coefficient more; zero where the data allow none.
+    fn error_of_the_next_order(&self, alpha_deg: f64) -> f64 {
+        let size = self.best.basis.size() + 1;
+        let next = self.orders.iter().find(|(_, fit)| fit.basis.size() == size);
+        next.map_or(0.0, |(_, fit)| fit.at(alpha_deg).1)
     }
 }
 
@@ -89,19 +121,23 @@ impl Fit {
     ///
     /// At least two degrees of freedom are left to the residuals, and there are no more coefficients than distinct α: with
     /// several maneuvers at each, a trend may run through the middle of every cluster, and must be able to where a
-    /// derivative bends between them.
-    fn all(points: &[Point], settings: &Settings) -> Vec<Fit> {
-        let by_alpha = clusters(points, settings.alpha_step_deg).saturating_sub(1);
-        let Some(by_points) = points.len().checked_sub(3) else { return Vec::new() };
-        let highest = settings.max_order.min(by_alpha).min(by_points);
-        (0..=highest).filter_map(|order| Fit::of_order(points, order, settings.criterion)).collect()
+    /// derivative bends between them. With knots, polynomials up to the third order compete with the splines.
+    fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<Fit> {
+        let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+        let range = (first.alpha_deg, last.alpha_deg);
+        let most = clusters(points, settings.alpha_step_deg).min(points.len().saturating_sub(2));
+        let highest = if knots_deg.is_empty() { settings.max_order } else { settings.max_order.min(3) };
+        let polynomials = (0..=highest).map(|order| Basis::polynomial(range, order));
+        let splines = (1..=highest).map(|order| Basis::spline(range, order, knots_deg));
+        let bent = splines.filter(|basis| basis.size() > basis.order() + 1);
+        let bases = polynomials.chain(bent).filter(|basis| basis.size() <= most);
+        bases.filter_map(|basis| Fit::of(points, basis, settings.criterion)).collect()
     }
 
-    /// The fit of one order; none where the normal equations have no solution.
-    pub(super) fn of_order(points: &[Point], order: usize, criterion: Criterion) -> Option<Fit> {
-        let range = (points.first()?.alpha_deg, points.last()?.alpha_deg);
-        let (n, p) = (points.len(), order + 1);
-        let design = DMatrix::from_rows(&points.iter().map(|q| basis(range, q.alpha_deg, order)).collect::<Vec<_>>());
+    /// The fit of one basis; none where the normal equations have no solution.
+    pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<Fit> {
+        let (n, p) = (points.len(), basis.size());
+        let design = DMatrix::from_rows(&points.iter().map(|q| basis.row(q.alpha_deg)).collect::<Vec<_>>());
         let values = DVector::from_iterator(n, points.iter().map(|q| q.value));
         let variances = floored_variances(points);
         let degrees_of_freedom = n.checked_sub(p).filter(|d| *d > 0)?;
@@ -122,10 +158,15 @@ impl Fit {
         }
         let residuals = &values - &design * &solution.0;
         let misfit = (0..n).map(|i| deviance(residuals[i], variances[i] + scatter2)).sum::<f64>();
+        let total: Vec<f64> = variances.iter().map(|v| v + scatter2).collect();
+        let covariance = robust_covariance(&design, &residuals, &total)?;
+        let of_bounds = solve(&design, &values, &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)))?.1;
         Some(Fit {
-            range,
+            residuals: standardised(&design, &residuals, &total, &weights, &solution.1),
+            basis,
             coefficients: solution.0,
-            covariance: solution.1,
+            covariance,
+            of_bounds,
             scatter2,
             degrees_of_freedom,
             criterion: misfit + penalty(criterion, n, p + 1),
@@ -134,13 +175,18 @@ impl Fit {
 
     /// Value and standard error at an angle of attack.
     pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
-        let row = basis(self.range, alpha_deg, self.order());
-        let variance = (&row * &self.covariance * row.transpose())[(0, 0)];
+        let row = self.basis.row(alpha_deg);
+        let variance = |covariance: &DMatrix<f64>| (&row * covariance * row.transpose())[(0, 0)];
+        let variance = variance(&self.covariance).max(variance(&self.of_bounds));
         ((&row * &self.coefficients)[(0, 0)], variance.max(0.0).sqrt())
     }
 
-    pub(super) fn order(&self) -> usize {
-        self.coefficients.len() - 1
+    pub(super) fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    pub(super) fn residuals(&self) -> &[Residual] {
+        &self.residuals
     }
 
     /// τ.
@@ -154,6 +200,37 @@ impl Fit {
     }
 }
 
+/// The covariance of an M-estimate's coefficients, by the residuals as they are.
+fn robust_covariance(design: &DMatrix<f64>, residuals: &DVector<f64>, variances: &[f64]) -> Option<DMatrix<f64>> {
+    let (n, p) = (design.nrows() as f64, design.ncols() as f64);
+    let u2 = || residuals.iter().zip(variances).map(|(r, v)| r * r / v);
+    let kept = u2().filter(|u2| *u2 <= HUBER * HUBER).count() as f64 / n;
+    let cut: f64 = u2().map(|u2| u2.min(HUBER * HUBER)).sum();
+    // Most of the residuals beyond the cut: a fit that describes half of its data does not exist.
+    let kept = kept.max(0.5);
+    let correction = 1.0 + p / n * (1.0 - kept) / kept;
+    let scale = correction * correction * cut / (n - p) / (kept * kept);
+    let weights = DVector::from_iterator(variances.len(), variances.iter().map(|v| 1.0 / v));
+    Some(solve(design, residuals, &weights)?.1 * scale)
+}
+
+/// Residuals over their standard deviations: the variance of a residual is less by what the estimate pulls the trend.
+fn standardised(
+    design: &DMatrix<f64>,
+    residuals: &DVector<f64>,
+    variances: &[f64],
+    weights: &DVector<f64>,
+    inverse: &DMatrix<f64>,
+) -> Vec<Residual> {
+    let of = |i: usize| {
+        let row = design.row(i);
+        let leverage = weights[i] * (row * inverse * row.transpose())[(0, 0)];
+        let left = (1.0 - leverage).max(1e-6);
+        Residual { z: residuals[i] / (variances[i] * left).sqrt(), share: weights[i] * variances[i] }
+    };
+    (0..design.nrows()).map(of).collect()
+}
+
 /// How many distinct α there are: a new one begins half a step of the published grid beyond the last one's beginning.
 fn clusters(points: &[Point], step_deg: f64) -> usize {
     let (mut n, mut begin) = (0, f64::NEG_INFINITY);
@@ -164,17 +241,6 @@ fn clusters(points: &[Point], step_deg: f64) -> usize {
         }
     }
     n
-}
-
-/// The Legendre polynomials up to an order at one α of a range.
-fn basis((low, high): (f64, f64), alpha_deg: f64, order: usize) -> nalgebra::RowDVector<f64> {
-    let x = if high > low { (2.0 * alpha_deg - low - high) / (high - low) } else { 0.0 };
-    let mut p = vec![1.0, x];
-    for j in 1..order {
-        let n = j as f64;
-        p.push(((2.0 * n + 1.0) * x * p[j] - n * p[j - 1]) / (n + 1.0));
-    }
-    nalgebra::RowDVector::from_iterator(order + 1, p.into_iter().take(order + 1))
 }
 
 /// Bounds squared, none smaller than the floor.
@@ -242,6 +308,11 @@ mod tests {
         alphas.iter().map(|&a| Point { alpha_deg: a, value: of(a), bound: 0.01 }).collect()
     }
 
+    fn constant(points: &[Point]) -> Option<Fit> {
+        let range = (points[0].alpha_deg, points[points.len() - 1].alpha_deg);
+        Fit::of(points, Basis::polynomial(range, 0), Criterion::Aicc)
+    }
+
     fn alphas() -> Vec<f64> {
         (0..48).map(|i| 5.0 + 55.0 * f64::from(i) / 47.0).collect()
     }
@@ -264,8 +335,8 @@ mod tests {
             p.value += 0.01 * [1.1, -0.7, 0.2, -1.3, 0.9, -0.2][i % 6];
         }
         for criterion in [Criterion::Aicc, Criterion::Bic] {
-            let fit = Trend::through(&data, &Settings { criterion, ..Settings::default() }).expect("a fit");
-            assert_eq!(fit.best.order(), 3);
+            let fit = Trend::through(&data, &Settings { criterion, ..Settings::default() }, &[]).expect("a fit");
+            assert_eq!(fit.best.basis().order(), 3);
             for a in [5.0, 20.0, 40.0, 60.0] {
                 assert_relative_eq!(fit.at(a).0, cubic(a), epsilon = 0.01);
             }
@@ -276,7 +347,7 @@ mod tests {
     fn order_zero_is_the_weighted_mean() {
         let data = [(10.0, 1.0, 0.1), (20.0, 1.1, 0.2), (30.0, 0.95, 0.1), (40.0, 1.05, 0.15)];
         let data = data.map(|(alpha_deg, value, bound)| Point { alpha_deg, value, bound });
-        let fit = Fit::of_order(&data, 0, Criterion::Aicc).expect("a fit");
+        let fit = constant(&data).expect("a fit");
         let sum = |f: &dyn Fn(&Point) -> f64| data.iter().map(f).sum::<f64>();
         let weight = sum(&|p| p.bound.powi(-2));
         assert_relative_eq!(fit.scatter(), 0.0);
@@ -292,7 +363,7 @@ mod tests {
             p.value += if i % 2 == 0 { 0.5 } else { -0.5 };
             p.bound = 1e-4;
         }
-        let fit = Fit::of_order(&data, 0, Criterion::Aicc).expect("a fit");
+        let fit = constant(&data).expect("a fit");
         assert_relative_eq!(fit.scatter(), (0.25 * 48.0 / 47.0 / HUBER_VARIANCE).sqrt(), max_relative = 1e-4);
     }
 
@@ -304,9 +375,9 @@ mod tests {
             p.value += if i % 2 == 0 { 0.01 } else { -0.01 };
         }
         let settings = Settings::default();
-        let clean = Trend::through(&data, &settings).expect("a fit");
+        let clean = Trend::through(&data, &settings, &[]).expect("a fit");
         data.push(Point { alpha_deg: 60.0, value: 5.0, bound: 0.01 });
-        let wild = Trend::through(&data, &settings).expect("a fit");
+        let wild = Trend::through(&data, &settings, &[]).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {
             assert_relative_eq!(wild.at(a).0, clean.at(a).0, epsilon = 0.01);
         }
@@ -318,7 +389,7 @@ mod tests {
         let mut data = points(|_| 1.0, &alphas()[..5]);
         data[0].value = 1.01;
         data[0].bound = 1e-9;
-        let fit = Fit::of_order(&data, 0, Criterion::Aicc).expect("a fit");
+        let fit = constant(&data).expect("a fit");
         assert!(fit.at(10.0).0 < 1.009);
     }
 
@@ -326,7 +397,7 @@ mod tests {
     fn a_bend_between_few_alpha_is_followed() {
         let bent = |a: f64| if a < 15.0 { 0.8 } else { 0.4 };
         let four: Vec<f64> = [10.0, 20.0, 30.0, 40.0].iter().flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3]).collect();
-        let fit = Trend::through(&points(bent, &four), &Settings::default()).expect("a fit");
+        let fit = Trend::through(&points(bent, &four), &Settings::default(), &[]).expect("a fit");
         assert!((fit.at(20.0).0 - 0.4).abs() < 0.02, "{}", fit.at(20.0).0);
     }
 
@@ -334,8 +405,13 @@ mod tests {
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
         let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
-        assert!(Trend::through(&points(wavy, &three), &Settings::default()).expect("a fit").best.order() <= 2);
+        assert!(
+            Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2
+        );
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
-        assert_eq!(Trend::through(&points(wavy, &one), &Settings::default()).expect("a fit").best.order(), 0);
+        assert_eq!(
+            Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(),
+            0
+        );
     }
 }

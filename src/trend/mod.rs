@@ -1,9 +1,12 @@
 //! Trend fits least squares across α through the estimates of one derivative, for the group of classes that speaks for
 //! it and for each class alone.
 //!
-//! The fit is in [`fit`]: a polynomial in α whose order a criterion chooses, with weights 1/(bound² + τ²), where τ is
-//! the scatter between maneuvers beyond their bounds.
+//! The fit is in [`fit`]: a polynomial in α, or a spline where the analyst gives knots, whose order a criterion chooses,
+//! with weights 1/(bound² + τ²), where τ is the scatter between maneuvers beyond their bounds.
 
+mod basis;
+#[cfg(test)]
+mod coverage;
 mod fit;
 #[cfg(test)]
 mod tests;
@@ -14,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Problem;
 use crate::maneuver::Status;
-use crate::tables::{EstimateRow, TrendRow};
+use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
 
@@ -39,6 +42,14 @@ pub struct Settings {
     /// for 60° has a mean of 59.8°. Default 0.5°.
     #[serde(default = "default_alpha_reach")]
     pub alpha_reach_deg: f64,
+    /// Angles of attack at which the trend may bend sharply, deg: with knots it is a spline whose order, up to 3, the
+    /// criterion chooses, or a polynomial up to the third order where that does better. Default none: a polynomial.
+    #[serde(default)]
+    pub knots_deg: Vec<f64>,
+    /// A maneuver further than this from its trend, in standard deviations, is named in the table `outliers`. Default 3.
+    /// It pulls the trend like one at 1.5, whatever is set here.
+    #[serde(default = "default_outlier_z")]
+    pub outlier_z: f64,
     /// Whether each class has a trend of its own beside the group's. Default true.
     #[serde(default = "default_per_class")]
     pub per_class: bool,
@@ -52,7 +63,7 @@ pub struct Settings {
 }
 
 /// The classes that speak for some derivatives.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Group {
     pub name: String,
@@ -62,6 +73,9 @@ pub struct Group {
     /// Empty: every class.
     #[serde(default)]
     pub classes: Vec<String>,
+    /// The group's own knots, deg, instead of all groups'.
+    #[serde(default)]
+    pub knots_deg: Option<Vec<f64>>,
 }
 
 /// What chooses the order: both weigh the misfit against the number of coefficients.
@@ -84,11 +98,14 @@ fn default_alpha_step() -> f64 {
 fn default_alpha_reach() -> f64 {
     0.5
 }
+fn default_outlier_z() -> f64 {
+    3.0
+}
 fn default_per_class() -> bool {
     true
 }
 fn default_groups() -> Vec<Group> {
-    vec![Group { name: "all".into(), derivatives: Vec::new(), classes: Vec::new() }]
+    vec![Group { name: "all".into(), ..Group::default() }]
 }
 
 impl Default for Settings {
@@ -98,6 +115,8 @@ impl Default for Settings {
             criterion: Criterion::default(),
             alpha_step_deg: default_alpha_step(),
             alpha_reach_deg: default_alpha_reach(),
+            knots_deg: Vec::new(),
+            outlier_z: default_outlier_z(),
             per_class: default_per_class(),
             groups: default_groups(),
             leave_out: BTreeSet::new(),
@@ -122,32 +141,49 @@ impl Group {
     }
 }
 
+/// What comes of trends.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trends {
+    pub rows: Vec<TrendRow>,
+    /// Every maneuver that lies far from a trend.
+    pub outliers: Vec<OutlierRow>,
+    pub problems: Vec<Problem>,
+}
+
 /// The trends of every derivative, in the order in which the derivatives first appear: its group's, then its classes'.
 ///
 /// Give it the estimates of converged fits only. Of them it takes those with status `estimated`, a value and a bound
 /// (the corrected one where there is one). A group of fewer than three maneuvers has no trend and is a problem; a
-/// single class of so few is passed over.
+/// single class of so few is passed over. A trend is published at the multiples of the step and at the derivative's
+/// `breakpoints`, deg, as far as they lie inside its data.
 #[must_use]
-pub fn trends(estimates: &[EstimateRow], settings: &Settings) -> (Vec<TrendRow>, Vec<Problem>) {
-    let (mut rows, mut problems) = (Vec::new(), Vec::new());
+pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl Fn(&str) -> Vec<f64>) -> Trends {
+    let mut trends = Trends::default();
     for (derivative, of_it) in by_derivative(estimates, settings) {
+        let further = breakpoints(derivative);
         let group = settings.group_of(derivative);
         if let Some(group) = group {
-            let members = of_it.iter().filter(|e| group.has(&e.class)).copied();
-            match trend(&members.collect::<Vec<_>>(), &group.name, settings) {
-                Ok(trend) => rows.extend(trend),
-                Err(reason) => problems.push(problem(derivative, &group.name, reason)),
+            let members: Vec<&EstimateRow> = of_it.iter().filter(|e| group.has(&e.class)).copied().collect();
+            let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
+            match trend(&members, &group.name, settings, knots, &further) {
+                Ok((rows, outliers)) => {
+                    trends.rows.extend(rows);
+                    trends.outliers.extend(outliers);
+                }
+                Err(reason) => trends.problems.push(problem(derivative, &group.name, reason)),
             }
         }
         if settings.per_class {
-            let classes: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
-            for class in classes.into_iter().filter(|c| group.is_none_or(|g| g.name != *c)) {
-                let members = of_it.iter().filter(|e| e.class == class).copied();
-                rows.extend(trend(&members.collect::<Vec<_>>(), class, settings).unwrap_or_default());
+            let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
+            for class in names.into_iter().filter(|name| group.is_none_or(|g| g.name != *name)) {
+                let members: Vec<&EstimateRow> = of_it.iter().filter(|e| e.class == class).copied().collect();
+                // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
+                let of_class = trend(&members, class, settings, &settings.knots_deg, &further);
+                trends.rows.extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
             }
         }
     }
-    (rows, problems)
+    trends
 }
 
 /// The usable estimates of each derivative, derivatives in order of appearance.
@@ -175,19 +211,29 @@ fn point(e: &EstimateRow) -> Option<Point> {
     (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0).then_some(p)
 }
 
-/// One trend on the published grid.
-fn trend(members: &[&EstimateRow], group: &str, settings: &Settings) -> Result<Vec<TrendRow>, String> {
+/// One trend on the published grid, and the maneuvers far from it.
+fn trend(
+    members: &[&EstimateRow],
+    group: &str,
+    settings: &Settings,
+    knots_deg: &[f64],
+    breakpoints: &[f64],
+) -> Result<(Vec<TrendRow>, Vec<OutlierRow>), String> {
     if members.len() < FEWEST_MANEUVERS {
         return Err(format!("{} maneuvers with an estimate and a bound are too few for a trend", members.len()));
     }
-    let mut points: Vec<Point> = members.iter().filter_map(|e| point(e)).collect();
+    let mut placed: Vec<(Point, &EstimateRow)> = members.iter().filter_map(|e| Some((point(e)?, *e))).collect();
     // Sums do not depend on the order in which the maneuvers come.
-    points.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(std::cmp::Ordering::Equal));
-    let fit = Trend::through(&points, settings).ok_or("the least-squares fit has no solution")?;
-    let half_width = fit.best.quantile_95();
+    placed.sort_by(|a, b| a.0.key().partial_cmp(&b.0.key()).unwrap_or(std::cmp::Ordering::Equal));
+    let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
+    let fit = Trend::through(&points, settings, knots_deg).ok_or("the least-squares fit has no solution")?;
+    let outliers = outliers(&placed, &fit, group, settings.outlier_z);
+    let (half_width, named) = (fit.best.quantile_95(), outliers.len());
+    let one_more = fit.best.scatter().hypot(median_bound(&points));
     let row = |alpha_deg: f64| {
-        let (value, own_error) = fit.at(alpha_deg);
-        let standard_error = own_error.hypot(held_error(members, alpha_deg, settings.alpha_step_deg));
+        let (value, own_error) = fit.at(inside(&points, alpha_deg));
+        let standard_error = own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
+        let prediction = half_width * standard_error.hypot(one_more);
         TrendRow {
             derivative: members[0].derivative.clone(),
             unit: members[0].unit.clone(),
@@ -197,38 +243,80 @@ fn trend(members: &[&EstimateRow], group: &str, settings: &Settings) -> Result<V
             standard_error,
             lower_95: value - half_width * standard_error,
             upper_95: value + half_width * standard_error,
+            prediction_lower_95: value - prediction,
+            prediction_upper_95: value + prediction,
             maneuvers: points.len(),
-            order: fit.best.order(),
+            outliers: named,
+            curve: fit.best.basis().name(),
+            order: fit.best.basis().order(),
             scatter: fit.best.scatter(),
         }
     };
-    Ok(grid(&points, settings).into_iter().map(row).collect())
+    Ok((grid(&points, settings, breakpoints).into_iter().map(row).collect(), outliers))
 }
 
-/// What the uncertainty of held values does to the trend at an angle of attack. Maneuvers that hold the same derivative
-/// at the same tunnel err together, so it does not average out: it is the mean over the maneuvers within a step of α,
-/// each with its weight 1/bound².
-fn held_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
+/// The maneuvers further than `limit` standard deviations from the trend.
+fn outliers(placed: &[(Point, &EstimateRow)], fit: &Trend, group: &str, limit: f64) -> Vec<OutlierRow> {
+    let far = placed.iter().zip(fit.best.residuals()).filter(|(_, residual)| residual.z.abs() > limit);
+    far.map(|((point, estimate), residual)| OutlierRow {
+        derivative: estimate.derivative.clone(),
+        unit: estimate.unit.clone(),
+        group: group.to_owned(),
+        maneuver_id: estimate.maneuver_id.clone(),
+        class: estimate.class.clone(),
+        alpha_deg: point.alpha_deg,
+        value: point.value,
+        bound: point.bound,
+        trend: fit.best.at(point.alpha_deg).0,
+        z: residual.z,
+        weight_share: residual.share,
+    })
+    .collect()
+}
+
+fn median_bound(points: &[Point]) -> f64 {
+    let mut bounds: Vec<f64> = points.iter().map(|p| p.bound).collect();
+    bounds.sort_by(f64::total_cmp);
+    bounds.get(bounds.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// α, or the end of the data where it lies a little beyond: a trend is not continued past its last maneuver.
+fn inside(points: &[Point], alpha_deg: f64) -> f64 {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return alpha_deg };
+    alpha_deg.max(first.alpha_deg).min(last.alpha_deg)
+}
+
+/// What the uncertainty of held values and of the instruments' calibration does to the trend at an angle of attack.
+/// Maneuvers that hold the same derivative at the same tunnel err together, and so do those with the same instruments: it
+/// does not average out. It is the mean over the maneuvers within a step of α, each with its weight 1/bound².
+fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
     let near = members.iter().filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (held, p) in near.filter_map(|e| Some((e.bound_held?, point(e)?))) {
+    for (e, p) in near.filter_map(|e| Some((e, point(e)?))) {
         let weight = p.bound.powi(-2);
-        sum += weight * held;
+        sum += weight * e.bound_held.unwrap_or(0.0).hypot(e.bound_calibration.unwrap_or(0.0));
         weights += weight;
     }
     if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
-/// The multiples of the step inside the range of the data.
-fn grid(points: &[Point], settings: &Settings) -> Vec<f64> {
+/// The multiples of the step and the breakpoints inside the range of the data, ascending.
+fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> {
     let (step, reach) = (settings.alpha_step_deg, settings.alpha_reach_deg);
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
-    if step.is_nan() || step <= 0.0 {
-        return Vec::new();
+    let (from, to) = (first.alpha_deg - reach, last.alpha_deg + reach);
+    let mut grid: Vec<f64> = breakpoints.iter().copied().filter(|a| (from..=to).contains(a)).collect();
+    if step > 0.0 {
+        let steps = std::iter::successors(Some((from / step).ceil()), |k| Some(k + 1.0));
+        let multiples = steps.map(|k| k * step).take_while(|alpha| *alpha <= to);
+        // A breakpoint that is a multiple but for rounding stands once, as the tunnel writes it.
+        let new: Vec<f64> =
+            multiples.filter(|alpha| !breakpoints.iter().any(|b| (b - alpha).abs() < 1e-6 * step)).collect();
+        grid.extend(new);
     }
-    let from = ((first.alpha_deg - reach) / step).ceil();
-    let to = ((last.alpha_deg + reach) / step).floor();
-    std::iter::successors(Some(from), |k| Some(k + 1.0)).take_while(|k| *k <= to).map(|k| k * step).collect()
+    grid.sort_by(f64::total_cmp);
+    grid.dedup();
+    grid
 }
 
 fn problem(derivative: &str, group: &str, reason: String) -> Problem {

@@ -5,6 +5,7 @@ use std::path::Path;
 use harvest::config::{Config, Overrides};
 use harvest::error::Problem;
 use harvest::flight::RawFlight;
+use harvest::ingest::compatibility::{Compatibility, OnFault};
 use harvest::ingest::{self, Ingested, Settings};
 use harvest::store::archive;
 
@@ -18,7 +19,7 @@ fn config() -> Config {
 
 fn flights(config: &Config) -> Vec<RawFlight> {
     let found = archive::find(&config.archive).unwrap();
-    found.iter().map(|files| archive::read(files, &config.channels).unwrap()).collect()
+    found.iter().map(|files| archive::read(files, &config.channels).unwrap().swap_remove(0)).collect()
 }
 
 fn ingest(config: &Config, raw: &RawFlight, settings: &Settings) -> Result<Ingested, Problem> {
@@ -41,7 +42,8 @@ fn every_demonstration_flight_passes_its_checks_and_is_repaired() {
         let lost = ingested.record.samples - raw.columns["time"].values.len();
         assert!(lost < 30, "{lost} lost frames");
         for row in &ingested.channels {
-            assert_eq!(row.missing, 0, "{row:?}");
+            assert_eq!((row.missing, row.stuck, row.between), (0, 0, 0), "{row:?}");
+            assert!(row.rate_hz.is_some_and(|rate| (rate - 40.0).abs() < 0.01), "{row:?}");
             assert!(row.bridged >= lost && row.bridged < 150, "{row:?}");
             assert!(row.despiked <= 12, "{row:?}");
         }
@@ -61,7 +63,9 @@ fn ten_minutes(config: &Config) -> RawFlight {
 fn each_is_named_alone(planted: &[(&str, f64)]) {
     let config = config();
     let raw = ten_minutes(&config);
-    let settings = Settings { on_failed_check: ingest::OnFailedCheck::Report, ..Settings::default() };
+    let gross = Compatibility { reconstruct: false, ..Compatibility::default() };
+    let on_failed_check = ingest::OnFailedCheck::Report;
+    let settings = Settings { on_failed_check, compatibility: gross, ..Settings::default() };
     for (channel, factor) in planted {
         let mut wrong = raw.clone();
         let column = wrong.columns.get_mut(*channel).unwrap();
@@ -115,4 +119,108 @@ fn a_refused_flight_names_channel_relation_and_cause() {
     assert_eq!((problem.flight_id.as_str(), problem.place.as_str()), ("flight_002", "channel `q`"));
     assert!(problem.reason.contains("theta rate against q and r: slope "), "{}", problem.reason);
     assert!(problem.reason.contains("it is recorded in rad/s, not in deg/s"), "{}", problem.reason);
+}
+
+/// Fewer windows than by default, for speed.
+fn few_windows(fault: OnFault) -> Settings {
+    Settings { compatibility: Compatibility { windows: 8, fault, ..Compatibility::default() }, ..Settings::default() }
+}
+
+/// A channel recorded so many samples late; each is 25 ms.
+fn delay(raw: &mut RawFlight, channel: &str, samples: usize) {
+    let values = &mut raw.columns.get_mut(channel).unwrap().values;
+    let before = values.clone();
+    for (value, late) in values[samples..].iter_mut().zip(before) {
+        *value = late;
+    }
+}
+
+/// The channels that are named as delayed, each with its delay in s.
+fn delayed(ingested: &Ingested) -> Vec<(&str, f64)> {
+    let rows = ingested.instruments.iter().filter(|r| r.verdict.contains("delayed by"));
+    rows.map(|r| (r.channel.as_str(), r.delay_s.unwrap())).collect()
+}
+
+#[test]
+fn a_delay_of_a_tenth_of_a_second_is_named_and_the_record_corrected_by_it() {
+    let config = config();
+    let exact = ten_minutes(&config);
+    let settings = few_windows(OnFault::Apply);
+    let healthy = ingest(&config, &exact, &settings).unwrap();
+    // A late yaw rate alone would make the gross checks accuse the lateral accelerometer.
+    for channel in ["r", "alpha_vane"] {
+        let mut raw = exact.clone();
+        delay(&mut raw, channel, 4);
+        let ingested = ingest(&config, &raw, &settings).unwrap();
+        let [(named, delay_s)] = delayed(&ingested)[..] else { panic!("{:?}", ingested.problems) };
+        assert_eq!(named, channel);
+        assert!((delay_s - 0.1).abs() < 0.01, "{delay_s}");
+        assert_eq!(ingested.problems.len(), 1, "{:?}", ingested.problems);
+        assert_eq!(ingested.problems[0].place, format!("channel `{channel}`"));
+        let signal = &config.channels[channel].signal;
+        let (values, before) = (ingested.record.values(signal).unwrap(), healthy.record.values(signal).unwrap());
+        let apart = |shift: usize| {
+            let pairs = values.iter().zip(&before[shift..]).skip(100).take(20_000);
+            pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+        };
+        assert!(apart(0) < apart(1), "{channel} is still late");
+    }
+}
+
+#[test]
+fn delays_of_two_channels_are_both_named() {
+    let config = config();
+    let mut raw = ten_minutes(&config);
+    delay(&mut raw, "theta", 3);
+    delay(&mut raw, "beta_vane", 4);
+    let ingested = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap();
+    let named: Vec<&str> = delayed(&ingested).into_iter().map(|d| d.0).collect();
+    assert_eq!(named, ["beta_vane", "theta"]);
+}
+
+#[test]
+fn a_reversed_sign_and_a_delay_in_one_flight_are_both_named() {
+    let config = config();
+    let mut raw = ten_minutes(&config);
+    raw.columns.get_mut("an").unwrap().values.iter_mut().for_each(|v| *v = -*v);
+    delay(&mut raw, "q", 4);
+    let problem = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap_err();
+    assert_eq!(problem.place, "channel `an`");
+    assert!(problem.reason.contains("its sign is reversed"), "{}", problem.reason);
+    assert!(problem.reason.contains("`q` is delayed by"), "{}", problem.reason);
+}
+
+#[test]
+fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
+    let config = config();
+    let mut raw = ten_minutes(&config);
+    delay(&mut raw, "q", 4);
+    let refuse = few_windows(OnFault::Refuse);
+    let problem = ingest(&config, &raw, &refuse).unwrap_err();
+    assert_eq!(problem.place, "channel `q`");
+    let report = few_windows(OnFault::Report);
+    let ingested = ingest(&config, &raw, &report).unwrap();
+    assert_eq!(ingested.problems.len(), 1);
+    let q = ingested.instruments.iter().find(|r| r.channel == "q").unwrap();
+    assert!(q.verdict.starts_with("delayed by") && !q.applied.contains("delay"), "{q:?}");
+}
+
+#[test]
+fn of_a_healthy_flight_with_known_errors_the_table_tells_them() {
+    let config = config();
+    let settings = few_windows(OnFault::Apply);
+    let mut raw = ten_minutes(&config);
+    let before = ingest(&config, &raw, &settings).unwrap().instruments;
+    raw.columns.get_mut("q").unwrap().values.iter_mut().for_each(|v| *v += 0.08);
+    raw.columns.get_mut("ax").unwrap().values.iter_mut().for_each(|v| *v -= 0.01);
+    let ingested = ingest(&config, &raw, &settings).unwrap();
+    assert_eq!(ingested.problems, []);
+    for (channel, bias) in [("q", 0.08), ("ax", -0.01)] {
+        let of = |rows: &[harvest::tables::InstrumentRow]| {
+            let row = rows.iter().find(|r| r.channel == channel).unwrap();
+            (row.bias.unwrap(), row.bias_bound.unwrap())
+        };
+        let ((with, bound), (without, _)) = (of(&ingested.instruments), of(&before));
+        assert!((with - without - bias).abs() < 2.0 * bound, "{channel}: {with} after {without}, bound {bound}");
+    }
 }

@@ -2,14 +2,17 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on ends here")]
 
+mod browser;
 mod check;
 mod compare;
 mod estimate;
+mod export;
 mod faults;
 mod fuzz;
 mod house;
 mod ingest;
 mod nights;
+mod paper;
 mod report;
 mod run;
 mod segment;

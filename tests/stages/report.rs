@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use crate::support::{Campaign, demo};
 
 #[test]
-fn the_report_needs_no_script_and_no_network() {
+fn the_report_needs_no_network() {
     let html = demo().report.to_lowercase();
-    for forbidden in ["<script", "<link", "<iframe", "@import", "url(http", "src=\"http", "href=\"http", "onload="] {
+    assert_eq!(html.matches("<script").count(), 1, "one that sorts and hides, and loads nothing");
+    for forbidden in ["<script ", "<link", "<iframe", "@import", "url(http", "src=\"http", "href=\"http", "onload="] {
         assert!(!html.contains(forbidden), "{forbidden}");
     }
     // Names of SVG's vocabularies are no addresses that anything is loaded from.
@@ -51,4 +52,21 @@ fn an_analyst_s_own_template_replaces_the_built_in_one() {
     campaign.finishes("report");
     let report = std::fs::read_to_string(campaign.path("reports/report.html")).unwrap();
     assert!(report.starts_with("<h1>F") && report.contains("derivatives"), "{report}");
+    assert!(campaign.path("reports/report.pdf").exists(), "it is well-formed, so it is on paper too");
+    std::fs::write(&template, "<h1>{{ title }}<br></h1>").unwrap();
+    campaign.ends("report", 2);
+    assert!(!campaign.path("reports/report.pdf").exists(), "another night's paper would be taken for this one's");
+    let problems = campaign.table("problems");
+    assert!(problems.iter().any(|p| p["place"] == "report.pdf" && p["reason"].contains("well-formed")), "{problems:?}");
+}
+
+#[test]
+fn every_maneuver_has_its_page_with_a_time_history_and_the_provenance_names_every_flight() {
+    let html = &demo().report;
+    for row in &demo().tables["maneuvers"] {
+        assert!(html.contains(&format!("Time history of {}<", row["maneuver_id"])));
+        assert!(html.contains(&format!("{}.parquet", row["flight_id"])), "{}", row["flight_id"]);
+    }
+    assert!(html.contains("harvest run harv --archive"));
+    assert!(html.contains("recognise:"), "the classes as configured");
 }

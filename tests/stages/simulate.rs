@@ -88,12 +88,12 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
     let x = Longitudinal::measured_state(&motion);
     let c = [-force.z / area, moment.y / chord, -force.x / area];
     let pitch = Longitudinal::rates(&known, &x, &c).rates;
-    let pitch_outputs = Longitudinal::outputs(&known, &x, &c).outputs;
+    let pitch_outputs = Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &motion), &x, &c).outputs;
     let known = Lateral::known(aircraft, &motion);
     let x = Lateral::measured_state(&motion);
     let c = [force.y / area, moment.x / span, moment.z / span];
     let lateral = Lateral::rates(&known, &x, &c).rates;
-    let lateral_outputs = Lateral::outputs(&known, &x, &c).outputs;
+    let lateral_outputs = Lateral::outputs(&known, &Lateral::sensed(aircraft, &motion), &x, &c).outputs;
 
     let (v, v_dot, w_dot) = (state.velocity, instant.slope.velocity, instant.slope.rates);
     let speed = v.norm();

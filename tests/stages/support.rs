@@ -165,7 +165,7 @@ impl Campaign {
         files(&folder).into_iter().filter(counts).map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
     }
 
-    /// Bytes of the published tables.
+    /// Bytes of the published tables; the report, on screen and on paper, says where the archive lies.
     pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let is_table = |p: &PathBuf| p.extension().is_some_and(|e| e == "csv" || e == "parquet");
         self.bytes("reports").into_iter().filter(|(p, _)| is_table(p)).collect()
@@ -183,6 +183,7 @@ pub fn demo() -> &'static Demo {
             tables: tables.iter().map(|name| (*name, campaign.table(name))).collect(),
             bytes: campaign.tables(),
             report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
+            printed: fs::read(campaign.path("reports/report.pdf")).unwrap(),
             store: campaign.bytes("store"),
             outcome,
         }
@@ -196,6 +197,8 @@ pub struct Demo {
     pub tables: BTreeMap<&'static str, Vec<Row>>,
     pub bytes: BTreeMap<PathBuf, Vec<u8>>,
     pub report: String,
+    /// The report as a PDF.
+    pub printed: Vec<u8>,
     store: BTreeMap<PathBuf, Vec<u8>>,
 }
 

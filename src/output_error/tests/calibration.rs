@@ -40,11 +40,10 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
             model: &model,
             case: &self.case,
             values: &self.parameters,
-            response: &self.response,
             weights: &TABLE,
         };
         let shifts = fitted.gradient_shifts(std::slice::from_ref(error)).unwrap();
-        let sums = cost::sums(&self.case.measurements, &self.response, &TABLE, self.parameters.len());
+        let sums = cost::sums(&self.response, &TABLE);
         let Identified::Determined { inverse, .. } = cramer_rao::identified(&sums.information, 1e12) else { panic!() };
         inverse * &shifts[0]
     }
@@ -65,7 +64,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
 
     /// The estimates move as is said, parameter by parameter, in units of how well noise lets them be known.
     fn moves_as_said(&self, signals: &[(&str, f64)]) {
-        let sums = cost::sums(&self.case.measurements, &self.response, &TABLE, self.parameters.len());
+        let sums = cost::sums(&self.response, &TABLE);
         let scale = cramer_rao::scale(&sums.information);
         for (signal, bias) in signals {
             for error in [Misreading { signal, scale: 1e-3, bias: 0.0 }, Misreading { signal, scale: 0.0, bias: *bias }]

@@ -42,6 +42,8 @@ fn maneuver_at(start_s: f64) -> Maneuver {
         x_cg_ft: 32.0,
         samples: 401,
         origin: "found".into(),
+        recognised: crate::maneuver::Recognised::default(),
+        quality: crate::maneuver::Quality::default(),
     }
 }
 
@@ -64,7 +66,17 @@ fn fit(outcome: &str, reason: &str) -> FitRow {
 
 fn drawn(record: &Record, maneuvers: &[Maneuver], events: &[EventRow]) -> String {
     let groups = groups();
-    flight(&FlightView { aircraft: "an aircraft", record, groups: &groups, maneuvers, events, problems: &[] })
+    let recorded = (record.samples, record.step_s);
+    flight(&FlightView {
+        aircraft: "an aircraft",
+        record,
+        recorded,
+        groups: &groups,
+        maneuvers,
+        unknown: &[],
+        events,
+        problems: &[],
+    })
 }
 
 fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> String {

@@ -59,7 +59,7 @@ fn archive(files: &[(&str, &[u8])]) -> (TempDir, String) {
 
 fn read_one(bytes: &[u8]) -> Result<RawFlight, Problem> {
     let (_folder, text) = archive(&[("f.parquet", bytes)]);
-    read(&find(&text).unwrap()[0], &channels())
+    read(&find(&text).unwrap()[0], &channels()).map(|mut files| files.swap_remove(0))
 }
 
 #[test]
@@ -82,7 +82,8 @@ fn the_files_of_a_hive_folder_are_one_flight_in_the_order_of_their_names() {
     let found = find(&text).unwrap();
     let ids: Vec<&str> = found.iter().map(|f| f.flight_id.as_str()).collect();
     assert_eq!(ids, ["007", "008"]);
-    assert_eq!(read(&found[0], &channels()).unwrap().columns["time"].values, [0.0, 1.0, 2.0, 3.0]);
+    let files = read(&found[0], &channels()).unwrap();
+    assert_eq!(files.iter().map(|f| f.columns["time"].values.clone()).collect::<Vec<_>>(), [[0.0, 1.0], [2.0, 3.0]]);
 }
 
 #[test]
@@ -161,24 +162,28 @@ fn truncated_and_other_files_are_named_with_the_reason() {
 }
 
 #[test]
-fn a_column_that_one_part_lacks_is_missing_there() {
-    let (_folder, text) = archive(&[
-        ("flight=1/a.parquet", &parquet(vec![("time", None, floats(&[0.0, 1.0]))])),
-        ("flight=1/b.parquet", &simple(&[2.0])),
-        ("flight=1/c.parquet", &parquet(vec![("time", None, floats(&[3.0]))])),
-    ]);
-    let flight = read(&find(&text).unwrap()[0], &channels()).unwrap();
-    let q = &flight.columns["q"].values;
-    assert_eq!(q.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [true, true, false, true]);
-}
-
-#[test]
-fn parts_in_different_units_are_refused() {
-    let in_radians = parquet(vec![("time", None, floats(&[2.0])), ("q", Some("rad/s"), floats(&[0.1]))]);
-    let (_folder, text) = archive(&[("flight=1/a.parquet", &simple(&[0.0])), ("flight=1/b.parquet", &in_radians)]);
-    let problem = read(&find(&text).unwrap()[0], &channels()).unwrap_err();
-    assert!(problem.place.ends_with("b.parquet"));
-    assert_eq!(problem.reason, "column `q` is in `rad/s` here and in `deg/s` in an earlier file of the flight");
+fn rows_are_read_from_the_middle_of_row_groups_and_pages() {
+    let schema = Arc::new(Schema::new(vec![Field::new("q", DataType::Float64, true)]));
+    let properties = parquet::file::properties::WriterProperties::builder()
+        .set_max_row_group_row_count(Some(1000))
+        .set_data_page_row_count_limit(64)
+        .set_write_batch_size(16)
+        .build();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, schema.clone(), Some(properties)).unwrap();
+    let values: Vec<Option<f64>> = (0..5000_i32).map(|k| (k % 7 != 0).then_some(f64::from(k))).collect();
+    writer.write(&RecordBatch::try_new(schema, vec![Arc::new(Float64Array::from(values))]).unwrap()).unwrap();
+    writer.close().unwrap();
+    let (_folder, text) = archive(&[("f.parquet", &bytes)]);
+    let opened = open(&find(&text).unwrap()[0], &channels()).unwrap();
+    assert_eq!((opened.files(), opened.rows(0)), (1, 5000));
+    let mut read = Vec::new();
+    opened.read(0, "q", 950..3100, &mut |v| read.extend_from_slice(v)).unwrap();
+    assert_eq!(read.len(), 2150);
+    let right =
+        |row: usize, v: f64| if row.is_multiple_of(7) { v.is_nan() } else { v.to_bits() == (row as f64).to_bits() };
+    assert!(read.iter().enumerate().all(|(i, v)| right(950 + i, *v)));
+    assert!(opened.read(0, "q", 4900..5001, &mut |_| {}).is_err());
 }
 
 proptest! {

@@ -8,14 +8,14 @@ struct Campaign {
     maneuvers: Vec<Window>,
     fits: Vec<FitRow>,
     estimates: Vec<EstimateRow>,
-    trends: Vec<TrendRow>,
-    comparison: Vec<ComparisonRow>,
+    trends: Vec<PublishedTrend>,
+    verdicts: Vec<PublishedVerdict>,
 }
 
 impl Campaign {
     fn tables(&self) -> Tables<'_> {
-        let Campaign { lineage, maneuvers, fits, estimates, trends, comparison } = self;
-        Tables { lineage, maneuvers, fits, estimates, trends, comparison }
+        let Campaign { lineage, maneuvers, fits, estimates, trends, verdicts } = self;
+        Tables { lineage, maneuvers, fits, estimates, trends, verdicts }
     }
 
     fn fly(&mut self, flight: &str, class: &str, value: f64) {
@@ -77,36 +77,19 @@ fn campaign() -> Campaign {
         fits: vec![],
         estimates: vec![],
         trends: vec![],
-        comparison: vec![],
+        verdicts: vec![],
     };
     campaign.fly("f1", "one", 1.0);
     campaign.fly("f2", "two", 2.0);
-    campaign.trends.push(TrendRow {
+    campaign.trends.push(PublishedTrend {
         derivative: "Cm_de".into(),
         unit: "per_deg".into(),
         group: "all".into(),
         alpha_deg: 30.0,
         value: 1.5,
         standard_error: 0.1,
-        lower_95: 1.3,
-        upper_95: 1.7,
-        maneuvers: 2,
-        order: 0,
-        scatter: 0.0,
     });
-    campaign.comparison.push(ComparisonRow {
-        derivative: "Cm_de".into(),
-        unit: "per_deg".into(),
-        group: "all".into(),
-        alpha_deg: 30.0,
-        flight: 1.5,
-        standard_error: 0.1,
-        wind_tunnel: Some(1.5),
-        difference: Some(0.0),
-        difference_pct: Some(0.0),
-        z: Some(0.0),
-        verdict: "agrees".into(),
-    });
+    campaign.verdicts.push(PublishedVerdict { derivative: "Cm_de".into(), alpha_deg: 30.0, verdict: "agrees".into() });
     campaign
 }
 
@@ -121,7 +104,7 @@ fn a_new_flight_brings_new_maneuvers_and_is_why_a_trend_moved() {
     let mut now = campaign();
     now.fly("f3", "one", 3.0);
     now.trends[0].value = 1.7;
-    now.comparison[0].verdict = "flight higher".into();
+    now.verdicts[0].verdict = "flight higher".into();
     let changes = between("0001", &campaign().tables(), &now.tables());
     assert_eq!(changes.maneuvers.len(), 1);
     let new = &changes.maneuvers[0];

@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+use crate::flight::is_stretch;
 use crate::lineage::{Cause, Lineage, Origin, Stage};
 use crate::maneuver::Status;
 use crate::output_error::Outcome;
-use crate::tables::{ComparisonRow, EstimateRow, FitRow, TrendRow};
+use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
 
 /// What a maneuver was taken for, of the table `maneuvers`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,8 +30,8 @@ pub struct Tables<'a> {
     pub maneuvers: &'a [Window],
     pub fits: &'a [FitRow],
     pub estimates: &'a [EstimateRow],
-    pub trends: &'a [TrendRow],
-    pub comparison: &'a [ComparisonRow],
+    pub trends: &'a [PublishedTrend],
+    pub verdicts: &'a [PublishedVerdict],
 }
 
 /// A maneuver that is new, gone, or no longer what it was.
@@ -151,8 +152,11 @@ impl Reasons {
             let mut path = c.subject.split('.');
             matches!(path.next(), Some("classes" | "recognition")) && path.next().is_some_and(|name| name != class)
         };
-        let of_flight =
-            self.causes.iter().filter(|c| c.origin == Origin::Flight && c.subject == flight_id).collect::<Vec<_>>();
+        let of_flight = self
+            .causes
+            .iter()
+            .filter(|c| c.origin == Origin::Flight && is_stretch(flight_id, &c.subject))
+            .collect::<Vec<_>>();
         let of_settings = || {
             let reaches = |c: &&Cause| c.origin != Origin::Flight && c.stage <= Stage::Estimate;
             let (others, own): (Vec<&Cause>, Vec<&Cause>) =
@@ -305,9 +309,9 @@ fn place<'a>(derivative: &'a str, group: &'a str, alpha_deg: f64) -> Place<'a> {
 }
 
 fn trends(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
-    let old: BTreeMap<Place, &TrendRow> =
+    let old: BTreeMap<Place, &PublishedTrend> =
         before.trends.iter().map(|t| (place(&t.derivative, &t.group, t.alpha_deg), t)).collect();
-    let moved = |t: &TrendRow| {
+    let moved = |t: &PublishedTrend| {
         let was = old.get(&place(&t.derivative, &t.group, t.alpha_deg))?;
         let uncertainty = was.standard_error.max(t.standard_error);
         ((t.value - was.value).abs() > uncertainty).then(|| Moved {
@@ -324,19 +328,19 @@ fn trends(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
 }
 
 fn verdicts(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<VerdictChange> {
-    let old: BTreeMap<Place, &ComparisonRow> =
-        before.comparison.iter().map(|c| (place(&c.derivative, "", c.alpha_deg), c)).collect();
-    let changed = |c: &ComparisonRow| {
+    let old: BTreeMap<Place, &PublishedVerdict> =
+        before.verdicts.iter().map(|c| (place(&c.derivative, "", c.alpha_deg), c)).collect();
+    let changed = |c: &PublishedVerdict| {
         let was = old.get(&place(&c.derivative, "", c.alpha_deg))?;
         (was.verdict != c.verdict).then(|| VerdictChange {
             derivative: c.derivative.clone(),
             alpha_deg: c.alpha_deg,
             before: was.verdict.clone(),
             now: c.verdict.clone(),
-            because: reasons.of_trend(&c.derivative, &c.group, Stage::Compare),
+            because: reasons.of_trend(&c.derivative, "", Stage::Compare),
         })
     };
-    now.comparison.iter().filter_map(changed).collect()
+    now.verdicts.iter().filter_map(changed).collect()
 }
 
 #[cfg(test)]

@@ -1,14 +1,13 @@
-//! The morning page's first questions, as tables: what changed since the night before and why, and what all of this was
-//! made from.
+//! The morning page's first questions, as tables: what changed since the night before and why.
 
 use super::Contents;
 use super::failures::TableView;
-use super::notation::{NOTHING, angle, number};
-use crate::changes::Moved;
+use super::notation::{angle, number};
+use crate::overnight::Moved;
 
 /// One sentence about what changed.
 pub fn headline(contents: &Contents) -> String {
-    let changes = contents.changes;
+    let changes = contents.overnight;
     let Some(since) = &changes.since else {
         return "No complete night was published here before: there is nothing to hold this one against.".to_owned();
     };
@@ -32,7 +31,7 @@ pub fn headline(contents: &Contents) -> String {
 
 /// What changed, in tables; those without rows are left out.
 pub fn tables(contents: &Contents) -> Vec<TableView> {
-    let changes = contents.changes;
+    let changes = contents.overnight;
     let causes = changes.causes.iter().map(|c| vec![c.stage.name().to_owned(), c.words.clone()]).collect();
     let maneuvers = changes
         .maneuvers
@@ -66,30 +65,4 @@ fn moved(title: &str, note: &str, of: &str, rows: &[Moved]) -> TableView {
     };
     let heads = ["derivative", of, "α", "before", "now", "uncertainty", "because"];
     TableView::new(title, note, &heads, rows.iter().map(row).collect())
-}
-
-/// What the night was made from.
-pub fn provenance(contents: &Contents) -> TableView {
-    let lineage = contents.lineage;
-    let code = &lineage.code;
-    let methods: Vec<String> = code.methods.iter().map(|(method, version)| format!("{method} {version}")).collect();
-    let mut rows = vec![
-        vec!["code".to_owned(), format!("harvest {}", code.version), code.source.clone()],
-        vec!["methods".to_owned(), methods.join(", "), NOTHING.to_owned()],
-    ];
-    for (stage, parts) in &lineage.configuration {
-        for (part, value) in parts {
-            let digest = blake3::hash(value.to_string().as_bytes()).to_hex()[..16].to_owned();
-            rows.push(vec![format!("configuration, {}", stage.name()), part.clone(), digest]);
-        }
-    }
-    for (stage, tables) in &lineage.tables {
-        rows.extend(
-            tables.iter().map(|(t, digest)| vec![format!("table, {}", stage.name()), t.clone(), digest.clone()]),
-        );
-    }
-    rows.extend(lineage.flights.iter().map(|(f, digest)| vec!["flight".to_owned(), f.clone(), digest.clone()]));
-    let note = "Fingerprints (BLAKE3). Each Parquet table carries the same, with its configuration written out, and \
-                harvest verify says whether they still hold.";
-    TableView::new("Code, configuration, input", note, &["", "", "fingerprint"], rows)
 }

@@ -1,0 +1,127 @@
+//! A campaign against an earlier one: the trend that speaks for each derivative beside the earlier trend of the same group,
+//! z = (now − before) / √(standard error now² + standard error before²).
+//!
+//! Where both campaigns share flights their errors are not independent, and z is smaller than it should be: a change that
+//! counts here is one that the data made.
+
+use std::path::Path;
+
+use super::{Settings, Verdict, judge};
+use crate::tables::{ChangeRow, PublishedTrend, TrendRow};
+use crate::trend;
+
+/// An earlier campaign's published trends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Earlier {
+    /// The folder, as the analyst names it.
+    pub name: String,
+    pub trends: Vec<PublishedTrend>,
+}
+
+impl Earlier {
+    #[must_use]
+    pub fn new(folder: &Path, trends: Vec<PublishedTrend>) -> Earlier {
+        Earlier { name: folder.display().to_string(), trends }
+    }
+
+    /// Value and standard error of a trend, linear between its published α; none outside of them or in another unit.
+    fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
+        let same = |e: &&PublishedTrend| {
+            e.derivative == now.derivative && e.group == now.group && e.unit == now.unit && e.alpha_deg.is_finite()
+        };
+        let mut rows: Vec<&PublishedTrend> = self.trends.iter().filter(same).collect();
+        rows.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg));
+        let high = rows.iter().find(|r| r.alpha_deg >= now.alpha_deg)?;
+        let low = rows.iter().rev().find(|r| r.alpha_deg <= now.alpha_deg)?;
+        let span = high.alpha_deg - low.alpha_deg;
+        let share = if span > 0.0 { (now.alpha_deg - low.alpha_deg) / span } else { 0.0 };
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Some((mix(low.value, high.value), mix(low.standard_error, high.standard_error)))
+    }
+}
+
+/// One row per derivative and α of the trend that speaks for it.
+#[must_use]
+pub fn changes(
+    trends: &[TrendRow],
+    earlier: &Earlier,
+    groups: &trend::Settings,
+    settings: &Settings,
+) -> Vec<ChangeRow> {
+    let speaks = |t: &&TrendRow| groups.group_of(&t.derivative).is_some_and(|g| g.name == t.group);
+    let row = |t: &TrendRow| {
+        let before = earlier.at(t);
+        let judged = judge(t.value, t.standard_error, before.map(|(value, error)| (value, Some(error))), settings);
+        let verdict = match judged.verdict {
+            Verdict::NothingThere => "not there before",
+            Verdict::Higher => "higher than before",
+            Verdict::Lower => "lower than before",
+            other => other.of_tunnel(),
+        };
+        ChangeRow {
+            against: earlier.name.clone(),
+            derivative: t.derivative.clone(),
+            unit: t.unit.clone(),
+            group: t.group.clone(),
+            alpha_deg: t.alpha_deg,
+            flight: t.value,
+            standard_error: t.standard_error,
+            before: before.map(|(value, _)| value),
+            before_standard_error: before.map(|(_, error)| error),
+            difference: judged.difference,
+            difference_pct: judged.difference_pct,
+            z: judged.z,
+            verdict: verdict.to_owned(),
+        }
+    };
+    trends.iter().filter(speaks).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tables::PublishedTrend;
+    use approx::assert_relative_eq;
+
+    fn now(alpha_deg: f64, value: f64) -> TrendRow {
+        TrendRow {
+            derivative: "d".into(),
+            unit: "per_deg".into(),
+            group: "all".into(),
+            alpha_deg,
+            value,
+            standard_error: 0.3,
+            lower_95: value,
+            upper_95: value,
+            prediction_lower_95: value,
+            prediction_upper_95: value,
+            maneuvers: 5,
+            outliers: 0,
+            curve: "polynomial".into(),
+            order: 1,
+            scatter: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_trend_is_compared_with_the_earlier_one_between_its_points_and_not_beyond() {
+        let before = |alpha_deg: f64, value: f64| PublishedTrend {
+            derivative: "d".into(),
+            unit: "per_deg".into(),
+            group: "all".into(),
+            alpha_deg,
+            value,
+            standard_error: 0.4,
+        };
+        let earlier = Earlier::new(Path::new("reports/last"), vec![before(20.0, 4.0), before(10.0, 2.0)]);
+        let trends = [now(10.0, 2.5), now(15.0, 5.0), now(20.0, 1.0), now(25.0, 1.0)];
+        let rows = changes(&trends, &earlier, &trend::Settings::default(), &Settings::default());
+        let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.as_str()).collect();
+        assert_eq!(verdicts, ["agrees", "higher than before", "lower than before", "not there before"]);
+        assert_relative_eq!(rows[1].before.expect("before"), 3.0);
+        assert_relative_eq!(rows[1].z.expect("z"), 4.0, max_relative = 1e-14);
+        let (verdicts, worst) = super::super::ranges::of_changes(&rows, "reports/last", &Settings::default());
+        assert_eq!(verdicts[1].words, "flight higher than reports/last at 15°, by 67%");
+        assert_eq!((worst.len(), worst[0].alpha_deg), (2, 20.0));
+    }
+}

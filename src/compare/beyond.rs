@@ -1,0 +1,62 @@
+//! Where the tunnel was to be read beyond its tables: at maneuvers, for values held or compared, and at the trends' α.
+
+use std::collections::BTreeMap;
+
+use crate::aero::wind_tunnel::{Beyond, Extrapolation};
+use crate::aero::{Condition, WindTunnel};
+use crate::maneuver::Maneuver;
+use crate::tables::{BeyondRow, ComparisonRow, EstimateRow};
+
+/// One row per maneuver (or α of the comparison), variable and range of tables, with the derivatives it concerns.
+#[must_use]
+pub fn beyond(
+    estimates: &[EstimateRow],
+    maneuvers: &[Maneuver],
+    comparison: &[ComparisonRow],
+    tunnel: &WindTunnel,
+) -> Vec<BeyondRow> {
+    let mut rows = Vec::new();
+    for maneuver in maneuvers {
+        let of_it = estimates.iter().filter(|e| e.maneuver_id == maneuver.maneuver_id);
+        let names = of_it.map(|e| e.derivative.as_str());
+        rows.extend(at(&maneuver.maneuver_id, &maneuver.condition(tunnel), names, tunnel));
+    }
+    let places = comparison.iter().filter_map(|c| Some((c, c.wind_tunnel.and(c.mach)?)));
+    for (c, mach) in places {
+        let condition = Condition { alpha_deg: c.alpha_deg, mach, third: None };
+        rows.extend(at("", &condition, std::iter::once(c.derivative.as_str()), tunnel));
+    }
+    rows
+}
+
+fn at<'a>(
+    maneuver_id: &str,
+    condition: &Condition,
+    derivatives: impl Iterator<Item = &'a str>,
+    tunnel: &WindTunnel,
+) -> Vec<BeyondRow> {
+    // Tables that end alike share a row; the key is their ends to the bit.
+    let mut found: BTreeMap<(String, u64, u64), (Beyond, Vec<&str>)> = BTreeMap::new();
+    for name in derivatives {
+        for beyond in tunnel.beyond(name, condition) {
+            let key = (beyond.variable.clone(), beyond.from.to_bits(), beyond.to.to_bits());
+            found.entry(key).or_insert_with(|| (beyond, Vec::new())).1.push(name);
+        }
+    }
+    let treatment = match tunnel.settings().extrapolation {
+        Extrapolation::Clamp => "clamped",
+        Extrapolation::Refuse => "refused",
+    };
+    let row = |(beyond, names): (Beyond, Vec<&str>)| BeyondRow {
+        maneuver_id: maneuver_id.to_owned(),
+        alpha_deg: condition.alpha_deg,
+        mach: condition.mach,
+        variable: beyond.variable,
+        read_at: beyond.read_at,
+        tabulated_from: beyond.from,
+        tabulated_to: beyond.to,
+        treatment: treatment.to_owned(),
+        derivatives: names.join(" "),
+    };
+    found.into_values().map(row).collect()
+}

@@ -1,0 +1,280 @@
+//! Verdicts in words: neighbouring angles of attack with the same verdict become one range and one sentence, and the
+//! ranges that disagree are ranked by how much of the derivative's size they are apart.
+
+use super::Settings;
+use crate::aero::WindTunnel;
+use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, VerdictRow};
+
+/// One compared angle of attack, of whichever comparison.
+#[derive(Clone, Copy, Debug)]
+struct Place<'a> {
+    derivative: &'a str,
+    unit: &'a str,
+    group: &'a str,
+    alpha_deg: f64,
+    verdict: &'a str,
+    flight: f64,
+    other: Option<f64>,
+    difference_pct: Option<f64>,
+    z: Option<f64>,
+}
+
+impl<'a> Place<'a> {
+    fn of_tunnel(r: &'a ComparisonRow) -> Place<'a> {
+        Place {
+            derivative: &r.derivative,
+            unit: &r.unit,
+            group: &r.group,
+            alpha_deg: r.alpha_deg,
+            verdict: &r.verdict,
+            flight: r.flight,
+            other: r.wind_tunnel,
+            difference_pct: r.difference_pct,
+            z: r.z,
+        }
+    }
+
+    fn of_change(r: &'a ChangeRow) -> Place<'a> {
+        Place {
+            derivative: &r.derivative,
+            unit: &r.unit,
+            group: &r.group,
+            alpha_deg: r.alpha_deg,
+            verdict: &r.verdict,
+            flight: r.flight,
+            other: r.before,
+            difference_pct: r.difference_pct,
+            z: r.z,
+        }
+    }
+}
+
+/// The ranges of the comparison with the tunnel, and the worst of them.
+#[must_use]
+pub fn of_tunnel(
+    rows: &[ComparisonRow],
+    tunnel: &WindTunnel,
+    settings: &Settings,
+) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
+    let places: Vec<Place> = rows.iter().map(Place::of_tunnel).collect();
+    ranges(&places, "wind tunnel", "tunnel", settings, |name| tunnel.root_mean_square(name))
+}
+
+/// The ranges of the comparison with one earlier campaign, and the worst of them.
+#[must_use]
+pub fn of_changes(rows: &[ChangeRow], against: &str, settings: &Settings) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
+    let places: Vec<Place> = rows.iter().filter(|r| r.against == against).map(Place::of_change).collect();
+    let size = |name: &str| {
+        let values: Vec<f64> = places.iter().filter(|p| p.derivative == name).filter_map(|p| p.other).collect();
+        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    };
+    ranges(&places, against, against, settings, size)
+}
+
+fn ranges(
+    places: &[Place],
+    against: &str,
+    called: &str,
+    settings: &Settings,
+    size: impl Fn(&str) -> f64,
+) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
+    let (mut verdicts, mut worst) = (Vec::new(), Vec::new());
+    let same = |a: &Place, b: &Place| a.derivative == b.derivative && a.group == b.group;
+    for derivative in places.chunk_by(same) {
+        let mut done = 0_usize;
+        for run in derivative.chunk_by(|a, b| a.verdict == b.verdict) {
+            let before = done.checked_sub(1).map(|i| derivative[i].alpha_deg);
+            done += run.len();
+            let (first, last) = (run[0], run[run.len() - 1]);
+            let words = words(run, before, done == derivative.len(), called, settings);
+            verdicts.push(VerdictRow {
+                against: against.to_owned(),
+                derivative: first.derivative.to_owned(),
+                unit: first.unit.to_owned(),
+                group: first.group.to_owned(),
+                alpha_from_deg: first.alpha_deg,
+                alpha_to_deg: last.alpha_deg,
+                verdict: first.verdict.to_owned(),
+                difference_pct: median(run.iter().filter_map(|p| p.difference_pct)),
+                words: words.clone(),
+            });
+            worst.extend(disagreement(run, against, size(first.derivative), words));
+        }
+    }
+    let size_of = |row: &DisagreementRow| row.size_pct.unwrap_or(0.0);
+    worst.sort_by(|a, b| size_of(b).total_cmp(&size_of(a)));
+    worst.truncate(settings.worst);
+    for (i, row) in worst.iter_mut().enumerate() {
+        row.rank = i + 1;
+    }
+    (verdicts, worst)
+}
+
+/// The worst angle of attack of a range that disagrees.
+fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Option<DisagreementRow> {
+    let apart = |p: &Place| p.other.map(|other| p.flight - other);
+    let disagrees = !matches!(run[0].verdict, "agrees" | "no tunnel value" | "not there before");
+    let far = |p: &Place| apart(p).map_or(0.0, f64::abs);
+    let p = run.iter().filter(|_| disagrees).max_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let difference = apart(p)?;
+    Some(DisagreementRow {
+        rank: 0,
+        against: against.to_owned(),
+        derivative: p.derivative.to_owned(),
+        unit: p.unit.to_owned(),
+        alpha_deg: p.alpha_deg,
+        flight: p.flight,
+        other: p.other?,
+        difference,
+        z: p.z,
+        size_pct: Some(100.0 * difference.abs() / size).filter(|s| s.is_finite()),
+        words,
+    })
+}
+
+/// One range in words.
+fn words(run: &[Place], before_deg: Option<f64>, to_the_end: bool, called: &str, settings: &Settings) -> String {
+    let (first, last) = (run[0], run[run.len() - 1]);
+    let range = if run.len() == 1 {
+        format!("at {}°", first.alpha_deg)
+    } else {
+        format!("from {}° to {}°", first.alpha_deg, last.alpha_deg)
+    };
+    match first.verdict {
+        "agrees" if run.iter().all(|p| p.z.is_some_and(|z| z.abs() <= settings.agreement_z)) => {
+            format!("agrees within its uncertainty {range}")
+        }
+        "agrees" => format!("agrees within its uncertainty or {}% {range}", settings.agreement_pct),
+        "flight higher" | "higher than before" => format!("flight higher than {called} {range}{}", by(run)),
+        "flight lower" | "lower than before" => format!("flight lower than {called} {range}{}", by(run)),
+        "sign differs" => match before_deg.filter(|_| to_the_end) {
+            Some(before) => format!("sign differs above {before}°"),
+            None => format!("sign differs {range}"),
+        },
+        other => format!("{other} {range}"),
+    }
+}
+
+/// By how much: the median in percent of the other's magnitude, with its extremes where they are far from it; in the
+/// derivative's unit where the other is zero.
+fn by(run: &[Place]) -> String {
+    let mut shares: Vec<f64> = run.iter().filter_map(|p| p.difference_pct).map(f64::abs).collect();
+    shares.sort_by(f64::total_cmp);
+    let whole = |share: f64| if share < 9.95 { format!("{share:.1}%") } else { format!("{share:.0}%") };
+    match (median(shares.iter().copied()), shares.first(), shares.last()) {
+        (Some(middle), Some(least), Some(most)) if most - least > 0.5 * middle => {
+            format!(", by {} ({} to {})", whole(middle), whole(*least), whole(*most))
+        }
+        (Some(middle), ..) => format!(", by {}", whole(middle)),
+        _ => {
+            let apart = run.iter().filter_map(|p| p.other.map(|other| (p.flight - other).abs()));
+            median(apart).map_or_else(String::new, |apart| format!(", by {apart:.3e} {}", run[0].unit))
+        }
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values.get(values.len().checked_sub(1)? / 2)?, values.get(values.len() / 2)?);
+    Some(low.midpoint(*high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aero::wind_tunnel::TunnelPoint;
+    use approx::assert_relative_eq;
+
+    fn row(alpha_deg: f64, flight: f64, tunnel: Option<f64>, verdict: &str) -> ComparisonRow {
+        ComparisonRow {
+            derivative: "d".into(),
+            unit: "per_deg".into(),
+            group: "all".into(),
+            alpha_deg,
+            mach: Some(0.3),
+            flight,
+            standard_error: 0.1,
+            wind_tunnel: tunnel,
+            difference: tunnel.map(|t| flight - t),
+            uncertainty: tunnel.map(|_| 0.1),
+            difference_pct: tunnel.filter(|t| *t != 0.0).map(|t| 100.0 * (flight - t) / t.abs()),
+            z: tunnel.map(|t| (flight - t) / 0.1),
+            verdict: verdict.into(),
+        }
+    }
+
+    fn tunnel() -> WindTunnel {
+        let mut tunnel = WindTunnel::default();
+        tunnel.insert("d", TunnelPoint { alpha_deg: 0.0, mach: None, value: 2.0, uncertainty: None, source: None });
+        tunnel
+    }
+
+    fn said(rows: &[ComparisonRow]) -> Vec<String> {
+        of_tunnel(rows, &tunnel(), &Settings::default()).0.into_iter().map(|v| v.words).collect()
+    }
+
+    #[test]
+    fn neighbours_with_one_verdict_become_one_sentence() {
+        let rows = [
+            row(5.0, 2.1, Some(2.0), "agrees"),
+            row(10.0, 2.1, Some(2.0), "agrees"),
+            row(35.0, 1.4, Some(2.0), "flight lower"),
+            row(40.0, 1.4, Some(2.0), "flight lower"),
+            row(60.0, 1.38, Some(2.0), "flight lower"),
+        ];
+        assert_eq!(
+            said(&rows),
+            ["agrees within its uncertainty from 5° to 10°", "flight lower than tunnel from 35° to 60°, by 30%"]
+        );
+    }
+
+    #[test]
+    fn a_sign_that_differs_to_the_end_differs_above_the_last_that_does_not() {
+        let rows = [
+            row(35.0, 2.0, None, "no tunnel value"),
+            row(40.0, 2.5, Some(0.0), "flight higher"),
+            row(45.0, 1.0, Some(-2.0), "sign differs"),
+            row(50.0, 1.0, Some(-2.0), "sign differs"),
+        ];
+        assert_eq!(
+            said(&rows),
+            [
+                "no tunnel value at 35°",
+                "flight higher than tunnel at 40°, by 2.500e0 per_deg",
+                "sign differs above 40°"
+            ]
+        );
+    }
+
+    #[test]
+    fn uneven_differences_are_told_with_their_extremes() {
+        let rows = [
+            row(5.0, 2.2, Some(2.0), "flight higher"),
+            row(10.0, 2.6, Some(2.0), "flight higher"),
+            row(15.0, 3.0, Some(2.0), "flight higher"),
+        ];
+        assert_eq!(said(&rows), ["flight higher than tunnel from 5° to 15°, by 30% (10% to 50%)"]);
+    }
+
+    #[test]
+    fn agreement_by_percent_alone_says_so() {
+        assert_eq!(said(&[row(5.0, 2.3, Some(2.0), "agrees")]), ["agrees within its uncertainty or 5% at 5°"]);
+    }
+
+    #[test]
+    fn the_worst_disagreement_is_the_one_furthest_apart_for_the_derivative_s_size() {
+        let rows = [
+            row(5.0, 0.05, Some(0.01), "flight higher"),
+            row(10.0, 2.0, Some(2.0), "agrees"),
+            row(15.0, 1.5, Some(2.0), "flight lower"),
+            row(20.0, 1.2, Some(2.0), "flight lower"),
+        ];
+        let (_, worst) = of_tunnel(&rows, &tunnel(), &Settings::default());
+        assert_eq!(worst.iter().map(|w| (w.rank, w.alpha_deg)).collect::<Vec<_>>(), [(1, 20.0), (2, 5.0)]);
+        assert_relative_eq!(worst[0].size_pct.expect("size"), 40.0, max_relative = 1e-12);
+        assert_relative_eq!(worst[1].size_pct.expect("size"), 2.0, max_relative = 1e-12);
+        let one = Settings { worst: 1, ..Settings::default() };
+        assert_eq!(of_tunnel(&rows, &tunnel(), &one).1.len(), 1);
+    }
+}

@@ -1,0 +1,240 @@
+//! The build-up as DAVE-ML (ANSI/AIAA S-119-2011, DAVEfunc 2.0): a gridded function per derivative, a second one that says
+//! where it is flight's, and the coefficients as their sums.
+
+use super::xml::{Xml, escaped};
+use super::{COEFFICIENTS, Contents, Table, terms};
+use crate::aero::{Coefficient, Derivative, Regressor};
+
+const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n\
+    <!DOCTYPE DAVEfunc PUBLIC \"-//AIAA//DTD for Flight Dynamic Models - Functions 2.0//EN\" \
+    \"http://daveml.org/DTDs/2p0/DAVEfunc.dtd\">";
+
+/// Rates over twice the speed: identifier, words.
+const RATES: [(Regressor, &str, &str); 3] = [
+    (Regressor::RollRate, "pb_2V", "roll rate p b/2V, positive right wing down"),
+    (Regressor::PitchRate, "qc_2V", "pitch rate q c/2V, positive nose up"),
+    (Regressor::YawRate, "rb_2V", "yaw rate r b/2V, positive nose right"),
+];
+
+/// The model, whole.
+#[must_use]
+pub fn document(contents: &Contents, tables: &[Table]) -> String {
+    let mut xml = Xml::new(DECLARATION);
+    xml.open("DAVEfunc", &[("xmlns", "http://daveml.org/2010/DAVEML")]);
+    header(contents, &mut xml);
+    inputs(contents, tables, &mut xml);
+    for table in tables {
+        let name = table.derivative.as_str();
+        variable(&mut xml, name, name, &unit(&table.unit), &table.sources(), Mark::Output);
+        let words = format!("1 where {name} is flight's, 0 where it is the tunnel's");
+        variable(&mut xml, name, &flag(name), "nd", &words, Mark::Output);
+    }
+    for coefficient in COEFFICIENTS {
+        coefficients(contents, tables, coefficient, &mut xml);
+    }
+    for (id, points, units) in breakpoints(contents, tables) {
+        xml.open("breakpointDef", &[("bpID", &id), ("units", units)]);
+        xml.text("bpVals", &[], &numbers(points));
+        xml.close();
+    }
+    for table in tables {
+        gridded(table, &mut xml);
+    }
+    for table in tables {
+        function(contents, table, &table.derivative, &format!("{}_table", table.derivative), &mut xml);
+        let flag = flag(&table.derivative);
+        function(contents, table, &flag, &format!("{flag}_table"), &mut xml);
+    }
+    xml.close();
+    xml.finish()
+}
+
+fn header(contents: &Contents, xml: &mut Xml) {
+    let (settings, a) = (contents.settings, contents.aircraft);
+    xml.open("fileHeader", &[("name", contents.title)]);
+    xml.empty("author", &[("name", &settings.author), ("org", &settings.organisation)]);
+    xml.empty("creationDate", &[("date", &settings.date)]);
+    let text = format!(
+        "{}: flight-updated derivatives: trends of flight tests where there is data, wind tunnel elsewhere; each table \
+         says which, and a function <name>_is_flight says it at every point. Body axes: CN up, CA aft, CY right, moments \
+         right wing down, nose up, nose right, about the c.g. Reference area {} ft2, span {} ft, chord {} ft. Thrust \
+         vectoring is in lbf and ft lbf and in no coefficient. Tables are linear between their points and constant beyond.",
+        contents.title, a.wing_area_ft2, a.span_ft, a.chord_ft
+    );
+    xml.text("description", &[], &text);
+    xml.close();
+}
+
+/// What a variable is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    Input,
+    Output,
+}
+
+fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, mark: Mark) {
+    xml.open("variableDef", &[("name", name), ("varID", id), ("units", units)]);
+    xml.text("description", &[], words);
+    xml.empty(if mark == Mark::Input { "isInput" } else { "isOutput" }, &[]);
+    xml.close();
+}
+
+fn inputs(contents: &Contents, tables: &[Table], xml: &mut Xml) {
+    variable(xml, "angleOfAttack", "alpha", "deg", "angle of attack, positive nose up", Mark::Input);
+    variable(xml, "angleOfSideslip", "beta", "deg", "sideslip, positive wind from the right", Mark::Input);
+    if tables.iter().any(|t| !t.machs.is_empty()) {
+        variable(xml, "machNumber", "mach", "nd", "Mach number", Mark::Input);
+    }
+    if let Some(third) = third(contents, tables) {
+        variable(xml, third, third, "nd", "the tables' third variable, in the unit of its name", Mark::Input);
+    }
+    for (_, id, words) in RATES {
+        variable(xml, id, id, "rad", words, Mark::Input);
+    }
+    let mut surfaces: Vec<&str> = contents.buildup.derivatives.iter().filter_map(|d| d.regressor.surface()).collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    // A surface that is a table's third variable is an input already.
+    for signal in surfaces.into_iter().filter(|s| Some(*s) != third(contents, tables)) {
+        variable(xml, signal, signal, "deg", "surface or vane, in the unit of its name", Mark::Input);
+    }
+}
+
+fn third<'a>(contents: &'a Contents, tables: &[Table]) -> Option<&'a str> {
+    let depends = tables.iter().any(|t| !t.thirds.is_empty());
+    contents.tunnel.settings().third.as_ref().filter(|_| depends).map(|third| third.name.as_str())
+}
+
+/// A coefficient without vanes as the sum of its terms, and the load of its vanes where it has some.
+fn coefficients(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
+    let name = format!("{coefficient:?}");
+    let load = if coefficient.is_moment() { "ft*lbf" } else { "lbf" };
+    for (vanes, id, units) in [(false, name.clone(), "nd"), (true, format!("{name}_vanes"), load)] {
+        let terms: Vec<&Derivative> = terms(contents, tables, coefficient, vanes).collect();
+        if terms.is_empty() {
+            continue;
+        }
+        xml.open("variableDef", &[("name", &id), ("varID", &id), ("units", units)]);
+        xml.open("calculation", &[]);
+        xml.open("math", &[("xmlns", "http://www.w3.org/1998/Math/MathML")]);
+        xml.open("apply", &[]);
+        xml.empty("plus", &[]);
+        for derivative in terms {
+            term(derivative, xml);
+        }
+        for _ in 0..3 {
+            xml.close();
+        }
+        xml.empty("isOutput", &[]);
+        xml.close();
+    }
+}
+
+fn term(derivative: &Derivative, xml: &mut Xml) {
+    let regressor = match &derivative.regressor {
+        Regressor::Constant => return xml.text("ci", &[], &derivative.name),
+        Regressor::Alpha => "alpha",
+        Regressor::Beta => "beta",
+        Regressor::Surface(signal) | Regressor::Vane(signal) => signal,
+        rate => RATES.iter().find(|(r, ..)| r == rate).map_or("", |(_, id, _)| id),
+    };
+    xml.open("apply", &[]);
+    xml.empty("times", &[]);
+    xml.text("ci", &[], &derivative.name);
+    xml.text("ci", &[], regressor);
+    xml.close();
+}
+
+/// The breakpoints of every table: those of one table's variable that has a grid.
+fn breakpoints<'a>(contents: &Contents, tables: &'a [Table]) -> Vec<(String, &'a [f64], &'static str)> {
+    let third = third(contents, tables).is_some();
+    let of = |table: &'a Table| {
+        let id = |variable: &str| format!("{}_{variable}", table.derivative);
+        let mut all = vec![(id("alpha"), table.alphas_deg.as_slice(), "deg"), (id("mach"), &table.machs, "nd")];
+        if third {
+            all.push((id("third"), &table.thirds, "nd"));
+        }
+        all.into_iter().filter(|(_, points, _)| !points.is_empty())
+    };
+    tables.iter().flat_map(of).collect()
+}
+
+/// Which variables a table depends on, slowest first: the name of its breakpoints and the variable's identifier.
+fn variables<'a>(table: &Table, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
+    let mut variables = Vec::new();
+    if !table.thirds.is_empty() {
+        variables.push(("third", third.unwrap_or_default()));
+    }
+    if !table.machs.is_empty() {
+        variables.push(("mach", "mach"));
+    }
+    variables.push(("alpha", "alpha"));
+    variables
+}
+
+fn gridded(table: &Table, xml: &mut Xml) {
+    let n = table.alphas_deg.len().max(1);
+    let lines = |of: &dyn Fn(&super::Cell) -> f64| -> Vec<String> {
+        let values: Vec<f64> = table.cells.iter().map(of).collect();
+        let rows: Vec<String> = values.chunks(n).map(numbers).collect();
+        let last = rows.len().saturating_sub(1);
+        rows.into_iter().enumerate().map(|(i, row)| if i < last { format!("{row},") } else { row }).collect()
+    };
+    let references = |xml: &mut Xml| {
+        xml.open("breakpointRefs", &[]);
+        for (variable, _) in variables(table, None) {
+            xml.empty("bpRef", &[("bpID", &format!("{}_{variable}", table.derivative))]);
+        }
+        xml.close();
+    };
+    let id = format!("{}_table", table.derivative);
+    xml.open("griddedTableDef", &[("name", &table.derivative), ("gtID", &id), ("units", &unit(&table.unit))]);
+    xml.text("description", &[], &table.sources());
+    references(xml);
+    if table.cells.iter().all(|c| c.uncertainty.is_some()) {
+        xml.open("uncertainty", &[("effect", "additive")]);
+        xml.open("normalPDF", &[("numSigmas", "1")]);
+        xml.open("bounds", &[]);
+        xml.block("dataTable", &[], &lines(&|c| c.uncertainty.unwrap_or_default()));
+        for _ in 0..3 {
+            xml.close();
+        }
+    }
+    xml.block("dataTable", &[], &lines(&|c| c.value));
+    xml.close();
+    let flag = flag(&table.derivative);
+    xml.open("griddedTableDef", &[("name", &flag), ("gtID", &format!("{flag}_table")), ("units", "nd")]);
+    references(xml);
+    xml.block("dataTable", &[], &lines(&|c| f64::from(u8::from(c.is_flight))));
+    xml.close();
+}
+
+fn function(contents: &Contents, table: &Table, variable: &str, gridded: &str, xml: &mut Xml) {
+    xml.open("function", &[("name", variable)]);
+    for (_, id) in variables(table, third(contents, std::slice::from_ref(table))) {
+        xml.empty("independentVarRef", &[("varID", id), ("extrapolate", "neither"), ("interpolate", "linear")]);
+    }
+    xml.empty("dependentVarRef", &[("varID", variable)]);
+    xml.open("functionDefn", &[]);
+    xml.empty("griddedTableRef", &[("gtID", gridded)]);
+    xml.close();
+    xml.close();
+}
+
+fn flag(derivative: &str) -> String {
+    format!("{derivative}_is_flight")
+}
+
+fn numbers(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// A unit as the standard spells it.
+fn unit(unit: &str) -> String {
+    match unit {
+        "-" => "nd".to_owned(),
+        "per_deg" => "1/deg".to_owned(),
+        "per_rad" => "1/rad".to_owned(),
+        other => escaped(&other.replace("_per_", "/")),
+    }
+}

@@ -1,0 +1,202 @@
+//! The build-up as a JSBSim aerodynamics section.
+//!
+//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are those of CN, CA and CY: its body forces are −AXIAL, SIDE,
+//! −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose right, as Cl, Cm, Cn. α and β are read in
+//! degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel` q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are
+//! forces in lbf and moments in ft lbf and are not multiplied by q̄S.
+
+use super::xml::Xml;
+use super::{COEFFICIENTS, Contents, Table, terms};
+use crate::aero::{Coefficient, Derivative, Regressor};
+
+/// The section, as JSBSim's `<aerodynamics>`.
+#[must_use]
+pub fn section(contents: &Contents, tables: &[Table]) -> String {
+    let mut xml = Xml::new("<?xml version=\"1.0\" encoding=\"UTF-8\"?>");
+    xml.open("aerodynamics", &[]);
+    let a = contents.aircraft;
+    let description = format!(
+        "{}: derivatives from flight where it has data, from the wind tunnel elsewhere; each function says which. \
+         Reference area {} ft2, span {} ft, chord {} ft: metrics must be the same. Moments are about the c.g.: put the \
+         aerodynamic reference point (AERORP) there. Signals that have no property of their own begin with harvest/ and \
+         are to be set by the flight control section, in the unit of their names.",
+        contents.title, a.wing_area_ft2, a.span_ft, a.chord_ft
+    );
+    xml.text("description", &[], &description);
+    for property in own_properties(contents, tables) {
+        xml.text("property", &[("value", "0")], &property);
+    }
+    for derivative in &contents.buildup.derivatives {
+        if let Some(table) = tables.iter().find(|t| t.derivative == derivative.name) {
+            function(contents, table, &mut xml);
+        }
+    }
+    for coefficient in COEFFICIENTS {
+        xml.open("function", &[("name", &format!("aero/harvest/{}", word(coefficient)))]);
+        let text = format!("{} without thrust-vectoring vanes", word(coefficient));
+        xml.text("description", &[], &text);
+        let products: Vec<Vec<String>> =
+            terms(contents, tables, coefficient, false).map(|d| factors(contents, d)).collect();
+        sum(&mut xml, &products);
+        xml.close();
+    }
+    for coefficient in COEFFICIENTS {
+        axis(contents, tables, coefficient, &mut xml);
+    }
+    xml.close();
+    xml.finish()
+}
+
+fn word(coefficient: Coefficient) -> String {
+    format!("{coefficient:?}")
+}
+
+/// JSBSim's axis of a coefficient and the property of its reference length.
+fn axis_of(coefficient: Coefficient) -> (&'static str, Option<&'static str>) {
+    match coefficient {
+        Coefficient::CN => ("NORMAL", None),
+        Coefficient::CA => ("AXIAL", None),
+        Coefficient::CY => ("SIDE", None),
+        Coefficient::Cl => ("ROLL", Some("metrics/bw-ft")),
+        Coefficient::Cm => ("PITCH", Some("metrics/cbarw-ft")),
+        Coefficient::Cn => ("YAW", Some("metrics/bw-ft")),
+    }
+}
+
+/// The property that a signal is.
+fn property(contents: &Contents, signal: &str) -> String {
+    let given = contents.settings.jsbsim_properties.get(signal);
+    given.cloned().unwrap_or_else(|| match signal {
+        "altitude_ft" => "position/h-sl-ft".to_owned(),
+        "qbar_psf" => "aero/qbar-psf".to_owned(),
+        "velocity_ft_s" => "velocities/vt-fps".to_owned(),
+        "mass_slug" => "inertia/mass-slugs".to_owned(),
+        _ => format!("harvest/{signal}"),
+    })
+}
+
+/// The third variable's property, where a table depends on one.
+fn third(contents: &Contents, tables: &[Table]) -> Option<String> {
+    let depends = tables.iter().any(|t| !t.thirds.is_empty());
+    let third = contents.tunnel.settings().third.as_ref().filter(|_| depends)?;
+    Some(property(contents, &third.name))
+}
+
+/// The properties that JSBSim does not have by itself, each once.
+fn own_properties(contents: &Contents, tables: &[Table]) -> Vec<String> {
+    let all = COEFFICIENTS.into_iter().flat_map(|c| [false, true].map(|vanes| (c, vanes)));
+    let derivatives = all.flat_map(|(c, vanes)| terms(contents, tables, c, vanes).collect::<Vec<_>>());
+    let surfaces = derivatives.filter_map(|d| d.regressor.surface()).map(|signal| property(contents, signal));
+    let mut properties: Vec<String> =
+        surfaces.chain(third(contents, tables)).filter(|p| p.starts_with("harvest/")).collect();
+    properties.sort();
+    properties.dedup();
+    properties
+}
+
+/// The factors of one term: the derivative and what it multiplies.
+fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
+    let mut factors = vec![format!("aero/harvest/{}", derivative.name)];
+    factors.extend(match &derivative.regressor {
+        Regressor::Constant => vec![],
+        Regressor::Alpha => vec!["aero/alpha-deg".to_owned()],
+        Regressor::Beta => vec!["aero/beta-deg".to_owned()],
+        Regressor::RollRate => vec!["velocities/p-aero-rad_sec".to_owned(), "aero/bi2vel".to_owned()],
+        Regressor::PitchRate => vec!["velocities/q-aero-rad_sec".to_owned(), "aero/ci2vel".to_owned()],
+        Regressor::YawRate => vec!["velocities/r-aero-rad_sec".to_owned(), "aero/bi2vel".to_owned()],
+        Regressor::Surface(signal) | Regressor::Vane(signal) => vec![property(contents, signal)],
+    });
+    factors
+}
+
+fn axis(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
+    let (name, length) = axis_of(coefficient);
+    xml.open("axis", &[("name", name)]);
+    let kind = if coefficient.is_moment() { "moment" } else { "force" };
+    xml.open("function", &[("name", &format!("aero/{kind}/harvest/{}", word(coefficient)))]);
+    let mut whole = vec!["aero/qbar-psf".to_owned(), "metrics/Sw-sqft".to_owned()];
+    whole.extend(length.map(str::to_owned));
+    whole.push(format!("aero/harvest/{}", word(coefficient)));
+    let vanes = terms(contents, tables, coefficient, true).map(|d| factors(contents, d));
+    let products: Vec<Vec<String>> = std::iter::once(whole).chain(vanes).collect();
+    sum(xml, &products);
+    xml.close();
+    xml.close();
+}
+
+/// A sum of products of properties. JSBSim wants two operands or more in each.
+fn sum(xml: &mut Xml, products: &[Vec<String>]) {
+    if products.is_empty() {
+        xml.text("value", &[], "0");
+    }
+    if products.len() > 1 {
+        xml.open("sum", &[]);
+    }
+    for product in products {
+        if product.len() > 1 {
+            xml.open("product", &[]);
+        }
+        for factor in product {
+            xml.text("property", &[], factor);
+        }
+        if product.len() > 1 {
+            xml.close();
+        }
+    }
+    if products.len() > 1 {
+        xml.close();
+    }
+}
+
+/// The table of one derivative.
+fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
+    xml.open("function", &[("name", &format!("aero/harvest/{}", table.derivative))]);
+    let over_mach = if table.machs.is_empty() { "" } else { "; at the Mach numbers flown" };
+    xml.text("description", &[], &format!("{} ({}){over_mach}", table.sources(), table.unit));
+    let third = third(contents, std::slice::from_ref(table)).unwrap_or_default();
+    let axes = [
+        ("aero/alpha-deg", table.alphas_deg.as_slice()),
+        ("velocities/mach", table.machs.as_slice()),
+        (third.as_str(), table.thirds.as_slice()),
+    ];
+    let values: Vec<f64> = table.cells.iter().map(|c| c.value).collect();
+    // A variable with one breakpoint is none: the cells stay as they are.
+    let axes: Vec<(&str, &[f64])> = axes.into_iter().filter(|(_, points)| points.len() > 1).collect();
+    match axes.as_slice() {
+        [] => xml.text("value", &[], &values.first().copied().unwrap_or_default().to_string()),
+        [(property, points)] => {
+            xml.open("table", &[]);
+            xml.text("independentVar", &[("lookup", "row")], property);
+            let lines: Vec<String> = points.iter().zip(&values).map(|(x, y)| format!("{x} {y}")).collect();
+            xml.block("tableData", &[], &lines);
+            xml.close();
+        }
+        [(row, rows), (column, columns), rest @ ..] => {
+            xml.open("table", &[]);
+            xml.text("independentVar", &[("lookup", "row")], row);
+            xml.text("independentVar", &[("lookup", "column")], column);
+            let size = rows.len() * columns.len();
+            if let [(property, breakpoints), ..] = rest {
+                xml.text("independentVar", &[("lookup", "table")], property);
+                for (breakpoint, values) in breakpoints.iter().zip(values.chunks(size)) {
+                    xml.block("tableData", &[("breakPoint", &breakpoint.to_string())], &plane(rows, columns, values));
+                }
+            } else {
+                xml.block("tableData", &[], &plane(rows, columns, &values));
+            }
+            xml.close();
+        }
+    }
+    xml.close();
+}
+
+/// A table of two variables: the columns' breakpoints, then each row's with its values. The rows' variable varies fastest
+/// in `values`.
+fn plane(rows: &[f64], columns: &[f64], values: &[f64]) -> Vec<String> {
+    let words = |values: Vec<f64>| values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let line = |(i, row): (usize, &f64)| {
+        let across = (0..columns.len()).filter_map(|j| values.get(j * rows.len() + i).copied()).collect();
+        format!("{row} {}", words(across))
+    };
+    std::iter::once(words(columns.to_vec())).chain(rows.iter().enumerate().map(line)).collect()
+}

@@ -1,0 +1,363 @@
+//! The export of the shipped model with a few trends: read back as a database, evaluated as a simulator would, held
+//! against DAVE-ML's grammar and against the simulator of this house, which has the build-up on its own.
+
+mod grammar;
+mod jsbsim;
+
+use std::path::Path;
+
+use approx::assert_relative_eq;
+use nalgebra::Vector3;
+
+use super::*;
+use crate::aero::{Axis, wind_tunnel};
+use crate::config::{Config, Overrides};
+use crate::export::jsbsim::section as section_of;
+use crate::simulate::aerodynamics::Aerodynamics;
+use crate::simulate::air_data::AirData;
+use crate::store::files::TunnelRow;
+use crate::store::tunnel;
+
+const ALPHAS: [f64; 7] = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0];
+
+/// The shipped pipeline with trends of four derivatives, one of each kind, between 10 and 40 deg.
+struct Flown {
+    config: Config,
+    trends: Vec<TrendRow>,
+    estimates: Vec<EstimateRow>,
+    maneuvers: Vec<Maneuver>,
+}
+
+fn trend_row(derivative: &str, unit: &str, group: &str, alpha_deg: f64, value: f64) -> TrendRow {
+    TrendRow {
+        derivative: derivative.into(),
+        unit: unit.into(),
+        group: group.into(),
+        alpha_deg,
+        value,
+        standard_error: 0.01 + 1e-4 * alpha_deg,
+        lower_95: value - 0.02,
+        upper_95: value + 0.02,
+        prediction_lower_95: value - 0.04,
+        prediction_upper_95: value + 0.04,
+        maneuvers: 8,
+        outliers: 0,
+        curve: "polynomial".into(),
+        order: 2,
+        scatter: 0.0,
+    }
+}
+
+fn maneuver(maneuver_id: &str, class: &str, mach: f64) -> Maneuver {
+    Maneuver {
+        maneuver_id: maneuver_id.into(),
+        flight_id: "f1".into(),
+        class: class.into(),
+        axis: Axis::Longitudinal,
+        start_s: 0.0,
+        end_s: 10.0,
+        alpha_deg: 25.0,
+        mach,
+        qbar_psf: 50.0,
+        velocity_ft_s: 300.0,
+        altitude_ft: 25e3,
+        mass_slug: 1050.0,
+        x_cg_ft: 38.0,
+        samples: 401,
+        origin: "found".into(),
+        recognised: crate::maneuver::Recognised::default(),
+        quality: crate::maneuver::Quality::default(),
+    }
+}
+
+fn estimate(maneuver_id: &str, class: &str, derivative: &str) -> EstimateRow {
+    EstimateRow {
+        maneuver_id: maneuver_id.into(),
+        flight_id: "f1".into(),
+        class: class.into(),
+        alpha_deg: 25.0,
+        mach: 0.3,
+        derivative: derivative.into(),
+        unit: "per_deg".into(),
+        status: "estimated".into(),
+        value: Some(1.0),
+        bound: Some(0.1),
+        bound_held: None,
+        bound_calibration: None,
+        bound_corrected: None,
+        wind_tunnel: None,
+        variance_inflation: None,
+        excitation: None,
+        contribution_pct: None,
+        equation_error: None,
+        held_because: None,
+    }
+}
+
+impl Flown {
+    fn new() -> Flown {
+        let config = Config::load(Path::new("pipelines/harv"), Overrides::default()).unwrap();
+        let (mut trends, mut estimates) = (Vec::new(), Vec::new());
+        for name in ["CN_alpha", "Cm_q", "Cl_p", "CY_dyv"] {
+            let group = &config.trend.group_of(name).unwrap().name;
+            let unit = config.buildup.unit_of(name).unwrap().name();
+            for (i, alpha) in ALPHAS.into_iter().enumerate() {
+                let tunnel = config.tunnel.value(name, alpha, 0.3).unwrap().value;
+                trends.push(trend_row(name, unit, group, alpha, 1.2 * tunnel + 0.001 * i as f64));
+            }
+            estimates.extend(["m1", "m2"].map(|id| estimate(id, "PPSS", name)));
+        }
+        let maneuvers = vec![maneuver("m1", "PPSS", 0.25), maneuver("m2", "PPSS", 0.35)];
+        Flown { config, trends, estimates, maneuvers }
+    }
+
+    fn contents(&self) -> Contents<'_> {
+        Contents {
+            title: "F/A-18 & others",
+            aircraft: &self.config.aircraft,
+            buildup: &self.config.buildup,
+            tunnel: &self.config.tunnel,
+            trends: &self.trends,
+            estimates: &self.estimates,
+            maneuvers: &self.maneuvers,
+            groups: &self.config.trend,
+            settings: &self.config.export,
+        }
+    }
+
+    /// A tunnel of one derivative over two Mach numbers and two altitudes.
+    fn over_mach_and_altitude(mut self) -> Flown {
+        let third = Some(wind_tunnel::Third { name: "altitude_ft".into(), at: 20e3 });
+        let mut tunnel = WindTunnel::new(wind_tunnel::Settings { third, ..Default::default() });
+        for altitude in [10e3, 40e3] {
+            for mach in [0.2, 0.9] {
+                for alpha_deg in [5.0, 20.0, 50.0] {
+                    let value = alpha_deg * (1.0 + mach) + 1e-4 * altitude;
+                    let point =
+                        TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: Some(0.5), source: None };
+                    tunnel.insert_at("CN_alpha", Some(altitude), point);
+                }
+            }
+        }
+        self.config.tunnel = tunnel;
+        self
+    }
+}
+
+#[test]
+fn flight_stands_where_it_has_data_and_the_tunnel_elsewhere() {
+    let flown = Flown::new();
+    let tables = tables(&flown.contents());
+    assert_eq!(tables.len(), flown.config.buildup.derivatives.len() + flown.config.buildup.combined.len());
+    for table in &tables {
+        for (at, cell) in table.points() {
+            let trend = flown
+                .trends
+                .iter()
+                .find(|t| t.derivative == table.derivative && (t.alpha_deg - at.alpha_deg).abs() < 1e-9);
+            assert_eq!(cell.is_flight, trend.is_some(), "{} {at:?}", table.derivative);
+            let tunnel = flown.config.tunnel.value(&table.derivative, at.alpha_deg, 0.3).unwrap().value;
+            assert_eq!(cell.value.to_bits(), trend.map_or(tunnel, |t| t.value).to_bits());
+        }
+    }
+    let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
+    assert_eq!(slope.sources(), "wind tunnel: 5°, 45° to 60°; flight, trend of all: 10° to 40°");
+}
+
+#[test]
+fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
+    let flown = Flown::new().over_mach_and_altitude();
+    let tables = tables(&flown.contents());
+    let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
+    assert_eq!(slope.machs, [0.2, 0.25, 0.35, 0.9]);
+    assert_eq!(slope.thirds, [10e3, 25e3, 40e3]);
+    assert_eq!(slope.alphas_deg, [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0]);
+    for (at, cell) in slope.points() {
+        let inside =
+            (0.25..=0.35).contains(&at.mach) && at.third == Some(25e3) && (10.0..=40.0).contains(&at.alpha_deg);
+        assert_eq!(cell.is_flight, inside, "{at:?}");
+    }
+}
+
+/// Where a value stands, by its bits: derivative, α, Mach, third variable.
+type Place = (String, [Option<u64>; 3]);
+
+/// The values and uncertainties of rows, by their bits.
+fn points(rows: impl IntoIterator<Item = TunnelRow>) -> BTreeMap<Place, (u64, Option<u64>)> {
+    let bits = |v: Option<f64>| v.map(f64::to_bits);
+    let point = |r: TunnelRow| {
+        let place = (r.derivative, [Some(r.alpha_deg), r.mach, r.third].map(bits));
+        (place, (r.value.to_bits(), bits(r.uncertainty)))
+    };
+    rows.into_iter().map(point).collect()
+}
+
+#[test]
+fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
+    for flown in [Flown::new(), Flown::new().over_mach_and_altitude()] {
+        let contents = flown.contents();
+        let tables = tables(&contents);
+        let folder = tempfile::tempdir().unwrap();
+        let third = flown.config.tunnel.settings().third.as_ref().map(|t| t.name.as_str());
+        crate::store::table::publish_export(&crate::store::table::Shelf::of(folder.path()), &rows(&tables), third)
+            .unwrap();
+        std::fs::write(folder.path().join("flight_updated.dml"), daveml::document(&contents, &tables)).unwrap();
+        let names: Vec<&str> = tables.iter().map(|t| t.derivative.as_str()).collect();
+        let read = |extension: &str| {
+            let path = folder.path().join(format!("flight_updated.{extension}"));
+            let found = tunnel::rows(&path, third, |name| names.contains(&name)).unwrap();
+            points(found.into_iter().map(|(_, row)| row))
+        };
+        let written = rows(&tables).into_iter().map(|r| TunnelRow {
+            derivative: r.derivative,
+            alpha_deg: r.alpha_deg,
+            mach: r.mach,
+            value: r.value,
+            unit: r.unit,
+            uncertainty: r.uncertainty,
+            source: None,
+            third: r.third,
+        });
+        let written = points(written);
+        assert_eq!(read("csv"), written);
+        assert_eq!(read("parquet"), written);
+        let of_values = |all: &BTreeMap<Place, (u64, Option<u64>)>| -> BTreeMap<Place, u64> {
+            all.iter().map(|(place, (value, _))| (place.clone(), *value)).collect()
+        };
+        assert_eq!(of_values(&read("dml")), of_values(&written));
+    }
+}
+
+#[test]
+fn daveml_keeps_the_uncertainties_where_every_value_has_one() {
+    let flown = Flown::new().over_mach_and_altitude();
+    let contents = flown.contents();
+    let text = daveml::document(&contents, &tables(&contents));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.dml");
+    std::fs::write(&path, text).unwrap();
+    let found = tunnel::rows(&path, Some("altitude_ft"), |name| name == "CN_alpha").unwrap();
+    assert!(
+        found.iter().any(|(_, r)| r.uncertainty == Some(0.5)) && found.iter().all(|(_, r)| r.uncertainty.is_some())
+    );
+}
+
+#[test]
+fn daveml_follows_its_grammar() {
+    for flown in [Flown::new(), Flown::new().over_mach_and_altitude()] {
+        let contents = flown.contents();
+        let text = daveml::document(&contents, &tables(&contents));
+        assert_eq!(grammar::faults(&text), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn the_grammar_sees_what_is_out_of_order() {
+    let flown = Flown::new();
+    let contents = flown.contents();
+    let text = daveml::document(&contents, &tables(&contents));
+    for (from, to) in [
+        ("<isInput/>", "<isInput/><description>late</description>"),
+        ("gtID=\"CN_alpha_table\"", "gtID=\"other_table\""),
+        ("<creationDate date=\"not stated\"/>", ""),
+        (" org=\"not stated\"", ""),
+    ] {
+        assert!(text.contains(from), "{from}");
+        assert!(!grammar::faults(&text.replacen(from, to, 1)).is_empty(), "{from}");
+    }
+}
+
+/// A state of flight with every regressor at work.
+fn states() -> Vec<(f64, f64, Vector3<f64>)> {
+    vec![
+        (12.3, 2.0, Vector3::new(0.3, -0.1, 0.05)),
+        (32.5, -4.0, Vector3::new(-0.2, 0.25, 0.1)),
+        (2.0, 0.5, Vector3::new(0.1, 0.1, -0.1)),
+        (64.0, 0.0, Vector3::zeros()),
+    ]
+}
+
+#[test]
+fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
+    let flown = Flown::new();
+    let contents = flown.contents();
+    let (tables, a) = (tables(&contents), contents.aircraft);
+    let section = section_of(&contents, &tables);
+    let mut surfaces: Vec<String> =
+        contents.buildup.derivatives.iter().filter_map(|d| d.regressor.surface().map(str::to_owned)).collect();
+    surfaces.sort();
+    surfaces.dedup();
+    let deflections: Vec<f64> = (0..surfaces.len()).map(|i| 3.0 - 1.1 * i as f64).collect();
+    let names: Vec<String> = surfaces.iter().map(|s| format!("harvest/{s}")).collect();
+    let truth =
+        Aerodynamics::new(contents.buildup, database(&tables, &wind_tunnel::Settings::default()), &surfaces).unwrap();
+    for (alpha_deg, beta_deg, rates) in states() {
+        let (alpha, beta) = (alpha_deg.to_radians(), f64::to_radians(beta_deg));
+        let air = AirData { velocity_ft_s: 310.0, alpha, beta, mach: 0.3, qbar_psf: 55.0 };
+        let (force, moment) = truth.loads(a, &truth.values(alpha_deg, 0.3), &air, &rates, &deflections);
+        let mut properties: BTreeMap<&str, f64> = BTreeMap::from([
+            ("aero/alpha-deg", alpha_deg),
+            ("aero/beta-deg", beta_deg),
+            ("aero/bi2vel", a.span_ft / (2.0 * 310.0)),
+            ("aero/ci2vel", a.chord_ft / (2.0 * 310.0)),
+            ("velocities/p-aero-rad_sec", rates.x),
+            ("velocities/q-aero-rad_sec", rates.y),
+            ("velocities/r-aero-rad_sec", rates.z),
+            ("velocities/mach", 0.3),
+            ("aero/qbar-psf", 55.0),
+            ("metrics/Sw-sqft", a.wing_area_ft2),
+            ("metrics/bw-ft", a.span_ft),
+            ("metrics/cbarw-ft", a.chord_ft),
+        ]);
+        properties.extend(names.iter().map(String::as_str).zip(deflections.iter().copied()));
+        let axes = jsbsim::axes(&section, &properties);
+        // JSBSim's body forces: X = −AXIAL, Y = SIDE, Z = −NORMAL.
+        for (axis, expected) in [
+            ("AXIAL", -force.x),
+            ("SIDE", force.y),
+            ("NORMAL", -force.z),
+            ("ROLL", moment.x),
+            ("PITCH", moment.y),
+            ("YAW", moment.z),
+        ] {
+            assert_relative_eq!(axes[axis], expected, max_relative = 1e-10, epsilon = 1e-8);
+        }
+    }
+}
+
+#[test]
+fn the_jsbsim_tables_over_three_variables_are_the_database_s() {
+    let flown = Flown::new().over_mach_and_altitude();
+    let contents = flown.contents();
+    let tables = tables(&contents);
+    let section = section_of(&contents, &tables);
+    let database = database(&tables, contents.tunnel.settings());
+    for (alpha_deg, mach, altitude) in [(12.0, 0.3, 25e3), (33.3, 0.5, 12e3), (3.0, 0.1, 50e3), (50.0, 0.25, 25e3)] {
+        let condition = Condition { alpha_deg, mach, third: Some(altitude) };
+        let properties = [("aero/alpha-deg", alpha_deg), ("velocities/mach", mach), ("position/h-sl-ft", altitude)];
+        let rest = [
+            "aero/beta-deg",
+            "aero/bi2vel",
+            "aero/ci2vel",
+            "velocities/p-aero-rad_sec",
+            "velocities/q-aero-rad_sec",
+            "velocities/r-aero-rad_sec",
+            "aero/qbar-psf",
+            "metrics/Sw-sqft",
+            "metrics/bw-ft",
+            "metrics/cbarw-ft",
+        ];
+        let all = properties.into_iter().chain(rest.map(|name| (name, 0.0))).collect();
+        let value = jsbsim::evaluated(&section, &all)["aero/harvest/CN_alpha"];
+        assert_relative_eq!(value, database.at("CN_alpha", &condition).unwrap().value, max_relative = 1e-12);
+    }
+}
+
+#[test]
+fn an_analyst_s_property_takes_the_place_of_the_house_s() {
+    let mut flown = Flown::new();
+    flown.config.export.jsbsim_properties.insert("de_deg".into(), "fcs/elevator-pos-deg".into());
+    let contents = flown.contents();
+    let section = section_of(&contents, &tables(&contents));
+    assert!(section.contains("<property>fcs/elevator-pos-deg</property>") && !section.contains("harvest/de_deg"));
+}

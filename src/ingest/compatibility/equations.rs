@@ -1,0 +1,208 @@
+//! The kinematic equations of flight and what the instruments read of them, with exact slopes; no aerodynamics.
+//!
+//! Over the turning earth, with ω the inertial body rates, Ω the earth's, n the navigation frame's and f the specific force:
+//!
+//! - v̇ = f + g − (ω + Ω) × v, with v relative to the air, whose wind may change at a steady rate
+//! - φ̇ = p' + tan θ (q' sin φ + r' cos φ), θ̇ = q' cos φ − r' sin φ, ψ̇ = (q' sin φ + r' cos φ)/cos θ, with ω' = ω − n
+//! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ
+//!
+//! An accelerometer on an arm r feels ω̇ × r besides. So that no rate is differentiated the state is, component by component,
+//! the velocity at the sensor of that component, `s_i` = (v + ω × `r_i`)_i: its rate has no ω̇.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::instruments::{INPUTS, OUTPUTS};
+use crate::aircraft::{Aircraft, Flow, Position};
+use crate::dynamics::lever;
+use crate::ingest::motion::atmosphere;
+use crate::units::DEG;
+
+/// States: three velocities at the sensors (ft/s), φ, θ, ψ (rad), altitude (ft).
+pub const STATES: usize = 7;
+
+pub type State = SVector<f64, STATES>;
+
+/// What is known at a sample and enters so weakly that the measured motion is good enough for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// ft/s².
+    pub gravity: f64,
+    /// From the c.g. to the axial, lateral and normal accelerometer, ft forward, right, down.
+    pub arms: [[f64; 3]; 3],
+    pub cg: Position,
+    /// The earth's rotation, and that of the local horizon, in body axes, rad/s.
+    pub earth: Vector3<f64>,
+    pub horizon: Vector3<f64>,
+    /// From north, east, down to body axes.
+    pub to_body: Matrix3<f64>,
+}
+
+/// p, q, r (rad/s) and specific force forward, right, down at the sensors (ft/s²).
+pub type Driven = [f64; INPUTS];
+
+/// Rates of the states with their slopes along states and inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    pub rates: State,
+    pub by_state: SMatrix<f64, STATES, STATES>,
+    pub by_input: SMatrix<f64, STATES, INPUTS>,
+}
+
+/// What the output instruments read, in the units of their signals, with slopes along states and body rates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readings {
+    pub values: [f64; OUTPUTS],
+    pub by_state: SMatrix<f64, OUTPUTS, STATES>,
+    pub by_rates: SMatrix<f64, OUTPUTS, 3>,
+}
+
+fn vector(omega: &Driven) -> Vector3<f64> {
+    Vector3::new(omega[0], omega[1], omega[2])
+}
+
+/// The velocity at the c.g. and its slopes along ω.
+fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix3<f64>) {
+    let mut velocity = Vector3::new(x[0], x[1], x[2]);
+    let mut by_rates = Matrix3::zeros();
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let arm = known.arms[i];
+        velocity[i] -= omega[j] * arm[k] - omega[k] * arm[j];
+        by_rates[(i, j)] = -arm[k];
+        by_rates[(i, k)] = arm[j];
+    }
+    (velocity, by_rates)
+}
+
+/// The rates of the states.
+pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
+    let omega = vector(input);
+    let (velocity, velocity_by_rates) = at_cg(x, omega, known);
+    let ((sp, cp), (st, ct)) = (x[3].sin_cos(), x[4].sin_cos());
+    let g = known.gravity;
+    let turning = omega + known.earth;
+    let mut out = Motion { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
+    let gravity = Vector3::new(-g * st, g * ct * sp, g * ct * cp);
+    let turned = turning.cross(&velocity);
+    let cross = turning.cross_matrix();
+    let mut by_rates = velocity.cross_matrix() - cross * velocity_by_rates;
+    for i in 0..3 {
+        let swing = lever(i, known.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
+        out.rates[i] = input[3 + i] - swing.value + gravity[i] - turned[i];
+        for j in 0..3 {
+            by_rates[(i, j)] -= swing.by_rates[j];
+        }
+        out.by_input[(i, 3 + i)] = 1.0;
+    }
+    out.by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&-cross);
+    out.by_input.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_rates);
+    let by_phi = Vector3::new(0.0, g * ct * cp, -g * ct * sp);
+    let by_theta = Vector3::new(-g * ct, -g * st * sp, -g * st * cp);
+    out.by_state.fixed_view_mut::<3, 1>(0, 3).copy_from(&by_phi);
+    out.by_state.fixed_view_mut::<3, 1>(0, 4).copy_from(&by_theta);
+    attitude(&mut out, omega - known.horizon, (sp, cp), (st, ct));
+    climb(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
+    out
+}
+
+/// Rates of φ, θ, ψ for body rates relative to the horizon.
+fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+    let tan = st / ct;
+    let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
+    out.rates[3] = w.x + tan * along;
+    out.rates[4] = across;
+    out.rates[5] = along / ct;
+    out.by_state[(3, 3)] = tan * across;
+    out.by_state[(3, 4)] = along / (ct * ct);
+    out.by_state[(4, 3)] = -along;
+    out.by_state[(5, 3)] = across / ct;
+    out.by_state[(5, 4)] = along * tan / ct;
+    out.by_input.fixed_view_mut::<3, 3>(3, 0).copy_from(&Matrix3::new(
+        1.0,
+        tan * sp,
+        tan * cp, //
+        0.0,
+        cp,
+        -sp, //
+        0.0,
+        sp / ct,
+        cp / ct,
+    ));
+}
+
+/// Rate of climb.
+fn climb(out: &mut Motion, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+    let up = Vector3::new(st, -sp * ct, -cp * ct);
+    out.rates[6] = up.dot(&v);
+    for i in 0..3 {
+        out.by_state[(6, i)] = up[i];
+        out.by_input[(6, i)] = up.dot(&v_by_rates.column(i));
+    }
+    out.by_state[(6, 3)] = -v.y * cp * ct + v.z * sp * ct;
+    out.by_state[(6, 4)] = v.x * ct + v.y * sp * st + v.z * cp * st;
+}
+
+/// What the output instruments read: α and β vanes, V, θ, φ, ψ, altitude, q̄ and Mach, in deg, ft/s, ft, lbf/ft².
+pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -> Readings {
+    let omega = vector(input);
+    let (v, v_by_rates) = at_cg(x, omega, known);
+    let speed = v.norm();
+    let across2 = v.x * v.x + v.z * v.z;
+    let unit = v / speed;
+    let beta = (v.y / speed).clamp(-1.0, 1.0).asin();
+    let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
+    let beta_by = (Vector3::y() - unit * unit.y) / (speed * beta.cos());
+    let flow = Flow { alpha: v.z.atan2(v.x), beta, velocity: speed, rates: [omega.x, omega.y, omega.z] };
+    let air = Air::at(x[6]);
+    let mut values = [0.0; OUTPUTS];
+    let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
+    let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
+    let vanes = [aircraft.sensors.alpha_reading(&flow, known.cg), aircraft.sensors.beta_reading(&flow, known.cg)];
+    for (o, vane) in vanes.iter().enumerate() {
+        values[o] = DEG * vane.angle;
+        // A reading depends on the rates over the velocity only, which gives its slope along the velocity.
+        let rates: Vector3<f64> = vane.by_rates.into();
+        let by = alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);
+        by_velocity.set_row(o, &(by * DEG).transpose());
+        by_rates.set_row(o, &(rates * DEG).transpose());
+    }
+    let pressures = [1.0, air.density * speed, 1.0 / air.sound];
+    for (o, factor) in [2, 7, 8].into_iter().zip(pressures) {
+        by_velocity.set_row(o, &(unit * factor).transpose());
+    }
+    values[2] = speed;
+    values[3] = DEG * x[4];
+    values[4] = DEG * x[3];
+    values[5] = DEG * x[5];
+    values[6] = x[6];
+    values[7] = 0.5 * air.density * speed * speed;
+    values[8] = speed / air.sound;
+    let mut by_state = SMatrix::<f64, OUTPUTS, STATES>::zeros();
+    by_state.fixed_columns_mut::<3>(0).copy_from(&by_velocity);
+    by_rates += by_velocity * v_by_rates;
+    by_state[(3, 4)] = DEG;
+    by_state[(4, 3)] = DEG;
+    by_state[(5, 5)] = DEG;
+    by_state[(6, 6)] = 1.0;
+    by_state[(7, 6)] = 0.5 * air.density_slope * speed * speed;
+    by_state[(8, 6)] = -speed * air.sound_slope / (air.sound * air.sound);
+    Readings { values, by_state, by_rates }
+}
+
+/// Standard atmosphere at an altitude with its slopes per ft.
+struct Air {
+    density: f64,
+    density_slope: f64,
+    sound: f64,
+    sound_slope: f64,
+}
+
+impl Air {
+    fn at(altitude_ft: f64) -> Air {
+        const REACH_FT: f64 = 5.0;
+        let ((density, sound), up, down) =
+            (atmosphere(altitude_ft), atmosphere(altitude_ft + REACH_FT), atmosphere(altitude_ft - REACH_FT));
+        let slope = |up: f64, down: f64| (up - down) / (2.0 * REACH_FT);
+        Air { density, density_slope: slope(up.0, down.0), sound, sound_slope: slope(up.1, down.1) }
+    }
+}

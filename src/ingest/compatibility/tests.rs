@@ -1,0 +1,434 @@
+//! The equations against closed forms and finite differences, and the fit against flights whose errors are known.
+
+use approx::{assert_abs_diff_eq, assert_relative_eq};
+use nalgebra::{Matrix3, Vector3};
+
+use super::equations::{self, Driven, Known, STATES, State, rates, readings};
+use super::instruments::{INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place};
+use super::response::{LOCAL, ROW, respond, shared_place};
+use super::window::{self, Window, factor};
+use super::*;
+use crate::aircraft::{Position, Sensors, Vane, VaneModel};
+use crate::flight::record::Series;
+use crate::flight::{Mark, signal as s};
+use crate::simulate::noise::Noise;
+use crate::units::{DEG, G0_FT_S2};
+
+const STEP_S: f64 = 0.025;
+const CG: Position = Position { x_ft: 38.3, y_ft: 0.1, z_ft: 8.7 };
+
+fn aircraft() -> Aircraft {
+    let at = |x_ft, y_ft, z_ft| Position { x_ft, y_ft, z_ft };
+    Aircraft {
+        name: "any".to_owned(),
+        wing_area_ft2: 400.0,
+        span_ft: 37.4,
+        chord_ft: 11.5,
+        engine_inertia_slug_ft2: 3.0,
+        latitude_deg: 35.0,
+        sensors: Sensors {
+            an: at(31.3, -0.25, 6.9),
+            ax: at(31.4, -0.1, 6.95),
+            ay: at(31.45, 0.1, 6.85),
+            alpha_vane: Vane { x_ft: 35.4, y_ft: 19.2, z_ft: 7.9, factor: 1.02 },
+            beta_vane: Vane { x_ft: 35.4, y_ft: -19.2, z_ft: 7.9, factor: 0.98 },
+            vane_model: VaneModel::Exact,
+            thrust_in_ax: true,
+        },
+    }
+}
+
+fn known() -> Known {
+    let sensors = aircraft().sensors;
+    Known {
+        gravity: 32.1,
+        arms: [sensors.ax.arm(CG), sensors.ay.arm(CG), sensors.an.arm(CG)],
+        cg: CG,
+        earth: Vector3::new(4e-5, -2e-5, 5e-5),
+        horizon: Vector3::new(6e-5, -4e-5, 3e-5),
+        to_body: Matrix3::identity(),
+    }
+}
+
+const INPUT: Driven = [0.4, -0.15, 0.2, 5.0, -2.0, -30.0];
+
+fn state() -> State {
+    State::from([420.0, 25.0, 160.0, 0.4, 0.3, 2.0, 24_000.0])
+}
+
+#[test]
+fn slopes_of_the_rates_are_those_of_finite_differences() {
+    let at = rates(&state(), &INPUT, &known());
+    for j in 0..STATES {
+        let h = 1e-5 * state()[j].abs().max(1.0);
+        let (mut up, mut down) = (state(), state());
+        up[j] += h;
+        down[j] -= h;
+        let numeric = (rates(&up, &INPUT, &known()).rates - rates(&down, &INPUT, &known()).rates) / (2.0 * h);
+        (0..STATES).for_each(|i| assert_abs_diff_eq!(at.by_state[(i, j)], numeric[i], epsilon = 1e-6));
+    }
+    for j in 0..INPUTS {
+        let (mut up, mut down) = (INPUT, INPUT);
+        up[j] += 1e-5;
+        down[j] -= 1e-5;
+        let numeric = (rates(&state(), &up, &known()).rates - rates(&state(), &down, &known()).rates) / 2e-5;
+        (0..STATES).for_each(|i| assert_abs_diff_eq!(at.by_input[(i, j)], numeric[i], epsilon = 1e-6));
+    }
+}
+
+#[test]
+fn slopes_of_the_readings_are_those_of_finite_differences() {
+    let read = |x: &State, u: &Driven| readings(&aircraft(), x, u, &known());
+    let at = read(&state(), &INPUT);
+    for j in 0..STATES {
+        let h = 1e-5 * state()[j].abs().max(1.0);
+        let (mut up, mut down) = (state(), state());
+        up[j] += h;
+        down[j] -= h;
+        let (up, down) = (read(&up, &INPUT).values, read(&down, &INPUT).values);
+        (0..OUTPUTS)
+            .for_each(|o| assert_abs_diff_eq!(at.by_state[(o, j)], (up[o] - down[o]) / (2.0 * h), epsilon = 1e-5));
+    }
+    for j in 0..3 {
+        let (mut up, mut down) = (INPUT, INPUT);
+        up[j] += 1e-6;
+        down[j] -= 1e-6;
+        let (up, down) = (read(&state(), &up).values, read(&state(), &down).values);
+        (0..OUTPUTS).for_each(|o| assert_abs_diff_eq!(at.by_rates[(o, j)], (up[o] - down[o]) / 2e-6, epsilon = 1e-5));
+    }
+}
+
+#[test]
+fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_changes() {
+    let (phi, speed): (f64, f64) = (0.6, 500.0);
+    let known = Known { earth: Vector3::zeros(), horizon: Vector3::zeros(), arms: [[0.0; 3]; 3], ..known() };
+    let turn = known.gravity * phi.tan() / speed;
+    let lift = known.gravity / phi.cos();
+    let input = [0.0, turn * phi.sin(), turn * phi.cos(), 0.0, 0.0, -lift];
+    let at = rates(&State::from([speed, 0.0, 0.0, phi, 0.0, 0.0, 0.0]), &input, &known).rates;
+    for (i, expected) in [0.0, 0.0, 0.0, 0.0, 0.0, turn, 0.0].into_iter().enumerate() {
+        assert_abs_diff_eq!(at[i], expected, epsilon = 1e-12);
+    }
+}
+
+#[test]
+fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
+    let horizon = Vector3::new(6e-5, 0.0, -4e-5);
+    let known = Known { earth: horizon, horizon, ..known() };
+    let at = rates(&State::zeros(), &[6e-5, 0.0, -4e-5, 0.0, 0.0, -known.gravity], &known).rates;
+    // The c.g. goes around the sensors, by a hundred-thousandth of a foot per second.
+    assert!(at.norm() < 1e-4, "{at}");
+}
+
+#[test]
+fn an_accelerometer_off_the_c_g_feels_the_turning_without_any_rate_being_differentiated() {
+    // Spinning up about the vertical with the c.g. at rest: the sensor at arm x goes right with r x.
+    let known = Known {
+        gravity: 0.0,
+        earth: Vector3::zeros(),
+        horizon: Vector3::zeros(),
+        arms: [[0.0; 3], [7.0, 0.0, 0.0], [0.0; 3]],
+        ..known()
+    };
+    let (r, r_dot) = (0.3, 0.2);
+    let at =
+        rates(&State::from([0.0, 7.0 * r, 0.0, 0.0, 0.0, 0.0, 0.0]), &[0.0, 0.0, r, 0.0, 7.0 * r_dot, 0.0], &known);
+    assert_abs_diff_eq!(at.rates[1], 7.0 * r_dot, epsilon = 1e-12);
+    assert_abs_diff_eq!(at.rates[6], 0.0, epsilon = 1e-12);
+}
+
+/// A flight in which everything moves, from the equations themselves with a step a tenth of the recorder's: what perfect
+/// instruments record of rates and forces that are sums of sines.
+fn flight(seconds: f64) -> Record {
+    const PARTS: usize = 10;
+    let samples = window_samples(seconds);
+    let aircraft = aircraft();
+    // φ, θ and the velocity are steered back to what they were, so that the flight goes on for long.
+    let mut x = State::from([450.0, 0.0, 90.0, 0.0, 0.2, 1.0, 24_000.0]);
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); INSTRUMENTS];
+    let sensors = &aircraft.sensors;
+    let arms = [sensors.ax.arm(CG), sensors.ay.arm(CG), sensors.an.arm(CG)];
+    let at = |t: f64, x: &State| {
+        let known = on_the_way(&aircraft, x, arms);
+        let input = steered(t, x, &known);
+        (known, input)
+    };
+    for k in 0..samples * PARTS {
+        let h = STEP_S / PARTS as f64;
+        let t = k as f64 * h;
+        if k % PARTS == 0 {
+            let (known, input) = at(t, &x);
+            for i in 0..INPUTS {
+                columns[i].push(input[i] / factor(i));
+            }
+            for (o, value) in readings(&aircraft, &x, &input, &known).values.into_iter().enumerate() {
+                columns[INPUTS + o].push(value);
+            }
+        }
+        let slope = |t: f64, x: &State| {
+            let (known, input) = at(t, x);
+            rates(x, &input, &known).rates
+        };
+        let k1 = slope(t, &x);
+        let k2 = slope(t + h / 2.0, &(x + k1 * (h / 2.0)));
+        let k3 = slope(t + h / 2.0, &(x + k2 * (h / 2.0)));
+        let k4 = slope(t + h, &(x + k3 * h));
+        x += (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0);
+    }
+    let constants = [(s::X_CG, CG.x_ft), (s::Y_CG, CG.y_ft), (s::Z_CG, CG.z_ft)];
+    let series = |values: Vec<f64>| Series { marks: vec![Mark::Measured; values.len()], values };
+    let mut signals: BTreeMap<String, Series> =
+        SIGNALS.iter().zip(columns).map(|(name, values)| ((*name).to_owned(), series(values))).collect();
+    signals.extend(constants.map(|(name, value)| (name.to_owned(), series(vec![value; samples]))));
+    Record { flight_id: "sines".to_owned(), start_s: 0.0, step_s: STEP_S, samples, signals }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of samples")]
+fn window_samples(seconds: f64) -> usize {
+    (seconds / STEP_S) as usize
+}
+
+/// What is known at a state, as the window knows it from exact signals.
+fn on_the_way(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> Known {
+    let along = Vector3::new(x[0], x[1], x[2]);
+    Known {
+        gravity: crate::aircraft::gravity_ft_s2(aircraft.latitude_deg, x[6]),
+        arms,
+        cg: CG,
+        ..window::turning(aircraft, [x[3], x[4], x[5]], along, true)
+    }
+}
+
+/// Rates and forces that keep the aircraft flying while everything moves.
+fn steered(t: f64, x: &State, known: &Known) -> Driven {
+    let sine = |period: f64, phase: f64| (2.0 * std::f64::consts::PI * t / period + phase).sin();
+    let (phi, theta) = (x[3], x[4]);
+    let p = 0.35 * sine(4.1, 0.0) + 0.1 * sine(2.3, 1.0) - 0.3 * (phi - 0.5 * sine(61.0, 0.0));
+    let q = 0.08 * sine(5.3, 0.5) + 0.05 * sine(3.1, 0.0) - 0.3 * (theta - 0.25 - 0.1 * sine(47.0, 2.0));
+    let r = 0.06 * sine(6.7, 0.3) + 0.03 * sine(2.9, 0.0);
+    // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without force.
+    let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], known).rates;
+    let wanted = [450.0 + 60.0 * sine(53.0, 0.0), 12.0 * sine(7.3, 0.0), 90.0 + 25.0 * sine(6.1, 1.0)];
+    let force = |i: usize| 0.5 * (wanted[i] - x[i]) - free[i] + 3.0 * sine(3.7 + i as f64, i as f64);
+    [p, q, r, force(0), force(1), force(2)]
+}
+
+fn settings() -> Compatibility {
+    Compatibility { windows: 4, window_s: 14.0, ..Compatibility::default() }
+}
+
+fn windows(record: &Record) -> Vec<Window> {
+    let settings = settings();
+    window::choose(record, &settings).into_iter().map(|w| Window::of(record, w, &aircraft(), &settings)).collect()
+}
+
+#[test]
+fn sensitivities_are_those_of_finite_differences() {
+    let record = flight(12.0);
+    let short = Compatibility { window_s: 6.0, ..settings() };
+    let window = Window::of(&record, window::choose(&record, &short).remove(0), &aircraft(), &short);
+    let mut noise = Noise::new(3, "errors");
+    let shared: [f64; PARAMETERS] = std::array::from_fn(|_| 0.01 * noise.normal());
+    let mut local = [0.0; LOCAL];
+    local.iter_mut().zip(window.start.iter()).for_each(|(l, x)| *l = *x);
+    local[STATES..].copy_from_slice(&[0.05, -0.1, 0.08]);
+    let at = respond(&window, &aircraft(), &local, &shared).unwrap();
+    let (k, h) = (window.samples - 40, 1e-6);
+    let compare =
+        |column: usize, outputs: &dyn Fn(usize) -> bool, size: f64, change: &dyn Fn(f64) -> response::Response| {
+            let (up, down) = (change(h * size), change(-h * size));
+            for o in (0..OUTPUTS).filter(|o| outputs(*o)) {
+                let numeric = (up.output(k, o).0 - down.output(k, o).0) / (2.0 * h * size);
+                let exact = at.output(k, o).1[column];
+                let scale = numeric.abs().max(1.0);
+                assert!((exact - numeric).abs() < 2e-4 * scale, "output {o}, column {column}: {exact} not {numeric}");
+            }
+        };
+    for j in 0..LOCAL {
+        let size = local[j].abs().max(1.0);
+        compare(j, &|_| true, size, &|d| {
+            let mut moved = local;
+            moved[j] += d;
+            respond(&window, &aircraft(), &moved, &shared).unwrap()
+        });
+    }
+    for column in LOCAL..ROW {
+        for o in 0..OUTPUTS {
+            compare(column, &|other| other == o, 1.0, &|d| {
+                let mut moved = shared;
+                moved[shared_place(column, o)] += d;
+                respond(&window, &aircraft(), &local, &moved).unwrap()
+            });
+        }
+    }
+}
+
+#[test]
+fn perfect_instruments_of_a_perfect_flight_have_no_errors() {
+    let errors = fit::fit(&windows(&flight(65.0)), &aircraft(), &settings()).unwrap();
+    for i in 0..INSTRUMENTS {
+        assert_abs_diff_eq!(errors.values[place(i, Kind::Delay)], 0.0, epsilon = 5e-4);
+        assert_abs_diff_eq!(errors.values[place(i, Kind::Scale)], 0.0, epsilon = 1e-3);
+    }
+    for i in 0..3 {
+        assert_abs_diff_eq!(errors.values[place(i, Kind::Bias)], 0.0, epsilon = 2e-3);
+    }
+}
+
+/// White noise of each instrument, in its unit.
+const NOISE: [f64; INSTRUMENTS] =
+    [0.1, 0.05, 0.05, 0.003, 0.005, 0.01, 0.1, 0.1, 0.6, 0.05, 0.05, 0.05, 4.0, 0.15, 0.0008];
+
+/// What instruments with these errors (bias, scale, delay) record of an exact flight. A delay is a whole number of samples.
+fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
+    let mut record = exact.clone();
+    for (i, name) in SIGNALS.iter().enumerate() {
+        let mut noise = Noise::new(seed, name);
+        let values = &mut record.signals.get_mut(*name).unwrap().values;
+        let before = values.clone();
+        let [bias, scale, delay] = [Kind::Bias, Kind::Scale, Kind::Delay].map(|kind| errors[place(i, kind)]);
+        for (k, value) in values.iter_mut().enumerate() {
+            let late = k.saturating_sub(window_samples(delay + 1e-9));
+            *value = (1.0 + scale) * before[late] + bias + NOISE[i] * noise.normal();
+        }
+    }
+    record
+}
+
+fn channels() -> (BTreeMap<String, Channel>, Vec<String>) {
+    let channel = |name: &str| Channel {
+        signal: name.to_owned(),
+        unit: crate::units::Unit::of_signal(name).name.to_owned(),
+        sign: 1.0,
+        scale: 1.0,
+        wraps_at: None,
+    };
+    let channels = SIGNALS.iter().map(|name| ((*name).to_owned(), channel(name))).collect();
+    (channels, SIGNALS.iter().map(|name| (*name).to_owned()).collect())
+}
+
+fn examined(record: &Record, settings: &Compatibility) -> Findings {
+    let (channels, names) = channels();
+    examine(std::iter::once(record.clone()), 1, &channels, &names, &aircraft(), settings)
+}
+
+/// The faults of a flight: signal and words.
+fn faults(findings: &Findings) -> Vec<(&'static str, String)> {
+    SIGNALS.into_iter().filter_map(|name| Some((name, findings.verdict(name)?))).collect()
+}
+
+/// Ordinary errors of every instrument, drawn.
+fn ordinary(seed: u64) -> [f64; PARAMETERS] {
+    let mut noise = Noise::new(seed, "ordinary errors");
+    let errors = settings().ordinary;
+    std::array::from_fn(|j| {
+        let (i, kind) = (j / 3, instruments::ALL_KINDS[j % 3]);
+        let drawn = noise.normal() * instruments::size(&errors, i, kind);
+        if kind == Kind::Delay || !observable(i, kind) { 0.0 } else { 0.5 * drawn }
+    })
+}
+
+#[test]
+fn bounds_hold_the_truth_as_often_as_they_say() {
+    let exact = flight(65.0);
+    let (mut within, mut count, mut faulty) = (0_u32, 0_u32, 0);
+    for seed in 0..6 {
+        let truth = ordinary(seed);
+        let findings = examined(&recorded(&exact, &truth, seed), &settings());
+        faulty += faults(&findings).len();
+        for (i, name) in SIGNALS.into_iter().enumerate() {
+            let finding = findings.0.iter().find(|f| f.signal == name).unwrap();
+            for (kind, estimate) in finding.estimates.iter().enumerate() {
+                if let Some(e) = estimate {
+                    count += 1;
+                    within += u32::from((e.value - truth[i * 3 + kind]).abs() < 1.96 * e.bound);
+                }
+            }
+        }
+    }
+    assert_eq!(faulty, 0);
+    assert!(count > 150, "{count} estimates");
+    let coverage = f64::from(within) / f64::from(count);
+    assert!((0.9..=1.0).contains(&coverage), "{coverage}");
+}
+
+#[test]
+fn a_delay_of_a_channel_is_named_and_no_other() {
+    let exact = flight(65.0);
+    for name in [s::P, s::AN, s::ALPHA_VANE, s::THETA, s::VELOCITY, s::ALTITUDE] {
+        let i = SIGNALS.iter().position(|n| *n == name).unwrap();
+        let mut errors = ordinary(40 + i as u64);
+        errors[place(i, Kind::Delay)] = 0.1;
+        let record = recorded(&exact, &errors, 7);
+        let findings = examined(&record, &settings());
+        let found = faults(&findings);
+        assert!(found.len() == 1 && found[0].0 == SIGNALS[i], "{}: {found:?}", SIGNALS[i]);
+        let delay = findings.0[i].estimates[Kind::Delay as usize].unwrap();
+        assert_abs_diff_eq!(delay.value, 0.1, epsilon = 0.01);
+    }
+}
+
+#[test]
+fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
+    let exact = flight(65.0);
+    for (name, scale) in [(s::ALPHA_VANE, 0.2), (s::Q, -0.1)] {
+        let i = SIGNALS.iter().position(|n| *n == name).unwrap();
+        let mut errors = ordinary(60);
+        errors[place(i, Kind::Scale)] = scale;
+        let mut record = recorded(&exact, &errors, 9);
+        let findings = examined(&record, &settings());
+        let found: Vec<&str> = faults(&findings).into_iter().map(|f| f.0).collect();
+        assert_eq!(found, [name]);
+        findings.corrections().iter().for_each(|c| c.apply(&mut record));
+        let (values, truth) = (record.values(name).unwrap(), exact.values(name).unwrap());
+        let swing = truth.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let mean = values.iter().zip(truth).map(|(a, b)| (a - b).abs()).sum::<f64>() / values.len() as f64;
+        assert!(mean < 0.02 * swing + 2.0 * NOISE[i], "{name}: {mean} of {swing}");
+    }
+}
+
+#[test]
+fn of_too_short_a_flight_nothing_is_said() {
+    // Too short for the least number of windows.
+    let findings = examined(&flight(15.0), &settings());
+    assert!(findings.0.iter().all(|f| f.estimates == [None; 3]));
+    assert!(findings.rows("f").iter().all(|r| r.verdict == "not excited" && r.applied.is_empty()));
+}
+
+#[test]
+fn a_window_is_never_cut_across_a_gap_or_a_wrapped_angle() {
+    let mut record = flight(65.0);
+    record.signals.get_mut(s::Q).unwrap().values[800..810].fill(f64::NAN);
+    record.signals.get_mut(s::PSI).unwrap().values[1700..].iter_mut().for_each(|v| *v += 360.0);
+    let chosen = window::choose(&record, &Compatibility { windows: 50, ..settings() });
+    assert!(chosen.len() >= 3);
+    assert!(chosen.iter().all(|w| w.end <= 800 || w.start >= 810), "{chosen:?}");
+    assert!(chosen.iter().all(|w| w.end <= 1700 || w.start >= 1700), "{chosen:?}");
+}
+
+#[test]
+fn an_applied_correction_carries_the_marks_along() {
+    let values: Vec<f64> = (0..8).map(f64::from).collect();
+    let mut marks = vec![Mark::Measured; 8];
+    marks[5] = Mark::Bridged;
+    let mut signals = BTreeMap::new();
+    signals.insert(s::THETA.to_owned(), Series { values, marks });
+    let mut record = Record { flight_id: "f".into(), start_s: 0.0, step_s: STEP_S, samples: 8, signals };
+    let fault = |value| Some(Estimate { value, bound: 0.0, fault: true, applied: true });
+    let findings = Findings(vec![Finding {
+        signal: s::THETA,
+        channel: "theta".into(),
+        estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
+    }]);
+    findings.corrections().iter().for_each(|c| c.apply(&mut record));
+    let series = &record.signals[s::THETA];
+    assert_relative_eq!(series.values[1], (3.0 - 1.0) / 2.0);
+    assert_eq!((series.marks[3], series.marks[5]), (Mark::Bridged, Mark::Measured));
+}
+
+#[test]
+fn units_of_inputs_are_those_of_the_equations() {
+    assert_abs_diff_eq!(factor(0) * DEG, 1.0);
+    assert_abs_diff_eq!(factor(5), -G0_FT_S2);
+    assert_eq!(equations::STATES, 7);
+}

@@ -1,0 +1,270 @@
+//! Windows of a record: which stretches of a flight say most about its instruments, and what of them is needed.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Compatibility;
+use super::equations::{Known, State};
+use super::instruments::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
+use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::flight::{Mark, Record, signal as s};
+use crate::units::{DEG, G0_FT_S2};
+
+/// The earth's rotation, rad/s, and its mean radius, ft.
+const EARTH_RATE: f64 = 7.292_115e-5;
+const EARTH_RADIUS_FT: f64 = 2.090_2e7;
+
+/// Beyond this pitch attitude the Euler angles are next to their singularity, deg.
+const STEEPEST_DEG: f64 = 75.0;
+/// Beyond these the vanes, and below this the airspeed, mean nothing.
+const LARGEST_ALPHA_DEG: f64 = 85.0;
+const LARGEST_BETA_DEG: f64 = 60.0;
+const SLOWEST_FT_S: f64 = 50.0;
+/// An angle that changes by more in one sample has wrapped around.
+const TURN_DEG: f64 = 90.0;
+
+/// What a window holds: samples of inputs with a margin on both sides, outputs, and what is known.
+#[derive(Clone, Debug)]
+pub struct Window {
+    pub step_s: f64,
+    pub samples: usize,
+    /// Samples before the first and after the last that the inputs have besides.
+    pub margin: usize,
+    pub known: Vec<Known>,
+    /// In the signals' units.
+    pub inputs: [Vec<f64>; INPUTS],
+    /// NaN where a sample does not count.
+    pub outputs: [Vec<f64>; OUTPUTS],
+    /// The state as measured at the first sample.
+    pub start: State,
+}
+
+/// The stretches of a record that say most, in order of time.
+pub fn choose(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
+    let usable = stretches(record, settings);
+    let activity: Vec<Vec<f64>> = SIGNALS.iter().map(|name| ranked(record, name, &usable)).collect();
+    let mut chosen = vec![false; usable.len()];
+    let mut count = 0;
+    // Each signal in turn proposes the window, of those left, in which it moves most.
+    'rounds: loop {
+        let before = count;
+        for ranks in &activity {
+            if count >= settings.windows {
+                break 'rounds;
+            }
+            let left = (0..usable.len()).filter(|&i| !chosen[i] && ranks[i] > 0.0);
+            if let Some(best) = left.max_by(|&a, &b| ranks[a].total_cmp(&ranks[b]).then(b.cmp(&a))) {
+                chosen[best] = true;
+                count += 1;
+            }
+        }
+        if count == before {
+            break;
+        }
+    }
+    usable.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(range, _)| range).collect()
+}
+
+fn samples(seconds: f64, step_s: f64) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of samples")]
+    let samples = (seconds / step_s).round().max(0.0) as usize;
+    samples
+}
+
+/// Samples that a delay may reach out of a window.
+pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
+    samples(settings.longest_delay_s, step_s) + 3
+}
+
+/// Stretches of a window's length, or of half of it at least, through which the equations can be driven.
+fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
+    let pace = pace(record.step_s);
+    let length = samples(settings.window_s, record.step_s).max(2 * pace);
+    let margin = pace * margin(settings, pace as f64 * record.step_s);
+    let mut found = Vec::new();
+    for run in runs(record) {
+        let mut first = run.start + margin;
+        while first + length / 2 + margin <= run.end {
+            let end = (first + length).min(run.end - margin);
+            found.push(first..end);
+            first = end;
+        }
+    }
+    found
+}
+
+/// The longest runs of samples in which every input is known and the attitude is away from the singularity.
+fn runs(record: &Record) -> Vec<Range<usize>> {
+    let values = |name: &str| record.values(name).unwrap_or_default();
+    let needed = SIGNALS[..INPUTS].iter().chain(&[s::PHI, s::X_CG, s::Y_CG, s::Z_CG, s::ALTITUDE]);
+    let finite: Vec<&[f64]> = needed.map(|name| values(name)).collect();
+    let (theta, alpha, beta) = (values(s::THETA), values(s::ALPHA_VANE), values(s::BETA_VANE));
+    let (velocity, phi, psi) = (values(s::VELOCITY), values(s::PHI), record.values(s::PSI));
+    let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
+    let sound = |k: usize| {
+        finite.iter().all(|values| at(values, k).is_finite())
+            && at(theta, k).abs() < STEEPEST_DEG
+            && at(alpha, k).abs() < LARGEST_ALPHA_DEG
+            && at(beta, k).abs() < LARGEST_BETA_DEG
+            && at(velocity, k) > SLOWEST_FT_S
+            && psi.is_none_or(|psi| at(psi, k).is_finite())
+    };
+    let jumps = |values: &[f64], k: usize| k > 0 && (at(values, k) - at(values, k - 1)).abs() > TURN_DEG;
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for k in (0..record.samples).filter(|k| sound(*k)) {
+        match runs.last_mut() {
+            Some(run) if run.end == k && !jumps(phi, k) && !psi.is_some_and(|psi| jumps(psi, k)) => run.end = k + 1,
+            _ => runs.push(k..k + 1),
+        }
+    }
+    runs
+}
+
+/// How much a signal moves in each stretch: the mean square of its change over a second.
+fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
+    let reach = samples(1.0, record.step_s).max(1);
+    let values = record.values(name).unwrap_or_default();
+    let moved = |range: &Range<usize>| {
+        let values = values.get(range.clone()).unwrap_or_default();
+        let changes = values.iter().zip(values.get(reach..).unwrap_or_default()).map(|(a, b)| (b - a).powi(2));
+        let (sum, count) = changes.filter(|c| c.is_finite()).fold((0.0, 0_usize), |(s, n), c| (s + c, n + 1));
+        sum / count.max(1) as f64
+    };
+    stretches.iter().map(moved).collect()
+}
+
+impl Window {
+    /// What a stretch of the record holds, at the pace of the windows.
+    pub fn of(record: &Record, range: Range<usize>, aircraft: &Aircraft, settings: &Compatibility) -> Window {
+        let pace = pace(record.step_s);
+        let step_s = pace as f64 * record.step_s;
+        let (margin, samples) = (margin(settings, step_s), range.len() / pace);
+        let first = range.start.saturating_sub(margin * pace);
+        let wide = first..first + (samples + 2 * margin) * pace;
+        let range = range.start..range.start + samples * pace;
+        let input =
+            |i: usize| paced(record.values(SIGNALS[i]).and_then(|v| v.get(wide.clone())).unwrap_or_default(), pace);
+        let output = |o: usize| paced(&measured(record, SIGNALS[INPUTS + o], &range), pace);
+        let centres: Vec<usize> = range.clone().step_by(pace).map(|k| k + pace / 2).collect();
+        let known: Vec<Known> = centres.iter().map(|k| known(record, *k, aircraft)).collect();
+        Window {
+            step_s,
+            samples,
+            margin,
+            start: start(record, centres.first().copied().unwrap_or(range.start), aircraft, known.first()),
+            known,
+            inputs: std::array::from_fn(input),
+            outputs: std::array::from_fn(output),
+        }
+    }
+
+    /// ω × v as measured at a sample, ft/s².
+    pub fn turning(&self, k: usize) -> Vector3<f64> {
+        let omega = Vector3::from_fn(|i, _| factor(i) * self.inputs[i][self.margin + k]);
+        let [alpha, beta, speed] = [0, 1, 2].map(|o| self.outputs[o][k]);
+        let ((sa, ca), (sb, cb)) = ((alpha / DEG).sin_cos(), (beta / DEG).sin_cos());
+        omega.cross(&(Vector3::new(ca * cb, sb, sa * cb) * speed))
+    }
+}
+
+/// Samples of the record that are one of a window: a faster recorder's are averaged, all channels' alike. The motion of an
+/// aircraft has no more to say than 25 samples a second tell.
+fn pace(step_s: f64) -> usize {
+    const SLOWEST_STEP_S: f64 = 0.04;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    let pace = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
+    pace
+}
+
+fn paced(values: &[f64], pace: usize) -> Vec<f64> {
+    values.chunks_exact(pace).map(|v| v.iter().sum::<f64>() / pace as f64).collect()
+}
+
+/// A signal over a stretch; NaN where it is marked or was not recorded.
+fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
+    let Some(series) = record.signals.get(name) else { return vec![f64::NAN; range.len()] };
+    let sample = |k: usize| match series.marks.get(k) {
+        Some(Mark::Measured) => series.values[k],
+        _ => f64::NAN,
+    };
+    range.clone().map(sample).collect()
+}
+
+fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
+    let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied().unwrap_or(0.0);
+    let cg = Position { x_ft: at(s::X_CG), y_ft: at(s::Y_CG), z_ft: at(s::Z_CG) };
+    let sensors = &aircraft.sensors;
+    let (alpha, beta, speed) = (at(s::ALPHA_VANE) / DEG, at(s::BETA_VANE) / DEG, at(s::VELOCITY));
+    Known {
+        gravity: gravity_ft_s2(aircraft.latitude_deg, at(s::ALTITUDE)),
+        arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
+        cg,
+        ..turning(
+            aircraft,
+            [s::PHI, s::THETA, s::PSI].map(|name| at(name) / DEG),
+            Vector3::new(alpha.cos() * beta.cos(), beta.sin(), alpha.sin() * beta.cos()) * speed,
+            record.values(s::PSI).is_some(),
+        )
+    }
+}
+
+/// The turning of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a heading only that
+/// part of it is known which does not depend on it.
+pub fn turning(aircraft: &Aircraft, [phi, theta, psi]: [f64; 3], along: Vector3<f64>, heading: bool) -> Known {
+    let to_body = to_body(phi, theta, psi);
+    let latitude = aircraft.latitude_deg / DEG;
+    let pole = Vector3::new(latitude.cos(), 0.0, -latitude.sin()) * EARTH_RATE;
+    let ground = to_body.transpose() * along;
+    let round = Vector3::new(ground.y, -ground.x, -ground.y * latitude.tan()) / EARTH_RADIUS_FT;
+    let earth = if heading { to_body * pole } else { Vector3::zeros() };
+    Known {
+        gravity: 0.0,
+        arms: [[0.0; 3]; 3],
+        cg: Position { x_ft: 0.0, y_ft: 0.0, z_ft: 0.0 },
+        earth,
+        horizon: earth + to_body * round,
+        to_body,
+    }
+}
+
+/// The rotation from north, east, down to body axes; angles in rad.
+fn to_body(phi: f64, theta: f64, psi: f64) -> Matrix3<f64> {
+    let ((sp, cp), (st, ct), (sy, cy)) = (phi.sin_cos(), theta.sin_cos(), psi.sin_cos());
+    Matrix3::new(
+        ct * cy,
+        ct * sy,
+        -st,
+        sp * st * cy - cp * sy,
+        sp * st * sy + cp * cy,
+        sp * ct,
+        cp * st * cy + sp * sy,
+        cp * st * sy - sp * cy,
+        cp * ct,
+    )
+}
+
+/// The state that the first sample measures.
+fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) -> State {
+    let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied().unwrap_or(0.0);
+    let Some(known) = known else { return State::zeros() };
+    let rates = [at(s::P) / DEG, at(s::Q) / DEG, at(s::R) / DEG];
+    let read = Flow { alpha: at(s::ALPHA_VANE) / DEG, beta: at(s::BETA_VANE) / DEG, velocity: at(s::VELOCITY), rates };
+    let flow = aircraft.sensors.flow_at_cg(&read, known.cg);
+    let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
+    let velocity = [flow.velocity * ca * cb, flow.velocity * sb, flow.velocity * sa * cb];
+    let omega = Vector3::from(rates);
+    let swung = |i: usize| velocity[i] + omega.cross(&Vector3::from(known.arms[i]))[i];
+    State::from([swung(0), swung(1), swung(2), at(s::PHI) / DEG, at(s::THETA) / DEG, at(s::PSI) / DEG, at(s::ALTITUDE)])
+}
+
+/// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).
+pub fn factor(input: usize) -> f64 {
+    match SIGNALS[input] {
+        s::AX | s::AY => G0_FT_S2,
+        s::AN => -G0_FT_S2,
+        _ => 1.0 / DEG,
+    }
+}
+
+const _: () = assert!(INPUTS + OUTPUTS == INSTRUMENTS);

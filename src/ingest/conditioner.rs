@@ -1,0 +1,319 @@
+//! One channel on its way from the recorder's numbers to a signal: converted, made continuous where it wraps around,
+//! cleaned of stuck values and spikes, its gaps bridged or left missing, every sample marked.
+//!
+//! Samples come in pieces of any length and leave as soon as those after them cannot change them any more. What is decided
+//! about a sample depends on its surroundings and on the character of its spell, never on the pieces.
+
+use std::collections::VecDeque;
+
+use super::character::{Character, Rate, SPELL, recorded};
+use super::{Settings, gaps, spikes};
+use crate::flight::record::Series;
+use crate::flight::{Channel, Mark};
+use crate::units::{Quantity, Unit};
+
+/// The unit of a flag: engaged or not, nothing between.
+const FLAG: &str = "0/1";
+
+/// The surroundings that decide about a sample, on either side: longer than any stand-still that must be recognised.
+const MARGIN: usize = SPELL / 4;
+
+/// Without a `wraps_at`, only a jump of nearly the whole circle from one sample to the next is a wrap.
+const WHOLE_TURN: f64 = 0.9;
+
+/// Makes a value that wraps around continuous.
+#[derive(Clone, Debug)]
+struct Unwrap {
+    period: f64,
+    /// A jump by more than this share of the period is a wrap.
+    share: f64,
+    turns: f64,
+    before: f64,
+    wraps: usize,
+}
+
+impl Unwrap {
+    fn of(channel: &Channel) -> Option<Unwrap> {
+        let unit = Unit::parse(&channel.unit).ok().filter(|u| u.quantity == Quantity::Angle);
+        let circle = unit.and_then(|u| Unit::of_signal("_deg").factor_to(u)).map(|f| 360.0 * f);
+        let stated = channel.wraps_at.map(|period| (period, 0.5));
+        let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
+        Some(Unwrap { period, share, turns: 0.0, before: f64::NAN, wraps: 0 })
+    }
+
+    fn next(&mut self, value: f64) -> f64 {
+        if !value.is_finite() {
+            return value;
+        }
+        let jump = (value + self.turns * self.period - self.before) / self.period;
+        if jump.abs() > self.share {
+            self.turns -= jump.round();
+            self.wraps += 1;
+        }
+        self.before = value + self.turns * self.period;
+        self.before
+    }
+}
+
+/// What was done to a channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Done {
+    /// How many samples have each mark, by its number.
+    pub marks: [usize; 6],
+    pub wraps: usize,
+    pub quantisation: Option<f64>,
+    pub noise: Option<f64>,
+    /// Samples of the record from one recorded value to the next.
+    pub period: usize,
+    /// From sample to sample where the channel was stuck.
+    pub stuck: Vec<(usize, usize)>,
+}
+
+impl Done {
+    #[must_use]
+    pub fn count(&self, mark: Mark) -> usize {
+        self.marks[mark as usize]
+    }
+}
+
+/// The state of one channel between its pieces.
+#[derive(Clone, Debug)]
+pub struct Conditioner {
+    settings: Settings,
+    step_s: f64,
+    samples: usize,
+    factor: f64,
+    flag: bool,
+    unwrap: Option<Unwrap>,
+    /// Converted values from sample `first` on.
+    values: VecDeque<f64>,
+    first: usize,
+    settled: usize,
+    /// The characters of the spells from `first`'s on.
+    characters: VecDeque<Character>,
+    first_spell: usize,
+    latest: Character,
+    noises: Vec<f64>,
+    periods: Vec<usize>,
+    done: Done,
+}
+
+impl Conditioner {
+    /// For a channel whose values times `factor` are in the signal's unit, over so many samples.
+    #[must_use]
+    pub fn new(channel: &Channel, factor: f64, step_s: f64, samples: usize, settings: &Settings) -> Conditioner {
+        Conditioner {
+            settings: settings.clone(),
+            step_s,
+            samples,
+            factor: factor * channel.sign * channel.scale,
+            flag: channel.unit == FLAG,
+            unwrap: Unwrap::of(channel),
+            values: VecDeque::new(),
+            first: 0,
+            settled: 0,
+            characters: VecDeque::new(),
+            first_spell: 0,
+            latest: Character::UNKNOWN,
+            noises: Vec::new(),
+            periods: Vec::new(),
+            done: Done::default(),
+        }
+    }
+
+    /// How many samples have been pushed.
+    #[must_use]
+    pub fn pushed(&self) -> usize {
+        self.first + self.values.len()
+    }
+
+    /// How many samples must be pushed before those up to `until` can leave.
+    #[must_use]
+    pub fn wanted(&self, until: usize) -> usize {
+        ((until + MARGIN).div_ceil(SPELL) * SPELL).min(self.samples)
+    }
+
+    /// The samples up to here could leave.
+    #[must_use]
+    pub fn ready(&self) -> usize {
+        let complete = if self.pushed() == self.samples { return self.samples } else { self.pushed() / SPELL * SPELL };
+        complete.saturating_sub(MARGIN)
+    }
+
+    /// The samples up to here have left.
+    #[must_use]
+    pub fn settled(&self) -> usize {
+        self.settled
+    }
+
+    /// The next samples as recorded, NaN where there is none.
+    pub fn push(&mut self, recorded: &[f64]) {
+        for value in recorded {
+            let value = match &mut self.unwrap {
+                Some(unwrap) => unwrap.next(*value),
+                None => *value,
+            };
+            self.values.push_back(if value.is_finite() { value * self.factor } else { f64::NAN });
+        }
+        loop {
+            let spell = self.first_spell + self.characters.len();
+            let (from, to) = (spell * SPELL, ((spell + 1) * SPELL).min(self.samples));
+            if from >= to || to > self.pushed() {
+                return;
+            }
+            self.characterise(from, to);
+        }
+    }
+
+    fn characterise(&mut self, from: usize, to: usize) {
+        let spell: Vec<f64> = self.values.range(from - self.first..to - self.first).copied().collect();
+        let mut character = Character::of(&spell, from, self.step_s, &self.latest, &self.settings.stuck);
+        if self.flag {
+            (character.stuck, character.rate.held) = (None, None);
+        }
+        self.noises.extend(character.noise.is_finite().then_some(character.noise));
+        self.periods.push(character.rate.period);
+        let finer = |a: f64| self.done.quantisation.map_or(a, |b: f64| b.min(a));
+        self.done.quantisation = character.quantisation.map(finer).or(self.done.quantisation);
+        self.latest = character;
+        self.characters.push_back(character);
+    }
+
+    fn character(&self, sample: usize) -> &Character {
+        let spell = (sample / SPELL).saturating_sub(self.first_spell);
+        self.characters.get(spell).unwrap_or(&Character::UNKNOWN)
+    }
+
+    /// The samples up to `until`, which must have been `wanted` and pushed.
+    pub fn settle(&mut self, until: usize) -> Series {
+        let until = until.min(self.samples);
+        let from = self.settled.saturating_sub(MARGIN).max(self.first);
+        let to = (until + MARGIN).min(self.pushed());
+        let mut values: Vec<f64> = self.values.range(from - self.first..to - self.first).copied().collect();
+        let stuck = self.leave_out(&mut values, from);
+        let despiked = if self.flag { Vec::new() } else { self.despike(&mut values, from) };
+        let mut marks = self.bridge(&mut values, from);
+        for range in stuck {
+            marks[range].fill(Mark::Stuck);
+        }
+        for k in despiked {
+            marks[k] = Mark::Despiked;
+        }
+        let core = self.settled - from..until - from;
+        self.count(&marks[core.clone()]);
+        self.settled = until;
+        self.forget();
+        Series { values: values[core.clone()].to_vec(), marks: marks[core].to_vec() }
+    }
+
+    fn count(&mut self, marks: &[Mark]) {
+        for (k, mark) in marks.iter().enumerate() {
+            self.done.marks[*mark as usize] += 1;
+            if *mark == Mark::Stuck {
+                let sample = self.settled + k;
+                match self.done.stuck.last_mut().filter(|s| s.1 == sample) {
+                    Some(run) => run.1 = sample + 1,
+                    None => self.done.stuck.push((sample, sample + 1)),
+                }
+            }
+        }
+    }
+
+    /// Drops what no later sample depends on.
+    fn forget(&mut self) {
+        let keep = self.settled.saturating_sub(MARGIN);
+        self.values.drain(..keep.saturating_sub(self.first).min(self.values.len()));
+        self.first = self.first.max(keep);
+        while self.first_spell < self.first / SPELL && !self.characters.is_empty() {
+            self.characters.pop_front();
+            self.first_spell += 1;
+        }
+    }
+
+    /// The parts of a range of samples that have one character, as offsets.
+    fn parts(&self, from: usize, length: usize) -> Vec<(std::ops::Range<usize>, Character)> {
+        let to = from + length;
+        let spells = from / SPELL..to.div_ceil(SPELL);
+        let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
+        spells.map(|s| (cut(s)..cut(s + 1), *self.character(s * SPELL))).collect()
+    }
+
+    /// Repeated values of a slow channel and stuck values become NaN; returns where it is stuck.
+    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<std::ops::Range<usize>> {
+        let parts = self.parts(from, values.len());
+        for (range, character) in &parts {
+            let Rate { period, held: Some(phase) } = character.rate else { continue };
+            for k in range.clone() {
+                if (from + k) % period != phase {
+                    values[k] = f64::NAN;
+                }
+            }
+        }
+        if parts.iter().all(|(_, c)| c.stuck.is_none()) {
+            return Vec::new();
+        }
+        let mut stuck = Vec::new();
+        // From a recorded value to the last one that is the same: places, and how many.
+        let (mut start, mut end, mut count, mut before) = (0, 0, 0_usize, f64::NAN);
+        let mut close = |start: usize, end: usize, count: usize, value: f64| {
+            let least = self.character(from + start).stuck.or(self.character(from + end).stuck);
+            if value.is_finite() && least.is_some_and(|least| count >= least) {
+                stuck.push(start..end + 1);
+            }
+        };
+        for (k, value) in recorded(values, 0, Rate::FULL) {
+            if value.to_bits() == before.to_bits() {
+                (end, count) = (k, count + 1);
+            } else {
+                close(start, end, count, before);
+                (start, end, count, before) = (k, k, 1, value);
+            }
+        }
+        close(start, end, count, before);
+        for range in &stuck {
+            values[range.clone()].fill(f64::NAN);
+        }
+        stuck
+    }
+
+    /// Replaces spikes; of a slow channel among its own samples.
+    fn despike(&self, values: &mut [f64], from: usize) -> Vec<usize> {
+        let parts = self.parts(from, values.len());
+        if parts.iter().all(|(_, c)| c.rate.period == 1) {
+            let floor = |k: usize| self.character(from + k).floor;
+            return spikes::remove(values, self.step_s, floor, &self.settings.spikes);
+        }
+        let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
+        let places: Vec<usize> = recorded(values, 0, Rate::FULL).map(|(k, _)| k).collect();
+        let mut own: Vec<f64> = places.iter().map(|&k| values[k]).collect();
+        let floor = |i: usize| places.get(i).map_or(0.0, |k| self.character(from + k).floor);
+        let step_s = self.step_s * period as f64;
+        let spikes = spikes::remove(&mut own, step_s, floor, &self.settings.spikes);
+        let spikes: Vec<(usize, f64)> =
+            spikes.into_iter().filter_map(|i| Some((*places.get(i)?, *own.get(i)?))).collect();
+        for (k, value) in &spikes {
+            values[*k] = *value;
+        }
+        spikes.into_iter().map(|(k, _)| k).collect()
+    }
+
+    fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
+        let longest = gaps::longest(self.settings.longest_bridge_s, self.step_s);
+        let bridge = if self.flag { gaps::Bridge::Held } else { gaps::Bridge::Line };
+        let period = |k: usize| self.character(from + k).rate.period;
+        gaps::fill(values, longest, bridge, period)
+    }
+
+    /// What was done; the channel is over.
+    #[must_use]
+    pub fn finish(mut self) -> Done {
+        let middle = |n: usize| n / 2;
+        self.noises.sort_by(f64::total_cmp);
+        self.periods.sort_unstable();
+        self.done.noise = self.noises.get(middle(self.noises.len())).copied().filter(|_| !self.flag);
+        self.done.quantisation = self.done.quantisation.filter(|_| !self.flag);
+        self.done.period = self.periods.get(middle(self.periods.len())).copied().unwrap_or(1);
+        self.done.wraps = self.unwrap.map_or(0, |u| u.wraps);
+        self.done
+    }
+}

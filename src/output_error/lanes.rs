@@ -1,0 +1,118 @@
+//! Where the parameters stand in the processor's vectors. Those that the integration feels, derivatives and initial
+//! states, lie in lanes side by side; a bias shifts an output and never meets a state.
+//!
+//! The derivatives of one coefficient form a group and fill whole vectors, so that what a coefficient does is one number
+//! for all of a vector's lanes; those along a state come first, in the order of the states, so that they are the same
+//! lanes of each group, and the groups of all coefficients are equally long. Initial states are the last group. Two lanes
+//! that are left over hold the residual and a one when sums are taken.
+
+use std::ops::Range;
+
+use super::case::Acting;
+use crate::dynamics::COEFFICIENTS;
+
+/// Groups of lanes: one per coefficient, and the initial states.
+const GROUPS: usize = COEFFICIENTS + 1;
+
+/// A group is padded to a multiple of this many lanes: the widest vector of doubles there is.
+pub(super) const VECTOR: usize = 8;
+
+/// The layout of one case.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Lanes {
+    pub groups: [Range<usize>; GROUPS],
+    /// The lane of each parameter in order, without the biases.
+    pub places: Vec<usize>,
+    /// Lanes left over: for the residual and a one when sums are taken, for the biases when sensitivities are kept.
+    pub residual: usize,
+    pub one: usize,
+    pub biases: Vec<usize>,
+    /// Lanes in use of each vector, from its first.
+    pub used: Vec<usize>,
+}
+
+fn padded(count: usize) -> usize {
+    count.next_multiple_of(VECTOR)
+}
+
+impl Lanes {
+    /// The layout for these derivatives, sorted by coefficient, and this number of free initial states. `followed` are
+    /// the states that derivatives can be along.
+    pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
+        let of = |k: usize| acting.iter().filter(move |a| a.coefficient == k);
+        let count = |k: usize| followed.len() + of(k).filter(|a| a.along.is_none()).count();
+        let widest = (0..COEFFICIENTS).map(count).max().filter(|_| !acting.is_empty()).map_or(0, padded);
+        let mut lanes = Lanes::default();
+        for k in 0..COEFFICIENTS {
+            lanes.groups[k] = k * widest..(k + 1) * widest;
+            let mut next = followed.len();
+            for a in of(k) {
+                let slot = a.along.and_then(|state| followed.iter().position(|f| *f == state));
+                lanes.places.push(k * widest + slot.unwrap_or(next));
+                next += usize::from(slot.is_none());
+            }
+        }
+        let first = COEFFICIENTS * widest;
+        lanes.groups[COEFFICIENTS] = first..first + padded(initial);
+        lanes.places.extend(first..first + initial);
+        let left_over: Vec<usize> = (0..).filter(|lane| !lanes.places.contains(lane)).take(biases.max(2)).collect();
+        (lanes.residual, lanes.one) = (left_over[0], left_over[1]);
+        lanes.biases = left_over[..biases].to_vec();
+        let last = lanes.places.iter().chain(&left_over).copied().max().unwrap_or(0);
+        let last_of = |vector: usize| {
+            let lanes = lanes.places.iter().copied().chain([lanes.residual, lanes.one]);
+            lanes.filter(|lane| lane / VECTOR == vector).map(|lane| lane % VECTOR + 1).max().unwrap_or(0)
+        };
+        lanes.used = (0..=last / VECTOR).map(last_of).collect();
+        lanes
+    }
+
+    /// All lanes, a whole number of vectors.
+    pub fn width(&self) -> usize {
+        VECTOR * self.used.len().max(self.groups[COEFFICIENTS].end / VECTOR)
+    }
+
+    /// Those of the derivatives; the first of the free initial states follows.
+    pub fn derivatives(&self) -> usize {
+        self.groups[COEFFICIENTS].start
+    }
+
+    /// The regressors of the derivatives point by point in the order of the lanes, zero in the padding.
+    pub fn spread(&self, acting: &[Acting], columns: &[Vec<f64>], points: usize) -> Aligned {
+        let width = self.derivatives();
+        let mut rows = Aligned::zeros(points * width);
+        for (a, lane) in acting.iter().zip(&self.places) {
+            for (row, r) in rows.slice_mut().chunks_exact_mut(width).zip(&columns[a.column]) {
+                row[*lane] = *r;
+            }
+        }
+        rows
+    }
+}
+
+/// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines costs twice.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Aligned {
+    buffer: Vec<f64>,
+    first: usize,
+    length: usize,
+}
+
+impl Aligned {
+    pub fn zeros(length: usize) -> Aligned {
+        const LINE: usize = 64;
+        let buffer = vec![0.0; length + LINE / size_of::<f64>()];
+        let first = buffer.as_ptr().align_offset(LINE).min(LINE / size_of::<f64>());
+        Aligned { buffer, first, length }
+    }
+
+    #[inline]
+    pub fn slice(&self) -> &[f64] {
+        &self.buffer[self.first..self.first + self.length]
+    }
+
+    #[inline]
+    pub fn slice_mut(&mut self) -> &mut [f64] {
+        &mut self.buffer[self.first..self.first + self.length]
+    }
+}

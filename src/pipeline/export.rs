@@ -1,0 +1,65 @@
+//! The export: the campaign brought up to date as far as the comparison, and its derivatives written for simulators.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::{Campaign, Progress, Stage, comparison};
+use crate::config::Config;
+use crate::error::{Problem, Result};
+use crate::export::{self, Contents, daveml, jsbsim};
+use crate::store::table::Shelf;
+use crate::store::{atomic, table};
+
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    pub files: Vec<PathBuf>,
+    /// Values that are flight's, of how many.
+    pub flight: usize,
+    pub values: usize,
+    /// Derivatives of the model that have a value nowhere.
+    pub missing: Vec<String>,
+    pub problems: Vec<Problem>,
+}
+
+/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
+/// (`_jsbsim.xml`) into a folder. The published night is left alone.
+///
+/// # Errors
+/// What stops a run.
+pub fn export(config: &Config, folder: &Path, wait: Duration, progress: &dyn Progress) -> Result<Exported> {
+    let (run, files) = super::begin(config, wait, progress)?;
+    let campaign = run.results(&files, Stage::Compare)?;
+    let estimates = comparison::converged(config, &campaign);
+    let contents = Contents {
+        title: &config.title,
+        aircraft: &config.aircraft,
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+        trends: &campaign.trends,
+        estimates: &estimates,
+        maneuvers: &campaign.maneuvers,
+        groups: &config.trend,
+        settings: &config.export,
+    };
+    write(&contents, &campaign, folder, &run.shelf_in(folder, Stage::Compare))
+}
+
+fn write(contents: &Contents, campaign: &Campaign, folder: &Path, shelf: &Shelf) -> Result<Exported> {
+    let tables = export::tables(contents);
+    let rows = export::rows(&tables);
+    let third = contents.tunnel.settings().third.as_ref().map(|third| third.name.as_str());
+    table::publish_export(shelf, &rows, third)?;
+    let (dml, section) = (folder.join("flight_updated.dml"), folder.join("flight_updated_jsbsim.xml"));
+    atomic::place(&dml, daveml::document(contents, &tables).as_bytes())?;
+    atomic::place(&section, jsbsim::section(contents, &tables).as_bytes())?;
+    let tables_of_rows = ["flight_updated.csv", "flight_updated.parquet"].map(|name| folder.join(name));
+    let names = contents.buildup.derivatives.iter().map(|d| d.name.clone());
+    Ok(Exported {
+        files: tables_of_rows.into_iter().chain([dml, section]).collect(),
+        flight: rows.iter().filter(|r| r.is_flight == 1).count(),
+        values: rows.len(),
+        missing: names.filter(|name| !tables.iter().any(|t| t.derivative == *name)).collect(),
+        problems: campaign.problems.clone(),
+    })
+}

@@ -1,0 +1,161 @@
+//! The two faces of the printed report, regular and bold: a part of Arimo (SIL Open Font License, `fonts/OFL.txt`) with
+//! Latin, Greek and the signs that a report needs. Every PDF carries them, so it looks the same everywhere.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
+use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, Str};
+use ttf_parser::Face;
+
+const REGULAR: &[u8] = include_bytes!("fonts/Arimo-Regular.ttf");
+const BOLD: &[u8] = include_bytes!("fonts/Arimo-Bold.ttf");
+
+/// How a text is set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weight {
+    #[default]
+    Regular,
+    Bold,
+}
+
+impl Weight {
+    pub const ALL: [Weight; 2] = [Weight::Regular, Weight::Bold];
+
+    /// Its name among a page's resources.
+    pub fn resource(self) -> &'static str {
+        match self {
+            Weight::Regular => "R",
+            Weight::Bold => "B",
+        }
+    }
+}
+
+/// One face: what its characters look like is in the file, how wide they are is here.
+#[derive(Clone, Debug)]
+struct Cut {
+    name: &'static str,
+    file: &'static [u8],
+    /// Glyph and width in thousandths of the size, by character.
+    glyphs: BTreeMap<char, (u16, f32)>,
+    widths: Vec<f32>,
+    bounds: Rect,
+    ascent: f32,
+    descent: f32,
+}
+
+/// Both faces.
+#[derive(Clone, Debug)]
+pub struct Fonts {
+    regular: Cut,
+    bold: Cut,
+}
+
+impl Fonts {
+    /// # Errors
+    /// None for the faces that are built in.
+    pub fn load() -> Result<Fonts, String> {
+        Ok(Fonts { regular: Cut::read("Arimo", REGULAR)?, bold: Cut::read("Arimo-Bold", BOLD)? })
+    }
+
+    fn cut(&self, weight: Weight) -> &Cut {
+        match weight {
+            Weight::Regular => &self.regular,
+            Weight::Bold => &self.bold,
+        }
+    }
+
+    /// How wide a text is, in the unit of the size.
+    pub fn width(&self, weight: Weight, size: f32, text: &str) -> f32 {
+        let cut = self.cut(weight);
+        text.chars().map(|c| cut.glyph(c).1).sum::<f32>() * size / 1000.0
+    }
+
+    /// The text as a PDF shows it: the numbers of its glyphs in hexadecimal.
+    pub fn encoded(&self, weight: Weight, text: &str) -> String {
+        let cut = self.cut(weight);
+        text.chars().fold(String::new(), |mut all, c| {
+            // Writing into a String cannot fail.
+            let _ = write!(all, "{:04x}", cut.glyph(c).0);
+            all
+        })
+    }
+
+    /// Writes a face as the objects that begin with `first`; it takes five.
+    pub fn write(&self, pdf: &mut Pdf, weight: Weight, first: Ref, compressed: &dyn Fn(&[u8]) -> Vec<u8>) {
+        self.cut(weight).write(pdf, first, compressed);
+    }
+}
+
+impl Cut {
+    fn read(name: &'static str, file: &'static [u8]) -> Result<Cut, String> {
+        let face = Face::parse(file, 0).map_err(|e| format!("the font {name}: {e}"))?;
+        let unit = 1000.0 / f32::from(face.units_per_em());
+        let width = |glyph: u16| f32::from(face.glyph_hor_advance(ttf_parser::GlyphId(glyph)).unwrap_or(0)) * unit;
+        let mut glyphs = BTreeMap::new();
+        for subtable in
+            face.tables().cmap.into_iter().flat_map(|t| t.subtables).filter(ttf_parser::cmap::Subtable::is_unicode)
+        {
+            subtable.codepoints(|code| {
+                if let (Some(c), Some(glyph)) = (char::from_u32(code), subtable.glyph_index(code)) {
+                    glyphs.insert(c, (glyph.0, width(glyph.0)));
+                }
+            });
+        }
+        let b = face.global_bounding_box();
+        let scaled = |v: i16| f32::from(v) * unit;
+        Ok(Cut {
+            name,
+            file,
+            glyphs,
+            widths: (0..face.number_of_glyphs()).map(width).collect(),
+            bounds: Rect::new(scaled(b.x_min), scaled(b.y_min), scaled(b.x_max), scaled(b.y_max)),
+            ascent: scaled(face.ascender()),
+            descent: scaled(face.descender()),
+        })
+    }
+
+    /// The glyph of a character; the empty box of the face where it has none.
+    fn glyph(&self, c: char) -> (u16, f32) {
+        let missing = (0, self.widths.first().copied().unwrap_or(500.0));
+        self.glyphs.get(&c).copied().unwrap_or(missing)
+    }
+
+    fn write(&self, pdf: &mut Pdf, first: Ref, compressed: &dyn Fn(&[u8]) -> Vec<u8>) {
+        let [cid, descriptor, file, unicode] = [1, 2, 3, 4].map(|i| Ref::new(first.get() + i));
+        let name = Name(self.name.as_bytes());
+        pdf.type0_font(first)
+            .base_font(name)
+            .encoding_predefined(Name(b"Identity-H"))
+            .descendant_font(cid)
+            .to_unicode(unicode);
+        let system = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
+        let mut font = pdf.cid_font(cid);
+        font.subtype(CidFontType::Type2).base_font(name).system_info(system).font_descriptor(descriptor);
+        font.default_width(0.0).cid_to_gid_map_predefined(Name(b"Identity"));
+        font.widths().consecutive(0, self.widths.iter().copied());
+        font.finish();
+        pdf.font_descriptor(descriptor)
+            .name(name)
+            .flags(FontFlags::SYMBOLIC)
+            .bbox(self.bounds)
+            .italic_angle(0.0)
+            .ascent(self.ascent)
+            .descent(self.descent)
+            .cap_height(688.0)
+            .stem_v(if self.name.ends_with("Bold") { 140.0 } else { 80.0 })
+            .font_file2(file);
+        let bytes = compressed(self.file);
+        let length = i32::try_from(self.file.len()).unwrap_or(i32::MAX);
+        pdf.stream(file, &bytes).filter(Filter::FlateDecode).pair(Name(b"Length1"), length);
+        let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
+        // A hyphen and one that may be left out look alike: what is read is the former, which comes first.
+        let mut known = BTreeSet::new();
+        for (c, (glyph, _)) in &self.glyphs {
+            if known.insert(*glyph) {
+                map.pair(*glyph, *c);
+            }
+        }
+        pdf.cmap(unicode, &compressed(&map.finish())).filter(Filter::FlateDecode);
+    }
+}

@@ -1,0 +1,58 @@
+//! Export: the demonstration's derivatives for simulators, read back as a tunnel and, where it is installed, by JSBSim.
+
+use std::process::Command;
+
+use crate::support::{Campaign, demo, number};
+
+/// The demonstration's export.
+fn exported() -> Campaign {
+    let campaign = Campaign::on("data/demo/flights");
+    demo().fill_store(&campaign);
+    campaign.ends("export", 0);
+    campaign
+}
+
+#[test]
+fn the_export_is_the_trend_where_flight_has_data_and_comes_back_as_the_tunnel() {
+    let campaign = exported();
+    let folder = campaign.path("reports/export");
+    let text = std::fs::read_to_string(folder.join("flight_updated.csv")).unwrap();
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let rows: Vec<crate::support::Row> = reader.deserialize().map(Result::unwrap).collect();
+    let comparison = campaign.table("comparison");
+    let mut flight = 0;
+    for row in rows.iter().filter(|r| r["is_flight"] == "1") {
+        let same = |c: &&crate::support::Row| {
+            c["derivative"] == row["derivative"] && (number(c, "alpha_deg") - number(row, "alpha_deg")).abs() < 1e-9
+        };
+        let compared = comparison.iter().find(same).unwrap_or_else(|| panic!("{row:?}"));
+        assert_eq!(compared["flight"], row["value"]);
+        flight += 1;
+    }
+    assert!(flight > 100 && flight < rows.len(), "{flight} of {}", rows.len());
+    // Every format is a tunnel that the pipeline takes; `export::tests` hold that its values are the same to the bit.
+    for name in ["flight_updated.csv", "flight_updated.parquet", "flight_updated.dml"] {
+        let outcome = crate::support::run(campaign.command("check").arg("--wind-tunnel").arg(folder.join(name)));
+        assert_eq!(outcome.code, Some(0), "{name}: {outcome:?}");
+    }
+}
+
+#[test]
+fn jsbsim_itself_computes_the_exported_coefficients() {
+    let campaign = exported();
+    let python = std::env::var("JSBSIM_PYTHON").unwrap_or_else(|_| "python3".into());
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/load_in_jsbsim.py");
+    let Ok(output) = Command::new(python).arg(script).arg(campaign.path("reports/export")).output() else { return };
+    // 77: JSBSim is not installed; `export::tests` evaluates the section by its rules in any case.
+    assert!(matches!(output.status.code(), Some(0 | 77)), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn an_export_does_not_change_what_is_up_to_date() {
+    let campaign = exported();
+    let names = ["flight_updated.csv", "flight_updated.parquet", "flight_updated.dml", "flight_updated_jsbsim.xml"];
+    let bytes = || names.map(|name| std::fs::read(campaign.path("reports/export").join(name)).unwrap());
+    let first = bytes();
+    campaign.ends("export", 0);
+    assert_eq!(bytes(), first);
+}
