@@ -1,5 +1,6 @@
 //! The command line: arguments as typed, progress bars, the few lines that a run says, exit codes.
 
+mod cluster;
 mod nightly;
 
 use std::path::{Path, PathBuf};
@@ -45,6 +46,7 @@ Examples:
   harvest run --quiet --wait 3600 --log nightly.jsonl
                                                  from cron or a timer: waits for another run, speaks only of errors
   harvest diff                                   what changed since the night before, and why
+  harvest submit --engine slurm                  the scripts of a job array and its merge; --go hands them over
   harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
@@ -53,18 +55,22 @@ Exit codes:
   1  could not run: the configuration, the archive or the disk is at fault; the message says where
   2  ran, and something was rejected: the table `problems` and the end of the report say what and why; `verify`: what
      is published does not hold
-  3  `diff`: something moved by more than its uncertainty, is gone or is another; `status`: something is stale";
+  3  `diff`: something moved by more than its uncertainty, is gone or is another; `status`: something is stale
+  75 a shard or a merge that may go well another time: the disk said no, a file could not be read, the store is in use";
+
+/// Something moved, is stale or missing: not wrong, but somebody should look.
+const LOOK: u8 = 3;
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// All stages, to the report
     Run(RunOptions),
     /// Read the archive: channels to signals on one clock, repairs, checks of units and signs
-    Ingest(RunOptions),
+    Ingest(StageOptions),
     /// Find the maneuvers and their classes
-    Segment(RunOptions),
+    Segment(StageOptions),
     /// Estimate the derivatives of every maneuver
-    Estimate(RunOptions),
+    Estimate(StageOptions),
     /// Fit least-squares trends across angle of attack
     Trend(RunOptions),
     /// Compare the trends with the wind-tunnel database
@@ -86,6 +92,12 @@ enum Command {
     Verify(nightly::VerifyOptions),
     /// Show the artefacts and nights that nothing published needs, and remove them with --yes
     Gc(nightly::GcOptions),
+    /// Deal a campaign's work to shards of about equal cost
+    Plan(cluster::PlanOptions),
+    /// Publish what the shards of a plan computed; refuses while something is missing
+    Merge(cluster::MergeOptions),
+    /// Write the scripts that compute a campaign on a cluster, and hand them over with --go
+    Submit(cluster::SubmitOptions),
     /// Draw a strip chart of a flight or a maneuver, SVG
     #[command(subcommand)]
     Show(Show),
@@ -213,6 +225,14 @@ struct RunOptions {
 }
 
 #[derive(Args, Debug)]
+struct StageOptions {
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    share: cluster::ShareOptions,
+}
+
+#[derive(Args, Debug)]
 struct Patience {
     /// Wait so long for another run to leave the store, instead of leaving at once
     #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0)]
@@ -292,9 +312,9 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<ExitCode> {
     let (until, options) = match command {
         Command::Run(options) | Command::Report(options) => (Stage::Report, options),
-        Command::Ingest(options) => (Stage::Ingest, options),
-        Command::Segment(options) => (Stage::Segment, options),
-        Command::Estimate(options) => (Stage::Estimate, options),
+        Command::Ingest(options) => return stage(Stage::Ingest, &options),
+        Command::Segment(options) => return stage(Stage::Segment, &options),
+        Command::Estimate(options) => return stage(Stage::Estimate, &options),
         Command::Trend(options) => (Stage::Trend, options),
         Command::Compare(options) => (Stage::Compare, options),
         Command::Status(options) => return nightly::status(&options),
@@ -302,6 +322,9 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Diff(options) => return nightly::diff(&options),
         Command::Verify(options) => return nightly::verify(&options),
         Command::Gc(options) => return nightly::gc(&options),
+        Command::Plan(options) => return cluster::plan(&options),
+        Command::Merge(options) => return cluster::merge(&options),
+        Command::Submit(options) => return cluster::submit(&options),
         Command::Export(options) => return export(&options),
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
@@ -310,8 +333,18 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
         Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
+    logged(until, &options)
+}
+
+/// A stage of the whole campaign, or of one shard.
+fn stage(until: Stage, options: &StageOptions) -> anyhow::Result<ExitCode> {
+    let shard = options.share.work(until, &options.run.options, &options.run.patience);
+    shard.unwrap_or_else(|| logged(until, &options.run))
+}
+
+fn logged(until: Stage, options: &RunOptions) -> anyhow::Result<ExitCode> {
     let log = options.log.as_deref().map(Log::open).transpose()?;
-    let done = brought(until, &options, log.as_ref());
+    let done = brought(until, options, log.as_ref());
     if let (Some(log), Err(error)) = (&log, &done) {
         log.write("end", &[("exit", 1.into()), ("error", format!("{error:#}").into())]);
     }
@@ -492,6 +525,22 @@ fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Res
 }
 
 impl Options {
+    /// Pipeline and options as they are typed, without those of the terminal: for a script that is to do the same.
+    fn typed(&self) -> Vec<String> {
+        let path = |path: &Path| path.display().to_string();
+        let options = [
+            ("--archive", self.archive.clone()),
+            ("--wind-tunnel", self.wind_tunnel.as_deref().map(path)),
+            ("--events", self.events.as_deref().map(path)),
+            ("--store", self.store.as_deref().map(path)),
+            ("--reports", self.reports.as_deref().map(path)),
+            ("--memory-mb", self.memory_mb.map(|mb| mb.to_string())),
+        ];
+        let against = self.against.iter().map(|folder| ("--against", Some(path(folder))));
+        let given = options.into_iter().chain(against).filter_map(|(name, value)| Some([name.to_owned(), value?]));
+        std::iter::once(path(&self.pipeline)).chain(given.flatten()).collect()
+    }
+
     fn load(&self) -> anyhow::Result<Config> {
         let folder =
             if self.pipeline.is_dir() { self.pipeline.clone() } else { Path::new("pipelines").join(&self.pipeline) };

@@ -32,6 +32,9 @@ pub mod report;
 // Studies: is what the stages say of themselves true?
 pub mod validate;
 
+// Past one machine: work dealt to shards, scripts for a scheduler.
+pub mod cluster;
+
 // Outside: disk and configuration.
 pub mod store;
 pub mod config;

@@ -14,6 +14,7 @@ pub mod gc;
 mod inputs;
 pub mod night;
 mod others;
+pub mod shard;
 pub mod show;
 pub mod status;
 mod stretches;

@@ -1,20 +1,21 @@
 //! The commands of the morning after: what is fresh, a maneuver's story, what changed, whether it still holds, what can go.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Bars, Options, Patience, start_threads};
+use super::{Bars, LOOK, Options, Patience, cluster, start_threads};
 use crate::overnight::{Changes, Moved};
 use crate::pipeline::{diff, explain, gc, status, verify};
-
-/// Something moved, or is stale: not wrong, but somebody should look.
-const LOOK: u8 = 3;
 
 #[derive(Args, Debug)]
 pub struct StatusOptions {
     #[command(flatten)]
     options: Options,
+    /// Instead, print the shards of this plan of which something is missing, as schedulers write an array: 1,4-7
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -75,6 +76,9 @@ fn bars(options: &Options) -> anyhow::Result<Bars<'static>> {
 /// Says per stage what is fresh, stale and failed, and why.
 #[expect(clippy::print_stdout, reason = "what a status says")]
 pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
+    if let Some(plan) = &options.plan {
+        return cluster::missing(&options.options, plan);
+    }
     let options = &options.options;
     let status = status::status(&options.load()?, &bars(options)?)?;
     if !options.quiet {

@@ -16,7 +16,7 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{cluster, compare, estimate, export, ingest, segment, trend};
 
 pub use cards::Simulation;
 pub use written::ReportSettings;
@@ -47,6 +47,7 @@ pub struct Config {
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,
+    pub cluster: cluster::Settings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
     /// The pipeline's files as they are: name and text.
@@ -106,6 +107,7 @@ impl Config {
             compare: against(pipeline.compare, overrides.against),
             export: pipeline.export,
             report: pipeline.report,
+            cluster: pipeline.cluster,
             template,
             files: files.all().map(|file| file.named(folder)).collect(),
         };

@@ -10,7 +10,7 @@ use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{cluster, compare, estimate, export, ingest, segment, trend};
 
 /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]
@@ -42,6 +42,8 @@ pub struct PipelineFile {
     pub export: export::Settings,
     #[serde(default)]
     pub report: ReportSettings,
+    #[serde(default)]
+    pub cluster: cluster::Settings,
 }
 
 /// Settings of the report.

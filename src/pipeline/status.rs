@@ -111,7 +111,12 @@ impl Run<'_> {
         if words.is_empty() { "its artefact is missing or damaged".to_owned() } else { words.join("; ") }
     }
 
-    fn ingest_status(&self, files: &[FlightFiles], campaign: &mut Campaign, before: Option<&Lineage>) -> StageStatus {
+    pub(super) fn ingest_status(
+        &self,
+        files: &[FlightFiles],
+        campaign: &mut Campaign,
+        before: Option<&Lineage>,
+    ) -> StageStatus {
         let mut status = StageStatus::new(Stage::Ingest);
         for file in files {
             let id = &file.flight_id;
@@ -132,7 +137,12 @@ impl Run<'_> {
         status
     }
 
-    fn segment_status(&self, ingest: &StageStatus, campaign: &mut Campaign, before: Option<&Lineage>) -> StageStatus {
+    pub(super) fn segment_status(
+        &self,
+        ingest: &StageStatus,
+        campaign: &mut Campaign,
+        before: Option<&Lineage>,
+    ) -> StageStatus {
         let mut status = StageStatus::new(Stage::Segment);
         for id in ingest.stale.values().flatten() {
             status.stale("its flight is stale", id);
@@ -154,7 +164,7 @@ impl Run<'_> {
         status
     }
 
-    fn estimate_status(&self, campaign: &Campaign, before: Option<&Lineage>) -> StageStatus {
+    pub(super) fn estimate_status(&self, campaign: &Campaign, before: Option<&Lineage>) -> StageStatus {
         let mut status = StageStatus::new(Stage::Estimate);
         for maneuver in &campaign.maneuvers {
             let id = &maneuver.maneuver_id;

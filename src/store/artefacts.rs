@@ -45,6 +45,16 @@ impl Store {
         Ok(Store { _lock: Some(lock), ..Store::look(folder) })
     }
 
+    /// Opens or creates a store as one of many that add to it at the same time, waiting up to `wait` for a run to leave
+    /// it. What lies there half written may be another's work and stays.
+    ///
+    /// # Errors
+    /// As [`Store::open`].
+    pub fn join(folder: &Path, wait: Duration) -> Result<Store> {
+        let lock = Lock::share(&folder.join("lock"), "store", wait)?;
+        Ok(Store { _lock: Some(lock), ..Store::look(folder) })
+    }
+
     /// A store to look into while others use it; it need not exist.
     #[must_use]
     pub fn look(folder: &Path) -> Store {

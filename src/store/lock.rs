@@ -1,7 +1,10 @@
-//! One run at a time: a lock on a file that also says who holds it.
+//! One run at a time, or many shards: a lock on a file that also says which run holds it.
 //!
 //! The lock is the operating system's and goes with the process that holds it, however that ends: the lock of a dead
-//! process blocks nobody, whatever its file still says.
+//! process blocks nobody, whatever its file still says. On a shared file system it reaches other machines where the file
+//! system carries locks; where it has none, everybody goes on without. Nothing hangs on it but waste: artefacts are named
+//! by what decides them and appear whole by a rename, so two who make the same one make the same bytes, and a leftover that
+//! a run sweeps away from under another costs that one a new try.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -20,7 +23,7 @@ const LONGEST_NOTE: u64 = 1000;
 /// A lock that is held. It ends with its value.
 #[derive(Debug)]
 pub struct Lock {
-    _file: File,
+    file: File,
 }
 
 impl Lock {
@@ -29,6 +32,23 @@ impl Lock {
     /// # Errors
     /// [`Error::Store`] naming the holder when another has it, [`Error::Io`] when the disk says no.
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
+        let mut lock = Lock::get(path, what, wait, File::try_lock)?;
+        // Only a word for others: a disk that is too full for it stops nobody here.
+        let note = format!("pid {} on {} since {}\n", std::process::id(), host(), timestamp(SystemTime::now()));
+        let file = &mut lock.file;
+        let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(note.as_bytes()));
+        Ok(lock)
+    }
+
+    /// Takes a share of the lock at `path`: any number may hold one, and nobody the whole meanwhile.
+    ///
+    /// # Errors
+    /// As [`Lock::take`].
+    pub fn share(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
+        Lock::get(path, what, wait, File::try_lock_shared)
+    }
+
+    fn get(path: &Path, what: &str, wait: Duration, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Lock> {
         let folder = path.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
         let mut file = OpenOptions::new()
@@ -40,18 +60,21 @@ impl Lock {
             .map_err(Error::io(path, "cannot create it"))?;
         let patience = Instant::now() + wait;
         loop {
-            match file.try_lock() {
+            match lock(&file) {
                 Ok(()) => break,
                 Err(TryLockError::WouldBlock) if Instant::now() < patience => std::thread::sleep(AGAIN),
                 Err(TryLockError::WouldBlock) => return Err(Error::store(folder, &busy(&mut file, what))),
+                Err(TryLockError::Error(e)) if has_none(&e) => break,
                 Err(TryLockError::Error(e)) => return Err(Error::io(path, "cannot lock it")(e)),
             }
         }
-        // Only a word for others: a disk that is too full for it stops nobody here.
-        let note = format!("pid {} on {} since {}\n", std::process::id(), host(), timestamp(SystemTime::now()));
-        let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(note.as_bytes()));
-        Ok(Lock { _file: file })
+        Ok(Lock { file })
     }
+}
+
+/// Whether an error says that the file system has no locks: not supported, or no lock manager (Linux's `ENOLCK`).
+fn has_none(error: &std::io::Error) -> bool {
+    error.kind() == std::io::ErrorKind::Unsupported || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
 }
 
 fn busy(file: &mut File, what: &str) -> String {
@@ -85,6 +108,19 @@ mod tests {
         assert!(second.contains(&who) && !second.contains("no more"), "{second}");
         drop(first);
         Lock::take(&path, "store", Duration::ZERO).unwrap();
+    }
+
+    #[test]
+    fn shares_bear_each_other_and_no_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let shares = [(); 3].map(|()| Lock::share(&path, "store", Duration::ZERO).unwrap());
+        assert!(Lock::take(&path, "store", Duration::ZERO).is_err());
+        drop(shares);
+        let whole = Lock::take(&path, "store", Duration::ZERO).unwrap();
+        assert!(Lock::share(&path, "store", Duration::ZERO).is_err());
+        drop(whole);
+        Lock::share(&path, "store", Duration::ZERO).unwrap();
     }
 
     #[test]
