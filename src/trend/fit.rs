@@ -307,7 +307,9 @@ fn total_variances(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64],
     let mut total = variances.to_vec();
     for stratum in strata.iter().rev() {
         let scatter2 = scatter_squared(residuals, variances, freedom, stratum);
-        stratum.iter().for_each(|i| total[*i] = variances[*i] + scatter2);
+        for i in stratum {
+            total[*i] = variances[*i] + scatter2;
+        }
     }
     total
 }

@@ -114,7 +114,9 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
     let mut bounds = problem.bounds(&members, &shared, &prior, windows)?;
     let doubted = problem.doubted(&shared, &bounds, &prior);
     if !doubted.is_empty() {
-        doubted.iter().for_each(|j| prior[*j] = size_of(&settings.ordinary, *j));
+        for j in doubted {
+            prior[j] = size_of(&settings.ordinary, j);
+        }
         problem.settle(&mut members, &mut shared, &prior)?;
         bounds = problem.bounds(&members, &shared, &prior, windows)?;
     }
