@@ -8,6 +8,7 @@ use crate::support::{Campaign, demo, number};
 fn exported() -> Campaign {
     let campaign = Campaign::on("data/demo/flights");
     demo().fill_store(&campaign);
+    campaign.ends("compare", 0);
     campaign.ends("export", 0);
     campaign
 }

@@ -180,7 +180,7 @@ fn a_copy_under_another_name_is_left_out_and_named() {
     let problems = campaign.table("problems");
     let named: Vec<&str> = problems.iter().map(|p| &*p["flight_id"]).collect();
     assert_eq!(named, ["flight_003", "flight_002", "flight_003", "flight_004"], "{problems:?}");
-    assert!(problems[1]["reason"].contains("those of flight `flight_001` under another name"), "{problems:?}");
+    assert!(problems[1]["reason"].contains("the same bytes as flight `flight_001`"), "{problems:?}");
     assert!(problems[2]["reason"].contains("holds the rows of flight `flight_001` again"), "{problems:?}");
     assert!(problems[3]["reason"].contains("holds the rows of flight `flight_001` again"), "{problems:?}");
     assert_eq!(campaign.table("maneuvers").len(), 1);
