@@ -9,6 +9,7 @@ pub mod calibration;
 mod case;
 pub mod coloured;
 pub mod cost;
+mod course;
 pub mod cramer_rao;
 pub mod equation_error;
 mod likelihood;
@@ -22,6 +23,7 @@ pub mod mean;
 pub mod newton_raphson;
 mod normal;
 mod outcome;
+mod propagators;
 mod response;
 pub mod theil;
 
