@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
@@ -56,7 +57,8 @@ const MASS_PROPERTIES: &[&str] =
 /// The signals of a window of a record at samples and half-samples.
 #[derive(Clone, Debug)]
 pub struct Window {
-    points: BTreeMap<String, Vec<f64>>,
+    /// Shared by windows that differ in few of them.
+    points: BTreeMap<String, Arc<[f64]>>,
     pub step_s: f64,
     pub samples: usize,
 }
@@ -83,11 +85,11 @@ impl Window {
                 return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
-            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) });
+            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) }.into());
         }
         for name in [signal::P, signal::Q, signal::R] {
             let slope = slope(record.values(name).unwrap_or_default(), &range, record.step_s);
-            points.insert(slope_name(name), halved(&slope));
+            points.insert(slope_name(name), halved(&slope).into());
         }
         Ok(Window { points, step_s: record.step_s, samples: range.len() })
     }
@@ -106,7 +108,7 @@ impl Window {
     /// A signal's values at the points; all zero for a signal that was not cut out.
     #[must_use]
     pub fn signal(&self, name: &str) -> &[f64] {
-        self.points.get(name).map_or(&[], Vec::as_slice)
+        self.points.get(name).map_or(&[], |points| points)
     }
 
     /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
@@ -114,12 +116,20 @@ impl Window {
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
         let mut change = |name: &str, bias: f64| {
-            for value in window.points.get_mut(name).into_iter().flatten() {
-                *value += scale * *value + bias;
+            if let Some(points) = window.points.get_mut(name) {
+                *points = points.iter().map(|value| value + (scale * value + bias)).collect();
             }
         };
         change(name, bias);
         change(&slope_name(name), 0.0);
+        window
+    }
+
+    /// The same window with a signal more, which does not change.
+    #[must_use]
+    pub fn with_constant(&self, name: &str, value: f64) -> Window {
+        let mut window = self.clone();
+        window.points.insert(name.to_owned(), vec![value; self.len()].into());
         window
     }
 

@@ -197,7 +197,9 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         let held: Vec<(Acting, f64)> = model.held.iter().map(|(d, value)| (columns.acting(d), *value)).collect();
         let mut along = Along::<NX, E>::over(aircraft, window);
         let mut columns = columns.filled(&along);
-        columns.iter_mut().for_each(|column| column.extend([0.0; BEYOND]));
+        for column in &mut columns {
+            column.extend([0.0; BEYOND]);
+        }
         // A step needs three points, also the one that would follow the last sample.
         along.known.extend(along.known.last().cloned().into_iter().cycle().take(2));
         let mut held_part = Coefficients::zero();

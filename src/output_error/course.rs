@@ -3,7 +3,6 @@
 //!
 //! A stage waits for the one before it, so the chain goes stage by stage beside other work ([`Meanwhile`]).
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code")]
 
 use nalgebra::{SMatrix, SVector};
 

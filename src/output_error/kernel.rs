@@ -126,7 +126,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 propagators: &propagators,
                 count,
             };
-            work.all::<E>(&mut course);
+            work.all::<E>();
             self.sink.take(simd, first, &self.outputs[first..next], rows, &mut course);
             course.finish();
             x = course.state();
@@ -163,25 +163,20 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
     /// Reads the sensors and takes the chunk's steps: the groups of all coefficients side by side, so that the processor
     /// has several independent sums to work on, then that of the initial states.
     #[inline(always)]
-    fn all<E: Equations<NX>>(&mut self, meanwhile: &mut impl Meanwhile) {
+    fn all<E: Equations<NX>>(&mut self) {
         let (from, end) = (self.lanes.groups[0].start, self.lanes.groups[0].end);
         for lane in (from..end).step_by(S::F64_LANES) {
-            self.bundle::<E, COEFFICIENTS>(lane, [0, 1, 2], meanwhile);
+            self.bundle::<E, COEFFICIENTS>(lane, [0, 1, 2]);
         }
         let initial = &self.lanes.groups[COEFFICIENTS];
         for lane in (0..initial.end - initial.start).step_by(S::F64_LANES) {
-            self.bundle::<E, 1>(lane, [COEFFICIENTS], meanwhile);
+            self.bundle::<E, 1>(lane, [COEFFICIENTS]);
         }
     }
 
     /// The vectors that begin at a lane of each of some groups, over the chunk.
     #[inline(always)]
-    fn bundle<E: Equations<NX>, const N: usize>(
-        &mut self,
-        lane: usize,
-        groups: [usize; N],
-        meanwhile: &mut impl Meanwhile,
-    ) {
+    fn bundle<E: Equations<NX>, const N: usize>(&mut self, lane: usize, groups: [usize; N]) {
         let width = self.lanes.width();
         let mut s = [[self.simd.splat_f64s(0.0); NX]; N];
         for n in 0..N {
