@@ -18,7 +18,8 @@ pub struct Compatibility {
     pub standard_errors: f64,
     /// A fault is named when it is this many times its bound, besides being beyond what is ordinary.
     pub fault_standard_errors: f64,
-    /// Length of the windows, s: some periods of the Dutch roll, and short enough that wind stays what it is.
+    /// Length of the windows, s: a few periods of the Dutch roll, and so short that wind and what gyros leave unknown change
+    /// steadily within it. A delay of a channel that is small, as lateral acceleration, shows in no longer ones.
     pub window_s: f64,
     /// The most windows of a flight; memory and time are proportional to them.
     pub windows: usize,
@@ -45,8 +46,8 @@ impl Default for Compatibility {
             fault: OnFault::Apply,
             standard_errors: 3.0,
             fault_standard_errors: 4.0,
-            window_s: 20.0,
-            windows: 20,
+            window_s: 10.0,
+            windows: 50,
             least_windows: 3,
             longest_delay_s: 0.3,
             wind_change_ft_s2: 0.1,
