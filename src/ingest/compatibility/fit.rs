@@ -9,9 +9,6 @@
 //! until none is; what comes out as large as a fault but not as sure as one is thought ordinary again. A delay common to
 //! all channels is no error: the mean of the delays, with the weights 1/P, is zero.
 
-#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
-
 use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
