@@ -36,7 +36,7 @@ use crate::{estimate, report, trend};
 use conditioning::{Done, Shares};
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 2;
+const INGEST_VERSION: u32 = 3;
 const SEGMENT_VERSION: u32 = 3;
 const ESTIMATE_VERSION: u32 = 7;
 const JOINT_VERSION: u32 = 3;

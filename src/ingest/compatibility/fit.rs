@@ -8,9 +8,6 @@
 //! had been thought of it before, and the one that is surest beyond the ordinary is freed, until none is. A delay common to all channels
 //! is no error: the mean of the delays, with the weights 1/P, is zero.
 
-#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
-
 use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
