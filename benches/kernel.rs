@@ -167,9 +167,8 @@ fn fused_s(chained: bool) -> (f64, usize) {
 fn floors(samples: usize, lanes: usize, pass_s: f64) {
     let (throughput_s, vector) = fused_s(false);
     let (latency_s, _) = fused_s(true);
-    // Of a lane and sample: four stages of A s + B r with its regressor, seven sums of states, outputs C s + D r.
-    let stage = Longitudinal::RATES_BY_STATE.len() + 2;
-    let lane = 4 * stage + 7 * NX + Longitudinal::OUTPUTS_BY_STATE.len() + 2;
+    // Of a lane and sample: its regressor at four stages, Φ s, Γ r (of the last stage one entry), outputs C s + D r.
+    let lane = 4 + NX * NX + 3 * NX + 1 + Longitudinal::OUTPUTS_BY_STATE.len() + 2;
     // The residual is a lane more. Half of the symmetric matrix.
     let squares = OUTPUTS * (lanes + 1) * (lanes + 2) / 2;
     let operations = samples * (lanes * lane + squares);
