@@ -10,6 +10,7 @@
 //! all channels is no error: the mean of the delays, with the weights 1/P, is zero.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Compatibility;
@@ -387,21 +388,8 @@ impl<'a> Member<'a> {
     }
 
     fn raw(&self, problem: &Problem, o: usize) -> Raw {
-        let mut raw = Raw { information: [0.0; ROW * ROW], gradient: [0.0; ROW], square: 0.0 };
-        for k in self.compared(problem) {
-            let measured = self.window.outputs[o][k];
-            if !measured.is_finite() {
-                continue;
-            }
-            let (value, row) = self.response.output(k, o);
-            let residual = measured - value;
-            raw.square += residual * residual;
-            for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                raw.gradient[i] += a * residual;
-                raw.information[i * ROW..][..=i].iter_mut().zip(&row).for_each(|(h, b)| *h += a * b);
-            }
-        }
-        raw
+        let (compared, measured) = (self.compared(problem), &self.window.outputs[o]);
+        Arch::new().dispatch(Summing { compared, measured, response: &self.response, output: o })
     }
 
     /// The outputs' sums together, each with its weight 1/R.
@@ -432,6 +420,50 @@ impl<'a> Member<'a> {
             self.variances[o] = coloured::level(&residuals, self.window.step_s).max(floor * floor);
         }
         self.weigh(problem);
+    }
+}
+
+/// The sums of one output over some samples, compiled for the processor at hand.
+struct Summing<'a> {
+    compared: std::ops::Range<usize>,
+    measured: &'a [f64],
+    response: &'a Response,
+    output: usize,
+}
+
+impl WithSimd for Summing<'_> {
+    type Output = Raw;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Raw {
+        const VECTOR: usize = 8;
+        const WIDE: usize = ROW.next_multiple_of(VECTOR);
+        let mut raw = Raw { information: [0.0; ROW * ROW], gradient: [0.0; ROW], square: 0.0 };
+        let mut squares = [[0.0; WIDE]; ROW];
+        let mut wide = [0.0; WIDE];
+        for k in self.compared {
+            let measured = self.measured[k];
+            if !measured.is_finite() {
+                continue;
+            }
+            let (value, row) = self.response.output(k, self.output);
+            let residual = measured - value;
+            raw.square += residual * residual;
+            wide[..ROW].copy_from_slice(&row);
+            for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                raw.gradient[i] += a * residual;
+                // Whole vectors up to the diagonal.
+                for block in (0..=i).step_by(VECTOR) {
+                    for c in block..block + VECTOR {
+                        squares[i][c] += a * wide[c];
+                    }
+                }
+            }
+        }
+        for i in 0..ROW {
+            raw.information[i * ROW..][..=i].copy_from_slice(&squares[i][..=i]);
+        }
+        raw
     }
 }
 
