@@ -56,7 +56,7 @@ const SEGMENT_VERSION: u32 = 4;
 const ESTIMATE_VERSION: u32 = 7;
 const JOINT_VERSION: u32 = 3;
 const PREDICT_VERSION: u32 = 3;
-const TREND_VERSION: u32 = 1;
+const TREND_VERSION: u32 = 2;
 const COMPARE_VERSION: u32 = 1;
 
 /// The report's names among the published files: on screen and on paper.
