@@ -45,7 +45,7 @@ end() {
     scancel -u "$(id -un)" 2>/dev/null && sleep 1.5
     kill -9 $(tasks_of "n[1-3]") 2>/dev/null
     pkill -9 -P $$
-    wait 2>/dev/null
+    sleep 0.5
     rm -rf "$work" 2>/dev/null
     exit $code
 }
@@ -63,6 +63,7 @@ dd if=/dev/urandom of="$work/munge/key" bs=128 count=1 status=none
 chmod 400 "$work/munge/key"
 munged --foreground --key-file="$work/munge/key" --socket="$work/socket/munge" --pid-file="$work/munge/pid" \
     --log-file="$work/log/munge.log" --seed-file="$work/munge/seed" >/dev/null 2>&1 &
+disown
 
 user=$(id -un)
 cat >"$work/slurm.conf" <<END
@@ -104,9 +105,14 @@ PartitionName=flight Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP
 END
 export SLURM_CONF="$work/slurm.conf"
 for _ in $(seq 50); do [ -S "$work/socket/munge" ] && break; sleep 0.1; done
-start_node() { slurmd -D -N "$1" -f "$work/slurm.conf" >/dev/null 2>&1 & }
+# Disowned: nobody is to be told of daemons that are killed on purpose.
+start_node() {
+    slurmd -D -N "$1" -f "$work/slurm.conf" >/dev/null 2>&1 &
+    disown
+}
 begun=$(date +%s.%N)
 slurmctld -D -i -f "$work/slurm.conf" >/dev/null 2>&1 &
+disown
 for node in n1 n2 n3; do start_node $node; done
 for _ in $(seq 150); do [ "$(sinfo -h -t idle -o %D 2>/dev/null)" = 3 ] && break; sleep 0.1; done
 [ "$(sinfo -h -t idle -o %D)" = 3 ] || { echo "the nodes did not come up"; exit 1; }
@@ -174,12 +180,12 @@ exec "$harvest" "\$@"
 END
 chmod 755 "$work/slow"
 kill_node() {
-    for _ in $(seq 120); do grep -q n3 "$work/began" 2>/dev/null && break; sleep 0.1; done
-    grep -q n3 "$work/began" || { echo "no task came to the node that is to die"; exit 1; }
-    pkill -9 -f "slurmd -D -N n3 -f $work"
+    for _ in $(seq 120); do grep -q n2 "$work/began" 2>/dev/null && break; sleep 0.1; done
+    grep -q n2 "$work/began" || { echo "no task came to the node that is to die"; exit 1; }
+    pkill -9 -f "slurmd -D -N n2 -f $work"
     # shellcheck disable=SC2046
-    kill -9 $(tasks_of n3)
-    echo "node n3 killed under its tasks"
+    kill -9 $(tasks_of n2)
+    echo "node n2 killed under its tasks"
 }
 HARVEST="$work/slow" campaign node kill_node
 [ "$(wc -l <"$work/began")" -gt 4 ] || { echo "no task was done again"; exit 1; }

@@ -16,6 +16,7 @@ mod paper;
 mod report;
 mod run;
 mod segment;
+mod shards;
 mod show;
 mod simulate;
 mod support;
