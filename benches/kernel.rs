@@ -30,7 +30,7 @@ impl Plain<'_> {
     fn regressor(&self, d: &Derivative, point: usize, x: &X) -> f64 {
         let m = &self.motion[point];
         let aircraft = self.subject.aircraft();
-        if let Some((state, factor)) = Longitudinal::state_regressor(aircraft, m, &d.regressor) {
+        if let Some((state, factor)) = Longitudinal::state_regressor(aircraft, m.velocity, &d.regressor) {
             return factor * x[state];
         }
         let force = m.qbar * aircraft.wing_area_ft2;
@@ -52,7 +52,8 @@ impl Plain<'_> {
         for (i, (d, value)) in free.chain(held).enumerate() {
             let (k, r) = (d.coefficient.index(), self.regressor(d, point, x));
             c[k] += value * r;
-            let along = Longitudinal::state_regressor(self.subject.aircraft(), &self.motion[point], &d.regressor);
+            let along =
+                Longitudinal::state_regressor(self.subject.aircraft(), self.motion[point].velocity, &d.regressor);
             if let Some((state, factor)) = along {
                 slopes[k][state] += value * factor;
             }
@@ -166,9 +167,8 @@ fn fused_s(chained: bool) -> (f64, usize) {
 fn floors(samples: usize, lanes: usize, pass_s: f64) {
     let (throughput_s, vector) = fused_s(false);
     let (latency_s, _) = fused_s(true);
-    // Of a lane and sample: four stages of A s + B r with its regressor, seven sums of states, outputs C s + D r.
-    let stage = Longitudinal::RATES_BY_STATE.len() + 2;
-    let lane = 4 * stage + 7 * NX + Longitudinal::OUTPUTS_BY_STATE.len() + 2;
+    // Of a lane and sample: its regressor at four stages, Φ s, Γ r (of the last stage one entry), outputs C s + D r.
+    let lane = 4 + NX * NX + 3 * NX + 1 + Longitudinal::OUTPUTS_BY_STATE.len() + 2;
     // The residual is a lane more. Half of the symmetric matrix.
     let squares = OUTPUTS * (lanes + 1) * (lanes + 2) / 2;
     let operations = samples * (lanes * lane + squares);
@@ -192,7 +192,7 @@ fn kernel(c: &mut Criterion) {
     let mut response = case.response();
     let mut free: Vec<&Derivative> = subject.derivatives().0.iter().collect();
     free.sort_by_key(|d| d.coefficient.index());
-    let motion: Vec<Motion> = window.motion(subject.aircraft()).collect();
+    let motion: Vec<Motion> = window.motion(subject.aircraft()).points().collect();
     let state = Longitudinal::measured_state(&motion[0]);
     let plain = Plain { motion, window: &window, subject: &subject, free };
     c.bench_function("one pass, kernel", |b| b.iter(|| case.respond(&start, &mut response)));

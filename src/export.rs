@@ -3,7 +3,8 @@
 //!
 //! A derivative's breakpoints are those of the tunnel and of the trend together. Flight was flown at some Mach numbers
 //! only: where the tunnel depends on Mach (or a third variable), the lowest and the highest flown are breakpoints too,
-//! flight's value stands between them, and the tunnel's beyond.
+//! flight's value stands between them, and the tunnel's beyond. The constants of sums are exported so that the sums
+//! (`CN_ba = CN_0 + CN_alpha α`), which flight tells best, come out as flown.
 
 pub mod daveml;
 pub mod jsbsim;
@@ -16,7 +17,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
+use crate::aero::{Buildup, Coefficient, Combined, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
 use crate::aircraft::Aircraft;
 use crate::maneuver::Maneuver;
 use crate::tables::{EstimateRow, ExportRow, TrendRow};
@@ -96,7 +97,32 @@ struct Flown {
 pub fn tables(contents: &Contents) -> Vec<Table> {
     let derivatives = contents.buildup.derivatives.iter().map(|d| &d.name);
     let names = derivatives.chain(contents.buildup.combined.iter().map(|c| &c.name));
-    names.filter_map(|name| contents.table(name)).collect()
+    let mut tables: Vec<Table> = names.filter_map(|name| contents.table(name)).collect();
+    contents.buildup.combined.iter().for_each(|sum| keep_sum(&mut tables, sum));
+    tables
+}
+
+/// Where flight has the sum of a constant and a slope, the constant is what makes the exported sum come out: the data tell
+/// the sum well and its parts, strongly correlated, badly; trends through each part on its own would not add up to it.
+fn keep_sum(tables: &mut [Table], sum: &Combined) {
+    let named = |name: &str| tables.iter().find(|t| t.derivative == name);
+    let (Some(whole), Some(slope), Some(constant)) = (named(&sum.name), named(&sum.slope), named(&sum.constant)) else {
+        return;
+    };
+    let kept = |(at, cell): (Condition, &Cell)| {
+        let whole = whole.cell(&at).filter(|c| c.is_flight)?;
+        let slope = slope.cell(&at).filter(|c| c.is_flight)?;
+        let uncertainty = |whole: f64, slope: f64| whole.hypot(slope * at.alpha_deg);
+        let source = format!("flight, {} − {} α", sum.name, sum.slope);
+        let value = whole.value - slope.value * at.alpha_deg;
+        let uncertainty = whole.uncertainty.zip(slope.uncertainty).map(|(w, s)| uncertainty(w, s));
+        cell.is_flight.then_some(Cell { value, uncertainty, is_flight: true, source })
+    };
+    let kept: Vec<Option<Cell>> = constant.points().map(kept).collect();
+    if let Some(constant) = tables.iter_mut().find(|t| t.derivative == sum.constant) {
+        let replaced = constant.cells.iter_mut().zip(kept);
+        replaced.filter_map(|(cell, kept)| Some((cell, kept?))).for_each(|(cell, kept)| *cell = kept);
+    }
 }
 
 impl Contents<'_> {
@@ -202,6 +228,16 @@ impl Table {
             third,
         };
         places.map(condition).zip(&self.cells)
+    }
+
+    /// The cell at one of the table's own points.
+    fn cell(&self, at: &Condition) -> Option<&Cell> {
+        let own = |a: f64, b: f64| same(a, b) || a.is_nan() || b.is_nan();
+        let there = |(point, _): &(Condition, &Cell)| {
+            let third = point.third.zip(at.third).is_none_or(|(a, b)| same(a, b));
+            same(point.alpha_deg, at.alpha_deg) && own(point.mach, at.mach) && third
+        };
+        self.points().find(there).map(|(_, cell)| cell)
     }
 
     /// Where each source stands, in words: `flight, trend of all: 10° to 40°; wind tunnel: 5°, 45° to 60°`. Of a table

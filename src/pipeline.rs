@@ -50,9 +50,9 @@ use crate::{estimate, report, trend};
 use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 2;
-const SEGMENT_VERSION: u32 = 3;
-const ESTIMATE_VERSION: u32 = 6;
+const INGEST_VERSION: u32 = 4;
+const SEGMENT_VERSION: u32 = 4;
+const ESTIMATE_VERSION: u32 = 7;
 const JOINT_VERSION: u32 = 3;
 const PREDICT_VERSION: u32 = 3;
 const TREND_VERSION: u32 = 1;

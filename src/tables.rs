@@ -195,7 +195,8 @@ pub struct EstimateRow {
     pub bound_held: Option<f64>,
     /// The part of the corrected bound that comes from errors of calibration.
     pub bound_calibration: Option<f64>,
-    /// The bound with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted.
+    /// The bound with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted: half the
+    /// width of a 95 % interval over 1.96, by Student's t as far as the autocorrelation is known from little.
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.
     pub wind_tunnel: Option<f64>,

@@ -66,12 +66,40 @@ impl Vane {
                 reading(w.atan2(u), slope, &local)
             }
             VaneModel::SmallAngle => {
-                let v = flow.velocity;
-                let by_rates = [arm[1] / v, -arm[0] / v, 0.0];
-                Reading { angle: flow.alpha + dot(by_rates, flow.rates), by_alpha: 1.0, by_beta: 0.0, by_rates }
+                return self.alpha_small(flow.alpha, self.alpha_by_rates(flow.velocity, cg), flow.rates);
             }
         };
         scaled(exact, self)
+    }
+
+    /// How the rates add to the small angle at an α vane, s.
+    #[inline(always)]
+    #[must_use]
+    pub fn alpha_by_rates(self, velocity: f64, cg: Position) -> [f64; 3] {
+        let (arm, per_speed) = (self.position().arm(cg), 1.0 / velocity);
+        [arm[1] * per_speed, -arm[0] * per_speed, 0.0]
+    }
+
+    /// How they do at a β vane, s.
+    #[inline(always)]
+    #[must_use]
+    pub fn beta_by_rates(self, velocity: f64, cg: Position) -> [f64; 3] {
+        let (arm, per_speed) = (self.position().arm(cg), 1.0 / velocity);
+        [-arm[2] * per_speed, 0.0, arm[0] * per_speed]
+    }
+
+    /// The small-angle reading of an α vane.
+    #[inline(always)]
+    #[must_use]
+    pub fn alpha_small(self, alpha: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
+        scaled(Reading { angle: alpha + dot(by_rates, rates), by_alpha: 1.0, by_beta: 0.0, by_rates }, self)
+    }
+
+    /// The small-angle reading of a β vane.
+    #[inline(always)]
+    #[must_use]
+    pub fn beta_small(self, beta: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
+        scaled(Reading { angle: beta + dot(by_rates, rates), by_alpha: 0.0, by_beta: 1.0, by_rates }, self)
     }
 
     /// What a β vane reads, rad, with the c.g. at `cg`.
@@ -89,9 +117,7 @@ impl Vane {
                 reading(v.atan2(across), slope, &local)
             }
             VaneModel::SmallAngle => {
-                let v = flow.velocity;
-                let by_rates = [-arm[2] / v, 0.0, arm[0] / v];
-                Reading { angle: flow.beta + dot(by_rates, flow.rates), by_alpha: 0.0, by_beta: 1.0, by_rates }
+                return self.beta_small(flow.beta, self.beta_by_rates(flow.velocity, cg), flow.rates);
             }
         };
         scaled(exact, self)
@@ -100,12 +126,14 @@ impl Vane {
 
 impl Sensors {
     /// What the α vane reads, rad, with the c.g. at `cg`.
+    #[inline(always)]
     #[must_use]
     pub fn alpha_reading(&self, flow: &Flow, cg: Position) -> Reading {
         self.alpha_vane.alpha_reading(self.vane_model, flow, cg)
     }
 
     /// What the β vane reads, rad, with the c.g. at `cg`.
+    #[inline(always)]
     #[must_use]
     pub fn beta_reading(&self, flow: &Flow, cg: Position) -> Reading {
         self.beta_vane.beta_reading(self.vane_model, flow, cg)
@@ -113,6 +141,7 @@ impl Sensors {
 
     /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the readings inverted by
     /// fixed-point iteration, which contracts by the ratio of arm times rate to velocity.
+    #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
         let mut flow =

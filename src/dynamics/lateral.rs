@@ -53,6 +53,8 @@ pub struct Sensed {
     cg: Position,
     vane: Vane,
     model: VaneModel,
+    /// How the rates add to a small angle at the vane, s.
+    vane_by_rates: [f64; 3],
 }
 
 const BETA: usize = 0;
@@ -103,6 +105,7 @@ impl Equations<4> for Lateral {
         &[(0, BETA), (0, P), (0, R), (1, P), (2, R), (3, PHI), (4, BETA), (4, P), (4, R)];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(4, CY), (4, CL), (4, CN)];
 
+    #[inline(always)]
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let determinant = m.ix * m.iz - m.ixz * m.ixz;
         // Rows of the inverse inertia matrix: what a rolling and a yawing moment give of ṗ and ṙ.
@@ -112,7 +115,7 @@ impl Equations<4> for Lateral {
         let turning = [[q * m.ixz, q * (m.iy - m.iz)], [q * (m.ix - m.iy), -q * m.ixz]];
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
         let times = |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
-        let ((sin_alpha, cos_alpha), (sin_theta, cos_theta)) = (m.alpha.sin_cos(), m.theta.sin_cos());
+        let [(sin_alpha, cos_alpha), (sin_theta, cos_theta)] = sin_cos([m.alpha, m.theta]);
         Known {
             per_speed: 1.0 / m.velocity,
             sin_alpha,
@@ -130,6 +133,7 @@ impl Equations<4> for Lateral {
         }
     }
 
+    #[inline(always)]
     fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
         let sensors = &aircraft.sensors;
         Sensed {
@@ -140,9 +144,11 @@ impl Equations<4> for Lateral {
             cg: m.cg,
             vane: sensors.beta_vane,
             model: sensors.vane_model,
+            vane_by_rates: sensors.beta_vane.beta_by_rates(m.velocity, m.cg),
         }
     }
 
+    #[inline(always)]
     fn measured_state(m: &Motion) -> SVector<f64, 4> {
         SVector::from([m.beta, m.rates[0], m.rates[2], m.phi])
     }
@@ -156,8 +162,8 @@ impl Equations<4> for Lateral {
         }
     }
 
-    fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
-        let rate = aircraft.span_ft / (2.0 * m.velocity);
+    fn state_regressor(aircraft: &Aircraft, velocity: f64, regressor: &Regressor) -> Option<(usize, f64)> {
+        let rate = aircraft.span_ft / (2.0 * velocity);
         match regressor {
             Regressor::Beta => Some((BETA, DEG)),
             Regressor::RollRate => Some((P, rate)),
@@ -166,8 +172,8 @@ impl Equations<4> for Lateral {
         }
     }
 
-    fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
-        let k = Self::known(aircraft, m);
+    #[inline(always)]
+    fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
         let [p, q, r] = m.rates;
         let [p_dot, _, r_dot] = m.accelerations;
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
@@ -213,8 +219,13 @@ impl Equations<4> for Lateral {
     fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Outputs<4> {
         let rates = [x[P], k.q, x[R]];
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
-        let flow = Flow { alpha: sensed.alpha, beta: x[BETA], velocity: sensed.velocity, rates };
-        let vane = sensed.vane.beta_reading(sensed.model, &flow, sensed.cg);
+        let vane = match sensed.model {
+            VaneModel::SmallAngle => sensed.vane.beta_small(x[BETA], sensed.vane_by_rates, rates),
+            VaneModel::Exact => {
+                let flow = Flow { alpha: sensed.alpha, beta: x[BETA], velocity: sensed.velocity, rates };
+                sensed.vane.beta_reading(sensed.model, &flow, sensed.cg)
+            }
+        };
         let right = lever(1, sensed.ay, rates, [p_dot, sensed.q_dot, r_dot]);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {

@@ -56,6 +56,8 @@ pub struct Sensed {
     cg: Position,
     vane: Vane,
     model: VaneModel,
+    /// How the rates add to a small angle at the vane, s.
+    vane_by_rates: [f64; 3],
 }
 
 const ALPHA: usize = 0;
@@ -80,9 +82,10 @@ impl Equations<3> for Longitudinal {
         &[(0, ALPHA), (0, Q), (1, Q), (2, THETA), (3, ALPHA), (3, Q), (4, ALPHA), (4, Q)];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(3, CN), (3, CM), (4, CM), (4, CA)];
 
+    #[inline(always)]
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
-        let ((sin_beta, cos_beta), (sin_phi, cos_phi)) = (m.beta.sin_cos(), m.phi.sin_cos());
+        let [(sin_beta, cos_beta), (sin_phi, cos_phi)] = sin_cos([m.beta, m.phi]);
         let per_speed = 1.0 / (m.velocity * cos_beta);
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
@@ -99,6 +102,7 @@ impl Equations<3> for Longitudinal {
         }
     }
 
+    #[inline(always)]
     fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
         let sensors = &aircraft.sensors;
         Sensed {
@@ -115,9 +119,11 @@ impl Equations<3> for Longitudinal {
             cg: m.cg,
             vane: sensors.alpha_vane,
             model: sensors.vane_model,
+            vane_by_rates: sensors.alpha_vane.alpha_by_rates(m.velocity, m.cg),
         }
     }
 
+    #[inline(always)]
     fn measured_state(m: &Motion) -> SVector<f64, 3> {
         SVector::from([m.alpha, m.rates[1], m.theta])
     }
@@ -130,16 +136,16 @@ impl Equations<3> for Longitudinal {
         }
     }
 
-    fn state_regressor(aircraft: &Aircraft, m: &Motion, regressor: &Regressor) -> Option<(usize, f64)> {
+    fn state_regressor(aircraft: &Aircraft, velocity: f64, regressor: &Regressor) -> Option<(usize, f64)> {
         match regressor {
             Regressor::Alpha => Some((ALPHA, DEG)),
-            Regressor::PitchRate => Some((Q, aircraft.chord_ft / (2.0 * m.velocity))),
+            Regressor::PitchRate => Some((Q, aircraft.chord_ft / (2.0 * velocity))),
             _ => None,
         }
     }
 
-    fn coefficients(aircraft: &Aircraft, m: &Motion) -> [f64; COEFFICIENTS] {
-        let k = Self::known(aircraft, m);
+    #[inline(always)]
+    fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
         let (force, thrust) = (m.qbar * aircraft.wing_area_ft2 / m.mass, m.thrust / m.mass);
         [-m.force_z / force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) / force]
     }
@@ -176,8 +182,13 @@ impl Equations<3> for Longitudinal {
     fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
         let rates = [sensed.p, x[Q], sensed.r];
         let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
-        let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
-        let vane = sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg);
+        let vane = match sensed.model {
+            VaneModel::SmallAngle => sensed.vane.alpha_small(x[ALPHA], sensed.vane_by_rates, rates),
+            VaneModel::Exact => {
+                let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
+                sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg)
+            }
+        };
         let down = lever(2, sensed.an, rates, accelerations);
         let forward = lever(0, sensed.ax, rates, accelerations);
         let g = 1.0 / G0_FT_S2;

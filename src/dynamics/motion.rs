@@ -2,9 +2,11 @@
 //!
 //! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs them at its two ends
 //! and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
+#![expect(clippy::inline_always, reason = "laid out by vectors for the processor at hand")]
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
@@ -55,7 +57,8 @@ const MASS_PROPERTIES: &[&str] =
 /// The signals of a window of a record at samples and half-samples.
 #[derive(Clone, Debug)]
 pub struct Window {
-    points: BTreeMap<String, Vec<f64>>,
+    /// Shared by windows that differ in few of them.
+    points: BTreeMap<String, Arc<[f64]>>,
     pub step_s: f64,
     pub samples: usize,
 }
@@ -75,16 +78,18 @@ impl Window {
         for name in signal::REQUIRED.iter().copied().chain(surfaces) {
             let values = record.values(name).and_then(|v| v.get(range.clone()));
             let values = values.ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
-            if let Some(gap) = values.iter().position(|v| !v.is_finite()) {
+            // Whether one is missing is asked of all at once: that is faster than looking for the first.
+            if values.iter().fold(false, |missing, v| missing | !v.is_finite()) {
+                let gap = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
                 let time_s = record.time_s(range.start + gap);
                 return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
-            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) });
+            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) }.into());
         }
         for name in [signal::P, signal::Q, signal::R] {
             let slope = slope(record.values(name).unwrap_or_default(), &range, record.step_s);
-            points.insert(slope_name(name), halved(&slope));
+            points.insert(slope_name(name), halved(&slope).into());
         }
         Ok(Window { points, step_s: record.step_s, samples: range.len() })
     }
@@ -103,7 +108,7 @@ impl Window {
     /// A signal's values at the points; all zero for a signal that was not cut out.
     #[must_use]
     pub fn signal(&self, name: &str) -> &[f64] {
-        self.points.get(name).map_or(&[], Vec::as_slice)
+        self.points.get(name).map_or(&[], |points| points)
     }
 
     /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
@@ -111,8 +116,8 @@ impl Window {
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
         let mut change = |name: &str, bias: f64| {
-            for value in window.points.get_mut(name).into_iter().flatten() {
-                *value += scale * *value + bias;
+            if let Some(points) = window.points.get_mut(name) {
+                *points = points.iter().map(|value| value + (scale * value + bias)).collect();
             }
         };
         change(name, bias);
@@ -120,9 +125,22 @@ impl Window {
         window
     }
 
-    /// The motion at every point in order.
-    pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> impl Iterator<Item = Motion> + 'a {
-        let signals = Signals {
+    /// The same window with a signal more, which does not change.
+    #[must_use]
+    pub fn with_constant(&self, name: &str, value: f64) -> Window {
+        let mut window = self.clone();
+        window.points.insert(name.to_owned(), vec![value; self.len()].into());
+        window
+    }
+
+    /// The motion at every point.
+    #[must_use]
+    pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> Along<'a, impl Fn(f64) -> f64 + use<>> {
+        Along { aircraft, signals: self.signals(), gravity: gravity_at(aircraft.latitude_deg), points: self.len() }
+    }
+
+    fn signals(&self) -> Signals<'_> {
+        Signals {
             flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY].map(|name| self.signal(name)),
             rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
             slopes: [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name))),
@@ -133,9 +151,34 @@ impl Window {
             mass: self.signal(signal::MASS),
             cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
             inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(|name| self.signal(name)),
-        };
-        let gravity = gravity_at(aircraft.latitude_deg);
-        (0..self.len()).map(move |i| signals.at(aircraft, &gravity, i))
+        }
+    }
+}
+
+/// The motion along a window.
+pub struct Along<'a, G: Fn(f64) -> f64> {
+    aircraft: &'a Aircraft,
+    signals: Signals<'a>,
+    gravity: G,
+    points: usize,
+}
+
+impl<G: Fn(f64) -> f64> std::fmt::Debug for Along<'_, G> {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{} points", self.points)
+    }
+}
+
+impl<G: Fn(f64) -> f64> Along<'_, G> {
+    /// At one point.
+    #[inline(always)]
+    pub fn at(&self, point: usize) -> Motion {
+        self.signals.at(self.aircraft, &self.gravity, point)
+    }
+
+    /// At every point in order.
+    pub fn points(&self) -> impl Iterator<Item = Motion> {
+        (0..self.points).map(|point| self.at(point))
     }
 }
 
@@ -154,6 +197,7 @@ struct Signals<'a> {
 }
 
 impl Signals<'_> {
+    #[inline(always)]
     fn at(&self, aircraft: &Aircraft, gravity: impl Fn(f64) -> f64, i: usize) -> Motion {
         let rates = self.rates.map(|s| s[i] / DEG);
         let accelerations = self.slopes.map(|s| s[i] / DEG);
@@ -203,11 +247,14 @@ fn slope_name(name: &str) -> String {
 
 /// Samples and the means of neighbours between them.
 fn halved(values: &[f64]) -> Vec<f64> {
-    let mut points = Vec::with_capacity(2 * values.len());
-    for pair in values.windows(2) {
-        points.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
+    let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
+    for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
+        points[0] = pair[0];
+        points[1] = 0.5 * (pair[0] + pair[1]);
     }
-    points.extend(values.last());
+    if let (Some(point), Some(value)) = (points.last_mut(), values.last()) {
+        *point = *value;
+    }
     points
 }
 
@@ -222,21 +269,35 @@ pub const SLOPE_REACH: usize = 4;
 
 /// Slope per second of a signal over a range of the record, by local least squares on up to nine samples.
 fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
-    range
-        .clone()
-        .map(|k| {
-            let reach = SLOPE_REACH.min(k).min(values.len().saturating_sub(k + 1));
-            let (mut up, mut norm) = (0.0, 0.0);
-            for d in 1..=reach {
-                let (weight, change) = (d as f64, values[k + d] - values[k - d]);
-                if change.is_finite() {
-                    up += weight * change;
-                    norm += 2.0 * weight * weight;
-                }
-            }
-            if norm > 0.0 { up / (norm * step_s) } else { 0.0 }
-        })
-        .collect()
+    const WHOLE: usize = 2 * SLOPE_REACH + 1;
+    let at = |k: usize| {
+        let first = k.checked_sub(SLOPE_REACH);
+        let Some(near) = first.and_then(|first| values.get(first..first + WHOLE)) else {
+            return slope_near_gap(values, k, step_s);
+        };
+        let (mut up, mut norm) = (0.0, 0.0);
+        for d in 1..=SLOPE_REACH {
+            let weight = d as f64;
+            up += weight * (near[SLOPE_REACH + d] - near[SLOPE_REACH - d]);
+            norm += 2.0 * weight * weight;
+        }
+        if up.is_finite() { up / (norm * step_s) } else { slope_near_gap(values, k, step_s) }
+    };
+    range.clone().map(at).collect()
+}
+
+/// The same where samples are missing or the record ends.
+fn slope_near_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
+    let reach = SLOPE_REACH.min(k).min(values.len().saturating_sub(k + 1));
+    let (mut up, mut norm) = (0.0, 0.0);
+    for d in 1..=reach {
+        let (weight, change) = (d as f64, values[k + d] - values[k - d]);
+        if change.is_finite() {
+            up += weight * change;
+            norm += 2.0 * weight * weight;
+        }
+    }
+    if norm > 0.0 { up / (norm * step_s) } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -61,24 +61,42 @@ fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
     }
 }
 
+/// Both sines and both cosines are the same polynomial with other numbers, so the processor computes all four at once.
 #[inline(always)]
 fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
-    let mut both = [(0.0, 0.0); 2];
-    for i in 0..2 {
-        let z = r[i] * r[i];
-        let zz = z * z;
-        let sine = (z * r[i]).mul_add(polynomial(&SINE, z, zz), r[i]);
-        let cosine = zz.mul_add(polynomial(&COSINE, z, zz), (-0.5_f64).mul_add(z, 1.0));
-        both[i] = (sine, cosine);
-    }
-    both
+    let angle = [r[0], r[1], r[0], r[1]];
+    let z = times(angle, angle);
+    let zz = times(z, z);
+    // Sine: r + z r p; cosine: 1 − z/2 + z² p.
+    let factor = [r[0], r[1], z[0], z[1]];
+    let start = fused([1.0, 1.0, -0.5, -0.5], factor, [0.0, 0.0, 1.0, 1.0]);
+    let both = fused(times(z, factor), polynomial(z, zz), start);
+    [(both[0], both[2]), (both[1], both[3])]
 }
 
-/// The polynomial of order five, in pairs so that the processor need not wait for each term.
 #[inline(always)]
-fn polynomial(c: &[f64; 6], z: f64, zz: f64) -> f64 {
-    let [low, middle, high] = [c[1].mul_add(z, c[0]), c[3].mul_add(z, c[2]), c[5].mul_add(z, c[4])];
-    (zz * zz).mul_add(high, zz.mul_add(middle, low))
+fn times(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
+}
+
+#[inline(always)]
+fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
+    [a[0].mul_add(b[0], c[0]), a[1].mul_add(b[1], c[1]), a[2].mul_add(b[2], c[2]), a[3].mul_add(b[3], c[3])]
+}
+
+/// The numbers of sine and cosine at one power.
+#[inline(always)]
+fn at_power(n: usize) -> [f64; 4] {
+    [SINE[n], SINE[n], COSINE[n], COSINE[n]]
+}
+
+/// The polynomials of order five, in pairs so that the processor need not wait for each term.
+#[inline(always)]
+fn polynomial(z: [f64; 4], zz: [f64; 4]) -> [f64; 4] {
+    let low = fused(at_power(1), z, at_power(0));
+    let middle = fused(at_power(3), z, at_power(2));
+    let high = fused(at_power(5), z, at_power(4));
+    fused(times(zz, zz), high, fused(zz, middle, low))
 }
 
 #[cfg(test)]

@@ -165,6 +165,29 @@ fn flight_stands_where_it_has_data_and_the_tunnel_elsewhere() {
 }
 
 #[test]
+fn the_exported_constant_and_slope_add_up_to_the_sum_that_was_flown() {
+    let mut flown = Flown::new();
+    for (name, of) in [("CN_0", &(|_| 0.3) as &dyn Fn(f64) -> f64), ("CN_ba", &|a| 0.07 * a - 0.05)] {
+        let group = &flown.config.trend.group_of(name).unwrap().name;
+        flown.trends.extend(ALPHAS.map(|alpha| trend_row(name, "-", group, alpha, of(alpha))));
+        flown.estimates.push(estimate("m1", "PPSS", name));
+    }
+    let tables = tables(&flown.contents());
+    let at = |name: &str, alpha_deg: f64| {
+        let table = tables.iter().find(|t| t.derivative == name).unwrap();
+        table.points().find(|(at, _)| same(at.alpha_deg, alpha_deg)).unwrap().1
+    };
+    for alpha in ALPHAS {
+        assert_relative_eq!(at("CN_0", alpha).value + at("CN_alpha", alpha).value * alpha, 0.07 * alpha - 0.05);
+        assert_eq!(at("CN_0", alpha).source, "flight, CN_ba − CN_alpha α");
+        let wanted = (0.01 + 1e-4 * alpha) * alpha.hypot(1.0);
+        assert_relative_eq!(at("CN_0", alpha).uncertainty.unwrap(), wanted, max_relative = 1e-12);
+    }
+    let tunnel = flown.config.tunnel.value("CN_0", 50.0, 0.3).unwrap().value;
+    assert_eq!(at("CN_0", 50.0).value.to_bits(), tunnel.to_bits());
+}
+
+#[test]
 fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
     let flown = Flown::new().over_mach_and_altitude();
     let tables = tables(&flown.contents());

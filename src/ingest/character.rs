@@ -136,8 +136,10 @@ const CHANCES: usize = 4;
 /// The longest period of which nearly all changes keep one phase.
 fn held(changes: &[usize]) -> Option<Rate> {
     let span = changes.last()? - changes.first()?;
+    let fitting = FITS * changes.len() as f64;
     let of_period = |period: usize| {
-        if CHANCES * changes.len() * period < span {
+        // Too few to tell, or more than there is room for in one phase: most channels are recorded in every sample.
+        if CHANCES * changes.len() * period < span || (fitting - 1.0) * period as f64 > span as f64 {
             return None;
         }
         let mut phases = vec![0_usize; period];
@@ -145,7 +147,7 @@ fn held(changes: &[usize]) -> Option<Rate> {
             phases[change % period] += 1;
         }
         let (phase, most) = phases.iter().enumerate().max_by_key(|(_, n)| **n)?;
-        (*most as f64 >= FITS * changes.len() as f64).then_some(Rate { period, held: Some(phase) })
+        (*most as f64 >= fitting).then_some(Rate { period, held: Some(phase) })
     };
     (2..=LONGEST_PERIOD).rev().find_map(of_period)
 }

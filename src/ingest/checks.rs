@@ -72,7 +72,7 @@ pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check
     let windows = windows(&relations, blocks, aircraft, settings);
     // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
     let check = |(relation, pairs): (Relation, Vec<(f64, f64)>)| {
-        let pairs = chosen(&relation, pairs);
+        let pairs = without_jumps(&relation, chosen(&relation, pairs, settings), settings);
         if pairs.len() < settings.least_windows.max(2) {
             return Check { relation, verdict: Verdict::NotExcited, fit: None };
         }
@@ -127,9 +127,12 @@ fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
     Some(change + integral).filter(|v| v.is_finite())
 }
 
+/// Where the largest windows are chosen, so many times the least number of them are wanted.
+const SEVERAL: usize = 5;
+
 /// The windows that say something. Where they are the largest of the predicting side, both sides lose their medians: a
 /// bias would otherwise be the largest thing there is.
-fn chosen(relation: &Relation, mut pairs: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+fn chosen(relation: &Relation, mut pairs: Vec<(f64, f64)>, settings: &Checks) -> Vec<(f64, f64)> {
     match relation.choice {
         Choice::Above(level) => pairs.retain(|(x, y)| x.abs().max(y.abs()) > level),
         Choice::Largest { share, .. } => {
@@ -140,10 +143,42 @@ fn chosen(relation: &Relation, mut pairs: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
             }
             pairs.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
-            pairs.truncate((pairs.len() as f64 * share).ceil().max(0.0) as usize);
+            let count = (pairs.len() as f64 * share).ceil().max(0.0) as usize;
+            // Of a short flight more than the share, or too few decide.
+            pairs.truncate(count.max(SEVERAL * settings.least_windows));
         }
     }
     pairs
+}
+
+/// How far a window is off the line through the middle of all, in robust standard deviations, when it holds a jump.
+const JUMP_DEVIATIONS: f64 = 10.0;
+
+/// The windows without the few that hold a jump of the record: frames lost without a trace, parts that were put together.
+/// What a wrong channel does it does in every window, so where many windows are off none is left out.
+fn without_jumps(relation: &Relation, mut pairs: Vec<(f64, f64)>, settings: &Checks) -> Vec<(f64, f64)> {
+    let slope = middle_slope(&pairs);
+    let off = |(x, y): &(f64, f64)| (y - slope * x).abs() / (1.0 + slope * slope).sqrt();
+    let spread = 1.4826 * median(pairs.iter().map(off).collect());
+    let limit = (JUMP_DEVIATIONS * spread).max(relation.choice.level());
+    let jumps = pairs.iter().filter(|p| off(p) > limit).count();
+    if slope.is_finite() && jumps as f64 <= settings.jumps_share * pairs.len() as f64 {
+        pairs.retain(|p| off(p) <= limit);
+    }
+    pairs
+}
+
+/// The slope that half of what the predicting sides weigh lies below.
+fn middle_slope(pairs: &[(f64, f64)]) -> f64 {
+    let mut slopes: Vec<(f64, f64)> = pairs.iter().filter(|p| p.0 != 0.0).map(|(x, y)| (y / x, x.abs())).collect();
+    slopes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * slopes.iter().map(|s| s.1).sum::<f64>();
+    let mut sum = 0.0;
+    let reaches = |s: &&(f64, f64)| {
+        sum += s.1;
+        sum >= half
+    };
+    slopes.iter().find(reaches).map_or(f64::NAN, |s| s.0)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -214,6 +249,30 @@ mod tests {
         assert_eq!(verdict(weak, 0.4, 0.15, 0.3), Verdict::NotExcited);
         assert_eq!(verdict(weak, 0.9, 0.1, 0.7), Verdict::Ok);
         assert_eq!(verdict(weak, -0.9, 0.1, -0.7), Verdict::WrongSign);
+    }
+
+    /// Windows of a relation that holds within noise.
+    fn windows(slope: f64) -> Vec<(f64, f64)> {
+        (0..200).map(|k| f64::from(k % 21) - 10.0).map(|x| (x, slope * x + 0.01 * (7.0 * x).sin())).collect()
+    }
+
+    #[test]
+    fn a_few_jumps_of_the_record_decide_nothing_and_a_wrong_channel_is_no_jump() {
+        let settings = Checks::default();
+        let relation = Relation { choice: Choice::Above(1.0), ..relations::all(&settings)[0] };
+        let mut jumped = windows(1.0);
+        for k in [20, 90, 150] {
+            jumped[k].1 += 60.0;
+        }
+        assert_eq!(without_jumps(&relation, jumped, &settings).len(), 197);
+        let mut often = windows(1.0);
+        often.iter_mut().step_by(5).for_each(|p| p.1 += 60.0);
+        assert_eq!(without_jumps(&relation, often, &settings).len(), 200);
+        for slope in [-1.0, 57.3] {
+            let pairs = without_jumps(&relation, windows(slope), &settings);
+            assert_eq!(pairs.len(), 200);
+            assert!((fit(&pairs).unwrap().slope / slope - 1.0).abs() < 0.01);
+        }
     }
 
     #[test]

@@ -29,7 +29,8 @@ impl Status {
     }
 }
 
-/// How many fast steps of one signal a maneuver of the class has.
+/// How many fast steps of one signal a maneuver of the class has. One that may step as often as a doublet does but need not
+/// is an input of those maneuvers in which it does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepCount {

@@ -11,13 +11,16 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use nalgebra::SVector;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::input_noise::NoisySurface;
-use super::lanes::{Aligned, Lanes};
+use super::kernel::{CHUNK, load, store};
+use super::lanes::{Aligned, Lanes, VECTOR};
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{COEFFICIENTS, Equations, Motion, OUTPUTS};
+use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::flight::signal;
 use crate::units::DEG;
 
 /// Whether the initial states are estimated with the derivatives or taken from the record.
@@ -29,7 +32,10 @@ pub enum InitialState {
     Measured,
 }
 
-/// The three coefficients at every point as functions of the state: c = offset + slope · x.
+/// Points kept beyond the last sample: those of a chunk that begins there.
+const BEYOND: usize = 2 * CHUNK + VECTOR;
+
+/// The three coefficients at every point as functions of the state: c = offset + slope · x; empty where zero throughout.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Coefficients<const NX: usize> {
     offset: [Vec<f64>; COEFFICIENTS],
@@ -37,12 +43,10 @@ pub(super) struct Coefficients<const NX: usize> {
 }
 
 impl<const NX: usize> Coefficients<NX> {
-    fn zero(points: usize) -> Self {
-        // A step needs three points, also the one that would follow the last sample.
-        let none = || vec![0.0; points + 2];
+    fn zero() -> Self {
         Coefficients {
-            offset: std::array::from_fn(|_| none()),
-            slope: std::array::from_fn(|_| std::array::from_fn(|_| none())),
+            offset: std::array::from_fn(|_| vec![]),
+            slope: std::array::from_fn(|_| std::array::from_fn(|_| vec![])),
         }
     }
 
@@ -52,34 +56,55 @@ impl<const NX: usize> Coefficients<NX> {
             Some(state) => &mut self.slope[acting.coefficient][state],
             None => &mut self.offset[acting.coefficient],
         };
+        sum.resize(column.len(), 0.0);
         sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += value * r);
     }
 
     /// Those of a point.
     #[inline(always)]
     pub(super) fn at(&self, point: usize) -> At<NX> {
-        self.near::<1>(point)[0]
+        let value = |of: &Vec<f64>| of.get(point).copied().unwrap_or(0.0);
+        At {
+            offset: std::array::from_fn(|k| value(&self.offset[k])),
+            slope: std::array::from_fn(|k| std::array::from_fn(|i| value(&self.slope[k][i]))),
+        }
     }
+}
 
-    /// Those of some points from one on.
+/// Points of a chunk, and those that vectors reach beyond.
+const POINTS: usize = BEYOND;
+
+/// The three coefficients at the points of a chunk.
+#[repr(align(64))]
+pub(super) struct Near<const NX: usize> {
+    pub offset: [[f64; POINTS]; COEFFICIENTS],
+    pub slope: [[[f64; POINTS]; NX]; COEFFICIENTS],
+}
+
+impl<const NX: usize> Near<NX> {
+    pub const NONE: Near<NX> =
+        Near { offset: [[0.0; POINTS]; COEFFICIENTS], slope: [[[0.0; POINTS]; NX]; COEFFICIENTS] };
+
+    /// Their values at one of the points when the state is x.
     #[inline(always)]
-    pub(super) fn near<const N: usize>(&self, point: usize) -> [At<NX>; N] {
-        let mut near = [At { offset: [0.0; COEFFICIENTS], slope: [[0.0; NX]; COEFFICIENTS] }; N];
+    pub fn coefficients<E: Equations<NX>>(&self, point: usize, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+        let mut values = [0.0; COEFFICIENTS];
         for k in 0..COEFFICIENTS {
-            let offset = &self.offset[k][point..point + N];
-            for n in 0..N {
-                near[n].offset[k] = offset[n];
-            }
-            for i in 0..NX {
-                if let Some(slope) = self.slope[k][i].get(point..point + N) {
-                    for n in 0..N {
-                        near[n].slope[k][i] = slope[n];
-                    }
-                }
+            values[k] = self.offset[k][point];
+            // The first state last: it is the one that the sum would wait for.
+            for &i in E::FOLLOWED.iter().rev() {
+                values[k] = self.slope[k][i][point].mul_add(x[i], values[k]);
             }
         }
-        near
+        values
     }
+}
+
+/// What a free derivative adds to a coefficient: its value times a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Term {
+    acting: Acting,
+    value: f64,
 }
 
 /// The coefficients at one point.
@@ -170,18 +195,14 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         let mut columns = Columns::<NX, E>::new(aircraft, window);
         let acting: Vec<Acting> = free.iter().map(|d| columns.acting(d)).collect();
         let held: Vec<(Acting, f64)> = model.held.iter().map(|(d, value)| (columns.acting(d), *value)).collect();
-        let mut along = Along::<NX, E>::default();
-        for (point, motion) in window.motion(aircraft).enumerate() {
-            along.known.push(E::known(aircraft, &motion));
-            columns.take(point, &motion);
-            if point % 2 == 0 {
-                along.sensed.push(E::sensed(aircraft, &motion));
-                along.states.push(E::measured_state(&motion));
-                along.implied.push(E::coefficients(aircraft, &motion));
-            }
+        let mut along = Along::<NX, E>::over(aircraft, window);
+        let mut columns = columns.filled(&along);
+        for column in &mut columns {
+            column.extend([0.0; BEYOND]);
         }
-        let columns = columns.values;
-        let mut held_part = Coefficients::zero(window.len());
+        // A step needs three points, also the one that would follow the last sample.
+        along.known.extend(along.known.last().cloned().into_iter().cycle().take(2));
+        let mut held_part = Coefficients::zero();
         for (acting, value) in held {
             held_part.add(value, acting, &columns[acting.column]);
         }
@@ -267,6 +288,55 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         sum
     }
 
+    /// What the free derivatives add to the coefficients.
+    pub(super) fn terms(&self, parameters: &[f64]) -> Vec<Term> {
+        self.acting.iter().zip(parameters).map(|(acting, value)| Term { acting: *acting, value: *value }).collect()
+    }
+
+    /// The coefficients at the points of a chunk that begins at one.
+    #[inline(always)]
+    pub(super) fn near<S: Simd>(&self, simd: S, terms: &[Term], first: usize, near: &mut Near<NX>) {
+        for k in 0..COEFFICIENTS {
+            let terms = &terms[self.ranges[k].clone()];
+            self.sum(simd, terms, None, &self.held.offset[k], &mut near.offset[k], first);
+            for &i in E::FOLLOWED {
+                self.sum(simd, terms, Some(i), &self.held.slope[k][i], &mut near.slope[k][i], first);
+            }
+        }
+    }
+
+    /// Held ones and the terms along one state, or along none.
+    #[inline(always)]
+    fn sum<S: Simd>(
+        &self,
+        simd: S,
+        terms: &[Term],
+        along: Option<usize>,
+        held: &[f64],
+        near: &mut [f64; POINTS],
+        first: usize,
+    ) {
+        let held = held.get(first..first + POINTS);
+        for at in (0..POINTS).step_by(VECTOR) {
+            let mut sum = [simd.splat_f64s(0.0); VECTOR];
+            if let Some(held) = held {
+                for n in 0..VECTOR / S::F64_LANES {
+                    sum[n] = load::<S>(held, at + n * S::F64_LANES);
+                }
+            }
+            for term in terms.iter().filter(|t| t.acting.along == along) {
+                let (value, column) = (simd.splat_f64s(term.value), &self.columns[term.acting.column]);
+                let column = &column[first + at..][..VECTOR];
+                for n in 0..VECTOR / S::F64_LANES {
+                    sum[n] = simd.mul_add_f64s(value, load::<S>(column, n * S::F64_LANES), sum[n]);
+                }
+            }
+            for n in 0..VECTOR / S::F64_LANES {
+                store::<S>(near, at + n * S::F64_LANES, sum[n]);
+            }
+        }
+    }
+
     /// The regressor of each free derivative at a point and state.
     pub(super) fn regressors_at(&self, point: usize, x: &SVector<f64, NX>, regressors: &mut [f64]) {
         for (r, acting) in regressors.iter_mut().zip(&self.acting) {
@@ -289,14 +359,53 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 /// What a case keeps of the motion.
 struct Along<const NX: usize, E: Equations<NX>> {
     known: Vec<E::Known>,
+    /// α and β at the c.g. at every point, rad.
+    flow: Vec<[f64; 2]>,
     sensed: Vec<E::Sensed>,
     states: Vec<SVector<f64, NX>>,
     implied: Vec<[f64; COEFFICIENTS]>,
 }
 
-impl<const NX: usize, E: Equations<NX>> Default for Along<NX, E> {
-    fn default() -> Self {
-        Along { known: vec![], sensed: vec![], states: vec![], implied: vec![] }
+impl<const NX: usize, E: Equations<NX>> Along<NX, E> {
+    fn over(aircraft: &Aircraft, window: &Window) -> Self {
+        let (points, samples) = (window.len(), window.samples);
+        let mut along = Along {
+            known: Vec::with_capacity(points + 2),
+            flow: Vec::with_capacity(points),
+            sensed: Vec::with_capacity(samples),
+            states: Vec::with_capacity(samples),
+            implied: Vec::with_capacity(samples),
+        };
+        Arch::new().dispatch(Over { aircraft, window, along: &mut along });
+        along
+    }
+}
+
+/// Takes over the motion point by point, compiled for the processor at hand.
+struct Over<'a, const NX: usize, E: Equations<NX>> {
+    aircraft: &'a Aircraft,
+    window: &'a Window,
+    along: &'a mut Along<NX, E>,
+}
+
+impl<const NX: usize, E: Equations<NX>> WithSimd for Over<'_, NX, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Over { aircraft, window, along } = self;
+        let motion = window.motion(aircraft);
+        for point in 0..window.len() {
+            let motion = motion.at(point);
+            let known = E::known(aircraft, &motion);
+            along.flow.push([motion.alpha, motion.beta]);
+            if point % 2 == 0 {
+                along.sensed.push(E::sensed(aircraft, &motion));
+                along.states.push(E::measured_state(&motion));
+                along.implied.push(E::coefficients(aircraft, &motion, &known));
+            }
+            along.known.push(known);
+        }
     }
 }
 
@@ -304,60 +413,61 @@ impl<const NX: usize, E: Equations<NX>> Default for Along<NX, E> {
 struct Columns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
-    /// Of each column a derivative that has it, and its surface's deflections.
-    asked: Vec<(&'a Derivative, &'a [f64])>,
-    values: Vec<Vec<f64>>,
+    /// Of each column a derivative that has it.
+    asked: Vec<&'a Derivative>,
     equations: PhantomData<E>,
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
     fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
-        Columns { aircraft, window, asked: vec![], values: vec![], equations: PhantomData }
+        Columns { aircraft, window, asked: vec![], equations: PhantomData }
     }
 
     /// How a derivative acts. Two share a column when they have the same regressor, but a vane's moment is not its force.
     fn acting(&mut self, derivative: &'a Derivative) -> Acting {
         let moment = |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
-        let same = |d: &Derivative| d.regressor == derivative.regressor && moment(d) == moment(derivative);
-        let column = self.asked.iter().position(|(d, _)| same(d)).unwrap_or_else(|| {
-            let deflections = derivative.regressor.surface().map_or::<&[f64], _>(&[], |name| self.window.signal(name));
-            self.asked.push((derivative, deflections));
-            self.values.push(Vec::with_capacity(self.window.len()));
-            self.values.len() - 1
+        let same = |d: &&Derivative| d.regressor == derivative.regressor && moment(d) == moment(derivative);
+        let column = self.asked.iter().position(same).unwrap_or_else(|| {
+            self.asked.push(derivative);
+            self.asked.len() - 1
         });
         Acting { coefficient: derivative.coefficient.index(), along: E::state_of(&derivative.regressor), column }
     }
 
-    /// Adds a point to every column.
-    fn take(&mut self, point: usize, motion: &Motion) {
-        for ((derivative, deflections), values) in self.asked.iter().zip(&mut self.values) {
-            values.push(regressor::<NX, E>(self.aircraft, motion, derivative, deflections, point));
-        }
+    /// Every column at every point, with room for points beyond.
+    fn filled(&self, along: &Along<NX, E>) -> Vec<Vec<f64>> {
+        let filled = |derivative: &&Derivative| {
+            let mut column = Vec::with_capacity(self.window.len() + BEYOND);
+            self.fill(derivative, along, &mut column);
+            column
+        };
+        self.asked.iter().map(filled).collect()
     }
-}
 
-/// A derivative's regressor at a point; where it is a state the factor of proportion.
-fn regressor<const NX: usize, E: Equations<NX>>(
-    aircraft: &Aircraft,
-    motion: &Motion,
-    derivative: &Derivative,
-    deflections: &[f64],
-    point: usize,
-) -> f64 {
-    if let Some((_, factor)) = E::state_regressor(aircraft, motion, &derivative.regressor) {
-        return factor;
-    }
-    let [p, q, r] = motion.rates;
-    let rate = |length: f64, rate: f64| rate * length / (2.0 * motion.velocity);
-    match &derivative.regressor {
-        Regressor::Constant => 1.0,
-        Regressor::Alpha => motion.alpha * DEG,
-        Regressor::Beta => motion.beta * DEG,
-        Regressor::RollRate => rate(aircraft.span_ft, p),
-        Regressor::PitchRate => rate(aircraft.chord_ft, q),
-        Regressor::YawRate => rate(aircraft.span_ft, r),
-        Regressor::Surface(_) | Regressor::Vane(_) => {
-            deflections[point] * surface_factor(aircraft, motion.qbar, derivative)
+    /// A derivative's regressor at every point; where it is a state the factor of proportion.
+    fn fill(&self, derivative: &Derivative, along: &Along<NX, E>, column: &mut Vec<f64>) {
+        let (aircraft, velocity) = (self.aircraft, self.window.signal(signal::VELOCITY));
+        let regressor = &derivative.regressor;
+        if E::state_of(regressor).is_some() {
+            let factor = |v: &f64| E::state_regressor(aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor);
+            return column.extend(velocity.iter().map(factor));
+        }
+        let mut rate = |name: &str, length: f64| {
+            let both = self.window.signal(name).iter().zip(velocity);
+            column.extend(both.map(|(rate, v)| rate / DEG * length / (2.0 * v)));
+        };
+        match regressor {
+            Regressor::RollRate => rate(signal::P, aircraft.span_ft),
+            Regressor::PitchRate => rate(signal::Q, aircraft.chord_ft),
+            Regressor::YawRate => rate(signal::R, aircraft.span_ft),
+            Regressor::Constant => column.resize(self.window.len(), 1.0),
+            Regressor::Alpha => column.extend(along.flow.iter().map(|[alpha, _]| alpha * DEG)),
+            Regressor::Beta => column.extend(along.flow.iter().map(|[_, beta]| beta * DEG)),
+            Regressor::Surface(name) => column.extend(self.window.signal(name)),
+            Regressor::Vane(name) => {
+                let both = self.window.signal(name).iter().zip(self.window.signal(signal::QBAR));
+                column.extend(both.map(|(force, qbar)| force * surface_factor(aircraft, *qbar, derivative)));
+            }
         }
     }
 }

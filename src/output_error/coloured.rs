@@ -7,6 +7,8 @@
 //!
 //! For this sensitivities are taken as S T with T Tᵀ = H⁻¹, which makes H the unit matrix.
 //!
+//! Variances from a noise that is itself estimated are known with few degrees of freedom ([`freedom`]).
+//!
 //! Noise is seen through blocks of samples: what moves slower than a block is the autoregressive process, with few
 //! coefficients even where it is far slower; what moves faster is white within the blocks. Parameters act slower than a
 //! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
@@ -17,6 +19,7 @@ use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::autoregression::Autoregression;
+use super::freedom::{self, Known, Part};
 use super::kernel::load;
 use super::lanes::{Aligned, VECTOR};
 use super::normal::Rows;
@@ -42,8 +45,9 @@ pub struct Series {
     /// Which blocks have a sample that counts, and the means of their residuals.
     used: Vec<bool>,
     residuals: Vec<f64>,
-    /// Variance of the samples about their block's mean.
+    /// Variance of the samples about their block's mean, and the degrees of freedom with which it is known.
     fast: f64,
+    fast_freedom: f64,
     /// Means of the sensitivities over the blocks, a row of whole vectors for each; of a block that does not count whole
     /// they are less.
     sensitivities: Aligned,
@@ -63,11 +67,38 @@ struct OutputNoise {
     fast: f64,
 }
 
+/// The scatter of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimated {
+    pub covariance: DMatrix<f64>,
+    /// Degrees of freedom with which each variance is known.
+    pub freedom: Vec<f64>,
+}
+
+impl Estimated {
+    /// The covariance whose roots times 1.96 are intervals of 95 %: Student's, not normal ones.
+    #[must_use]
+    pub fn of_student(mut self) -> DMatrix<f64> {
+        for (j, freedom) in self.freedom.iter().enumerate() {
+            let factor = freedom::longer(*freedom);
+            self.covariance.row_mut(j).scale_mut(factor);
+            self.covariance.column_mut(j).scale_mut(factor);
+        }
+        self.covariance
+    }
+}
+
 /// Covariance of the parameters, where T Tᵀ = H⁻¹ and each output has independent noise.
 #[must_use]
-pub fn covariance(root: &DMatrix<f64>, outputs: Vec<Series>) -> DMatrix<f64> {
+pub fn covariance(root: &DMatrix<f64>, outputs: Vec<Series>) -> Estimated {
     let outputs = transformed(root, outputs);
-    root * gradient_covariance(&outputs, &settled(&outputs)) * root.transpose()
+    let noise = settled(&outputs);
+    let covariance = root * gradient_covariance(&outputs, &noise) * root.transpose();
+    let mut known = Known::nothing(root.nrows());
+    for (output, noise) in outputs.iter().zip(&noise.0) {
+        output.know(noise, root, &mut known);
+    }
+    Estimated { covariance, freedom: known.freedom() }
 }
 
 /// The noise that residuals of a fit speak for, where T Tᵀ = H⁻¹.
@@ -162,13 +193,15 @@ impl Series {
     ) -> Series {
         let (block, parameters) = (samples_of_block(step_s), squares.nrows());
         let blocks = used.len().div_ceil(block);
+        let (fast, fast_freedom) = fast_variance(residuals, used, block);
         let mut series = Series {
             weight,
             block,
             parameters,
             used: Vec::with_capacity(blocks),
             residuals: Vec::with_capacity(blocks),
-            fast: fast_variance(residuals, used, block),
+            fast,
+            fast_freedom,
             sensitivities: Aligned::zeros(blocks * width(parameters)),
             within: squares,
         };
@@ -179,12 +212,20 @@ impl Series {
             series.used.push(count > 0);
             series.residuals.push(residuals[samples.clone()].iter().sum::<f64>() / count.max(1) as f64);
             add_sum(samples, row);
-            for (j, mut column) in series.within.column_iter_mut().enumerate() {
-                let factor = row[j] / count.max(1) as f64;
-                column.iter_mut().zip(row.iter()).for_each(|(within, s)| *within -= factor * s);
-            }
+            // So that a sum's square counts per sample.
+            let scale = 1.0 / (count.max(1) as f64).sqrt();
             for s in row.iter_mut() {
-                *s /= block as f64;
+                *s *= scale;
+            }
+        }
+        let mut between = Scatter::zeros(parameters);
+        between.add_squares(series.sensitivities.slice(), 1.0);
+        series.within -= between.whole();
+        let rows = series.sensitivities.slice_mut().chunks_exact_mut(width(parameters).max(1));
+        for (used, row) in used.chunks(block).zip(rows) {
+            let count = used.iter().filter(|used| **used).count().max(1) as f64;
+            for s in row.iter_mut() {
+                *s *= count.sqrt() / block as f64;
             }
         }
         series
@@ -216,14 +257,30 @@ impl Series {
     /// S to S T.
     fn transform(&mut self, root: &DMatrix<f64>) {
         let width = width(self.parameters);
-        let mut rows = Aligned::zeros(self.parameters * width);
-        for (i, row) in rows.slice_mut().chunks_exact_mut(width.max(1)).enumerate() {
-            row.iter_mut().zip(root.row(i).iter()).for_each(|(row, root)| *row = *root);
-        }
+        let rows = rows_of(root, width);
         let before = std::mem::replace(&mut self.sensitivities, Aligned::zeros(self.used.len() * width));
         let (rows, from) = (rows.slice(), before.slice());
         Arch::new().dispatch(Product { from, matrix: rows, to: self.sensitivities.slice_mut(), width });
         self.within = root.transpose() * &self.within * root;
+    }
+
+    /// Adds what this output's noise gives the parameters, and how well that is known. Sensitivities are S T.
+    fn know(&self, noise: &OutputNoise, root: &DMatrix<f64>, known: &mut Known) {
+        let (width, weight) = (width(self.parameters), self.block_weight());
+        let own = root * &self.within * root.transpose();
+        let within = self.weight * self.weight * noise.fast;
+        known.add(own.diagonal().iter().map(|v| within * v), self.fast_freedom);
+        let matrix = rows_of(&root.transpose(), width);
+        let mut changes = vec![0.0; (self.used.len() + noise.slow.memory(self.used.len())) * width];
+        let from = self.sensitivities.slice();
+        Arch::new().dispatch(Product { from, matrix: matrix.slice(), to: &mut changes[..from.len()], width });
+        for change in &mut changes {
+            *change *= weight;
+        }
+        // With H the unit matrix, this is what the parameters took of the blocks.
+        let taken = weight * from.iter().map(|s| s * s).sum::<f64>();
+        let freedom = self.used.iter().filter(|used| **used).count() as f64 - taken;
+        Arch::new().dispatch(Part { noise: &noise.slow, changes, width, freedom, known });
     }
 
     fn fitted(&self, autocovariances: &[f64]) -> Autoregression {
@@ -288,14 +345,23 @@ impl Series {
     }
 }
 
+/// A matrix row by row, each padded to `width`.
+fn rows_of(matrix: &DMatrix<f64>, width: usize) -> Aligned {
+    let mut rows = Aligned::zeros(matrix.nrows() * width);
+    for (i, row) in rows.slice_mut().chunks_exact_mut(width.max(1)).enumerate() {
+        row.iter_mut().zip(matrix.row(i).iter()).for_each(|(row, v)| *row = *v);
+    }
+    rows
+}
+
 /// Samples of a block.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
 fn samples_of_block(step_s: f64) -> usize {
     (BLOCK_S / step_s).round().max(1.0) as usize
 }
 
-/// Variance of the residuals about their block's mean.
-fn fast_variance(residuals: &[f64], used: &[bool], block: usize) -> f64 {
+/// Variance of the residuals about their block's mean, and its degrees of freedom.
+fn fast_variance(residuals: &[f64], used: &[bool], block: usize) -> (f64, f64) {
     let (mut square, mut freedom) = (0.0, 0);
     for (v, used) in residuals.chunks(block).zip(used.chunks(block)) {
         let counted = || v.iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| *v);
@@ -304,7 +370,8 @@ fn fast_variance(residuals: &[f64], used: &[bool], block: usize) -> f64 {
         square += counted().map(|v| (v - mean) * (v - mean)).sum::<f64>();
         freedom += count.saturating_sub(1);
     }
-    square / freedom.max(1) as f64
+    let freedom = freedom.max(1) as f64;
+    (square / freedom, freedom)
 }
 
 /// Σ Sᵀ W R W S, rows of whole vectors.
@@ -457,7 +524,7 @@ mod tests {
     use super::*;
 
     /// The variance stated for the mean of values, given their residuals from it; H = w N and T = 1/√H.
-    fn of_the_mean(values: &[f64], used: &[bool]) -> f64 {
+    fn of_the_mean(values: &[f64], used: &[bool]) -> Estimated {
         let weight = 3.0;
         let count = used.iter().filter(|used| **used).count() as f64;
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
@@ -467,7 +534,7 @@ mod tests {
         let series = Series::new(0.1, weight, &residuals, used, squares, |samples, row| {
             row[0] += used[samples].iter().map(|used| of(*used, 1.0)).sum::<f64>();
         });
-        covariance(&DMatrix::from_element(1, 1, 1.0 / (weight * count).sqrt()), vec![series])[(0, 0)]
+        covariance(&DMatrix::from_element(1, 1, 1.0 / (weight * count).sqrt()), vec![series])
     }
 
     #[test]
@@ -478,7 +545,12 @@ mod tests {
         let mean = means.iter().sum::<f64>() / 9.0;
         let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
         // Nine blocks, so that a degree of freedom not counted would be 11%.
-        assert_relative_eq!(of_the_mean(&values, &[true; 18]), square / 8.0 / 9.0, max_relative = 0.02);
+        let said = of_the_mean(&values, &[true; 18]);
+        assert_relative_eq!(said.covariance[(0, 0)], square / 8.0 / 9.0, max_relative = 0.02);
+        // The interval is Student's with as many.
+        assert_relative_eq!(said.freedom[0], 8.0, max_relative = 1e-9);
+        let longer = said.clone().of_student()[(0, 0)] / said.covariance[(0, 0)];
+        assert_relative_eq!(longer.sqrt(), 2.306 / 1.960, max_relative = 1e-3);
     }
 
     #[test]
@@ -495,7 +567,7 @@ mod tests {
                     value
                 })
                 .collect();
-            stated += of_the_mean(&values, &used) / f64::from(draws);
+            stated += of_the_mean(&values, &used).covariance[(0, 0)] / f64::from(draws);
             let counted: Vec<f64> = values.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect();
             let mean = counted.iter().sum::<f64>() / counted.len() as f64;
             scatter += mean * mean / f64::from(draws);
@@ -507,5 +579,31 @@ mod tests {
         // 200 draws give the scatter to 10%, the mean of the stated variances to some 3%.
         assert_relative_eq!(stated, exact, max_relative = 0.1);
         assert_relative_eq!(scatter, exact, max_relative = 0.3);
+    }
+
+    #[test]
+    fn intervals_hold_the_mean_of_few_coloured_values_as_often_as_they_say() {
+        // 30 periods of a slow process: normal intervals hold the truth in nine cases of ten.
+        let (samples, draws, c) = (160, 1000, 0.8_f64);
+        let mut noise = Noise(20_260_303);
+        let (mut normal, mut student) = (0, 0);
+        for _ in 0..draws {
+            let mut value = noise.gaussian();
+            let values: Vec<f64> = (0..samples)
+                .map(|_| {
+                    value = c * value + (1.0 - c * c).sqrt() * noise.gaussian();
+                    value
+                })
+                .collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let said = of_the_mean(&values, &vec![true; samples]);
+            let within = |variance: f64| u32::from(mean.abs() < 1.96 * variance.sqrt());
+            normal += within(said.covariance[(0, 0)]);
+            student += within(said.of_student()[(0, 0)]);
+        }
+        let (normal, student) = (f64::from(normal) / f64::from(draws), f64::from(student) / f64::from(draws));
+        // 1000 draws give a share to 0.7 %.
+        assert!(student > normal + 0.005, "Student {student}, normal {normal}");
+        assert!((0.93..0.975).contains(&student), "Student {student}, normal {normal}");
     }
 }

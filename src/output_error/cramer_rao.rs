@@ -2,7 +2,9 @@
 //!
 //! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹; it is H⁻¹, the
 //! usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate weights that are not. Correlated residuals are
-//! counted by their autocovariance ([`coloured`]), and the bound is never below the one for white ones.
+//! counted by their autocovariance ([`coloured`]), and the bound is never below the one for white ones. Where that
+//! autocovariance is known from little, the corrected bound is longer by what Student's t says, so that ±1.96 of it are an
+//! interval of 95 %.
 
 use std::collections::BTreeMap;
 
@@ -94,7 +96,8 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
     let inputs = data.input_covariance(&fit.values, &sensitivities, &fit.weights);
-    let corrected = never_below(coloured::covariance(root, series), &covariance) + &inverse * inputs * &inverse;
+    let corrected =
+        never_below(coloured::covariance(root, series).of_student(), &covariance) + &inverse * inputs * &inverse;
     Some(Bounds { covariance, corrected })
 }
 

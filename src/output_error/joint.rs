@@ -108,6 +108,22 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     }
 }
 
+impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
+    /// Computes each member's response. The sample at which one diverges is counted through the members in order.
+    fn each(
+        &self,
+        response: &mut [Response],
+        respond: impl Fn(&Member<'a, NX, E>, &mut Response) -> Result<(), Diverged>,
+    ) -> Result<(), Diverged> {
+        let mut before = 0;
+        for (member, response) in self.members.iter().zip(response) {
+            respond(member, response).map_err(|d| Diverged { sample: before + d.sample })?;
+            before += member.case.samples();
+        }
+        Ok(())
+    }
+}
+
 impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     type Response = Vec<Response>;
     type Sensitivities = Vec<Sensitivities>;
@@ -120,15 +136,12 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         self.members.iter().map(|m| m.case.response()).collect()
     }
 
-    /// The sample at which one diverges is counted through the members in order.
     fn respond(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
-        let mut before = 0;
-        for (member, response) in self.members.iter().zip(response) {
-            let shift = |d: Diverged| Diverged { sample: before + d.sample };
-            member.case.respond(&member.parameters(parameters), response).map_err(shift)?;
-            before += member.case.samples();
-        }
-        Ok(())
+        self.each(response, |member, response| member.case.respond(&member.parameters(parameters), response))
+    }
+
+    fn respond_roughly(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
+        self.each(response, |member, response| member.case.respond_roughly(&member.parameters(parameters), response))
     }
 
     fn sensitivities(&self, parameters: &[f64]) -> Result<Vec<Sensitivities>, Diverged> {
@@ -137,12 +150,18 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
         let n = self.names.len();
-        let mut sums =
-            Sums { weighted_square: 0.0, gradient: DVector::zeros(n), information: DMatrix::zeros(n, n), count: 0 };
+        let mut sums = Sums {
+            weighted_square: 0.0,
+            gradient: DVector::zeros(n),
+            information: DMatrix::zeros(n, n),
+            count: 0,
+            whole: true,
+        };
         for (member, response) in self.members.iter().zip(response) {
             let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
             sums.count += own.count;
+            sums.whole &= own.whole;
             for (g, &place) in own.gradient.iter().zip(&member.places) {
                 sums.gradient[place] += g;
             }

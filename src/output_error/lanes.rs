@@ -77,13 +77,17 @@ impl Lanes {
         self.groups[COEFFICIENTS].start
     }
 
-    /// The regressors of the derivatives point by point in the order of the lanes, zero in the padding.
+    /// The regressors of the derivatives point by point in the order of the lanes, zero in the padding and at two points
+    /// beyond the last: those of a step from there.
     pub fn spread(&self, acting: &[Acting], columns: &[Vec<f64>], points: usize) -> Aligned {
         let width = self.derivatives();
-        let mut rows = Aligned::zeros(points * width);
-        for (a, lane) in acting.iter().zip(&self.places) {
-            for (row, r) in rows.slice_mut().chunks_exact_mut(width).zip(&columns[a.column]) {
-                row[*lane] = *r;
+        let mut rows = Aligned::zeros((points + 2) * width);
+        let filled = rows.slice_mut();
+        let each: Vec<(usize, &[f64])> =
+            acting.iter().zip(&self.places).map(|(a, lane)| (*lane, &columns[a.column][..points])).collect();
+        for (point, row) in filled.chunks_exact_mut(width.max(1)).take(points).enumerate() {
+            for (lane, column) in &each {
+                row[*lane] = column[point];
             }
         }
         rows

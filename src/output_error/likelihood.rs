@@ -29,6 +29,12 @@ pub trait Likelihood {
     /// [`Diverged`] when an integration leaves the bounds of sense.
     fn respond(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
 
+    /// The same with information that tells the way to the minimum, but not how sharp it is.
+    ///
+    /// # Errors
+    /// [`Diverged`] when an integration leaves the bounds of sense.
+    fn respond_roughly(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
+
     /// Computes the sensitivities at these parameters.
     ///
     /// # Errors
@@ -78,6 +84,10 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
 
     fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
         Case::respond(self, parameters, response)
+    }
+
+    fn respond_roughly(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        Case::respond_roughly(self, parameters, response)
     }
 
     fn sensitivities(&self, parameters: &[f64]) -> Result<Sensitivities, Diverged> {

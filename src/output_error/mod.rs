@@ -9,8 +9,10 @@ pub mod calibration;
 mod case;
 pub mod coloured;
 pub mod cost;
+mod course;
 pub mod cramer_rao;
 pub mod equation_error;
+mod freedom;
 mod likelihood;
 pub mod holding;
 pub mod identifiability;
@@ -22,6 +24,7 @@ pub mod mean;
 pub mod newton_raphson;
 mod normal;
 mod outcome;
+mod propagators;
 mod response;
 pub mod theil;
 

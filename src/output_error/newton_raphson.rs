@@ -1,4 +1,8 @@
 //! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step does not lower the cost.
+//!
+//! Far from the minimum the second gradient may be a rough one (of a part of the samples: subsampled Newton, Byrd et al.
+//! 2011): it costs most of a pass, and the step is wrong anyway. Cost and gradient are exact always, and where the iteration
+//! ends, so is the second gradient.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -120,7 +124,7 @@ pub fn minimise<D: Likelihood>(
         covariance_calibration: None,
         covariance_corrected: None,
     };
-    if let Err(diverged) = data.respond(&fit.values, &mut response) {
+    if let Err(diverged) = data.respond_roughly(&fit.values, &mut response) {
         fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
         return fit;
     }
@@ -130,18 +134,34 @@ pub fn minimise<D: Likelihood>(
     let floor = f64::EPSILON * f64::EPSILON.sqrt() * at.weighted_square;
     let mut damping = 0.0;
     while fit.iterations < settings.max_iterations {
-        let Some(full) = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING)) else {
+        let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING));
+        let gain = full.as_ref().map(|full| at.gradient.dot(full));
+        let converged = |gain| gain <= settings.tolerance * at.weighted_square + floor;
+        if !at.whole && gain.is_none_or(converged) {
+            // Rough information decides nothing.
+            if !complete(data, &fit, &mut response, &mut at) {
+                break;
+            }
+            continue;
+        }
+        let Some(gain) = gain else {
             fit.reason = "the information matrix is singular".into();
             break;
         };
-        let gain = at.gradient.dot(&full);
-        if gain <= settings.tolerance * at.weighted_square + floor {
+        if converged(gain) {
             fit.outcome = Outcome::Converged;
             fit.reason = "a further step would not lower the cost".into();
             break;
         }
+        // Each step does to the gain about what it does to the residuals squared: after this one it may be small enough.
+        let last = gain <= settings.tolerance.sqrt() * at.weighted_square;
+        let better = lower(data, &fit.values, &at, &weights, &mut damping, last, &mut trial);
+        if better.is_none() && !at.whole && complete(data, &fit, &mut response, &mut at) {
+            damping = 0.0;
+            continue;
+        }
         fit.iterations += 1;
-        let Some(better) = lower(data, &fit.values, &at, &weights, &mut damping, &mut trial) else {
+        let Some(better) = better else {
             fit.reason = "no step lowers the cost".into();
             break;
         };
@@ -149,24 +169,37 @@ pub fn minimise<D: Likelihood>(
         at = better.1;
         std::mem::swap(&mut response, &mut trial);
     }
+    if !at.whole {
+        complete(data, &fit, &mut response, &mut at);
+    }
     fit.final_cost = Some(at.cost());
     fit.response = response;
     fit
 }
 
-/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
+/// Makes rough information whole, at the same values.
+fn complete<D: Likelihood>(data: &D, fit: &Fit<D::Response>, response: &mut D::Response, at: &mut Sums) -> bool {
+    let possible = data.respond(&fit.values, response).is_ok();
+    *at = data.sums(response, &fit.weights);
+    possible
+}
+
+/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`, whole where it may be
+/// the last one.
 fn lower<D: Likelihood>(
     data: &D,
     values: &[f64],
     at: &Sums,
     weights: &[f64; OUTPUTS],
     damping: &mut f64,
+    last: bool,
     trial: &mut D::Response,
 ) -> Option<(Vec<f64>, Sums)> {
     while *damping < MOST_DAMPING {
         if let Some(d) = step(at, *damping) {
             let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
-            if data.respond(&next, trial).is_ok() {
+            let possible = if last { data.respond(&next, trial) } else { data.respond_roughly(&next, trial) };
+            if possible.is_ok() {
                 let sums = data.sums(trial, weights);
                 let gain = at.weighted_square - sums.weighted_square;
                 if gain > 0.0 {

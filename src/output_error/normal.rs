@@ -1,6 +1,9 @@
 //! The sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples that count. Weights
 //! come later, so that other weights need no other pass.
 //!
+//! Σ s sᵀ is most of the work. Far from the minimum it may be that of every fourth sample, times four: it says where to go
+//! well enough, while gradient and cost are those of all samples.
+//!
 //! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one symmetric matrix, updated
 //! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
 //! past, and only tiles that touch the lower triangle are computed.
@@ -11,7 +14,8 @@ use nalgebra::{DMatrix, DVector};
 use pulp::Simd;
 
 use super::case::Measurements;
-use super::kernel::{Sink, load, store};
+use super::course::{Meanwhile, Nothing};
+use super::kernel::Sink;
 use super::lanes::{Aligned, Lanes, VECTOR};
 use crate::dynamics::OUTPUTS;
 
@@ -20,6 +24,12 @@ use crate::dynamics::OUTPUTS;
 pub(super) struct Normal {
     /// Of each output Σ over rows (s, v, 1) of their squares, row by row; the lower triangle counts.
     squares: [Aligned; OUTPUTS],
+    /// Of each output Σ v (s, v, 1).
+    moments: [Aligned; OUTPUTS],
+    /// Samples that count.
+    counts: [usize; OUTPUTS],
+    /// The squares are of every so many samples.
+    every: usize,
     lanes: Lanes,
     /// Derivatives, which come before the biases among the parameters; initial states come after them.
     derivatives: usize,
@@ -28,32 +38,41 @@ pub(super) struct Normal {
 
 impl Normal {
     pub fn new(lanes: &Lanes, derivatives: usize, biased: &[usize]) -> Normal {
-        let size = lanes.width() * lanes.width();
+        let width = lanes.width();
         Normal {
-            squares: std::array::from_fn(|_| Aligned::zeros(size)),
+            squares: std::array::from_fn(|_| Aligned::zeros(width * width)),
+            moments: std::array::from_fn(|_| Aligned::zeros(width)),
+            counts: [0; OUTPUTS],
+            every: 1,
             lanes: lanes.clone(),
             derivatives,
             biased: biased.to_vec(),
         }
     }
 
-    pub fn clear(&mut self) {
-        self.squares.iter_mut().for_each(|squares| squares.slice_mut().fill(0.0));
+    /// Begins anew, with the squares of every so many samples, a divisor of a chunk's.
+    pub fn clear(&mut self, every: usize) {
+        self.squares.iter_mut().chain(&mut self.moments).for_each(|sums| sums.slice_mut().fill(0.0));
+        (self.counts, self.every) = ([0; OUTPUTS], every);
+    }
+
+    /// Whether the squares are of all samples.
+    pub fn whole(&self) -> bool {
+        self.every == 1
     }
 
     /// Samples of an output that count.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sum of ones")]
     pub fn count(&self, output: usize) -> usize {
-        self.at(output, self.lanes.one, self.lanes.one) as usize
+        self.counts[output]
     }
 
     /// Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
-        self.at(output, self.lanes.residual, self.lanes.residual)
+        self.moments[output].slice()[self.lanes.residual]
     }
 
     fn at(&self, output: usize, i: usize, j: usize) -> f64 {
-        self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
+        self.every as f64 * self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
     }
 
     /// The lane of each parameter; of a bias that of the ones, and the output where alone it is.
@@ -69,7 +88,7 @@ impl Normal {
         let lanes = self.parameters();
         let of = |(lane, only): (usize, Option<usize>)| -> f64 {
             let outputs = (0..OUTPUTS).filter(|o| only.is_none_or(|only| only == *o));
-            outputs.map(|o| weights[o] * self.at(o, lane, self.lanes.residual)).sum()
+            outputs.map(|o| weights[o] * self.moments[o].slice()[lane]).sum()
         };
         DVector::from_iterator(lanes.len(), lanes.iter().map(|lane| of(*lane)))
     }
@@ -86,7 +105,8 @@ impl Normal {
         let width = self.lanes.width();
         let mut sum = vec![0.0; width * width];
         for (squares, w) in self.squares.iter().zip(weights) {
-            sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += w * s);
+            let factor = w * self.every as f64;
+            sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s);
         }
         let lanes = self.parameters();
         let both = |(i, first): (usize, Option<usize>), (j, second): (usize, Option<usize>)| match (first, second) {
@@ -113,8 +133,15 @@ pub(super) struct Summing<'a> {
 
 impl Sink for Summing<'_> {
     #[inline(always)]
-    fn take<S: Simd>(&mut self, simd: S, first: usize, outputs: &[[f64; OUTPUTS]], rows: &mut [f64]) {
-        let Normal { squares, lanes, .. } = &mut *self.normal;
+    fn take<S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        outputs: &[[f64; OUTPUTS]],
+        rows: &mut [f64],
+        meanwhile: &mut impl Meanwhile,
+    ) {
+        let Normal { squares, moments, counts, every, lanes, .. } = &mut *self.normal;
         let width = lanes.width();
         for (k, y) in outputs.iter().enumerate() {
             for o in 0..OUTPUTS {
@@ -122,17 +149,23 @@ impl Sink for Summing<'_> {
                 if self.measurements.used[first + k][o] {
                     row[lanes.residual] = self.measurements.values[first + k][o] - y[o];
                     row[lanes.one] = 1.0;
+                    counts[o] += 1;
                 } else {
                     row.fill(0.0);
                 }
             }
         }
         for o in 0..OUTPUTS {
-            let rows = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
-            rows.add_squares(simd, &lanes.used, squares[o].slice_mut(), width);
+            let all = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
+            all.add_moments(simd, lanes.residual, moments[o].slice_mut());
+            let rows = Rows { stride: *every * all.stride, samples: all.samples.div_ceil(*every), ..all };
+            rows.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
         }
     }
 }
+
+/// Samples of a tile between two stages of what goes on meanwhile: about as long as a stage waits.
+const SAMPLES_BETWEEN: usize = 4;
 
 /// Rows of some samples, `stride` apart.
 #[derive(Clone, Copy)]
@@ -147,32 +180,83 @@ impl Rows<'_> {
     /// in use.
     #[inline(always)]
     pub fn add_squares<S: Simd>(self, simd: S, used: &[usize], matrix: &mut [f64], width: usize) {
+        self.add_squares_beside(simd, used, matrix, width, &mut Nothing);
+    }
+
+    /// The same while something else goes on.
+    #[inline(always)]
+    pub fn add_squares_beside<S: Simd>(
+        self,
+        simd: S,
+        used: &[usize],
+        matrix: &mut [f64],
+        width: usize,
+        meanwhile: &mut impl Meanwhile,
+    ) {
         for vector in 0..used.len() {
             let first = vector * VECTOR;
             match used[vector] {
                 0 => {}
-                1 => self.rows::<S, 1>(simd, first, matrix, width),
-                2 => self.rows::<S, 2>(simd, first, matrix, width),
-                3 => self.rows::<S, 3>(simd, first, matrix, width),
-                4 => self.rows::<S, 4>(simd, first, matrix, width),
-                5 => self.rows::<S, 5>(simd, first, matrix, width),
-                6 => self.rows::<S, 6>(simd, first, matrix, width),
-                7 => self.rows::<S, 7>(simd, first, matrix, width),
-                _ => self.rows::<S, VECTOR>(simd, first, matrix, width),
+                1 => self.rows::<S, 1>(simd, first, matrix, width, meanwhile),
+                2 => self.rows::<S, 2>(simd, first, matrix, width, meanwhile),
+                3 => self.rows::<S, 3>(simd, first, matrix, width, meanwhile),
+                4 => self.rows::<S, 4>(simd, first, matrix, width, meanwhile),
+                5 => self.rows::<S, 5>(simd, first, matrix, width, meanwhile),
+                6 => self.rows::<S, 6>(simd, first, matrix, width, meanwhile),
+                7 => self.rows::<S, 7>(simd, first, matrix, width, meanwhile),
+                _ => self.rows::<S, VECTOR>(simd, first, matrix, width, meanwhile),
             }
         }
     }
 
+    /// Adds Σ v s to a row, v being one of the lanes.
+    #[inline(always)]
+    fn add_moments<S: Simd>(self, simd: S, v: usize, row: &mut [f64]) {
+        let mut lane = 0;
+        while lane + 3 * S::F64_LANES <= row.len() {
+            self.moments::<S, 3>(simd, v, lane, row);
+            lane += 3 * S::F64_LANES;
+        }
+        while lane < row.len() {
+            self.moments::<S, 1>(simd, v, lane, row);
+            lane += S::F64_LANES;
+        }
+    }
+
+    /// The same of `C` vectors.
+    #[inline(always)]
+    fn moments<S: Simd, const C: usize>(self, simd: S, v: usize, lane: usize, row: &mut [f64]) {
+        let into = S::as_mut_simd_f64s(&mut row[lane..lane + C * S::F64_LANES]).0;
+        let mut sums = [simd.splat_f64s(0.0); C];
+        sums.copy_from_slice(into);
+        for k in 0..self.samples {
+            let row = &self.values[k * self.stride..];
+            let factor = simd.splat_f64s(row[v]);
+            let s = S::as_simd_f64s(&row[lane..lane + C * S::F64_LANES]).0;
+            for c in 0..C {
+                sums[c] = simd.mul_add_f64s(factor, s[c], sums[c]);
+            }
+        }
+        into.copy_from_slice(&sums);
+    }
+
     /// `T` rows of the matrix, from its left edge to the diagonal.
     #[inline(always)]
-    fn rows<S: Simd, const T: usize>(self, simd: S, first: usize, matrix: &mut [f64], width: usize) {
+    fn rows<S: Simd, const T: usize>(
+        self,
+        simd: S,
+        first: usize,
+        matrix: &mut [f64],
+        width: usize,
+        meanwhile: &mut impl Meanwhile,
+    ) {
         let mut lane = 0;
         while lane + S::F64_LANES < first + T {
-            self.tile::<S, T, 2>(simd, first, lane, matrix, width);
+            self.tile::<S, T, 2>(simd, first, lane, matrix, width, meanwhile);
             lane += 2 * S::F64_LANES;
         }
         if lane < first + T {
-            self.tile::<S, T, 1>(simd, first, lane, matrix, width);
+            self.tile::<S, T, 1>(simd, first, lane, matrix, width, meanwhile);
         }
     }
 
@@ -185,19 +269,21 @@ impl Rows<'_> {
         lane: usize,
         matrix: &mut [f64],
         width: usize,
+        meanwhile: &mut impl Meanwhile,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
+        let matrix = &mut matrix[first * width + lane..(first + T - 1) * width + lane + C * S::F64_LANES];
         for t in 0..T {
-            for c in 0..C {
-                sums[t][c] = load::<S>(matrix, (first + t) * width + lane + c * S::F64_LANES);
-            }
+            let row = S::as_simd_f64s(&matrix[t * width..][..C * S::F64_LANES]).0;
+            sums[t].copy_from_slice(row);
         }
         for k in 0..self.samples {
+            if k % SAMPLES_BETWEEN == 0 {
+                meanwhile.advance();
+            }
             let row = &self.values[k * self.stride..];
             let mut s = [simd.splat_f64s(0.0); C];
-            for c in 0..C {
-                s[c] = load::<S>(row, lane + c * S::F64_LANES);
-            }
+            s.copy_from_slice(S::as_simd_f64s(&row[lane..][..C * S::F64_LANES]).0);
             let factors = &row[first..first + T];
             for t in 0..T {
                 let factor = simd.splat_f64s(factors[t]);
@@ -207,9 +293,8 @@ impl Rows<'_> {
             }
         }
         for t in 0..T {
-            for c in 0..C {
-                store::<S>(matrix, (first + t) * width + lane + c * S::F64_LANES, sums[t][c]);
-            }
+            let row = S::as_mut_simd_f64s(&mut matrix[t * width..][..C * S::F64_LANES]).0;
+            row.copy_from_slice(&sums[t]);
         }
     }
 }

@@ -4,6 +4,7 @@
 use pulp::Simd;
 
 use super::case::Case;
+use super::course::Meanwhile;
 use super::kernel::Sink;
 use super::lanes::Aligned;
 use super::normal::{Normal, Summing};
@@ -55,7 +56,14 @@ struct Keeping<'a> {
 }
 
 impl Sink for Keeping<'_> {
-    fn take<S: Simd>(&mut self, _: S, first: usize, outputs: &[[f64; OUTPUTS]], rows: &mut [f64]) {
+    fn take<S: Simd>(
+        &mut self,
+        _: S,
+        first: usize,
+        outputs: &[[f64; OUTPUTS]],
+        rows: &mut [f64],
+        _: &mut impl Meanwhile,
+    ) {
         let row = OUTPUTS * self.kept.width;
         let kept = &mut self.kept.rows.slice_mut()[first * row..][..outputs.len() * row];
         kept.copy_from_slice(&rows[..outputs.len() * row]);
@@ -86,8 +94,24 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
     pub fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        self.respond_every(1, parameters, response)
+    }
+
+    /// The same, with an information matrix of every few samples where there are plenty: at least so many rows of five
+    /// outputs a parameter are left.
+    ///
+    /// # Errors
+    /// [`Diverged`] when the state leaves the bounds of sense or is no number.
+    pub fn respond_roughly(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        const ROWS_A_PARAMETER: usize = 8;
+        let plenty = self.samples() / (ROWS_A_PARAMETER * self.parameters().max(1));
+        let every = if plenty >= 4 { 4 } else { plenty.clamp(1, 2) };
+        self.respond_every(every, parameters, response)
+    }
+
+    fn respond_every(&self, every: usize, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
         let Response { outputs, normal } = response;
-        normal.clear();
+        normal.clear(every);
         self.pass(parameters, outputs, &mut Summing { normal, measurements: &self.measurements })
     }
 

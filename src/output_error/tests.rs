@@ -273,10 +273,10 @@ fn the_bound_is_the_scatter_for_white_noise_and_weights_that_are_not_its_inverse
 
 #[test]
 fn the_corrected_bound_counts_colour_that_the_bound_for_white_noise_misses() {
-    // 80 draws give a scatter to 8%; three standard errors to each side.
+    // 80 draws give a scatter to 8%; three standard errors to each side. Student's t makes the bound some 10% longer.
     for (name, white, corrected) in scatter::<3, Longitudinal>(80, 0.9, Weights::Table) {
         assert!(white > 2.0, "{name}: the white bound should be far too small, the scatter is {white:.2} of it");
-        assert!((0.76..1.24).contains(&corrected), "{name}: the scatter is {corrected:.2} of the corrected bound");
+        assert!((0.66..1.14).contains(&corrected), "{name}: the scatter is {corrected:.2} of the corrected bound");
     }
 }
 

@@ -178,8 +178,10 @@ struct Growing<'a> {
     controls: BTreeMap<&'a str, Control>,
 }
 
-/// Where one control of a train stands. Trim drifts in a turn, so a control is back at it by its level or by its steps, which
-/// then cancel.
+/// A deflection from trim is about half a reversal; a control is at trim when it is nearer to that than to a deflection.
+const TRIM_SHARE: f64 = 0.25;
+
+/// Where one control of a train stands.
 struct Control {
     trim: f64,
     now: f64,
@@ -187,24 +189,38 @@ struct Control {
     moved: f64,
     /// The smallest change that is a deflection.
     deflection: f64,
+    /// Its largest step, and its last.
+    largest: f64,
+    last: f64,
 }
 
 impl Control {
-    /// Whether a level is trim, no deflection from where the train found the control, or whether its steps cancel.
-    fn is_trim(&self, level: f64, moved: f64) -> bool {
-        (level - self.trim).abs() < self.deflection || moved.abs() < self.deflection
+    fn is_near(&self, from_trim: f64) -> bool {
+        from_trim.abs() < self.deflection.max(TRIM_SHARE * self.largest)
     }
 
+    /// Trim drifts in a turn, so a control is back at it when its steps cancel, or by its level; but a whole reversal leads
+    /// to the other side, whatever the level.
     fn rests(&self) -> bool {
-        self.is_trim(self.now, self.moved)
+        let reversed = self.last > (1.0 - TRIM_SHARE) * self.largest;
+        self.is_near(self.moved) || (self.is_near(self.now - self.trim) && !reversed)
+    }
+
+    /// Whether a step leads from away to trim, by the sum of the steps or by the level: one of them may have been slow.
+    fn comes_to_trim(&self, step: &Step) -> bool {
+        let leads = |before: f64, after: f64| !self.is_near(before) && self.is_near(after);
+        leads(self.moved, self.moved + step.change()) || leads(self.now - self.trim, step.after - self.trim)
     }
 }
 
 impl<'a> Growing<'a> {
     fn add(&mut self, signal: &'a str, step: &Step, trim: f64, deflection: f64) {
         self.to_s = step.time_s;
-        let control = self.controls.entry(signal).or_insert(Control { trim, now: trim, moved: 0.0, deflection });
+        let new = Control { trim, now: trim, moved: 0.0, deflection, largest: 0.0, last: 0.0 };
+        let control = self.controls.entry(signal).or_insert(new);
         control.now = step.after;
+        control.last = step.change().abs();
+        control.largest = control.largest.max(control.last);
         // The first step that counts may follow the deflection that opens the train.
         control.moved = if control.moved == 0.0 { step.after - trim } else { control.moved + step.change() };
     }
@@ -215,7 +231,7 @@ impl<'a> Growing<'a> {
 
     /// Whether a control of the train that is held away from trim comes back to it with this step.
     fn brings_to_trim(&self, signal: &str, step: &Step) -> bool {
-        self.controls.get(signal).is_some_and(|c| !c.rests() && c.is_trim(step.after, c.moved + step.change()))
+        self.controls.get(signal).is_some_and(|c| c.comes_to_trim(step))
     }
 
     fn longest_quiet(&self, settings: &Settings) -> f64 {

@@ -172,7 +172,7 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
 fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<(usize, usize)> {
     let edges = train.edges.get(first..end)?;
     let of_class = |class: &&Class| {
-        let inputs = class.recognition.inputs();
+        let inputs = seen.inputs(class);
         let left = edges.iter().filter(|e| !inputs.contains(e.signal)).count();
         let in_pulses = edges.iter().filter(|e| class.recognition.pulses.contains_key(e.signal)).count();
         (left, in_pulses)
@@ -247,7 +247,7 @@ fn leave<'a>(
     let nearest = misses.min_by_key(|(c, misses)| (usize::MAX - seen.explained(c), misses.len()));
     let Some((class, misses)) = nearest else { return };
     let signals = train.edges.iter().map(|e| e.signal);
-    if !signals.collect::<std::collections::BTreeSet<_>>().into_iter().any(|s| is_excitation(&seen, s)) {
+    if !signals.collect::<std::collections::BTreeSet<_>>().into_iter().any(|s| seen.is_excitation(s)) {
         return;
     }
     // Pilots move their controls anyway: a few steps, or steps among which no class finds one of its inputs complete.
@@ -256,14 +256,6 @@ fn leave<'a>(
     }
     let reason = in_words(scene, class, &misses, &seen);
     into.unknown.push(unknown(&seen, classes, class.name.clone(), reason));
-}
-
-/// Three steps to alternating sides, one of them a reversal: twice the smallest.
-fn is_excitation(seen: &Seen, signal: &str) -> bool {
-    let steps = seen.steps_of(signal);
-    let turns = steps.windows(2).filter(|s| s[0].change() * s[1].change() < 0.0).count();
-    let smallest = seen.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
-    turns + 1 >= seen.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
 }
 
 /// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants of all its inputs

@@ -127,19 +127,36 @@ impl<'a> Seen<'a> {
         (known > 0).then_some(2 * up > known)
     }
 
+    /// Three steps to alternating sides, one of them a reversal: twice the smallest.
+    pub fn is_excitation(&self, signal: &str) -> bool {
+        let steps = self.steps_of(signal);
+        let turns = steps.windows(2).filter(|s| s[0].change() * s[1].change() < 0.0).count();
+        let smallest = self.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
+        turns + 1 >= self.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
+    }
+
+    /// The signals that make a maneuver of a class here: those that must, and of those that may step as often as a doublet
+    /// does the ones that are excited. Fewer steps of these are feedback's.
+    pub fn inputs<'c>(&self, class: &'c Class) -> BTreeSet<&'c str> {
+        let fewest = self.scene.settings.fewest_steps;
+        let may = class.recognition.steps.iter().filter(|(_, count)| count.at_least == 0 && count.at_most >= fewest);
+        let excited = may.map(|(signal, _)| signal.as_str()).filter(|signal| self.is_excitation(signal));
+        class.recognition.inputs().into_iter().chain(excited).collect()
+    }
+
     /// First and last step of the class's inputs; of the pilot's controls, first and last deflection.
     pub fn excited_s(&self, class: &Class) -> Option<(f64, f64)> {
         if *self.kind != Kind::Onboard {
             return Some((self.from_s, self.to_s));
         }
-        let inputs = class.recognition.inputs();
+        let inputs = self.inputs(class);
         let times = || inputs.iter().flat_map(|s| self.steps_of(s)).map(|s| s.time_s);
         Some((times().min_by(f64::total_cmp)?, times().max_by(f64::total_cmp)?))
     }
 
     /// How many steps the class's inputs make.
     pub fn explained(&self, class: &Class) -> usize {
-        class.recognition.inputs().iter().map(|s| self.steps_of(s).len()).sum()
+        self.inputs(class).iter().map(|s| self.steps_of(s).len()).sum()
     }
 
     /// How often each of some signals steps, in words: `de_deg 5, dpv_deg 1`.
@@ -152,7 +169,7 @@ impl<'a> Seen<'a> {
 
     /// All that is said of a maneuver of a class in this stretch.
     pub fn recognised(&self, class: &Class, (first_s, last_s): (f64, f64)) -> Recognised {
-        let inputs = class.recognition.inputs();
+        let inputs = self.inputs(class);
         let voices = self.voices(class);
         let confidence = voices.iter().map(|v| v.weight).product::<f64>();
         let evidence: Vec<&str> = voices.iter().map(|v| v.words.as_str()).filter(|w| !w.is_empty()).collect();

@@ -71,7 +71,7 @@ fn classes() -> Vec<Class> {
     let doublets = [("dsa_deg", 3, 8), ("de_deg", 3, 8)];
     let mut classes = vec![
         class("DOUBLETS", Axis::Longitudinal, &obes, &doublets, 1.5),
-        class("SERIES", Axis::Longitudinal, &obes, &[("de_deg", 10, 19), ("dsa_deg", 0, 2)], 1.5),
+        class("SERIES", Axis::Longitudinal, &obes, &[("de_deg", 10, 19), ("dsa_deg", 0, 2), ("dpv_deg", 0, 9)], 1.5),
         class("3211", Axis::Longitudinal, &obes, &[("dsa_deg", 0, 2)], 4.5),
         class("PITCH", Axis::Longitudinal, &free, &pitch, 2.5),
         class("PITCH_TV", Axis::Longitudinal, &vectored, &pitch, 2.5),
@@ -484,6 +484,26 @@ fn a_maneuver_against_a_turn_has_the_same_window() {
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["3211", "PITCH"]);
     assert_abs_diff_eq!(segmented.maneuvers[1].end_s, last_s + 2.5, epsilon = 0.2);
+}
+
+#[test]
+fn steps_back_to_a_trim_that_drifted_in_a_turn_belong_to_the_maneuver() {
+    let mut r = flight(60);
+    // Half an inch in the time between two reversals.
+    add(&mut r, "stick_pitch_in", |t| 0.15 * (t - 20.0).clamp(0.0, 15.0));
+    let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.5);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["PITCH"]);
+    assert_window(&segmented.maneuvers[0], "PITCH", 19.0, last_s + 2.5);
+}
+
+#[test]
+fn a_doublet_that_may_go_with_a_series_belongs_to_it() {
+    let mut r = flight(60);
+    let last_s = pilot_steps(&mut r, "de_deg", 20.0, 5.0, 10, 0.8);
+    assert_one(&r, "SERIES", 19.0, last_s + 1.5);
+    doublet(&mut r, "dpv_deg", last_s + 1.2, 5.0);
+    assert_one(&r, "SERIES", 19.0, last_s + 3.2 + 1.5);
 }
 
 #[test]

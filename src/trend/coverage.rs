@@ -56,8 +56,8 @@ const STUDIES: [(Study, f64); 7] = [
     (Study { maneuvers: 6, points: 6, truth: parabola, scatter: 0.003 }, 0.92),
     (Study { maneuvers: 12, points: 12, truth: parabola, scatter: 0.008 }, 0.90),
     (Study { maneuvers: 40, points: 12, truth: parabola, scatter: 0.003 }, 0.92),
-    (Study { maneuvers: 12, points: 12, truth: stall, scatter: 0.003 }, 0.84),
-    (Study { maneuvers: 40, points: 12, truth: stall, scatter: 0.008 }, 0.86),
+    (Study { maneuvers: 12, points: 12, truth: stall, scatter: 0.003 }, 0.88),
+    (Study { maneuvers: 40, points: 12, truth: stall, scatter: 0.008 }, 0.91),
 ];
 
 #[test]

@@ -3,7 +3,9 @@
 //! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) + maneuver's own deviation +
 //! error, with the functions of [`Basis`], deviations of standard deviation τ, errors of standard deviation bᵢ. Weights are
 //! 1/(bᵢ² + τ²). τ² is the value at which the weighted residuals come out as large as their degrees of freedom,
-//! Σ r²/(b² + τ²) = n − p (Paule and Mandel 1982), or zero where they are smaller already.
+//! Σ r²/(b² + τ²) = Σ (1 − hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is what an estimate
+//! pulls its own trend, and the sum n − p over all maneuvers. A class of `OWN_SCATTER` maneuvers has a τ of its own: one
+//! that strays (a derivative of it is held at a wrong value, say) does not take the weight from those that agree.
 //!
 //! One wild estimate must bend neither the trend nor τ: a residual beyond `HUBER` standard deviations counts as if it
 //! were just that far (Huber's weights in the fit, his proposal 2 for τ). And no maneuver is trusted beyond a share
@@ -38,6 +40,8 @@ const HUBER_VARIANCE: f64 = 0.778_465;
 const WILD: f64 = 3.0;
 /// No bound is taken as smaller than this share of the median bound.
 const BOUND_FLOOR: f64 = 0.25;
+/// A class of so many maneuvers has a scatter of its own; from fewer it would be a guess, and they have that of all.
+const OWN_SCATTER: usize = 8;
 /// Steps of the iteration between coefficients, τ² and Huber's weights; it settles in about ten.
 const MOST_STEPS: usize = 100;
 
@@ -47,11 +51,13 @@ pub(super) struct Point {
     pub alpha_deg: f64,
     pub value: f64,
     pub bound: f64,
+    /// The place of its class among those of the trend.
+    pub class: usize,
 }
 
 impl Point {
-    pub(super) fn key(&self) -> (f64, f64, f64) {
-        (self.alpha_deg, self.value, self.bound)
+    pub(super) fn key(&self) -> (f64, f64, f64, usize) {
+        (self.alpha_deg, self.value, self.bound, self.class)
     }
 }
 
@@ -63,7 +69,9 @@ pub(super) struct Fit {
     covariance: DMatrix<f64>,
     /// The covariance if the bounds were all there is.
     of_bounds: DMatrix<f64>,
-    scatter2: f64,
+    /// Of each point, in its order: τ², and with the bound squared.
+    scatter2: Vec<f64>,
+    variances: Vec<f64>,
     degrees_of_freedom: usize,
     criterion: f64,
     /// Of each point, in its order.
@@ -121,15 +129,24 @@ impl Fit {
     ///
     /// At least two degrees of freedom are left to the residuals, and there are no more coefficients than distinct α: with
     /// several maneuvers at each, a trend may run through the middle of every cluster, and must be able to where a
-    /// derivative bends between them. With knots, polynomials up to the third order compete with the splines.
+    /// derivative bends between them. Besides polynomials there are splines: between the analyst's knots, with polynomials
+    /// up to the third order; where he gives none, between the flown α, each or every second.
     fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<Fit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
         let range = (first.alpha_deg, last.alpha_deg);
-        let most = clusters(points, settings.alpha_step_deg).min(points.len().saturating_sub(2));
+        let flown = flown(points, settings.alpha_step_deg);
+        let most = flown.len().min(points.len().saturating_sub(2));
         let highest = if knots_deg.is_empty() { settings.max_order } else { settings.max_order.min(3) };
         let polynomials = (0..=highest).map(|order| Basis::polynomial(range, order));
-        let splines = (1..=highest).map(|order| Basis::spline(range, order, knots_deg));
-        let bent = splines.filter(|basis| basis.size() > basis.order() + 1);
+        let splines: Vec<Basis> = if knots_deg.is_empty() {
+            let between = flown.get(1..flown.len() - 1).unwrap_or_default();
+            let thinned = |every| between.iter().copied().skip(every - 1).step_by(every).collect::<Vec<f64>>();
+            let of = |(order, every)| Basis::spline(range, order, &thinned(every));
+            [(1, 1), (1, 2), (3, 2)].map(of).into()
+        } else {
+            (1..=highest).map(|order| Basis::spline(range, order, knots_deg)).collect()
+        };
+        let bent = splines.into_iter().filter(|basis| basis.order() <= highest && basis.size() > basis.order() + 1);
         let bases = polynomials.chain(bent).filter(|basis| basis.size() <= most);
         bases.filter_map(|basis| Fit::of(points, basis, settings.criterion)).collect()
     }
@@ -141,24 +158,27 @@ impl Fit {
         let values = DVector::from_iterator(n, points.iter().map(|q| q.value));
         let variances = floored_variances(points);
         let degrees_of_freedom = n.checked_sub(p).filter(|d| *d > 0)?;
-        let mut weights = DVector::from_element(n, 1.0);
-        let (mut scatter2, mut solution) = (f64::INFINITY, solve(&design, &values, &weights)?);
+        let strata = strata(points);
+        let mut weights = DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v));
+        let mut solution = solve(&design, &values, &weights)?;
+        let mut total = vec![f64::INFINITY; n];
         for _ in 0..MOST_STEPS {
             let residuals = &values - &design * &solution.0;
-            let before = scatter2;
-            scatter2 = scatter_squared(&residuals, &variances, degrees_of_freedom);
-            weights = DVector::from_iterator(n, (0..n).map(|i| weight(residuals[i], variances[i] + scatter2)));
+            let before = total;
+            let freedom = freedom(&design, &weights, &solution.1);
+            total = total_variances(&residuals, &variances, &freedom, &strata);
+            weights = DVector::from_iterator(n, (0..n).map(|i| weight(residuals[i], total[i])));
             let next = solve(&design, &values, &weights)?;
             let moved = (&design * (&next.0 - &solution.0)).amax();
-            let smallest = variances.iter().copied().fold(f64::INFINITY, f64::min) + scatter2;
+            let smallest = total.iter().copied().fold(f64::INFINITY, f64::min);
             solution = next;
-            if moved <= 1e-6 * smallest.sqrt() && (scatter2 - before).abs() <= 1e-6 * smallest {
+            let settled = total.iter().zip(&before).all(|(now, before)| (now - before).abs() <= 1e-6 * now);
+            if settled && moved <= 1e-6 * smallest.sqrt() {
                 break;
             }
         }
         let residuals = &values - &design * &solution.0;
-        let misfit = (0..n).map(|i| deviance(residuals[i], variances[i] + scatter2)).sum::<f64>();
-        let total: Vec<f64> = variances.iter().map(|v| v + scatter2).collect();
+        let misfit = (0..n).map(|i| deviance(residuals[i], total[i])).sum::<f64>();
         let covariance = robust_covariance(&design, &residuals, &total)?;
         let of_bounds = solve(&design, &values, &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)))?.1;
         Some(Fit {
@@ -167,9 +187,10 @@ impl Fit {
             coefficients: solution.0,
             covariance,
             of_bounds,
-            scatter2,
+            scatter2: total.iter().zip(&variances).map(|(all, bound)| all - bound).collect(),
+            variances: total,
             degrees_of_freedom,
-            criterion: misfit + penalty(criterion, n, p + 1),
+            criterion: misfit + penalty(criterion, n, p + strata.len()),
         })
     }
 
@@ -189,9 +210,14 @@ impl Fit {
         &self.residuals
     }
 
-    /// τ.
+    /// τ of the median maneuver.
     pub(super) fn scatter(&self) -> f64 {
-        self.scatter2.sqrt()
+        median(self.scatter2.clone()).sqrt()
+    }
+
+    /// τ and bound together of the median maneuver: how far one more lies from what is true.
+    pub(super) fn one_more(&self) -> f64 {
+        median(self.variances.clone()).sqrt()
     }
 
     /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees of freedom.
@@ -231,24 +257,61 @@ fn standardised(
     (0..design.nrows()).map(of).collect()
 }
 
-/// How many distinct α there are: a new one begins half a step of the published grid beyond the last one's beginning.
-fn clusters(points: &[Point], step_deg: f64) -> usize {
-    let (mut n, mut begin) = (0, f64::NEG_INFINITY);
+/// The distinct α that were flown, deg, ascending: a new one begins half a step of the published grid beyond the last one's
+/// beginning. Each is the mean of its maneuvers, to a tenth.
+fn flown(points: &[Point], step_deg: f64) -> Vec<f64> {
+    let mut clusters: Vec<Vec<f64>> = Vec::new();
     for p in points {
-        if p.alpha_deg - begin > 0.5 * step_deg {
-            n += 1;
-            begin = p.alpha_deg;
+        match clusters.last_mut() {
+            Some(cluster) if p.alpha_deg - cluster[0] <= 0.5 * step_deg => cluster.push(p.alpha_deg),
+            _ => clusters.push(vec![p.alpha_deg]),
         }
     }
-    n
+    let mean = |cluster: &Vec<f64>| cluster.iter().sum::<f64>() / cluster.len() as f64;
+    clusters.iter().map(|cluster| (10.0 * mean(cluster)).round() / 10.0).collect()
 }
 
 /// Bounds squared, none smaller than the floor.
 fn floored_variances(points: &[Point]) -> Vec<f64> {
-    let mut bounds: Vec<f64> = points.iter().map(|p| p.bound).collect();
-    bounds.sort_by(f64::total_cmp);
-    let floor = BOUND_FLOOR * bounds.get(bounds.len() / 2).copied().unwrap_or(0.0);
+    let floor = BOUND_FLOOR * median(points.iter().map(|p| p.bound).collect());
     points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The points of each scatter: of every class that has one of its own, and of all points, last, where any is left.
+fn strata(points: &[Point]) -> Vec<Vec<usize>> {
+    let classes = points.iter().map(|p| p.class).max().map_or(0, |most| most + 1);
+    let of = |class: usize| (0..points.len()).filter(|i| points[*i].class == class).collect::<Vec<usize>>();
+    let mut strata: Vec<Vec<usize>> = (0..classes).map(of).filter(|own| own.len() >= OWN_SCATTER).collect();
+    if strata.iter().map(Vec::len).sum::<usize>() < points.len() {
+        strata.push((0..points.len()).collect());
+    }
+    strata
+}
+
+/// 1 − h of each point: h is what its value pulls the trend there.
+fn freedom(design: &DMatrix<f64>, weights: &DVector<f64>, inverse: &DMatrix<f64>) -> Vec<f64> {
+    let of = |i: usize| {
+        let row = design.row(i);
+        (1.0 - weights[i] * (row * inverse * row.transpose())[(0, 0)]).max(0.0)
+    };
+    (0..design.nrows()).map(of).collect()
+}
+
+/// b² + τ² of each point, τ of its stratum: the classes' own take the place of that of all.
+fn total_variances(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64], strata: &[Vec<usize>]) -> Vec<f64> {
+    let mut total = variances.to_vec();
+    for stratum in strata.iter().rev() {
+        let scatter2 = scatter_squared(residuals, variances, freedom, stratum);
+        for i in stratum {
+            total[*i] = variances[*i] + scatter2;
+        }
+    }
+    total
 }
 
 /// Coefficients and their covariance for given weights.
@@ -281,17 +344,17 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     }
 }
 
-/// τ²: where the sum of squared residuals over their variances, wild ones cut, is what its degrees of freedom expect.
-/// The sum falls as τ² grows, so bisection finds it.
-fn scatter_squared(residuals: &DVector<f64>, variances: &[f64], degrees_of_freedom: usize) -> f64 {
-    let expected = HUBER_VARIANCE * degrees_of_freedom as f64;
-    let sum = |scatter2: f64| -> f64 {
-        residuals.iter().zip(variances).map(|(r, v)| (r * r / (v + scatter2)).min(HUBER * HUBER)).sum()
-    };
-    if sum(0.0) <= expected {
+/// τ² of some of the points: where the sum of their squared residuals over their variances, wild ones cut, is what its
+/// degrees of freedom expect. The sum falls as τ² grows, so bisection finds it.
+fn scatter_squared(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64], stratum: &[usize]) -> f64 {
+    let expected = HUBER_VARIANCE * stratum.iter().map(|i| freedom[*i]).sum::<f64>();
+    let cut = |i: &usize, scatter2: f64| (residuals[*i].powi(2) / (variances[*i] + scatter2)).min(HUBER * HUBER);
+    let sum = |scatter2: f64| stratum.iter().map(|i| cut(i, scatter2)).sum::<f64>();
+    if sum(0.0) <= expected || expected <= 0.0 {
         return 0.0;
     }
-    let (mut low, mut high) = (0.0, residuals.norm_squared() / expected);
+    let square: f64 = stratum.iter().map(|i| residuals[*i].powi(2)).sum();
+    let (mut low, mut high) = (0.0, square / expected);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if sum(middle) > expected { low = middle } else { high = middle }
@@ -305,7 +368,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn points(of: impl Fn(f64) -> f64, alphas: &[f64]) -> Vec<Point> {
-        alphas.iter().map(|&a| Point { alpha_deg: a, value: of(a), bound: 0.01 }).collect()
+        alphas.iter().map(|&a| Point { alpha_deg: a, value: of(a), bound: 0.01, class: 0 }).collect()
     }
 
     fn constant(points: &[Point]) -> Option<Fit> {
@@ -346,7 +409,7 @@ mod tests {
     #[test]
     fn order_zero_is_the_weighted_mean() {
         let data = [(10.0, 1.0, 0.1), (20.0, 1.1, 0.2), (30.0, 0.95, 0.1), (40.0, 1.05, 0.15)];
-        let data = data.map(|(alpha_deg, value, bound)| Point { alpha_deg, value, bound });
+        let data = data.map(|(alpha_deg, value, bound)| Point { alpha_deg, value, bound, class: 0 });
         let fit = constant(&data).expect("a fit");
         let sum = |f: &dyn Fn(&Point) -> f64| data.iter().map(f).sum::<f64>();
         let weight = sum(&|p| p.bound.powi(-2));
@@ -376,7 +439,7 @@ mod tests {
         }
         let settings = Settings::default();
         let clean = Trend::through(&data, &settings, &[]).expect("a fit");
-        data.push(Point { alpha_deg: 60.0, value: 5.0, bound: 0.01 });
+        data.push(Point { alpha_deg: 60.0, value: 5.0, bound: 0.01, class: 0 });
         let wild = Trend::through(&data, &settings, &[]).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {
             assert_relative_eq!(wild.at(a).0, clean.at(a).0, epsilon = 0.01);

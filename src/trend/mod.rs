@@ -1,8 +1,8 @@
 //! Trend fits least squares across α through the estimates of one derivative, for the group of classes that speaks for
 //! it and for each class alone.
 //!
-//! The fit is in [`fit`]: a polynomial in α, or a spline where the analyst gives knots, whose order a criterion chooses,
-//! with weights 1/(bound² + τ²), where τ is the scatter between maneuvers beyond their bounds.
+//! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights 1/(bound² + τ²), where τ is the
+//! scatter between maneuvers of a class beyond their bounds.
 
 mod basis;
 #[cfg(test)]
@@ -43,7 +43,8 @@ pub struct Settings {
     #[serde(default = "default_alpha_reach")]
     pub alpha_reach_deg: f64,
     /// Angles of attack at which the trend may bend sharply, deg: with knots it is a spline whose order, up to 3, the
-    /// criterion chooses, or a polynomial up to the third order where that does better. Default none: a polynomial.
+    /// criterion chooses, or a polynomial up to the third order where that does better. Default none: a polynomial, or a
+    /// spline between the flown angles of attack where that does better.
     #[serde(default)]
     pub knots_deg: Vec<f64>,
     /// A maneuver further than this from its trend, in standard deviations, is named in the table `outliers`. Default 3.
@@ -204,10 +205,10 @@ fn by_derivative<'a>(estimates: &'a [EstimateRow], settings: &Settings) -> Vec<(
     order
 }
 
-/// An estimate as the fit sees it; none without a value and a bound.
+/// An estimate as the fit sees it, of the first class; none without a value and a bound.
 fn point(e: &EstimateRow) -> Option<Point> {
     let bound = e.bound_corrected.or(e.bound)?;
-    let p = Point { alpha_deg: e.alpha_deg, value: e.value?, bound };
+    let p = Point { alpha_deg: e.alpha_deg, value: e.value?, bound, class: 0 };
     (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0).then_some(p)
 }
 
@@ -222,14 +223,17 @@ fn trend(
     if members.len() < FEWEST_MANEUVERS {
         return Err(format!("{} maneuvers with an estimate and a bound are too few for a trend", members.len()));
     }
-    let mut placed: Vec<(Point, &EstimateRow)> = members.iter().filter_map(|e| Some((point(e)?, *e))).collect();
+    let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
+    let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
+    let of_class = |e: &EstimateRow| Some(Point { class: class(e), ..point(e)? });
+    let mut placed: Vec<(Point, &EstimateRow)> = members.iter().filter_map(|e| Some((of_class(e)?, *e))).collect();
     // Sums do not depend on the order in which the maneuvers come.
     placed.sort_by(|a, b| a.0.key().partial_cmp(&b.0.key()).unwrap_or(std::cmp::Ordering::Equal));
     let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
     let fit = Trend::through(&points, settings, knots_deg).ok_or("the least-squares fit has no solution")?;
     let outliers = outliers(&placed, &fit, group, settings.outlier_z);
     let (half_width, named) = (fit.best.quantile_95(), outliers.len());
-    let one_more = fit.best.scatter().hypot(median_bound(&points));
+    let one_more = fit.best.one_more();
     let row = |alpha_deg: f64| {
         let (value, own_error) = fit.at(inside(&points, alpha_deg));
         let standard_error = own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
@@ -272,12 +276,6 @@ fn outliers(placed: &[(Point, &EstimateRow)], fit: &Trend, group: &str, limit: f
         weight_share: residual.share,
     })
     .collect()
-}
-
-fn median_bound(points: &[Point]) -> f64 {
-    let mut bounds: Vec<f64> = points.iter().map(|p| p.bound).collect();
-    bounds.sort_by(f64::total_cmp);
-    bounds.get(bounds.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// α, or the end of the data where it lies a little beyond: a trend is not continued past its last maneuver.

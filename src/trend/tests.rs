@@ -100,7 +100,7 @@ fn the_first_group_that_names_a_derivative_speaks_for_it() {
     };
     let groups = vec![group("all", &[], &[]), group("B", &["vane"], &["B"]), group("A and B", &["rate"], &["A", "B"])];
     let settings = Settings { groups, ..Settings::default() };
-    let value = |class: &str| if class == "B" { 2.0 } else { 1.0 };
+    let value = |class: &str| if class == "B" { 1.03 } else { 1.0 };
     let estimates: Vec<EstimateRow> = ["vane", "rate", "other"]
         .iter()
         .flat_map(|d| ["A", "B", "C"].map(|c| (*d, c)))
@@ -112,9 +112,24 @@ fn the_first_group_that_names_a_derivative_speaks_for_it() {
     assert_eq!(groups_of(&rows, "rate"), ["A", "A and B", "B", "C"].into());
     assert_eq!(groups_of(&rows, "other"), ["A", "B", "C", "all"].into());
     let of = |d: &str, g: &str| rows.iter().find(|r| r.derivative == d && r.group == g).expect("a trend");
-    assert_relative_eq!(of("vane", "B").value, 2.0, max_relative = 1e-9);
+    assert_relative_eq!(of("vane", "B").value, 1.03, max_relative = 1e-9);
     assert_eq!(of("rate", "A and B").maneuvers, 16);
-    assert_relative_eq!(of("other", "all").value, 4.0 / 3.0, max_relative = 1e-6);
+    assert_relative_eq!(of("other", "all").value, 1.01, max_relative = 1e-6);
+}
+
+#[test]
+fn a_class_that_strays_does_not_take_the_weight_from_those_that_agree() {
+    let mut random = Lcg(5);
+    let mut draw = |class: &str, i: u32, value: f64, bound: f64| {
+        estimate("d", class, 5.0 + 4.0 * f64::from(i), value + bound * random.normal(), bound)
+    };
+    let mut estimates: Vec<EstimateRow> = (0..14).map(|i| draw("A", i, 1.0, 0.02)).collect();
+    // As a vane of which the rudder that moves with it is held at a wrong value.
+    estimates.extend((0..14).map(|i| draw("B", i, -2.0 + 0.3 * f64::from(i), 0.4)));
+    let trends = through(&estimates, &Settings { per_class: false, ..Settings::default() });
+    for row in trends.rows {
+        assert!((row.value - 1.0).abs() < 0.05 && row.standard_error < 0.1, "{row:?}");
+    }
 }
 
 #[test]
@@ -207,7 +222,7 @@ fn each_outlier_is_named_and_a_good_maneuver_is_not() {
 }
 
 #[test]
-fn a_spline_follows_a_kink_at_its_knot_that_a_polynomial_rounds_off() {
+fn a_spline_follows_a_kink_at_its_knot_or_between_the_flown_alpha() {
     let kinked = |a: f64| if a < 30.0 { 1.0 } else { 1.0 + 0.05 * (a - 30.0) };
     let estimates: Vec<EstimateRow> =
         (0..56).map(|i| 5.0 + f64::from(i)).map(|a| estimate("d", "A", a, kinked(a), 0.002)).collect();
@@ -221,7 +236,7 @@ fn a_spline_follows_a_kink_at_its_knot_that_a_polynomial_rounds_off() {
     let spline = at_kink(&settings(vec![30.0]));
     assert_eq!((spline.curve.as_str(), spline.order), ("spline, knots 30", 1));
     assert_relative_eq!(spline.value, 1.0, epsilon = 1e-6);
-    let polynomial = at_kink(&settings(vec![]));
-    assert_eq!(polynomial.curve, "polynomial");
-    assert!((polynomial.value - 1.0).abs() > 0.005, "{polynomial:?}");
+    let unguided = at_kink(&settings(vec![]));
+    assert!(unguided.curve.starts_with("spline, knots"), "{unguided:?}");
+    assert_relative_eq!(unguided.value, 1.0, epsilon = 0.003);
 }

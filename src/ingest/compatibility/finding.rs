@@ -25,6 +25,8 @@ pub struct Estimate {
     pub bound: f64,
     /// Many times its bound and beyond what is ordinary.
     pub fault: bool,
+    /// As large as a fault and not as sure: neither named nor corrected.
+    pub doubtful: bool,
     /// Whether the record is corrected by it.
     pub applied: bool,
 }
@@ -159,9 +161,10 @@ fn estimate(errors: &Errors, instrument: usize, kind: Kind, settings: &Compatibi
         Kind::Scale => settings.scale,
         Kind::Delay => settings.delay,
     };
-    let counts = value.abs() > settings.standard_errors * bound;
+    let doubtful = value.abs() > limit && !fault;
+    let counts = value.abs() > settings.standard_errors * bound && !doubtful;
     let applied = if fault { settings.fault == OnFault::Apply } else { action == Action::Apply && counts };
-    Some(Estimate { value, bound, fault, applied })
+    Some(Estimate { value, bound, fault, doubtful, applied })
 }
 
 /// A bias and a scale error are estimated together and make sense together: where one is applied so is the other.
@@ -170,8 +173,8 @@ fn correct_together(estimates: &mut [Option<Estimate>; KINDS], settings: &Compat
     if let (Some(bias), Some(scale)) = (bias, scale)
         && (bias.applied || scale.applied)
     {
-        bias.applied |= settings.bias == Action::Apply && !bias.fault;
-        scale.applied |= settings.scale == Action::Apply && !scale.fault;
+        bias.applied |= settings.bias == Action::Apply && !bias.fault && !bias.doubtful;
+        scale.applied |= settings.scale == Action::Apply && !scale.fault && !scale.doubtful;
     }
 }
 

@@ -4,11 +4,13 @@
 //! complement), so that the work grows with the number of windows and no faster. R is the long-run variance of each
 //! window's residuals: coloured noise counts as white noise as strong as its slowest part. P says that instruments are
 //! ordinary or, rarely, wrong by any amount: P = size², and size² + θ² (Cauchy's distribution by reweighting) for what is
-//! surely larger, so that an error which several instruments could explain is given to one. At the end the data are asked of each parameter as if nothing
-//! had been thought of it before, and the one that is surest beyond the ordinary is freed, until none is. A delay common to all channels
-//! is no error: the mean of the delays, with the weights 1/P, is zero.
+//! surely larger, so that an error which several instruments could explain is given to one. At the end the data are asked
+//! of each parameter as if nothing had been thought of it before, and the one that is surest beyond the ordinary is freed,
+//! until none is; what comes out as large as a fault but not as sure as one is thought ordinary again. A delay common to
+//! all channels is no error: the mean of the delays, with the weights 1/P, is zero.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Compatibility;
@@ -110,12 +112,14 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         prior[j] = size;
         problem.settle(&mut members, &mut shared, &prior)?;
     }
-    let inverse = problem.inverse(&total(&members), &prior)?;
-    let jackknife = problem.jackknife(&members, &shared, &prior);
-    let mut bounds = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]).sqrt());
-    for (i, outweighed) in outweighed(windows).into_iter().enumerate() {
-        let j = place(3 + i, Kind::Scale);
-        bounds[j] = bounds[j].hypot(MODEL_SCALE * outweighed);
+    let mut bounds = problem.bounds(&members, &shared, &prior, windows)?;
+    let doubted = problem.doubted(&shared, &bounds, &prior);
+    if !doubted.is_empty() {
+        for j in doubted {
+            prior[j] = size_of(&settings.ordinary, j);
+        }
+        problem.settle(&mut members, &mut shared, &prior)?;
+        bounds = problem.bounds(&members, &shared, &prior, windows)?;
     }
     Some(Errors { values: shared, bounds, prior })
 }
@@ -288,6 +292,34 @@ impl Problem<'_> {
         })
     }
 
+    /// Standard deviations of the shared parameters: of the information or of the scatter between windows, whichever is
+    /// larger.
+    fn bounds(
+        &self,
+        members: &[Member],
+        shared: &[f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+        windows: &[Window],
+    ) -> Option<[f64; PARAMETERS]> {
+        let inverse = self.inverse(&total(members), prior)?;
+        let jackknife = self.jackknife(members, shared, prior);
+        let mut bounds = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]).sqrt());
+        for (i, outweighed) in outweighed(windows).into_iter().enumerate() {
+            let j = place(3 + i, Kind::Scale);
+            bounds[j] = bounds[j].hypot(MODEL_SCALE * outweighed);
+        }
+        Some(bounds)
+    }
+
+    /// Parameters that came out as large as a fault but, seen by their bounds, not as sure as one: no ordinary error is
+    /// that large, so they are thought ordinary after all.
+    fn doubted(&self, shared: &[f64; PARAMETERS], bounds: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> Vec<usize> {
+        let freed = |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
+        let large = |j: &usize| shared[*j].abs() > size_of(&self.settings.faulty, *j);
+        let unsure = |j: &usize| shared[*j].abs() <= self.settings.fault_standard_errors * bounds[*j];
+        (0..PARAMETERS).filter(freed).filter(large).filter(unsure).collect()
+    }
+
     /// Variances of the shared parameters from the scatter between windows: each left out in turn.
     fn jackknife(
         &self,
@@ -356,21 +388,8 @@ impl<'a> Member<'a> {
     }
 
     fn raw(&self, problem: &Problem, o: usize) -> Raw {
-        let mut raw = Raw { information: [0.0; ROW * ROW], gradient: [0.0; ROW], square: 0.0 };
-        for k in self.compared(problem) {
-            let measured = self.window.outputs[o][k];
-            if !measured.is_finite() {
-                continue;
-            }
-            let (value, row) = self.response.output(k, o);
-            let residual = measured - value;
-            raw.square += residual * residual;
-            for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                raw.gradient[i] += a * residual;
-                raw.information[i * ROW..][..=i].iter_mut().zip(&row).for_each(|(h, b)| *h += a * b);
-            }
-        }
-        raw
+        let (compared, measured) = (self.compared(problem), &self.window.outputs[o]);
+        Arch::new().dispatch(Summing { compared, measured, response: &self.response, output: o })
     }
 
     /// The outputs' sums together, each with its weight 1/R.
@@ -401,6 +420,50 @@ impl<'a> Member<'a> {
             self.variances[o] = coloured::level(&residuals, self.window.step_s).max(floor * floor);
         }
         self.weigh(problem);
+    }
+}
+
+/// The sums of one output over some samples, compiled for the processor at hand.
+struct Summing<'a> {
+    compared: std::ops::Range<usize>,
+    measured: &'a [f64],
+    response: &'a Response,
+    output: usize,
+}
+
+impl WithSimd for Summing<'_> {
+    type Output = Raw;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Raw {
+        const VECTOR: usize = 8;
+        const WIDE: usize = ROW.next_multiple_of(VECTOR);
+        let mut raw = Raw { information: [0.0; ROW * ROW], gradient: [0.0; ROW], square: 0.0 };
+        let mut squares = [[0.0; WIDE]; ROW];
+        let mut wide = [0.0; WIDE];
+        for k in self.compared {
+            let measured = self.measured[k];
+            if !measured.is_finite() {
+                continue;
+            }
+            let (value, row) = self.response.output(k, self.output);
+            let residual = measured - value;
+            raw.square += residual * residual;
+            wide[..ROW].copy_from_slice(&row);
+            for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                raw.gradient[i] += a * residual;
+                // Whole vectors up to the diagonal.
+                for block in (0..=i).step_by(VECTOR) {
+                    for c in block..block + VECTOR {
+                        squares[i][c] += a * wide[c];
+                    }
+                }
+            }
+        }
+        for i in 0..ROW {
+            raw.information[i * ROW..][..=i].copy_from_slice(&squares[i][..=i]);
+        }
+        raw
     }
 }
 

@@ -3,7 +3,10 @@
 //! An input is freed of its error before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale); an output is
 //! given its error after them, y(t) = (1 + scale) h(t − delay) + bias.
 
-use nalgebra::SMatrix;
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+
+use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{self, Driven, STATES, State};
 use super::instruments::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
@@ -21,8 +24,11 @@ pub const ROW: usize = DRIVING + KINDS;
 
 pub type Local = [f64; LOCAL];
 
-/// Slopes of the states along what they depend on.
-type Slopes = SMatrix<f64, STATES, DRIVING>;
+/// The same in whole vectors.
+const WIDE: usize = DRIVING.next_multiple_of(8);
+
+/// Slopes of the states along what they depend on, a row for each state.
+type Slopes = [[f64; WIDE]; STATES];
 
 /// One input freed of its error at one instant, in rad/s or ft/s², with its slopes along bias, scale and delay.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,26 +53,61 @@ const CELL: usize = 1 + DRIVING;
 /// The computed outputs of a window; none where the integration leaves sense.
 pub fn respond(window: &Window, aircraft: &Aircraft, local: &Local, shared: &[f64; PARAMETERS]) -> Option<Response> {
     let points = freed(window, shared);
-    let mut at = (State::from_column_slice(&local[..STATES]), Slopes::identity());
-    let along = |(x, s): (State, Slopes), h: f64, (dx, ds): (State, Slopes)| (x + dx * h, s + ds * h);
-    let mut exact = Vec::with_capacity(window.samples * OUTPUTS * CELL);
-    for k in 0..window.samples {
-        read(&mut exact, window, aircraft, k, &points[2 * k], &at);
-        if k + 1 < window.samples {
-            let rate = |stage: usize, at| {
-                let sample = if POINT[stage] == 2 { k + 1 } else { k };
-                slope(window, sample, &points[2 * k + POINT[stage]], local, at)
-            };
-            at = step(at, window.step_s, rate, along);
-        }
-        if !at.0.iter().all(|x| x.is_finite() && x.abs() < 1e7) {
-            return None;
-        }
-    }
+    let exact = Arch::new().dispatch(Flight { window, aircraft, local, points: &points })?;
     let own = |o: usize| std::array::from_fn(|kind| shared[(INPUTS + o) * KINDS + kind]);
     let errors: [[f64; KINDS]; OUTPUTS] = std::array::from_fn(own);
     let taps = errors.map(|e| Taps::at(-e[Kind::Delay as usize] / window.step_s));
     Some(Response { samples: window.samples, exact, taps, errors, step_s: window.step_s })
+}
+
+/// The integration of a window, compiled for the processor at hand.
+struct Flight<'a> {
+    window: &'a Window,
+    aircraft: &'a Aircraft,
+    local: &'a Local,
+    points: &'a [[Freed; INPUTS]],
+}
+
+impl WithSimd for Flight<'_> {
+    /// The outputs without their own errors, and their slopes.
+    type Output = Option<Vec<f64>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<Vec<f64>> {
+        let Flight { window, aircraft, local, points } = self;
+        let mut at = (State::from_column_slice(&local[..STATES]), [[0.0; WIDE]; STATES]);
+        for i in 0..STATES {
+            at.1[i][i] = 1.0;
+        }
+        let mut exact = Vec::with_capacity(window.samples * OUTPUTS * CELL);
+        for k in 0..window.samples {
+            read(&mut exact, window, aircraft, k, &points[2 * k], &at);
+            if k + 1 < window.samples {
+                at = step(
+                    at,
+                    window.step_s,
+                    #[inline(always)]
+                    |stage, at| {
+                        let sample = if POINT[stage] == 2 { k + 1 } else { k };
+                        slope(window, sample, &points[2 * k + POINT[stage]], local, &at)
+                    },
+                    #[inline(always)]
+                    |(x, mut s), h, (dx, ds)| {
+                        for i in 0..STATES {
+                            for c in 0..WIDE {
+                                s[i][c] += h * ds[i][c];
+                            }
+                        }
+                        (x + dx * h, s)
+                    },
+                );
+            }
+            if !at.0.iter().all(|x| x.is_finite() && x.abs() < 1e7) {
+                return None;
+            }
+        }
+        Some(exact)
+    }
 }
 
 /// The inputs at samples and the halves between them.
@@ -88,34 +129,48 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
 }
 
 /// Rates of the states and of their slopes.
+#[inline(always)]
 fn slope(
     window: &Window,
     sample: usize,
     point: &[Freed; INPUTS],
     local: &Local,
-    (x, s): (State, Slopes),
+    (x, s): &(State, Slopes),
 ) -> (State, Slopes) {
     let driven: Driven = point.map(|p| p.value);
     let known = &window.known[sample];
-    let at = equations::rates(&x, &driven, known);
-    let (mut rates, mut slopes) = (at.rates, at.by_state * s);
+    let at = equations::rates(x, &driven, known);
+    let (mut rates, mut slopes) = (at.rates, [[0.0; WIDE]; STATES]);
     for i in 0..STATES {
+        for j in 0..STATES {
+            // Most of them are zero.
+            let by = at.by_state[(i, j)];
+            if by != 0.0 {
+                for c in 0..WIDE {
+                    slopes[i][c] += by * s[j][c];
+                }
+            }
+        }
         for (input, freed) in point.iter().enumerate() {
-            for (kind, by) in freed.by.iter().enumerate() {
-                slopes[(i, LOCAL + input * KINDS + kind)] += at.by_input[(i, input)] * by;
+            let by_input = at.by_input[(i, input)];
+            if by_input != 0.0 {
+                for (kind, by) in freed.by.iter().enumerate() {
+                    slopes[i][LOCAL + input * KINDS + kind] += by_input * by;
+                }
             }
         }
     }
     for i in 0..3 {
         for j in 0..3 {
             rates[i] -= known.to_body[(i, j)] * local[STATES + j];
-            slopes[(i, STATES + j)] -= known.to_body[(i, j)];
+            slopes[i][STATES + j] -= known.to_body[(i, j)];
         }
     }
     (rates, slopes)
 }
 
 /// Adds the outputs of a sample, without their own errors.
+#[inline(always)]
 fn read(
     exact: &mut Vec<f64>,
     window: &Window,
@@ -127,14 +182,13 @@ fn read(
     let driven: Driven = point.map(|p| p.value);
     let at = equations::readings(aircraft, x, &driven, &window.known[k]);
     for o in 0..OUTPUTS {
-        let first = exact.len() + 1;
-        exact.push(at.values[o]);
-        exact.resize(first + DRIVING, 0.0);
-        let row = &mut exact[first..];
-        for (i, s) in s.row_iter().enumerate() {
+        let mut row = [0.0; WIDE];
+        for i in 0..STATES {
             let by = at.by_state[(o, i)];
             if by != 0.0 {
-                row.iter_mut().zip(s.iter()).for_each(|(r, s)| *r += by * s);
+                for c in 0..WIDE {
+                    row[c] += by * s[i][c];
+                }
             }
         }
         for (input, freed) in point.iter().enumerate().take(3) {
@@ -143,11 +197,14 @@ fn read(
                 row[LOCAL + input * KINDS + kind] += by * slope;
             }
         }
+        exact.push(at.values[o]);
+        exact.extend_from_slice(&row[..DRIVING]);
     }
 }
 
 impl Response {
     /// One output at one sample with the slopes along what it depends on.
+    #[inline(always)]
     pub fn output(&self, k: usize, o: usize) -> (f64, [f64; ROW]) {
         let [bias, scale, _] = self.errors[o];
         let mut row = [0.0; ROW];

@@ -388,6 +388,23 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
 }
 
 #[test]
+fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corrected() {
+    let exact = flight(65.0);
+    let (vane, j) = (INPUTS, place(INPUTS, Kind::Scale));
+    let mut errors = ordinary(60);
+    errors[j] = 0.2;
+    let record = recorded(&exact, &errors, 9);
+    let sure_of_nothing = Compatibility { fault_standard_errors: 1e6, ..settings() };
+    let fitted = fit::fit(&windows(&record), &aircraft(), &sure_of_nothing).unwrap();
+    assert_abs_diff_eq!(fitted.prior[j], sure_of_nothing.ordinary.vane_deg.scale);
+    assert!(fit::fit(&windows(&record), &aircraft(), &settings()).unwrap().prior[j] > 0.1);
+
+    let findings = examined(&record, &sure_of_nothing);
+    let scale = findings.0[vane].estimates[Kind::Scale as usize].unwrap();
+    assert!(scale.value > 0.1 && scale.doubtful && !scale.fault && !scale.applied, "{scale:?}");
+}
+
+#[test]
 fn of_too_short_a_flight_nothing_is_said() {
     // Too short for the least number of windows.
     let findings = examined(&flight(15.0), &settings());
@@ -414,7 +431,7 @@ fn an_applied_correction_carries_the_marks_along() {
     let mut signals = BTreeMap::new();
     signals.insert(s::THETA.to_owned(), Series { values, marks });
     let mut record = Record { flight_id: "f".into(), start_s: 0.0, step_s: STEP_S, samples: 8, signals };
-    let fault = |value| Some(Estimate { value, bound: 0.0, fault: true, applied: true });
+    let fault = |value| Some(Estimate { value, bound: 0.0, fault: true, doubtful: false, applied: true });
     let findings = Findings(vec![Finding {
         signal: s::THETA,
         channel: "theta".into(),
