@@ -87,11 +87,12 @@ impl Run<'_> {
     /// The artefacts of a night that are not as they were written; a record is held against its flight's artefact.
     fn damaged(&self, night: &Night) -> Vec<String> {
         let records: BTreeMap<PathBuf, Digest> = night.artefacts.keys().flat_map(|name| self.recorded(name)).collect();
-        let is_whole = |name: &String| match name.starts_with("records/") {
-            true => records.get(Path::new(name)).is_some_and(|digest| {
-                Digest::of_file(&self.store.folder().join(name)).is_ok_and(|found| found == *digest)
-            }),
-            false => self.store.is_whole(name),
+        let is_whole = |name: &String| {
+            if !name.starts_with("records/") {
+                return self.store.is_whole(name);
+            }
+            let holds = |digest: &Digest| Digest::of_file(&self.store.folder().join(name)).is_ok_and(|f| f == *digest);
+            records.get(Path::new(name)).is_some_and(holds)
         };
         night.artefacts.par_iter().map(|(name, _)| name).filter(|name| !is_whole(name)).cloned().collect()
     }
