@@ -91,9 +91,8 @@ impl Run<'_> {
             if !name.starts_with("records/") {
                 return self.store.is_whole(name);
             }
-            records.get(Path::new(name)).is_some_and(|digest| {
-                Digest::of_file(&self.store.folder().join(name)).is_ok_and(|found| found == *digest)
-            })
+            let holds = |digest: &Digest| Digest::of_file(&self.store.folder().join(name)).is_ok_and(|f| f == *digest);
+            records.get(Path::new(name)).is_some_and(holds)
         };
         night.artefacts.par_iter().map(|(name, _)| name).filter(|name| !is_whole(name)).cloned().collect()
     }
