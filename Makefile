@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
+.PHONY: cluster status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -98,6 +98,9 @@ KILLS ?= 200
 FLIPS ?= 200
 torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; the bytes must be those of an undisturbed run
 	HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
+
+cluster: build ## a campaign on a Slurm of this machine's own: plain, with a failing task, with a killed node
+	bash tests/cluster/slurm.sh target/release/harvest
 
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files

@@ -118,16 +118,17 @@ for _ in $(seq 150); do [ "$(sinfo -h -t idle -o %D 2>/dev/null)" = 3 ] && break
 [ "$(sinfo -h -t idle -o %D)" = 3 ] || { echo "the nodes did not come up"; exit 1; }
 echo "three nodes up in $(echo "$(date +%s.%N) - $begun" | bc) s"
 
-# The pipeline, with few shards and small tasks.
+# The pipeline, with few shards and small tasks, on two flights of the demonstration: some shards have no work.
 pipeline=$work/harv
 cp -r pipelines/harv "$pipeline"
-ln -s "$PWD/data" "$work/data"
+mkdir "$work/flights"
+for flight in $(find data/demo/flights -name '*.parquet' | sort | head -n 2); do ln -s "$PWD/$flight" "$work/flights/"; done
 cat >>"$pipeline/pipeline.yaml" <<END
 
 cluster: { shards: 4, time: "00:05:00", memory_mb: 500, processors: 1, retries: 3, partition: flight }
 END
 tables() { (cd "$1" && find -L . -maxdepth 1 -name '*.csv' -type f | sort | xargs sha256sum); }
-options() { echo "$pipeline --store $work/$1/store --reports $work/$1/reports"; }
+options() { echo "$pipeline --archive $work/flights --store $work/$1/store --reports $work/$1/reports"; }
 
 # shellcheck disable=SC2046
 "$harvest" run $(options alone) --quiet || [ $? = 2 ]
@@ -180,7 +181,7 @@ exec "$harvest" "\$@"
 END
 chmod 755 "$work/slow"
 kill_node() {
-    for _ in $(seq 120); do grep -q n2 "$work/began" 2>/dev/null && break; sleep 0.1; done
+    for _ in $(seq 900); do grep -q n2 "$work/began" 2>/dev/null && break; sleep 0.1; done
     grep -q n2 "$work/began" || { echo "no task came to the node that is to die"; exit 1; }
     pkill -9 -f "slurmd -D -N n2 -f $work"
     # shellcheck disable=SC2046
