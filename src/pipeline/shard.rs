@@ -17,15 +17,14 @@ use crate::error::{Error, Result};
 use crate::flight::is_stretch;
 use crate::maneuver::{Maneuver, Status};
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Contents, Store, atomic};
+use crate::store::{Contents, Store, atomic, files};
 
 /// Reads a plan's file.
 ///
 /// # Errors
 /// [`Error::Config`] naming the file: it cannot be read, or is no plan to work by.
 pub fn read(file: &Path) -> Result<Plan> {
-    let text = std::fs::read_to_string(file).map_err(|e| Error::config(file, None, format!("cannot be read: {e}")))?;
-    Plan::read(&text).map_err(|why| Error::config(file, None, why))
+    Plan::read(&files::text(file)?).map_err(|why| Error::config(file, None, why))
 }
 
 /// Deals the campaign's flights, or the maneuvers found in them, to shards, and writes the plan.
@@ -149,7 +148,7 @@ impl Run<'_> {
     /// Every flight whose files can be read, at the cost of its bytes.
     fn flights(&self, files: &[FlightFiles]) -> Vec<(String, String, f64)> {
         let bytes = |file: &FlightFiles| -> f64 {
-            file.files.iter().map(|path| std::fs::metadata(path).map_or(0.0, |m| m.len() as f64)).sum()
+            file.files.iter().map(|path| self.contents.of(path).map_or(0.0, |content| content.bytes as f64)).sum()
         };
         let readable = files.iter().filter(|file| self.inputs.content(&file.flight_id).is_ok());
         readable.map(|file| (file.flight_id.clone(), file.flight_id.clone(), bytes(file))).collect()
