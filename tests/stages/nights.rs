@@ -146,7 +146,7 @@ fn a_full_disk_ends_in_a_clear_message_and_a_store_that_is_still_good() {
         campaign.forget();
         let outcome = with_room_for(&campaign, u32::try_from(room).unwrap());
         assert_eq!(outcome.code, Some(1), "{room} kB: {outcome:?}");
-        assert!(outcome.stderr.contains("cannot write it") && outcome.stderr.lines().count() == 1, "{outcome:?}");
+        assert!(outcome.stderr.contains("cannot write") && outcome.stderr.lines().count() == 1, "{outcome:?}");
         assert!(!campaign.path("reports/report.html").exists());
         campaign.finishes("run");
         let differing = differing(&everything(&campaign), &expected);
