@@ -19,41 +19,59 @@ options = \
 	$(if $(AGAINST),--against '$(AGAINST)') \
 	$(if $(STORE),--store '$(STORE)') \
 	$(if $(REPORTS),--reports '$(REPORTS)') \
-	$(if $(THREADS),--threads '$(THREADS)')
+	$(if $(THREADS),--threads '$(THREADS)') \
+	$(if $(MEMORY_MB),--memory-mb '$(MEMORY_MB)')
+# Of the targets that run stages: make nightly WAIT=3600 LOG=nightly.jsonl
+running = $(if $(WAIT),--wait '$(WAIT)') $(if $(LOG),--log '$(LOG)')
 
 harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
+.PHONY: cluster status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
-	$(call harvest,ingest)
+	$(call harvest,ingest) $(running)
 
 segment: build ## find the maneuvers and their classes
-	$(call harvest,segment)
+	$(call harvest,segment) $(running)
 
 estimate: build ## estimate the derivatives of every maneuver
-	$(call harvest,estimate)
+	$(call harvest,estimate) $(running)
 
 trend: build ## fit least-squares trends across angle of attack
-	$(call harvest,trend)
+	$(call harvest,trend) $(running)
 
 compare: build ## compare the trends with the wind-tunnel database
-	$(call harvest,compare)
+	$(call harvest,compare) $(running)
 
 report: build ## write the report
-	$(call harvest,report)
+	$(call harvest,report) $(running)
 
 export: build ## write the flight-updated derivatives for simulators: DAVE-ML, JSBSim, CSV, Parquet
-	$(call harvest,export)
+	$(call harvest,export) $(if $(WAIT),--wait '$(WAIT)')
 
 nightly: build ## the main job: every stage, to the report
-	$(call harvest,run)
+	$(call harvest,run) $(running)
 
 check: build ## is the pipeline's configuration right, and what would it do
 	$(call harvest,check)
+
+status: build ## what is fresh, stale or failed, and why
+	$(call harvest,status)
+
+explain: shown build ## the whole story of MANEUVER
+	cargo run --release --locked --quiet -- explain '$(MANEUVER)' '$(PIPELINE)' $(options)
+
+diff: build ## what changed since the night before, and why
+	$(call harvest,diff)
+
+verify: build ## does what is published still hold
+	$(call harvest,verify)
+
+gc: build ## what nothing published needs; with YES=1 it is removed
+	$(call harvest,gc) $(if $(YES),--yes)
 
 show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder show of the reports
 	cargo run --release --locked --quiet -- show $(shown) '$(PIPELINE)' $(options)
@@ -76,6 +94,18 @@ build: ## build the binary (the first time takes minutes)
 test: ## run the tests
 	cargo test --locked
 
+KILLS ?= 200
+FLIPS ?= 200
+torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; the bytes must be those of an undisturbed run
+	HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
+
+cluster: build ## a campaign on a Slurm of this machine's own: plain, with a failing task, with a killed node
+	bash tests/cluster/slurm.sh target/release/harvest
+
+FILES ?= 5000
+fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
+	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --release --locked --test stages -- fuzz:: --nocapture
+
 bench: ## run the benchmarks
 	cargo bench --locked
 
@@ -87,10 +117,11 @@ clean: ## remove what runs made: data/store and the folders under reports (cargo
 	rm -rf data/store reports/*/
 
 help: ## this list
-	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [AGAINST=] [STORE=] [REPORTS=] [THREADS=]'
+	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [AGAINST=] [STORE=] [REPORTS=] [THREADS=] [MEMORY_MB=]'
 	@echo
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
+	@echo 'stages also take [WAIT=seconds for another run] [LOG=file]; make explain takes MANEUVER='
 	@echo 'make show takes FLIGHT= or MANEUVER=, an id as in the table maneuvers'
 	@echo 'make simulate takes [CARDS=$(CARDS)] [OUT=$(OUT)]; then for instance'
 	@echo '  make nightly ARCHIVE=$(OUT)/flights WIND_TUNNEL=$(OUT)/wind_tunnel.csv STORE=data/store/simulated REPORTS=reports/simulated'

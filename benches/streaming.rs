@@ -52,7 +52,7 @@ fn run(archive: Option<&str>, until: Stage) -> anyhow::Result<()> {
         ..Overrides::default()
     };
     let config = Config::load(Path::new("pipelines/harv"), own)?;
-    pipeline::run(&config, until, &Quiet)?;
+    pipeline::run(&config, until, std::time::Duration::ZERO, &Quiet)?;
     Ok(())
 }
 

@@ -1,8 +1,12 @@
 //! The command line: arguments as typed, progress bars, the few lines that a run says, exit codes.
 
+mod cluster;
+mod nightly;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
@@ -10,9 +14,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Config, Overrides, Simulation};
 use crate::maneuver::Status;
+use crate::pipeline::night::{self, Done};
 use crate::pipeline::show::{self, Subject};
-use crate::pipeline::{self, Campaign, Progress, Stage};
-use crate::store::{archive, atomic};
+use crate::pipeline::{self, Progress, Stage};
+use crate::store::{Log, archive, atomic};
 use crate::{bench_case, simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
@@ -29,7 +34,7 @@ struct Cli {
 
 const AFTER: &str = "\
 Every stage first brings its predecessors up to date; what is up to date is not done again, and a run that was
-killed goes on where it was.
+killed goes on where it was. What a run made is published at once, as a night; the last nights stay.
 
 Examples:
   harvest run                                    the pipeline pipelines/harv, to the report
@@ -38,35 +43,61 @@ Examples:
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
   harvest show flight flight_001                 a strip chart of the flight with its maneuvers drawn in
   harvest export                                 the flight-updated derivatives as DAVE-ML, JSBSim section, CSV, Parquet
+  harvest run --quiet --wait 3600 --log nightly.jsonl
+                                                 from cron or a timer: waits for another run, speaks only of errors
+  harvest diff                                   what changed since the night before, and why
+  harvest submit --engine slurm                  the scripts of a job array and its merge; --go hands them over
   harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
 Exit codes:
   0  all well
   1  could not run: the configuration, the archive or the disk is at fault; the message says where
-  2  ran, and something was rejected: the table `problems` and the end of the report say what and why";
+  2  ran, and something was rejected: the table `problems` and the end of the report say what and why; `verify`: what
+     is published does not hold
+  3  `diff`: something moved by more than its uncertainty, is gone or is another; `status`: something is stale
+  75 a shard or a merge that may go well another time: the disk said no, a file could not be read, the store is in use";
+
+/// Something moved, is stale or missing: not wrong, but somebody should look.
+const LOOK: u8 = 3;
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// All stages, to the report
-    Run(Options),
+    Run(RunOptions),
     /// Read the archive: channels to signals on one clock, repairs, checks of units and signs
-    Ingest(Options),
+    Ingest(StageOptions),
     /// Find the maneuvers and their classes
-    Segment(Options),
+    Segment(StageOptions),
     /// Estimate the derivatives of every maneuver
-    Estimate(Options),
+    Estimate(StageOptions),
     /// Fit least-squares trends across angle of attack
-    Trend(Options),
+    Trend(RunOptions),
     /// Compare the trends with the wind-tunnel database
-    Compare(Options),
+    Compare(RunOptions),
     /// Write the report
-    Report(Options),
+    Report(RunOptions),
     /// Write the flight-updated derivatives for simulators: DAVE-ML, a JSBSim section, CSV and Parquet
     #[command(after_help = EXPORT_HELP)]
     Export(ExportOptions),
     /// Validate a pipeline's configuration and say what it would do
     Check(Options),
+    /// Say per stage what is fresh, stale or failed, and why
+    Status(nightly::StatusOptions),
+    /// Tell a maneuver's story: where from, which samples, what was held, how it was fitted, what it depends on
+    Explain(nightly::ExplainOptions),
+    /// Say what changed since the night before, and why
+    Diff(nightly::DiffOptions),
+    /// Say whether what is published still holds: bytes, input, configuration, code
+    Verify(nightly::VerifyOptions),
+    /// Show the artefacts and nights that nothing published needs, and remove them with --yes
+    Gc(nightly::GcOptions),
+    /// Deal a campaign's work to shards of about equal cost
+    Plan(cluster::PlanOptions),
+    /// Publish what the shards of a plan computed; refuses while something is missing
+    Merge(cluster::MergeOptions),
+    /// Write the scripts that compute a campaign on a cluster, and hand them over with --go
+    Submit(cluster::SubmitOptions),
     /// Draw a strip chart of a flight or a maneuver, SVG
     #[command(subcommand)]
     Show(Show),
@@ -139,6 +170,8 @@ Exit codes: 0 written; 1 not written, the message says why; 2 written, and somet
 struct ExportOptions {
     #[command(flatten)]
     options: Options,
+    #[command(flatten)]
+    patience: Patience,
     /// The folder to write into [default: export in the folder of the reports]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -152,7 +185,7 @@ struct SimulateOptions {
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
     /// No progress bars and no summary
     #[arg(long, short)]
@@ -173,11 +206,43 @@ struct ValidateOptions {
     #[arg(long, value_name = "N")]
     realisations: Option<usize>,
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
     /// No progress bars and no summary
     #[arg(long, short)]
     quiet: bool,
+}
+
+#[derive(Args, Debug)]
+struct RunOptions {
+    #[command(flatten)]
+    options: Options,
+    #[command(flatten)]
+    patience: Patience,
+    /// Append what happens to a file, one JSON object per line, with the time of day
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+struct StageOptions {
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    share: cluster::ShareOptions,
+}
+
+#[derive(Args, Debug)]
+struct Patience {
+    /// Wait so long for another run to leave the store, instead of leaving at once
+    #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0)]
+    seconds: u64,
+}
+
+impl Patience {
+    fn wait(&self) -> Duration {
+        Duration::from_secs(self.seconds)
+    }
 }
 
 #[derive(Args, Debug)]
@@ -191,7 +256,7 @@ struct BenchCaseOptions {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
 }
 
@@ -220,8 +285,12 @@ struct Options {
     #[arg(long, value_name = "FOLDER")]
     reports: Option<PathBuf>,
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
+    /// What reading flights may hold in memory at once, over all of them, instead of the pipeline's; results do not depend on
+    /// it
+    #[arg(long, value_name = "MB")]
+    memory_mb: Option<f64>,
     /// No progress bars and no summary
     #[arg(long, short)]
     quiet: bool,
@@ -243,11 +312,19 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> anyhow::Result<ExitCode> {
     let (until, options) = match command {
         Command::Run(options) | Command::Report(options) => (Stage::Report, options),
-        Command::Ingest(options) => (Stage::Ingest, options),
-        Command::Segment(options) => (Stage::Segment, options),
-        Command::Estimate(options) => (Stage::Estimate, options),
+        Command::Ingest(options) => return stage(Stage::Ingest, &options),
+        Command::Segment(options) => return stage(Stage::Segment, &options),
+        Command::Estimate(options) => return stage(Stage::Estimate, &options),
         Command::Trend(options) => (Stage::Trend, options),
         Command::Compare(options) => (Stage::Compare, options),
+        Command::Status(options) => return nightly::status(&options),
+        Command::Explain(options) => return nightly::explain(&options),
+        Command::Diff(options) => return nightly::diff(&options),
+        Command::Verify(options) => return nightly::verify(&options),
+        Command::Gc(options) => return nightly::gc(&options),
+        Command::Plan(options) => return cluster::plan(&options),
+        Command::Merge(options) => return cluster::merge(&options),
+        Command::Submit(options) => return cluster::submit(&options),
         Command::Export(options) => return export(&options),
         Command::Check(options) => return check(&options),
         Command::Simulate(options) => return simulate(&options),
@@ -256,14 +333,90 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
         Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
-    start_threads(options.threads)?;
-    let config = options.load()?;
-    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
-    let campaign = pipeline::run(&config, until, &bars)?;
-    if !options.quiet {
-        summary(&config, &campaign, until);
+    logged(until, &options)
+}
+
+/// A stage of the whole campaign, or of one shard.
+fn stage(until: Stage, options: &StageOptions) -> anyhow::Result<ExitCode> {
+    let shard = options.share.work(until, &options.run.options, &options.run.patience);
+    shard.unwrap_or_else(|| logged(until, &options.run))
+}
+
+fn logged(until: Stage, options: &RunOptions) -> anyhow::Result<ExitCode> {
+    let log = options.log.as_deref().map(Log::open).transpose()?;
+    let done = brought(until, options, log.as_ref());
+    if let (Some(log), Err(error)) = (&log, &done) {
+        log.write("end", &[("exit", 1.into()), ("error", format!("{error:#}").into())]);
     }
-    Ok(if campaign.rejected() { ExitCode::from(2) } else { ExitCode::SUCCESS })
+    let code = done?;
+    match log.and_then(|log| log.failure()) {
+        Some(failure) => Err(failure.into()),
+        None => Ok(code),
+    }
+}
+
+/// Brings a pipeline up to date as far as a stage, and says so to the terminal and the log.
+fn brought(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Result<ExitCode> {
+    let (begun, quiet) = (Instant::now(), options.options.quiet);
+    start_threads(options.options.threads)?;
+    let config = options.options.load()?;
+    if let Some(log) = log {
+        let folders = [&config.store, &config.reports].map(|f| f.display().to_string());
+        let [store, reports] = folders;
+        log.write(
+            "begin",
+            &[
+                ("pipeline", config.name.as_str().into()),
+                ("until", until.name().into()),
+                ("version", env!("CARGO_PKG_VERSION").into()),
+                ("source", env!("HARVEST_SOURCE").into()),
+                ("archive", config.archive.as_str().into()),
+                ("store", store.into()),
+                ("reports", reports.into()),
+                ("threads", rayon::current_num_threads().into()),
+            ],
+        );
+    }
+    let bars = Bars::new(quiet, log);
+    let done = pipeline::run(&config, until, options.patience.wait(), &bars)?;
+    if !quiet {
+        summary(&config, &done, until);
+    }
+    let exit = if done.rejected() { 2 } else { 0 };
+    if let Some(log) = log {
+        said(log, &done, exit, begun);
+    }
+    Ok(ExitCode::from(exit))
+}
+
+/// What a run that came to its end has to say to the log.
+fn said(log: &Log, done: &Done, exit: u8, begun: Instant) {
+    let summary = &done.summary;
+    for problem in &summary.problems {
+        let (stage, flight) = (problem.stage.as_str(), problem.flight_id.as_str());
+        let (place, reason) = (problem.place.as_str(), problem.reason.as_str());
+        log.write(
+            "problem",
+            &[("stage", stage.into()), ("flight", flight.into()), ("place", place.into()), ("reason", reason.into())],
+        );
+    }
+    log.write(
+        "night",
+        &[("night", done.night.as_str().into()), ("new", done.is_new.into()), ("alert", summary.alert.into())],
+    );
+    log.write(
+        "end",
+        &[
+            ("exit", exit.into()),
+            ("seconds", begun.elapsed().as_secs_f64().into()),
+            ("artefacts_made", done.made.into()),
+            ("flights", summary.flights.into()),
+            ("refused", summary.refused.into()),
+            ("maneuvers", summary.maneuvers.into()),
+            ("converged", summary.converged.into()),
+            ("problems", summary.problems.len().into()),
+        ],
+    );
 }
 
 fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
@@ -279,7 +432,7 @@ fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
 fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let simulation = Simulation::load(&options.cards)?;
-    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let bars = Bars::new(options.quiet, None);
     let flights = simulation::run(&simulation, &options.out, &bars)?;
     let problems: Vec<_> = flights.iter().flat_map(|f| &f.problems).collect();
     if !options.quiet {
@@ -302,7 +455,7 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
         simulation.cards.study.realisations = realisations;
     }
     anyhow::ensure!(simulation.cards.study.realisations > 1, "a scatter needs two realisations or more");
-    let bars = Bars { quiet: options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let bars = Bars::new(options.quiet, None);
     let command =
         format!("harvest validate {} --realisations {}", options.cards.display(), simulation.cards.study.realisations);
     let found = validation::run(&simulation, &options.out, &options.page, &command, &bars)?;
@@ -340,9 +493,9 @@ fn bench(options: &BenchCaseOptions) -> anyhow::Result<ExitCode> {
 fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
-    let bars = Bars { quiet: options.options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let bars = Bars::new(options.options.quiet, None);
     let folder = options.out.clone().unwrap_or_else(|| config.reports.join("export"));
-    let exported = pipeline::export::export(&config, &folder, &bars)?;
+    let exported = pipeline::export::export(&config, &folder, options.patience.wait(), &bars)?;
     if !options.options.quiet {
         println!("{} values, {} of them from flight", exported.values, exported.flight);
         if !exported.missing.is_empty() {
@@ -352,8 +505,7 @@ fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
             println!("{}", file.display());
         }
     }
-    let rejected = exported.problems.iter().any(|p| p.stage != "trend");
-    Ok(if rejected { ExitCode::from(2) } else { ExitCode::SUCCESS })
+    Ok(if night::rejected(&exported.problems) { ExitCode::from(2) } else { ExitCode::SUCCESS })
 }
 
 /// Draws a flight or a maneuver and says where the picture is.
@@ -361,7 +513,7 @@ fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
 fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
-    let bars = Bars { quiet: options.options.quiet, bar: Mutex::new(ProgressBar::hidden()) };
+    let bars = Bars::new(options.options.quiet, None);
     let picture = show::show(&config, &subject(options.id.clone()), options.out.as_deref(), &bars)?;
     if !options.options.quiet {
         for problem in &picture.problems {
@@ -373,6 +525,22 @@ fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Res
 }
 
 impl Options {
+    /// Pipeline and options as they are typed, without those of the terminal: for a script that is to do the same.
+    fn typed(&self) -> Vec<String> {
+        let path = |path: &Path| path.display().to_string();
+        let options = [
+            ("--archive", self.archive.clone()),
+            ("--wind-tunnel", self.wind_tunnel.as_deref().map(path)),
+            ("--events", self.events.as_deref().map(path)),
+            ("--store", self.store.as_deref().map(path)),
+            ("--reports", self.reports.as_deref().map(path)),
+            ("--memory-mb", self.memory_mb.map(|mb| mb.to_string())),
+        ];
+        let against = self.against.iter().map(|folder| ("--against", Some(path(folder))));
+        let given = options.into_iter().chain(against).filter_map(|(name, value)| Some([name.to_owned(), value?]));
+        std::iter::once(path(&self.pipeline)).chain(given.flatten()).collect()
+    }
+
     fn load(&self) -> anyhow::Result<Config> {
         let folder =
             if self.pipeline.is_dir() { self.pipeline.clone() } else { Path::new("pipelines").join(&self.pipeline) };
@@ -388,19 +556,21 @@ impl Options {
             reports: self.reports.clone(),
             events: self.events.clone(),
             against: self.against.clone(),
+            memory_mb: self.memory_mb,
         };
         Ok(Config::load(&folder, overrides)?)
     }
 }
 
 #[expect(clippy::print_stdout, reason = "what a run says")]
-fn summary(config: &Config, campaign: &Campaign, until: Stage) {
-    println!("{} flights, {} refused", campaign.flights.len(), campaign.refused());
+fn summary(config: &Config, done: &Done, until: Stage) {
+    let campaign = &done.summary;
+    println!("{} flights, {} refused", campaign.flights, campaign.refused);
     if until >= Stage::Segment {
-        println!("{} maneuvers", campaign.maneuvers.len());
+        println!("{} maneuvers", campaign.maneuvers);
     }
     if until >= Stage::Estimate {
-        println!("{} of them converged", campaign.converged());
+        println!("{} of them converged", campaign.converged);
     }
     for problem in campaign.problems.iter().take(10) {
         let place = [problem.flight_id.as_str(), problem.place.as_str()].map(str::trim);
@@ -410,8 +580,11 @@ fn summary(config: &Config, campaign: &Campaign, until: Stage) {
     if campaign.problems.len() > 10 {
         println!("  and {} more in {}", campaign.problems.len() - 10, config.reports.join("problems.csv").display());
     }
+    if !done.is_new {
+        println!("nothing new: night {} holds", done.night);
+    }
     println!("tables in {}", config.reports.display());
-    if let Some(report) = &campaign.report {
+    if let Some(report) = &done.report {
         println!("report: {}", report.display());
     }
 }
@@ -442,13 +615,19 @@ fn check(options: &Options) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A progress bar per stage on the terminal; nothing where there is none.
-struct Bars {
+/// A progress bar per stage on the terminal, nothing where there is none; and a line per stage in the log.
+struct Bars<'a> {
     quiet: bool,
+    log: Option<&'a Log>,
     bar: Mutex<ProgressBar>,
+    stage: Mutex<Option<(String, usize, Instant)>>,
 }
 
-impl Bars {
+impl Bars<'_> {
+    fn new(quiet: bool, log: Option<&Log>) -> Bars<'_> {
+        Bars { quiet, log, bar: Mutex::new(ProgressBar::hidden()), stage: Mutex::new(None) }
+    }
+
     fn with(&self, act: impl FnOnce(&mut ProgressBar)) {
         if let Ok(mut bar) = self.bar.lock() {
             act(&mut bar);
@@ -456,8 +635,11 @@ impl Bars {
     }
 }
 
-impl Progress for Bars {
+impl Progress for Bars<'_> {
     fn begin(&self, stage: &str, items: usize) {
+        if let Ok(mut begun) = self.stage.lock() {
+            *begun = Some((stage.to_owned(), items, Instant::now()));
+        }
         let new = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(items as u64) };
         if let Ok(style) =
             ProgressStyle::with_template("{prefix:>9} {bar:32} {pos:>4}/{len:<4} {elapsed:>4}  {wide_msg}")
@@ -476,6 +658,11 @@ impl Progress for Bars {
     }
 
     fn end(&self) {
+        let begun = self.stage.lock().ok().and_then(|mut begun| begun.take());
+        if let (Some(log), Some((stage, items, begun))) = (self.log, begun) {
+            let seconds = begun.elapsed().as_secs_f64();
+            log.write("stage", &[("stage", stage.into()), ("items", items.into()), ("seconds", seconds.into())]);
+        }
         self.with(|bar| bar.finish_with_message(""));
     }
 }

@@ -32,6 +32,12 @@ impl Error {
         Error::Store { path: path.to_owned(), what: what.to_string() }
     }
 
+    /// Whether the same may go well another time: a disk or a file server that says no, a store in use.
+    #[must_use]
+    pub fn is_passing(&self) -> bool {
+        matches!(self, Error::Io { .. } | Error::Store { .. })
+    }
+
     /// For `map_err` on a disk operation: `.map_err(Error::io(path, "cannot create the folder"))`.
     pub fn io(path: &Path, what: &'static str) -> impl FnOnce(std::io::Error) -> Error {
         let path = path.to_owned();

@@ -10,6 +10,7 @@ pub mod aircraft;
 pub mod aero;
 pub mod maneuver;
 pub mod tables;
+pub mod lineage;
 
 // Physics: how the aircraft moves and what its sensors read.
 pub mod dynamics;
@@ -24,11 +25,15 @@ pub mod segment;
 pub mod estimate;
 pub mod trend;
 pub mod compare;
+pub mod overnight;
 pub mod export;
 pub mod report;
 
 // Studies: is what the stages say of themselves true?
 pub mod validate;
+
+// Past one machine: work dealt to shards, scripts for a scheduler.
+pub mod cluster;
 
 // Outside: disk and configuration.
 pub mod store;

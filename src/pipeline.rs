@@ -3,37 +3,52 @@
 //! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts
 //! lie in the store under fingerprints of all that decides them, so what is up to date is not done again, and a killed run
 //! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
-//! the order of flights and maneuvers, whatever thread made them.
+//! the order of flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
 
 mod comparison;
 mod conditioning;
+pub mod diff;
+pub mod explain;
 pub mod export;
+pub mod gc;
+mod inputs;
+pub mod night;
 mod others;
-mod stretches;
+pub mod shard;
 pub mod show;
+pub mod status;
+mod stretches;
+pub mod verify;
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::compare::against::Earlier;
 use crate::config::Config;
-use crate::error::{Problem, Result};
+use crate::error::{Error, Problem, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::{Correction, Record};
 use crate::ingest::Signature;
-use crate::maneuver::{Maneuver, Unknown};
+use crate::lineage::Lineage;
+use crate::maneuver::{Event, Maneuver, Unknown};
 use crate::output_error::Outcome;
+use crate::overnight::Changes;
 use crate::store::archive::FlightFiles;
-use crate::store::{Digest, Fingerprint, Store, archive, atomic, table};
+use crate::store::record_file::RecordFile;
+use crate::store::table::Shelf;
+use crate::store::{Contents, Digest, Fingerprint, Nights, Store, archive, table};
 use crate::tables::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
     History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
 use crate::{estimate, report, trend};
-use conditioning::{Done, Shares};
+use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 4;
@@ -41,17 +56,14 @@ const SEGMENT_VERSION: u32 = 4;
 const ESTIMATE_VERSION: u32 = 7;
 const JOINT_VERSION: u32 = 3;
 const PREDICT_VERSION: u32 = 3;
+const TREND_VERSION: u32 = 2;
+const COMPARE_VERSION: u32 = 1;
 
-/// The stages in order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Stage {
-    Ingest,
-    Segment,
-    Estimate,
-    Trend,
-    Compare,
-    Report,
-}
+/// The report's names among the published files: on screen and on paper.
+const REPORT: &str = "report.html";
+const PRINTED: &str = "report.pdf";
+
+pub use crate::lineage::Stage;
 
 /// Where the conductor says how far it is.
 pub trait Progress: Sync {
@@ -73,6 +85,8 @@ pub struct Flight {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Ingested {
     accepted: bool,
+    /// What the record's file holds, where there is one.
+    record: Option<Digest>,
     channels: Vec<ChannelRow>,
     checks: Vec<CheckRow>,
     instruments: Vec<InstrumentRow>,
@@ -97,8 +111,6 @@ type Fitted = (Estimated, Option<History>);
 /// The campaign as far as it has been brought.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
-    /// The archive's files, as far as they could be read.
-    pub sources: Vec<report::SourceFile>,
     pub flights: Vec<Flight>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
@@ -131,8 +143,10 @@ pub struct Campaign {
     pub problems: Vec<Problem>,
     /// Rows that an earlier flight has, too: the later flight's id, from when to when, s.
     pub again: Vec<(String, f64, f64)>,
-    /// The report, where it was written.
-    pub report: Option<PathBuf>,
+    /// Flights that are to be read again the next time, and why they could not be read now.
+    pub unread: BTreeMap<String, String>,
+    /// Since the last complete night; nothing before the report.
+    pub overnight: Changes,
 }
 
 impl Campaign {
@@ -152,56 +166,41 @@ impl Campaign {
         self.predicted.iter().flat_map(|p| &p.outputs).cloned().collect()
     }
 
-    /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for a trend is among the
-    /// problems, but nothing of it was rejected.
-    #[must_use]
-    pub fn rejected(&self) -> bool {
-        self.problems.iter().any(|p| p.stage != "trend")
-    }
-
     #[must_use]
     pub fn converged(&self) -> usize {
         self.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).count()
     }
 }
 
-/// Brings the campaign up to date as far as `until`.
+/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait` for another run to
+/// leave store and reports.
 ///
 /// # Errors
 /// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
-/// the campaign's problems.
-pub fn run(config: &Config, until: Stage, progress: &dyn Progress) -> Result<Campaign> {
-    let (run, files) = begin(config, progress)?;
-    // Read before anything is published: it may lie in the same folder.
-    let earlier = comparison::earlier(config)?;
-    let mut campaign = Campaign::default();
-    run.ingest(&files, &mut campaign)?;
-    if until >= Stage::Segment {
-        run.segment(&mut campaign)?;
+/// the problems of the night's summary.
+pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progress) -> Result<night::Done> {
+    let (mut run, files) = begin(config, wait, progress)?;
+    let nights = Nights::open(&config.reports, wait)?;
+    if let Some(done) = run.is_published(&nights, until) {
+        return Ok(done);
     }
-    if until >= Stage::Estimate {
-        run.estimate(&mut campaign)?;
+    run.publish_into(nights.tonight()?);
+    let made = run.make(&files, until, &nights).and_then(|campaign| run.publish(&nights, &campaign, until));
+    if made.is_err() {
+        // What is left of tonight takes up room on a disk that may be full.
+        nights.forget_tonight();
     }
-    if until >= Stage::Trend {
-        run.trend(&mut campaign)?;
-    }
-    if until >= Stage::Compare {
-        run.compare(&mut campaign, &earlier)?;
-    }
-    if until >= Stage::Report {
-        run.report(&mut campaign)?;
-    }
-    table::publish(&config.reports, &campaign.problems)?;
-    Ok(campaign)
+    made
 }
 
-/// Opens the store; while the run lives no other can.
-fn begin<'a>(config: &'a Config, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
+/// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
+fn begin<'a>(config: &'a Config, wait: Duration, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
     let files = archive::find(&config.archive)?;
-    let store = Store::open(&config.store)?;
-    atomic::sweep(&config.reports)?;
-    let shares = Shares::of(config.ingest.memory_mb, config.channels.len(), rayon::current_num_threads());
-    Ok((Run { config, store, progress, shares }, files))
+    let store = Store::open(&config.store, wait)?;
+    let contents = Contents::load(&config.store.join("contents.json"));
+    let run = Run::new(config, store, contents, &files, progress)?;
+    run.contents.save()?;
+    Ok((run, files))
 }
 
 struct Run<'a> {
@@ -209,15 +208,48 @@ struct Run<'a> {
     store: Store,
     progress: &'a dyn Progress,
     shares: Shares,
-}
-
-/// The fingerprint of a flight, and those of its files, or why there are none.
-struct Prints {
-    fingerprint: String,
-    content: std::result::Result<Vec<Digest>, String>,
+    contents: Contents,
+    inputs: inputs::Inputs,
+    /// The tables of earlier campaigns to compare with.
+    earlier: Vec<Earlier>,
+    lineage: Lineage,
+    /// Where each stage's tables go; nowhere unless a night is to be published.
+    shelves: BTreeMap<Stage, Shelf>,
+    /// Tonight's folder, where there is one.
+    tonight: Option<PathBuf>,
 }
 
 impl Run<'_> {
+    /// All stages as far as `until`, their tables in tonight's folder.
+    fn make(&self, files: &[FlightFiles], until: Stage, nights: &Nights) -> Result<Campaign> {
+        let mut campaign = self.results(files, until)?;
+        if until >= Stage::Report {
+            campaign.overnight = self.changes(nights, &campaign)?;
+            self.report(&mut campaign)?;
+        }
+        table::publish(&self.shelf(until), &campaign.problems)?;
+        Ok(campaign)
+    }
+
+    /// The stages before the report, as far as `until`.
+    fn results(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
+        let mut campaign = Campaign::default();
+        self.ingest(files, &mut campaign)?;
+        if until >= Stage::Segment {
+            self.segment(&mut campaign)?;
+        }
+        if until >= Stage::Estimate {
+            self.estimate(&mut campaign)?;
+        }
+        if until >= Stage::Trend {
+            self.trend(&mut campaign)?;
+        }
+        if until >= Stage::Compare {
+            self.compare(&mut campaign)?;
+        }
+        Ok(campaign)
+    }
+
     /// Does `work` on every item in parallel with a progress bar; results in the order of the items.
     fn each<T: Sync, R: Send>(
         &self,
@@ -240,31 +272,18 @@ impl Run<'_> {
     }
 
     fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
-        let prints: Vec<Prints> = files.par_iter().map(|f| self.prints(f)).collect();
-        let items: Vec<(&FlightFiles, &Prints)> = files.iter().zip(&prints).collect();
-        for (files, prints) in &items {
-            let digests = prints.content.iter().flatten().cloned();
-            campaign.sources.extend(files.files.iter().zip(digests).map(|(path, digest)| source_file(path, digest)));
-        }
-        let copy = |prints: &Prints| items.iter().find(|(_, p)| p.content.is_ok() && p.content == prints.content);
-        let work = |(files, prints): &(&FlightFiles, &Prints)| {
-            let id = &files.flight_id;
-            let first = copy(prints).map(|(f, _)| &f.flight_id).filter(|first| *first != id);
-            match (&prints.content, first) {
-                (Err(reason), _) => Ok(self.refused(id, &prints.fingerprint, problem("ingest", id, id, reason))),
-                (Ok(_), Some(first)) => {
-                    let reason = format!("its files are those of flight `{first}` under another name; it is left out");
-                    Ok(self.refused(id, &prints.fingerprint, problem("ingest", id, id, &reason)))
-                }
-                (Ok(_), None) => self.ingest_flight(files, &prints.fingerprint),
+        campaign.problems.extend_from_slice(&self.inputs.problems);
+        let done = self.each_flight(files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
+        for (files, done) in files.iter().zip(done) {
+            match done.artefact {
+                Some(artefact) => self.store.need([&artefact]),
+                None => _ = campaign.unread.insert(files.flight_id.clone(), done.reasons()),
             }
-        };
-        let done = self.each_flight(&items, |(f, _)| &f.flight_id, work)?;
-        let artefacts: Vec<PathBuf> = done.iter().map(|d| d.artefact.clone()).collect();
-        for flight in done {
-            campaign.problems.extend(flight.problems);
-            campaign.flights.extend(flight.stretches);
+            campaign.problems.extend(done.problems);
+            campaign.flights.extend(done.stretches);
         }
+        let recorded = campaign.flights.iter().filter(|f| f.ingested.accepted);
+        self.store.need(recorded.map(|f| &f.record));
         stretches::same_rows(campaign);
         for flight in &campaign.flights {
             campaign.channels.extend_from_slice(&flight.ingested.channels);
@@ -272,46 +291,17 @@ impl Run<'_> {
             campaign.instruments.extend_from_slice(&flight.ingested.instruments);
             campaign.problems.extend_from_slice(&flight.ingested.problems);
         }
-        let records: Vec<PathBuf> = campaign.flights.iter().map(|f| f.record.clone()).collect();
-        self.store.keep_only("records", &records)?;
-        self.store.keep_only("ingest", &artefacts)?;
-        table::publish(&self.config.reports, &campaign.channels)?;
-        table::publish(&self.config.reports, &campaign.checks)?;
-        table::publish(&self.config.reports, &campaign.instruments)
-    }
-
-    /// What decides a flight's record, and what its files hold alone.
-    fn prints(&self, files: &FlightFiles) -> Prints {
-        let config = self.config;
-        let content = files.files.iter().map(|path| Digest::of_file(path)).collect::<Result<Vec<Digest>>>();
-        let content = content.map_err(|error| error.to_string());
-        let fingerprint = Fingerprint::of("ingest", INGEST_VERSION)
-            .with(&files.flight_id)
-            .with(&config.channels)
-            .with(&config.constants)
-            .with(&config.aircraft)
-            .with(&config.ingest)
-            .with(&content);
-        Prints { fingerprint: fingerprint.finish(), content }
-    }
-
-    /// A flight that has no record.
-    fn refused(&self, id: &str, fingerprint: &str, problem: Problem) -> Done {
-        let flight = Flight {
-            flight_id: id.to_owned(),
-            fingerprint: fingerprint.to_owned(),
-            record: self.record_path(id, fingerprint),
-            ingested: Ingested::refused(problem),
-        };
-        let artefact = self.store.path("ingest", id, fingerprint, "json");
-        Done { stretches: vec![flight], problems: vec![], artefact }
+        let shelf = self.shelf(Stage::Ingest);
+        table::publish(&shelf, &campaign.channels)?;
+        table::publish(&shelf, &campaign.checks)?;
+        table::publish(&shelf, &campaign.instruments)
     }
 
     fn segment(&self, campaign: &mut Campaign) -> Result<()> {
         let accepted: Vec<&Flight> = campaign.flights.iter().filter(|f| f.ingested.accepted).collect();
         let found = self.each("segment", &accepted, |f| &f.flight_id, |f| self.segment_flight(f))?;
         let (paths, found): (Vec<PathBuf>, Vec<Found>) = found.into_iter().unzip();
-        self.store.keep_only("segment", &paths)?;
+        self.store.need(&paths);
         for flight in found {
             campaign.maneuvers.extend(flight.maneuvers);
             campaign.unknown.extend(flight.unknown);
@@ -325,15 +315,14 @@ impl Run<'_> {
             let reason = "the archive has no such flight; the analyst's list names it";
             campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
         }
-        table::publish(&self.config.reports, &campaign.maneuvers)?;
-        table::publish(&self.config.reports, &campaign.unknown)?;
-        table::publish(&self.config.reports, &campaign.events)
+        let shelf = self.shelf(Stage::Segment);
+        table::publish(&shelf, &campaign.maneuvers)?;
+        table::publish(&shelf, &campaign.unknown)?;
+        table::publish(&shelf, &campaign.events)
     }
 
-    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+    fn segment_path(&self, flight: &Flight, events: &[Event]) -> PathBuf {
         let config = self.config;
-        let record = flight.open()?;
-        let events = flight.events(&config.events, &record.about);
         let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
         let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
             .with(&flight.fingerprint)
@@ -341,11 +330,29 @@ impl Run<'_> {
             .with(&config.segment)
             .with(&events)
             .finish();
-        let path = self.store.path("segment", &flight.flight_id, &fingerprint, "json");
+        self.store.path("segment", &flight.flight_id, &fingerprint, "json")
+    }
+
+    /// A flight's record, the analyst's events in it, and where what is found in it lies.
+    fn to_segment(&self, flight: &Flight) -> Result<(RecordFile, Vec<Event>, PathBuf)> {
+        let record = flight.open()?;
+        let events = flight.events(&self.config.events, &record.about);
+        let path = self.segment_path(flight, &events);
+        Ok((record, events, path))
+    }
+
+    /// What was found in a flight and where that lies, if it is up to date.
+    fn segmented(&self, flight: &Flight) -> Option<(PathBuf, Found)> {
+        let (_, _, path) = self.to_segment(flight).ok()?;
+        Some((path.clone(), self.store.load(&path)?))
+    }
+
+    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+        let (record, events, path) = self.to_segment(flight)?;
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
         }
-        let found = stretches::segmented(config, &record, &events)?;
+        let found = stretches::segmented(self.config, &record, &events)?;
         self.store.save(&path, &found)?;
         Ok((path, found))
     }
@@ -359,8 +366,8 @@ impl Run<'_> {
         let (paths, done): (Vec<PathBuf>, Vec<_>) = done?.into_iter().flatten().unzip();
         let (estimated, histories): (Vec<Estimated>, Vec<Option<History>>) = done.into_iter().unzip();
         campaign.histories = histories.into_iter().flatten().collect();
-        self.store.keep_only("estimate", &paths)?;
-        self.store.keep_only("history", &paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>())?;
+        self.store.need(&paths);
+        self.store.need(&paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>());
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -374,7 +381,7 @@ impl Run<'_> {
             campaign.combined.extend(estimated.combined);
             campaign.correlations.extend(estimated.correlations);
         }
-        table::publish(&self.config.reports, &campaign.correlations)?;
+        table::publish(&self.shelf(Stage::Estimate), &campaign.correlations)?;
         self.publish_estimates(campaign)
     }
 
@@ -399,7 +406,7 @@ impl Run<'_> {
                         self.store.save(&path, &estimated)?;
                         (estimated, history)
                     }
-                    (None, None) => return Err(crate::error::Error::store(&path, &"its flight's record was not read")),
+                    (None, None) => return Err(Error::store(&path, &"its flight's record was not read")),
                 };
                 self.progress.advance(&maneuver.maneuver_id);
                 Ok((path, done))
@@ -439,13 +446,12 @@ impl Run<'_> {
         campaign.trends = found.rows;
         campaign.problems.extend(found.problems);
         campaign.outliers = found.outliers;
-        table::publish(&self.config.reports, &campaign.outliers)?;
-        table::publish(&self.config.reports, &campaign.trends)
+        table::publish(&self.shelf(Stage::Trend), &campaign.outliers)?;
+        table::publish(&self.shelf(Stage::Trend), &campaign.trends)
     }
 
     fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
-        let path = config.reports.join("report.html");
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
@@ -468,46 +474,46 @@ impl Run<'_> {
             problems: &campaign.problems,
             histories: &campaign.histories,
             typical_alpha_deg: config.report.histories_at_alpha_deg,
-            provenance: &self.provenance(campaign)?,
+            provenance: &self.provenance(),
             order: &config.derivative_names(),
             classes: &classes,
+            overnight: &campaign.overnight,
         };
-        let html =
-            report::html(&contents, config.template.as_deref()).map_err(|e| crate::error::Error::store(&path, &e))?;
-        atomic::place(&path, html.as_bytes())?;
-        let printed = config.reports.join("report.pdf");
+        let named = |e| Error::store(&config.reports.join(REPORT), &e);
+        let html = report::html(&contents, config.template.as_deref()).map_err(named)?;
+        self.place_tonight(REPORT, html.as_bytes())?;
         match report::pdf::pdf(&html) {
-            Ok(bytes) => atomic::place(&printed, &bytes)?,
+            Ok(bytes) => self.place_tonight(PRINTED, &bytes)?,
             Err(why) => {
-                // One of another night beside this page would be taken for the same.
-                atomic::remove(&printed)?;
                 let reason = format!("not made: the template's page is no well-formed XML: {why}");
-                campaign.problems.push(problem("report", "", "report.pdf", &reason));
+                campaign.problems.push(problem("report", "", PRINTED, &reason));
             }
         }
-        campaign.report = Some(path);
         Ok(())
     }
 
     /// Everything that decided the results, enough to do it again.
-    fn provenance(&self, campaign: &Campaign) -> Result<report::Provenance> {
+    fn provenance(&self) -> report::Provenance {
         let config = self.config;
-        let tunnel = source_file(&config.wind_tunnel, Digest::of_file(&config.wind_tunnel)?);
         let versions = format!(
             "ingest {INGEST_VERSION}, segment {SEGMENT_VERSION}, estimate {ESTIMATE_VERSION}, joint {JOINT_VERSION}, predict \
              {PREDICT_VERSION}"
         );
-        Ok(report::Provenance {
-            program: format!("harvest {}, methods: {versions}", env!("CARGO_PKG_VERSION")),
+        report::Provenance {
+            program: format!(
+                "harvest {} (sources {}), methods: {versions}",
+                env!("CARGO_PKG_VERSION"),
+                env!("HARVEST_SOURCE")
+            ),
             command: format!(
                 "harvest run {} --archive '{}' --wind-tunnel '{}'",
                 config.name,
                 config.archive,
                 config.wind_tunnel.display()
             ),
-            data: campaign.sources.iter().cloned().chain([tunnel]).collect(),
+            data: self.inputs.sources.clone(),
             configuration: config.files.clone(),
-        })
+        }
     }
 }
 
@@ -519,11 +525,6 @@ fn tunnel_and_sources(config: &Config) -> String {
     } else {
         format!("{name} (sources: {})", sources.join("; "))
     }
-}
-
-fn source_file(path: &Path, digest: Digest) -> report::SourceFile {
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    report::SourceFile { name, bytes: digest.bytes, blake3: digest.blake3 }
 }
 
 fn problem(stage: &str, flight_id: &str, place: &str, reason: &str) -> Problem {

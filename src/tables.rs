@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::aero::Output;
 
@@ -372,15 +372,50 @@ pub struct ChangeRow {
     pub verdict: String,
 }
 
-/// A row of an earlier campaign's `trends`, as far as it is compared with.
+/// A number of a published table; one that does not exist is an empty field there, and no number here.
+fn published<'de, D: Deserializer<'de>>(field: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
+}
+
+/// A row of published `trends`, as far as it is compared with: an earlier campaign's or another night's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EarlierTrendRow {
+pub struct PublishedTrend {
     pub derivative: String,
     pub unit: String,
     pub group: String,
     pub alpha_deg: f64,
+    #[serde(deserialize_with = "published")]
     pub value: f64,
+    #[serde(deserialize_with = "published")]
     pub standard_error: f64,
+}
+
+impl From<&TrendRow> for PublishedTrend {
+    fn from(row: &TrendRow) -> PublishedTrend {
+        PublishedTrend {
+            derivative: row.derivative.clone(),
+            unit: row.unit.clone(),
+            group: row.group.clone(),
+            alpha_deg: row.alpha_deg,
+            value: row.value,
+            standard_error: row.standard_error,
+        }
+    }
+}
+
+/// A row of published `comparison`, as far as nights are compared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PublishedVerdict {
+    pub derivative: String,
+    pub alpha_deg: f64,
+    pub verdict: String,
+}
+
+impl From<&ComparisonRow> for PublishedVerdict {
+    fn from(row: &ComparisonRow) -> PublishedVerdict {
+        let (derivative, verdict) = (row.derivative.clone(), row.verdict.clone());
+        PublishedVerdict { derivative, alpha_deg: row.alpha_deg, verdict }
+    }
 }
 
 /// `flight_updated`: one derivative at one grid point of the export.

@@ -86,8 +86,9 @@ pub fn run(
         progress.advance(&name(maneuver));
     }
     progress.end();
-    table::publish(out, &found.coverage)?;
-    table::publish(out, &found.starts)?;
+    let shelf = table::Shelf::of(out);
+    table::publish(&shelf, &found.coverage)?;
+    table::publish(&shelf, &found.starts)?;
     atomic::place(page, validate::page(command, &found.coverage, &found.starts).as_bytes())?;
     Ok(found)
 }

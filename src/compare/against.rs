@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use super::{Settings, Verdict, judge};
-use crate::tables::{ChangeRow, EarlierTrendRow, TrendRow};
+use crate::tables::{ChangeRow, PublishedTrend, TrendRow};
 use crate::trend;
 
 /// An earlier campaign's published trends.
@@ -15,21 +15,21 @@ use crate::trend;
 pub struct Earlier {
     /// The folder, as the analyst names it.
     pub name: String,
-    pub trends: Vec<EarlierTrendRow>,
+    pub trends: Vec<PublishedTrend>,
 }
 
 impl Earlier {
     #[must_use]
-    pub fn new(folder: &Path, trends: Vec<EarlierTrendRow>) -> Earlier {
+    pub fn new(folder: &Path, trends: Vec<PublishedTrend>) -> Earlier {
         Earlier { name: folder.display().to_string(), trends }
     }
 
     /// Value and standard error of a trend, linear between its published α; none outside of them or in another unit.
     fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
-        let same = |e: &&EarlierTrendRow| {
+        let same = |e: &&PublishedTrend| {
             e.derivative == now.derivative && e.group == now.group && e.unit == now.unit && e.alpha_deg.is_finite()
         };
-        let mut rows: Vec<&EarlierTrendRow> = self.trends.iter().filter(same).collect();
+        let mut rows: Vec<&PublishedTrend> = self.trends.iter().filter(same).collect();
         rows.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg));
         let high = rows.iter().find(|r| r.alpha_deg >= now.alpha_deg)?;
         let low = rows.iter().rev().find(|r| r.alpha_deg <= now.alpha_deg)?;
@@ -80,7 +80,7 @@ pub fn changes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::EarlierTrendRow;
+    use crate::tables::PublishedTrend;
     use approx::assert_relative_eq;
 
     fn now(alpha_deg: f64, value: f64) -> TrendRow {
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_trend_is_compared_with_the_earlier_one_between_its_points_and_not_beyond() {
-        let before = |alpha_deg: f64, value: f64| EarlierTrendRow {
+        let before = |alpha_deg: f64, value: f64| PublishedTrend {
             derivative: "d".into(),
             unit: "per_deg".into(),
             group: "all".into(),

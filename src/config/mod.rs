@@ -16,7 +16,7 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{cluster, compare, estimate, export, ingest, segment, trend};
 
 pub use cards::Simulation;
 pub use written::ReportSettings;
@@ -47,6 +47,7 @@ pub struct Config {
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,
+    pub cluster: cluster::Settings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
     /// The pipeline's files as they are: name and text.
@@ -63,6 +64,8 @@ pub struct Overrides {
     pub events: Option<PathBuf>,
     /// Folders of earlier campaigns' tables; the pipeline's own where it is empty.
     pub against: Vec<PathBuf>,
+    /// What reading may hold in memory at once, MB.
+    pub memory_mb: Option<f64>,
 }
 
 impl Config {
@@ -94,13 +97,17 @@ impl Config {
             constants: aircraft.constants,
             buildup,
             classes,
-            ingest: pipeline.ingest,
+            ingest: ingest::Settings {
+                memory_mb: overrides.memory_mb.unwrap_or(pipeline.ingest.memory_mb),
+                ..pipeline.ingest
+            },
             segment: pipeline.segment,
             estimate: pipeline.estimate,
             trend: pipeline.trend,
             compare: against(pipeline.compare, overrides.against),
             export: pipeline.export,
             report: pipeline.report,
+            cluster: pipeline.cluster,
             template,
             files: files.all().map(|file| file.named(folder)).collect(),
         };

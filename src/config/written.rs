@@ -10,7 +10,7 @@ use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{cluster, compare, estimate, export, ingest, segment, trend};
 
 /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]
@@ -42,6 +42,8 @@ pub struct PipelineFile {
     pub export: export::Settings,
     #[serde(default)]
     pub report: ReportSettings,
+    #[serde(default)]
+    pub cluster: cluster::Settings,
 }
 
 /// Settings of the report.
@@ -52,12 +54,14 @@ pub struct ReportSettings {
     pub histories_at_alpha_deg: f64,
     /// A template of the analyst's own instead of the built-in one.
     pub template: Option<PathBuf>,
+    /// So many published nights stay; at least one. Default 7: a week to look back over.
+    pub keep_nights: usize,
 }
 
 impl Default for ReportSettings {
     fn default() -> Self {
         // The paper's Figures 4 and 12 are at 30 deg.
-        ReportSettings { histories_at_alpha_deg: 30.0, template: None }
+        ReportSettings { histories_at_alpha_deg: 30.0, template: None, keep_nights: 7 }
     }
 }
 

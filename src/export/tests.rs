@@ -222,7 +222,8 @@ fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
         let tables = tables(&contents);
         let folder = tempfile::tempdir().unwrap();
         let third = flown.config.tunnel.settings().third.as_ref().map(|t| t.name.as_str());
-        crate::store::table::publish_export(folder.path(), &rows(&tables), third).unwrap();
+        crate::store::table::publish_export(&crate::store::table::Shelf::of(folder.path()), &rows(&tables), third)
+            .unwrap();
         std::fs::write(folder.path().join("flight_updated.dml"), daveml::document(&contents, &tables)).unwrap();
         let names: Vec<&str> = tables.iter().map(|t| t.derivative.as_str()).collect();
         let read = |extension: &str| {

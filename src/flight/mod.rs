@@ -9,3 +9,10 @@ pub mod taps;
 pub use channel::{Channel, RawFlight};
 pub use correction::Correction;
 pub use record::{Mark, Record};
+
+/// Whether an id is a flight's own or that of one of its stretches.
+#[must_use]
+pub fn is_stretch(id: &str, flight_id: &str) -> bool {
+    let rest = id.strip_prefix(flight_id);
+    rest.is_some_and(|r| r.is_empty() || r.strip_prefix('.').is_some_and(|n| n.parse::<usize>().is_ok()))
+}

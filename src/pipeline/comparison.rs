@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Campaign, Run};
+use super::{Campaign, Run, Stage};
 use crate::compare::against::{self, Earlier};
 use crate::compare::{self, beyond, ranges};
 use crate::config::Config;
@@ -32,15 +32,15 @@ pub(super) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow
 }
 
 impl Run<'_> {
-    pub(super) fn compare(&self, campaign: &mut Campaign, earlier: &[Earlier]) -> Result<()> {
+    pub(super) fn compare(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
-        let (tunnel, settings, reports) = (&config.tunnel, &config.compare, &config.reports);
+        let (tunnel, settings, shelf) = (&config.tunnel, &config.compare, self.shelf(Stage::Compare));
         let comparison = compare::comparison(&campaign.trends, &campaign.maneuvers, tunnel, &config.trend, settings);
         let of_maneuvers = compare::of_maneuvers(&converged(config, campaign), &campaign.maneuvers, tunnel, settings);
         let beyond = beyond::beyond(&campaign.estimates, &campaign.maneuvers, &comparison, tunnel);
         let (mut verdicts, mut worst) = ranges::of_tunnel(&comparison, tunnel, settings);
         let mut changes = Vec::new();
-        for before in earlier {
+        for before in &self.earlier {
             let rows = against::changes(&campaign.trends, before, &config.trend, settings);
             let (words, furthest) = ranges::of_changes(&rows, &before.name, settings);
             changes.extend(rows);
@@ -49,11 +49,11 @@ impl Run<'_> {
         }
         (campaign.comparison, campaign.verdicts, campaign.disagreements) = (comparison, verdicts, worst);
         campaign.changes = changes;
-        table::publish(reports, &campaign.comparison)?;
-        table::publish(reports, &of_maneuvers)?;
-        table::publish(reports, &campaign.verdicts)?;
-        table::publish(reports, &campaign.disagreements)?;
-        table::publish(reports, &campaign.changes)?;
-        table::publish(reports, &beyond)
+        table::publish(&shelf, &campaign.comparison)?;
+        table::publish(&shelf, &of_maneuvers)?;
+        table::publish(&shelf, &campaign.verdicts)?;
+        table::publish(&shelf, &campaign.disagreements)?;
+        table::publish(&shelf, &campaign.changes)?;
+        table::publish(&shelf, &beyond)
     }
 }

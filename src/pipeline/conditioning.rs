@@ -13,12 +13,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Flight, Ingested, Run, problem};
+use super::{Flight, INGEST_VERSION, Ingested, Run, inputs, problem};
 use crate::error::{Error, Problem, Result};
 use crate::ingest::{self, Basis, Flow, Signature, Surveyed};
 use crate::store::archive::{self, FlightFiles, Opened};
 use crate::store::atomic::Draft;
 use crate::store::record_file::{self, About, GROUP, SignalWriter};
+use crate::store::{Digest, Fingerprint};
 
 /// What the store keeps of a flight besides its records: what concerns all of it, and its stretches.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -27,11 +28,20 @@ pub(super) struct Kept {
     pub stretches: Vec<(String, Ingested)>,
 }
 
-/// A flight after ingest, as the table has it: its stretches, and where its artefact lies.
-pub(super) struct Done {
+/// A flight after ingest: its stretches, and where its artefact lies.
+pub(super) struct Conditioned {
     pub stretches: Vec<Flight>,
     pub problems: Vec<Problem>,
-    pub artefact: PathBuf,
+    /// None where nothing is kept of it: what was refused for now may be read the next time.
+    pub artefact: Option<PathBuf>,
+}
+
+impl Conditioned {
+    /// Why its stretches were refused.
+    pub fn reasons(&self) -> String {
+        let problems = self.stretches.iter().flat_map(|f| &f.ingested.problems);
+        problems.map(|p| p.reason.as_str()).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// The pieces in which a channel is read where memory allows: they stay in the processor's cache.
@@ -123,21 +133,67 @@ impl Run<'_> {
         }
     }
 
-    /// Ingests a flight whose files and settings have this fingerprint, unless it is up to date.
-    pub(super) fn ingest_flight(&self, files: &FlightFiles, fingerprint: &str) -> Result<Done> {
+    /// Ingests a flight, unless it is up to date.
+    pub(super) fn ingest_flight(&self, files: &FlightFiles) -> Result<Conditioned> {
         let id = &files.flight_id;
-        let artefact = self.store.path("ingest", id, fingerprint, "json");
-        let whole = |(id, ingested): &(String, Ingested)| {
-            !ingested.accepted || record_file::is_whole(&self.record_path(id, fingerprint))
+        let content = match self.inputs.content(id) {
+            Ok(content) => content,
+            Err(reason) => return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason))),
         };
-        let present = self.store.load::<Kept>(&artefact).filter(|kept| kept.stretches.iter().all(whole));
-        let kept = if let Some(kept) = present {
-            kept
-        } else {
-            let kept = self.ingest_files(files, fingerprint)?;
-            self.store.save(&artefact, &kept)?;
-            kept
+        if let Some(done) = self.ingested(id, content) {
+            return Ok(done);
+        }
+        let fingerprint = self.ingest_fingerprint(id, content);
+        let kept = self.ingest_files(files, &fingerprint)?;
+        // What was read must be what the fingerprint is of.
+        if let Some(changed) = files.files.iter().find(|file| !self.contents.is_unchanged(file)) {
+            let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
+            return Ok(self.refused(id, problem("ingest", id, &changed.display().to_string(), reason)));
+        }
+        let artefact = self.store.path("ingest", id, &fingerprint, "json");
+        self.store.save(&artefact, &kept)?;
+        Ok(self.conditioned(kept, &fingerprint, artefact))
+    }
+
+    /// A flight as the store has it: none unless it is up to date and its records hold what was written.
+    pub(super) fn ingested(&self, id: &str, content: &str) -> Option<Conditioned> {
+        let fingerprint = self.ingest_fingerprint(id, content);
+        let artefact = self.store.path("ingest", id, &fingerprint, "json");
+        let kept: Kept = self.store.load(&artefact)?;
+        let is_whole = |(id, ingested): &(String, Ingested)| match &ingested.record {
+            Some(digest) => self.contents.of(&self.record_path(id, &fingerprint)).is_ok_and(|found| found == *digest),
+            None => !ingested.accepted,
         };
+        kept.stretches.iter().all(is_whole).then(|| self.conditioned(kept, &fingerprint, artefact))
+    }
+
+    /// The records that an artefact of ingest tells of, relative to the store, with what they hold; none of another kind.
+    pub(super) fn recorded(&self, artefact: &str) -> Vec<(PathBuf, Digest)> {
+        let path = self.store.folder().join(artefact);
+        let fingerprint = path.file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-').map(|(_, f)| f.to_owned()));
+        let kept = if artefact.starts_with("ingest/") { self.store.load::<Kept>(&path) } else { None };
+        let (Some(fingerprint), Some(kept)) = (fingerprint, kept) else { return vec![] };
+        let record = |(id, ingested): (String, Ingested)| {
+            let path = self.record_path(&id, &fingerprint);
+            Some((path.strip_prefix(self.store.folder()).ok()?.to_owned(), ingested.record?))
+        };
+        kept.stretches.into_iter().filter_map(record).collect()
+    }
+
+    /// What decides a flight's records.
+    fn ingest_fingerprint(&self, id: &str, content: &str) -> String {
+        let config = self.config;
+        Fingerprint::of("ingest", INGEST_VERSION)
+            .with(&id)
+            .with(&content)
+            .with(&config.channels)
+            .with(&config.constants)
+            .with(&config.aircraft)
+            .with(&config.ingest)
+            .finish()
+    }
+
+    fn conditioned(&self, kept: Kept, fingerprint: &str, artefact: PathBuf) -> Conditioned {
         let stretch = |(flight_id, ingested): (String, Ingested)| Flight {
             record: self.record_path(&flight_id, fingerprint),
             fingerprint: fingerprint.to_owned(),
@@ -145,7 +201,18 @@ impl Run<'_> {
             ingested,
         };
         let stretches = kept.stretches.into_iter().map(stretch).collect();
-        Ok(Done { stretches, problems: kept.problems, artefact })
+        Conditioned { stretches, problems: kept.problems, artefact: Some(artefact) }
+    }
+
+    /// A flight without a record, for a reason that is not kept.
+    fn refused(&self, id: &str, problem: Problem) -> Conditioned {
+        let flight = Flight {
+            flight_id: id.to_owned(),
+            fingerprint: String::new(),
+            record: self.record_path(id, "none"),
+            ingested: Ingested::refused(problem),
+        };
+        Conditioned { stretches: vec![flight], problems: vec![], artefact: None }
     }
 
     pub(super) fn record_path(&self, id: &str, fingerprint: &str) -> PathBuf {
@@ -204,8 +271,10 @@ impl Run<'_> {
         match finished {
             Ok(judged) => {
                 draft.place()?;
+                self.store.note(&path);
                 Ok(Ingested {
                     accepted: true,
+                    record: Some(Digest::of_file(&path)?),
                     channels: judged.channels,
                     checks: judged.checks,
                     instruments: judged.instruments,
@@ -281,6 +350,7 @@ impl Ingested {
     pub(super) fn refused(problem: Problem) -> Ingested {
         Ingested {
             accepted: false,
+            record: None,
             channels: vec![],
             checks: vec![],
             instruments: vec![],

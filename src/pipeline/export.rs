@@ -1,11 +1,13 @@
 //! The export: the campaign brought up to date as far as the comparison, and its derivatives written for simulators.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::{Campaign, Progress, Stage, comparison};
 use crate::config::Config;
 use crate::error::{Problem, Result};
 use crate::export::{self, Contents, daveml, jsbsim};
+use crate::store::table::Shelf;
 use crate::store::{atomic, table};
 
 /// What was written.
@@ -20,13 +22,14 @@ pub struct Exported {
     pub problems: Vec<Problem>,
 }
 
-/// Brings the campaign up to date and writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
-/// (`_jsbsim.xml`) into a folder.
+/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
+/// (`_jsbsim.xml`) into a folder. The published night is left alone.
 ///
 /// # Errors
-/// As [`super::run`].
-pub fn export(config: &Config, folder: &Path, progress: &dyn Progress) -> Result<Exported> {
-    let campaign = super::run(config, Stage::Compare, progress)?;
+/// What stops a run.
+pub fn export(config: &Config, folder: &Path, wait: Duration, progress: &dyn Progress) -> Result<Exported> {
+    let (run, files) = super::begin(config, wait, progress)?;
+    let campaign = run.results(&files, Stage::Compare)?;
     let estimates = comparison::converged(config, &campaign);
     let contents = Contents {
         title: &config.title,
@@ -39,14 +42,14 @@ pub fn export(config: &Config, folder: &Path, progress: &dyn Progress) -> Result
         groups: &config.trend,
         settings: &config.export,
     };
-    write(&contents, &campaign, folder)
+    write(&contents, &campaign, folder, &run.shelf_in(folder, Stage::Compare))
 }
 
-fn write(contents: &Contents, campaign: &Campaign, folder: &Path) -> Result<Exported> {
+fn write(contents: &Contents, campaign: &Campaign, folder: &Path, shelf: &Shelf) -> Result<Exported> {
     let tables = export::tables(contents);
     let rows = export::rows(&tables);
     let third = contents.tunnel.settings().third.as_ref().map(|third| third.name.as_str());
-    table::publish_export(folder, &rows, third)?;
+    table::publish_export(shelf, &rows, third)?;
     let (dml, section) = (folder.join("flight_updated.dml"), folder.join("flight_updated_jsbsim.xml"));
     atomic::place(&dml, daveml::document(contents, &tables).as_bytes())?;
     atomic::place(&section, jsbsim::section(contents, &tables).as_bytes())?;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Campaign, Fingerprint, JOINT_VERSION, PREDICT_VERSION, Run, problem};
+use super::{Campaign, Fingerprint, JOINT_VERSION, PREDICT_VERSION, Run, Stage, problem};
 use crate::error::{Error, Result};
 use crate::estimate::Estimated;
 use crate::estimate::joint::{self, Bin, Joined};
@@ -52,7 +52,7 @@ impl Run<'_> {
         };
         let joined: Result<Vec<Joined>> = items.into_par_iter().map(work).collect();
         campaign.joined = joined?;
-        self.store.keep_only("joint", &paths)?;
+        self.store.need(&paths);
         for fit in campaign.joined.iter().map(|j| &j.estimated.fit).filter(|f| f.outcome != Outcome::Converged.name()) {
             let reason = format!("{}: {}", fit.outcome, fit.reason);
             campaign.problems.push(problem("estimate", "joint", &fit.maneuver_id, &reason));
@@ -63,7 +63,7 @@ impl Run<'_> {
     /// Predicts each maneuver from the others of its class and angle of attack, unless that is switched off.
     pub(super) fn predict(&self, campaign: &mut Campaign, paths: &[PathBuf], estimated: &[Estimated]) -> Result<()> {
         let Some(settings) = &self.config.estimate.prediction else {
-            return self.store.keep_only("predict", &[]);
+            return Ok(());
         };
         let fits: Vec<FitRow> = estimated.iter().map(|e| e.fit.clone()).collect();
         let others = prediction::others(&campaign.maneuvers, &fits, settings);
@@ -95,8 +95,8 @@ impl Run<'_> {
         let items: Vec<(usize, Option<Predicted>)> = present.into_iter().enumerate().collect();
         let predicted: Result<Vec<Predicted>> = items.into_par_iter().map(work).collect();
         campaign.predicted = predicted?;
-        let current: Vec<PathBuf> = artefacts.into_iter().flatten().collect();
-        self.store.keep_only("predict", &current)
+        self.store.need(artefacts.iter().flatten());
+        Ok(())
     }
 
     fn predicted(
@@ -123,12 +123,12 @@ impl Run<'_> {
             campaign.combined.iter().chain(joined().flat_map(|e| &e.combined)).cloned().collect();
         let predicted: Vec<PredictedRow> = campaign.predicted.iter().map(|p| p.summary.clone()).collect();
         let members: Vec<JointRow> = campaign.joined.iter().flat_map(|j| &j.members).cloned().collect();
-        let reports = &self.config.reports;
-        table::publish_fits(reports, &fits, &predicted)?;
-        table::publish(reports, &estimates)?;
-        table::publish_as(reports, "combined", &combined)?;
-        table::publish(reports, &members)?;
-        table::publish(reports, &campaign.predictions())
+        let shelf = self.shelf(Stage::Estimate);
+        table::publish_fits(&shelf, &fits, &predicted)?;
+        table::publish(&shelf, &estimates)?;
+        table::publish_as(&shelf, "combined", &combined)?;
+        table::publish(&shelf, &members)?;
+        table::publish(&shelf, &campaign.predictions())
     }
 }
 

@@ -1,12 +1,13 @@
 //! Pictures of one flight or one maneuver: what it takes is brought up to date, then drawn.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use super::stretches::is_stretch;
 use super::{Campaign, Flight, Progress, Run, begin};
 use crate::aero::Regressor;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result, did_you_mean};
+use crate::flight::is_stretch;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::report::chart::{self, FlightView, Groups, ManeuverView};
@@ -43,7 +44,7 @@ pub struct Picture {
 /// # Errors
 /// What stops a run, and a flight or maneuver that does not exist or was refused, with what was probably meant.
 pub fn show(config: &Config, subject: &Subject, out: Option<&Path>, progress: &dyn Progress) -> Result<Picture> {
-    let (run, files) = begin(config, progress)?;
+    let (run, files) = begin(config, Duration::ZERO, progress)?;
     let mut campaign = Campaign::default();
     if let Subject::Flight(id) = subject {
         known_flight(config, id, &files)?;

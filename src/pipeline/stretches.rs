@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use super::{Campaign, Flight, Found, problem};
 use crate::config::Config;
 use crate::error::{Problem, Result};
+use crate::flight::is_stretch;
 use crate::maneuver::{Event, Maneuver};
 use crate::segment::{self, Segmented};
 use crate::store::record_file::{self, About, RecordFile};
@@ -22,12 +23,6 @@ const SURROUNDINGS_S: f64 = 180.0;
 
 /// How far from an event no window ends, s.
 const EVENT_S: f64 = 10.0;
-
-/// Whether an id is a flight's own or that of one of its stretches.
-pub(super) fn is_stretch(id: &str, flight_id: &str) -> bool {
-    let rest = id.strip_prefix(flight_id);
-    rest.is_some_and(|r| r.is_empty() || r.strip_prefix('.').is_some_and(|n| n.parse::<usize>().is_ok()))
-}
 
 impl Flight {
     /// Its record, corrected by what its instruments are off by.

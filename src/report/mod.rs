@@ -11,6 +11,7 @@ mod gallery;
 mod histories;
 mod marks;
 mod notation;
+mod overnight;
 pub mod pdf;
 mod predictions;
 mod provenance;
@@ -36,6 +37,7 @@ use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
+use crate::overnight::Changes;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
     PredictionRow, TrendRow,
@@ -81,6 +83,8 @@ pub struct Contents<'a> {
     pub order: &'a [String],
     /// Name, title and axis of each configured class.
     pub classes: &'a [(String, String, Axis)],
+    /// Since the night that was published before.
+    pub overnight: &'a Changes,
 }
 
 /// What the template is given: see the first lines of `report.html` for what each part means.
@@ -91,6 +95,8 @@ struct Page<'a> {
     archive: &'a str,
     wind_tunnel: &'a str,
     counts: String,
+    changed: String,
+    changes: Vec<TableView>,
     summary: summary::Summary,
     outcome_heads: Vec<&'static str>,
     classes: Vec<ClassView>,
@@ -133,6 +139,8 @@ fn page<'a>(contents: &Contents<'a>) -> Page<'a> {
         archive: contents.archive,
         wind_tunnel: contents.wind_tunnel,
         counts: counts(contents, &subjects),
+        changed: overnight::headline(contents),
+        changes: overnight::tables(contents),
         summary: summary::summary(contents, &subjects, &classes),
         outcome_heads: summary::outcome_heads(),
         classes,

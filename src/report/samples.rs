@@ -5,6 +5,7 @@ use crate::aero::Axis;
 use crate::error::Problem;
 use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
+use crate::overnight::Changes;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
     InstrumentRow, PredictionRow, TrendRow,
@@ -30,6 +31,7 @@ pub struct Campaign {
     pub provenance: Provenance,
     pub order: Vec<String>,
     pub classes: Vec<(String, String, Axis)>,
+    pub overnight: Changes,
 }
 
 impl Campaign {
@@ -57,6 +59,7 @@ impl Campaign {
             provenance: &self.provenance,
             order: &self.order,
             classes: &self.classes,
+            overnight: &self.overnight,
         }
     }
 }

@@ -3,11 +3,13 @@
 //! Only the columns of the channel map are read, each by itself, row group by row group and page by page, into numbers;
 //! what a file cannot give is a problem of its flight, never a panic.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::ops::Range;
-use std::panic::AssertUnwindSafe;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
@@ -28,6 +30,8 @@ use crate::units::Unit;
 pub struct FlightFiles {
     pub flight_id: String,
     pub files: Vec<PathBuf>,
+    /// Files of another place that would be the same flight.
+    pub rivals: Vec<PathBuf>,
 }
 
 /// A tree deeper than this is a loop of links.
@@ -36,6 +40,10 @@ const DEPTH: usize = 16;
 /// Rows decoded at a time: a few MB, whatever the size of the file's row groups.
 const BATCH_ROWS: usize = 16_384;
 
+/// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels at 200 Hz. A file of a
+/// few kilobytes can claim any number of rows, and would be read for as long.
+const LARGEST_FILE: u64 = 500_000_000;
+
 /// The field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
 
@@ -43,7 +51,8 @@ pub(super) const UNIT: &str = "unit";
 /// file. The files of one folder `flight=007` are one flight of that name; otherwise a file is a flight named by its stem.
 ///
 /// # Errors
-/// No file is found, a folder cannot be read, or two files would be the same flight.
+/// No file is found, or the archive's own folder cannot be read. A folder below it that cannot be read stands among the
+/// files, as one that cannot be read.
 pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     let mut files = BTreeSet::new();
     if Path::new(archive).is_dir() {
@@ -54,7 +63,9 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
         for path in paths {
             let path = path.map_err(|e| nonsense(e.to_string()))?;
             if path.is_dir() {
-                walk(&path, DEPTH, &mut files)?;
+                if walk(&path, DEPTH, &mut files).is_err() {
+                    files.insert(path);
+                }
             } else {
                 files.insert(path);
             }
@@ -65,7 +76,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
             "no flight records here: looked for files *.parquet in this folder and below it, or matching this glob";
         return Err(Error::Archive { place: archive.into(), what: what.to_owned() });
     }
-    flights(files)
+    Ok(flights(files))
 }
 
 /// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other programs' own.
@@ -78,8 +89,8 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
             continue;
         }
         if path.is_dir() {
-            if depth > 0 {
-                walk(&path, depth - 1, files)?;
+            if depth > 0 && walk(&path, depth - 1, files).is_err() {
+                files.insert(path);
             }
         } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
             files.insert(path);
@@ -88,21 +99,18 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
     Ok(())
 }
 
-fn flights(files: BTreeSet<PathBuf>) -> Result<Vec<FlightFiles>, Error> {
-    let mut flights: BTreeMap<String, FlightFiles> = BTreeMap::new();
-    let mut folders: BTreeMap<String, PathBuf> = BTreeMap::new();
+fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
+    let mut flights: BTreeMap<String, (PathBuf, FlightFiles)> = BTreeMap::new();
     for file in files {
         let (flight_id, source) = identity(&file);
-        if let Some(other) = folders.insert(flight_id.clone(), source.clone())
-            && other != source
-        {
-            let what = format!("two records would be flight `{flight_id}`: {} is the other", other.display());
-            return Err(Error::Archive { place: source, what });
-        }
-        let flight = flights.entry(flight_id.clone());
-        flight.or_insert_with(|| FlightFiles { flight_id, files: Vec::new() }).files.push(file);
+        let new = || {
+            let flight = FlightFiles { flight_id: flight_id.clone(), files: Vec::new(), rivals: Vec::new() };
+            (source.clone(), flight)
+        };
+        let (first, flight) = flights.entry(flight_id.clone()).or_insert_with(new);
+        if *first == source { flight.files.push(file) } else { flight.rivals.push(file) }
     }
-    Ok(flights.into_values().collect())
+    flights.into_values().map(|(_, flight)| flight).collect()
 }
 
 /// The flight that a file belongs to, and the folder or file that all of it comes from.
@@ -118,6 +126,11 @@ fn identity(file: &Path) -> (String, PathBuf) {
     }
     let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     (stem, file.to_owned())
+}
+
+thread_local! {
+    /// Whether this thread is reading a file of which it need not be said that it made the reader panic.
+    static READING: Cell<bool> = const { Cell::new(false) };
 }
 
 /// The files of a flight, opened: what their footers say. Columns are read from them one at a time, so that memory holds one
@@ -159,10 +172,22 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
     Ok(Opened { flight_id: files.flight_id.clone(), files: opened.collect::<Result<_, _>>()? })
 }
 
-/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too.
+/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too; silently, for the reason
+/// goes into a table.
 fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    std::panic::catch_unwind(AssertUnwindSafe(read))
-        .unwrap_or_else(|_| Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned()))
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !READING.get() {
+                before(info);
+            }
+        }));
+    });
+    let outside = READING.replace(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(read));
+    READING.set(outside);
+    result.unwrap_or_else(|_| Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned()))
 }
 
 fn unreadable(e: &dyn std::fmt::Display) -> String {
@@ -182,7 +207,14 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
             return Err(format!("two columns are named `{}`", field.name()));
         }
     }
-    let rows = usize::try_from(metadata.metadata().file_metadata().num_rows()).unwrap_or_default();
+    let claimed = |rows: i64| u64::try_from(rows).unwrap_or(u64::MAX);
+    let in_groups = metadata.metadata().row_groups().iter().map(|g| claimed(g.num_rows()));
+    let all = claimed(metadata.metadata().file_metadata().num_rows());
+    let most = in_groups.fold(0, u64::saturating_add).max(all);
+    if most.saturating_mul(columns.len() as u64) > LARGEST_FILE {
+        return Err(format!("claims {most} rows of {} mapped columns, more than any recorder writes", columns.len()));
+    }
+    let rows = usize::try_from(all).unwrap_or_default();
     Ok(OpenFile { path: path.to_owned(), metadata, columns, rows })
 }
 

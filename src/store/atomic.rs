@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// How the temporary files of an interrupted run are told from everything else.
-const TEMPORARY: &str = ".harvest-";
+pub const TEMPORARY: &str = ".harvest-";
 
 /// Puts `bytes` at `path`, creating folders as needed. A file that holds these bytes already is left untouched.
 ///
@@ -79,6 +79,20 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
+/// Makes sure that the names in a folder are on the disk, as its files' contents are: what is renamed after this cannot
+/// survive a loss of power without what was renamed before.
+///
+/// # Errors
+/// [`Error::Io`] naming the folder.
+pub fn sync_folder(folder: &Path) -> Result<()> {
+    // Elsewhere than on Unix a folder cannot be opened as a file, and a rename is as durable as it gets.
+    if cfg!(unix) {
+        let synced = fs::File::open(folder).and_then(|f| f.sync_all());
+        synced.map_err(Error::io(folder, "cannot write the folder to the disk"))?;
+    }
+    Ok(())
+}
+
 /// Removes what a killed run left half written in a folder.
 ///
 /// # Errors
@@ -86,7 +100,10 @@ pub fn remove(path: &Path) -> Result<()> {
 pub fn sweep(folder: &Path) -> Result<()> {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
-            fs::remove_file(entry.path()).map_err(Error::io(&entry.path(), "cannot remove a leftover"))?;
+            let path = entry.path();
+            let is_folder = entry.file_type().is_ok_and(|t| t.is_dir());
+            let removed = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            removed.map_err(Error::io(&path, "cannot remove a leftover"))?;
         }
     }
     Ok(())

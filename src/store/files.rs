@@ -10,7 +10,7 @@ use super::atomic;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::error::{Error, Result};
 use crate::maneuver::Event;
-use crate::tables::EarlierTrendRow;
+use crate::tables::PublishedTrend;
 
 /// A text file whole.
 ///
@@ -71,6 +71,14 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
 }
 
+/// The rows of a table that was published as CSV; columns that the row type does not have are passed over.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
+pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
+    Ok(rows(&folder.join(format!("{table}.csv")))?.into_iter().map(|(_, row)| row).collect())
+}
+
 /// The columns of a CSV of numbers, by the names of its header.
 ///
 /// # Errors
@@ -92,13 +100,13 @@ pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no such table.
-pub fn earlier_trends(folder: &Path) -> Result<Vec<EarlierTrendRow>> {
+pub fn earlier_trends(folder: &Path) -> Result<Vec<PublishedTrend>> {
     let path = folder.join("trends.csv");
     if !path.is_file() {
         let what = "nothing to compare against: an earlier campaign's folder of reports has the table trends.csv";
         return Err(Error::config(&path, None, what));
     }
-    Ok(rows(&path)?.into_iter().map(|(_, row)| row).collect())
+    published(folder, "trends")
 }
 
 /// Places rows as CSV with a header, whole or not at all.

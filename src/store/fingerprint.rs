@@ -51,16 +51,44 @@ impl Digest {
     /// [`Error::Io`] naming the file.
     pub fn of_file(path: &Path) -> Result<Digest> {
         let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+        Digest::of(&mut file).map_err(Error::io(path, "cannot read it"))
+    }
+
+    /// Of all that a reader gives.
+    ///
+    /// # Errors
+    /// A disk that says no.
+    pub fn of(reader: &mut impl Read) -> std::io::Result<Digest> {
         let mut hasher = blake3::Hasher::new();
         let mut buffer = vec![0; 1 << 20];
         loop {
-            let n = file.read(&mut buffer).map_err(Error::io(path, "cannot read it"))?;
+            let n = reader.read(&mut buffer)?;
             if n == 0 {
                 return Ok(Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() });
             }
             hasher.update(&buffer[..n]);
         }
     }
+}
+
+/// Digits of the fingerprint at the end of a sealed text.
+const SEAL: usize = 16;
+
+/// A text with a fingerprint of its bytes in a last line, which tells whether it is as it was written.
+pub(super) fn sealed(mut text: Vec<u8>) -> Vec<u8> {
+    let seal = seal(&text);
+    text.extend_from_slice(seal.as_bytes());
+    text
+}
+
+/// A sealed text without its seal; none where the seal is not its.
+pub(super) fn unsealed(bytes: &[u8]) -> Option<&[u8]> {
+    let (text, end) = bytes.split_at_checked(bytes.len().checked_sub(SEAL + 1)?)?;
+    (end == seal(text).as_bytes()).then_some(text)
+}
+
+fn seal(text: &[u8]) -> String {
+    format!("\n{}", &blake3::hash(text).to_hex()[..SEAL])
 }
 
 #[cfg(test)]

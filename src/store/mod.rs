@@ -3,12 +3,19 @@
 pub mod archive;
 pub mod artefacts;
 pub mod atomic;
+pub mod contents;
 pub mod files;
 pub mod fingerprint;
+pub mod lock;
+pub mod log;
+pub mod nights;
 pub mod record_file;
 pub mod recorder;
 pub mod table;
 pub mod tunnel;
 
 pub use artefacts::Store;
+pub use contents::Contents;
 pub use fingerprint::{Digest, Fingerprint};
+pub use log::Log;
+pub use nights::{Night, Nights};

@@ -251,12 +251,6 @@ pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
     writer.finish()
 }
 
-/// Whether a record lies here whole, as far as its footer tells: one that was cut short or overwritten has none.
-#[must_use]
-pub fn is_whole(path: &Path) -> bool {
-    open(path).is_ok()
-}
-
 /// A record on the disk: read by windows of time and by signals.
 #[derive(Clone, Debug)]
 pub struct RecordFile {

@@ -1,9 +1,12 @@
 //! The published tables: rows to a data frame, to Parquet and CSV.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use polars::prelude::{Column, CsvWriter, DataFrame, NamedFrom, ParquetCompression, ParquetWriter, SerWriter, Series};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use polars::prelude::{
+    Column, CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter, SerWriter, Series,
+};
 
 use super::atomic;
 use crate::aero::{Axis, Output};
@@ -14,6 +17,40 @@ use crate::tables::{
     EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow,
     PredictionRow, StartRow, TrendRow, VerdictRow,
 };
+
+/// Where tables are published, and what their Parquet files say about where they come from.
+#[derive(Clone, Debug, Default)]
+pub struct Shelf {
+    /// None: what is published there goes nowhere.
+    folder: Option<PathBuf>,
+    provenance: Vec<(String, String)>,
+}
+
+impl Shelf {
+    /// A folder for tables that say nothing about where they come from.
+    #[must_use]
+    pub fn of(folder: &Path) -> Shelf {
+        Shelf { folder: Some(folder.to_owned()), provenance: Vec::new() }
+    }
+
+    /// The same with pairs for the key-value metadata of each Parquet file; the CSV beside it stays as it is.
+    #[must_use]
+    pub fn with(mut self, provenance: Vec<(String, String)>) -> Shelf {
+        self.provenance = provenance;
+        self
+    }
+}
+
+/// The key-value metadata of a published Parquet file.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
+    let file = std::fs::File::open(path).map_err(Error::io(path, "cannot open the table"))?;
+    let reader = SerializedFileReader::new(file).map_err(|e| Error::store(path, &e))?;
+    let pairs = reader.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
+    Ok(pairs.into_iter().filter_map(|pair| Some((pair.key, pair.value?))).collect())
+}
 
 /// A row type with the name of its table and its columns.
 pub trait Table: Sized {
@@ -173,50 +210,53 @@ impl PredictedRow {
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_fits(folder: &Path, fits: &[FitRow], predicted: &[PredictedRow]) -> Result<()> {
+pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) -> Result<()> {
     let none = PredictedRow::default();
     let beside: Vec<&PredictedRow> = (0..fits.len()).map(|i| predicted.get(i).unwrap_or(&none)).collect();
     let mut columns = FitRow::columns(fits);
     columns.extend(PredictedRow::columns(&beside));
-    place(folder, FitRow::NAME, fits.len(), columns)
+    place(shelf, FitRow::NAME, fits.len(), columns)
 }
 
 /// Publishes the export's rows; the third variable, where the tables have one, is a column of its name.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_export(folder: &Path, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
+pub fn publish_export(shelf: &Shelf, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
     macro_rules! columns {
         ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
     }
     let mut columns = columns!(derivative alpha_deg mach);
     columns.extend(third.map(|name| Cell::column(name, rows.iter().map(|row| &row.third))));
     columns.extend(columns!(value unit uncertainty source is_flight));
-    place(folder, "flight_updated", rows.len(), columns)
+    place(shelf, "flight_updated", rows.len(), columns)
 }
 
-/// Publishes rows as `<name>.parquet` and `<name>.csv` in a folder, each placed whole.
+/// Publishes rows as `<name>.parquet` and `<name>.csv` on a shelf, each placed whole.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish<T: Table>(folder: &Path, rows: &[T]) -> Result<()> {
-    publish_as(folder, T::NAME, rows)
+pub fn publish<T: Table>(shelf: &Shelf, rows: &[T]) -> Result<()> {
+    publish_as(shelf, T::NAME, rows)
 }
 
 /// Publishes rows as [`publish`] does, under another name than their type's: a second table of the same columns.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_as<T: Table>(folder: &Path, name: &str, rows: &[T]) -> Result<()> {
-    place(folder, name, rows.len(), T::columns(rows))
+pub fn publish_as<T: Table>(shelf: &Shelf, name: &str, rows: &[T]) -> Result<()> {
+    place(shelf, name, rows.len(), T::columns(rows))
 }
 
-fn place(folder: &Path, name: &str, rows: usize, columns: Vec<Column>) -> Result<()> {
+fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result<()> {
+    let Some(folder) = &shelf.folder else { return Ok(()) };
     let (parquet, csv) = (folder.join(format!("{name}.parquet")), folder.join(format!("{name}.csv")));
     let mut frame = DataFrame::new(rows, columns).map_err(|e| Error::store(&parquet, &e))?;
     let mut bytes = Vec::new();
+    let metadata = (!shelf.provenance.is_empty()).then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
     ParquetWriter::new(&mut bytes)
         .with_compression(ParquetCompression::Zstd(None))
+        .with_key_value_metadata(metadata)
         .finish(&mut frame)
         .map_err(|e| Error::store(&parquet, &e))?;
     atomic::place(&parquet, &bytes)?;
@@ -232,7 +272,7 @@ mod tests {
     #[test]
     fn a_table_without_rows_has_its_columns() {
         let folder = tempfile::tempdir().unwrap();
-        publish::<FitRow>(folder.path(), &[]).unwrap();
+        publish::<FitRow>(&Shelf::of(folder.path()), &[]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("fits.csv")).unwrap();
         assert!(
             csv.starts_with(
@@ -252,7 +292,7 @@ mod tests {
             correlation: Some(f64::NAN),
             verdict: "not excited".into(),
         };
-        publish(folder.path(), &[row]).unwrap();
+        publish(&Shelf::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
         assert_eq!(csv.lines().nth(1), Some("f1,\"theta rate, against q\",theta_deg q_deg_s,,,not excited"));
     }

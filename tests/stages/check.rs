@@ -32,7 +32,9 @@ fn every_subcommand_explains_its_options() {
     for stage in ["run", "ingest", "segment", "estimate", "trend", "compare", "report", "check"] {
         let outcome = run(harvest().args([stage, "--help"]));
         assert_eq!(outcome.code, Some(0), "{stage}");
-        for option in ["--archive", "--wind-tunnel", "--events", "--store", "--reports", "--threads", "[PIPELINE]"] {
+        for option in
+            ["--archive", "--wind-tunnel", "--events", "--store", "--reports", "--threads", "--memory-mb", "[PIPELINE]"]
+        {
             assert!(outcome.stdout.contains(option), "{stage}: {option}");
         }
     }

@@ -29,7 +29,7 @@ fn sources() -> Vec<Source> {
         if !is_rust
             || ["tests.rs", "samples.rs"].contains(&&*name)
             || path.contains("/tests/")
-            || ["lib.rs", "main.rs"].contains(&&*path)
+            || ["lib.rs", "main.rs", "build.rs"].contains(&&*path)
         {
             continue;
         }

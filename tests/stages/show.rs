@@ -37,6 +37,7 @@ fn a_flight_and_a_maneuver_are_drawn_and_a_second_run_changes_no_byte() {
     show(&campaign, "maneuver", MANEUVER, 0);
     let maneuver = fs::read_to_string(picture(&campaign, MANEUVER)).unwrap();
     assert_eq!(maneuver.matches(">residual</text>").count(), 5);
+    campaign.ends("segment", 0);
     let class = &campaign.table("maneuvers")[0]["class"];
     assert!(maneuver.contains(&format!("{class} {MANEUVER}")) && maneuver.contains("converged"));
 

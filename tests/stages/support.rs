@@ -155,17 +155,20 @@ impl Campaign {
         ParquetReader::new(file).finish().unwrap()
     }
 
-    /// Bytes of every file below a folder of the campaign, by relative path.
+    /// Bytes of every file below a folder of the campaign, by relative path: of the reports under the names that hold, of
+    /// the store without what knows a clock, a process or a folder of this machine.
     pub fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
         let folder = self.path(folder);
         let relative = |p: PathBuf| p.strip_prefix(&folder).unwrap().to_owned();
-        files(&folder).into_iter().map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
+        let no_result = ["lock", "contents.json", "serves.json", "nights", "current"];
+        let counts = |p: &PathBuf| !no_result.iter().any(|name| relative(p.clone()).starts_with(name));
+        files(&folder).into_iter().filter(counts).map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
     }
 
     /// Bytes of the published tables; the report, on screen and on paper, says where the archive lies.
     pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
-        let is_report = |path: &PathBuf| path.extension().is_some_and(|e| e == "html" || e == "pdf");
-        self.bytes("reports").into_iter().filter(|(path, _)| !is_report(path)).collect()
+        let is_table = |p: &PathBuf| p.extension().is_some_and(|e| e == "csv" || e == "parquet");
+        self.bytes("reports").into_iter().filter(|(p, _)| is_table(p)).collect()
     }
 }
 
@@ -320,4 +323,37 @@ pub fn without(record: &RecordBatch, channel: &str) -> RecordBatch {
     let at = record.schema().index_of(channel).unwrap();
     let others: Vec<usize> = (0..record.num_columns()).filter(|&i| i != at).collect();
     record.project(&others).unwrap()
+}
+
+/// A number that the environment may give, for tests that take as long as they are let.
+pub fn from_environment(name: &str, default: usize) -> usize {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
+}
+
+/// Random numbers that are the same each time (the generator of Steele, Lea and Flood).
+#[derive(Debug)]
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Random {
+        Random(seed)
+    }
+
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 up to, and without, `below`.
+    pub fn below(&mut self, below: usize) -> usize {
+        usize::try_from(self.next() % u64::try_from(below.max(1)).unwrap()).unwrap()
+    }
+
+    /// From 0 to 1.
+    #[expect(clippy::cast_precision_loss, reason = "a fraction")]
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
 }

@@ -87,9 +87,12 @@ fn the_files_of_a_hive_folder_are_one_flight_in_the_order_of_their_names() {
 }
 
 #[test]
-fn two_records_of_one_name_are_refused() {
-    let (_folder, text) = archive(&[("one/f.parquet", b""), ("two/f.parquet", b"")]);
-    assert!(find(&text).unwrap_err().to_string().contains("two records would be flight `f`"));
+fn a_second_record_of_one_name_is_the_first_s_rival() {
+    let (_folder, text) = archive(&[("one/f.parquet", b""), ("two/f.parquet", b""), ("two/g.parquet", b"")]);
+    let found = find(&text).unwrap();
+    assert_eq!(found.len(), 2);
+    assert!(found[0].files[0].ends_with("one/f.parquet") && found[0].rivals[0].ends_with("two/f.parquet"));
+    assert!(found[1].rivals.is_empty());
 }
 
 #[test]

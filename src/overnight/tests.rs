@@ -1,0 +1,163 @@
+//! Two nights that differ in one thing: that is found, with its cause, and nothing else is.
+
+use super::*;
+
+#[derive(Clone)]
+struct Campaign {
+    lineage: Lineage,
+    maneuvers: Vec<Window>,
+    fits: Vec<FitRow>,
+    estimates: Vec<EstimateRow>,
+    trends: Vec<PublishedTrend>,
+    verdicts: Vec<PublishedVerdict>,
+}
+
+impl Campaign {
+    fn tables(&self) -> Tables<'_> {
+        let Campaign { lineage, maneuvers, fits, estimates, trends, verdicts } = self;
+        Tables { lineage, maneuvers, fits, estimates, trends, verdicts }
+    }
+
+    fn fly(&mut self, flight: &str, class: &str, value: f64) {
+        let maneuver_id = format!("{flight}_{class}");
+        self.lineage.flights.insert(flight.to_owned(), "01".to_owned());
+        self.maneuvers.push(Window {
+            maneuver_id: maneuver_id.clone(),
+            flight_id: flight.to_owned(),
+            class: class.to_owned(),
+            start_s: 10.0,
+            end_s: 20.0,
+        });
+        self.fits.push(fit(&maneuver_id, class));
+        self.estimates.push(EstimateRow {
+            maneuver_id,
+            flight_id: flight.into(),
+            class: class.into(),
+            alpha_deg: 30.0,
+            mach: 0.3,
+            derivative: "Cm_de".into(),
+            unit: "per_deg".into(),
+            status: "estimated".into(),
+            value: Some(value),
+            bound: Some(0.05),
+            bound_held: None,
+            bound_calibration: None,
+            bound_corrected: Some(0.1),
+            wind_tunnel: None,
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
+        });
+    }
+}
+
+fn fit(maneuver_id: &str, class: &str) -> FitRow {
+    FitRow {
+        maneuver_id: maneuver_id.to_owned(),
+        class: class.to_owned(),
+        outcome: "converged".into(),
+        reason: String::new(),
+        start: None,
+        iterations: 5,
+        initial_cost: None,
+        final_cost: None,
+        condition_number: None,
+        left_out: None,
+        largest_condition_index: None,
+        confounded: None,
+    }
+}
+
+fn campaign() -> Campaign {
+    let mut campaign = Campaign {
+        lineage: Lineage::default(),
+        maneuvers: vec![],
+        fits: vec![],
+        estimates: vec![],
+        trends: vec![],
+        verdicts: vec![],
+    };
+    campaign.fly("f1", "one", 1.0);
+    campaign.fly("f2", "two", 2.0);
+    campaign.trends.push(PublishedTrend {
+        derivative: "Cm_de".into(),
+        unit: "per_deg".into(),
+        group: "all".into(),
+        alpha_deg: 30.0,
+        value: 1.5,
+        standard_error: 0.1,
+    });
+    campaign.verdicts.push(PublishedVerdict { derivative: "Cm_de".into(), alpha_deg: 30.0, verdict: "agrees".into() });
+    campaign
+}
+
+#[test]
+fn two_nights_of_the_same_differ_in_nothing() {
+    let changes = between("0001", &campaign().tables(), &campaign().tables());
+    assert!(changes.is_empty() && !changes.alert && changes.causes.is_empty());
+}
+
+#[test]
+fn a_new_flight_brings_new_maneuvers_and_is_why_a_trend_moved() {
+    let mut now = campaign();
+    now.fly("f3", "one", 3.0);
+    now.trends[0].value = 1.7;
+    now.verdicts[0].verdict = "flight higher".into();
+    let changes = between("0001", &campaign().tables(), &now.tables());
+    assert_eq!(changes.maneuvers.len(), 1);
+    let new = &changes.maneuvers[0];
+    assert_eq!((&*new.maneuver_id, &*new.what, &*new.because), ("f3_one", "new", "new flight f3"));
+    assert_eq!((changes.trends.len(), &*changes.trends[0].because), (1, "new flight f3"));
+    assert_eq!((changes.verdicts.len(), &*changes.verdicts[0].because), (1, "new flight f3"));
+    assert!(changes.alert && changes.estimates.is_empty());
+}
+
+#[test]
+fn what_moves_within_its_uncertainty_is_no_news_and_new_maneuvers_alone_no_alert() {
+    let mut now = campaign();
+    now.fly("f3", "one", 3.0);
+    now.estimates[0].value = Some(1.09);
+    now.trends[0].value = 1.59;
+    let changes = between("0001", &campaign().tables(), &now.tables());
+    assert!(changes.estimates.is_empty() && changes.trends.is_empty() && !changes.alert);
+}
+
+#[test]
+fn a_class_s_setting_moves_its_own_maneuvers_and_the_method_those_of_all() {
+    let mut before = campaign();
+    let classes = |weight: f64| -> BTreeMap<String, serde_json::Value> {
+        [("classes".to_owned(), serde_json::json!({"one": {"w": weight}, "two": {"w": 1.0}}))].into()
+    };
+    before.lineage.configuration.insert(Stage::Estimate, classes(1.0));
+    let mut now = before.clone();
+    now.lineage.configuration.insert(Stage::Estimate, classes(2.0));
+    now.estimates[0].value = Some(1.2);
+    let changes = between("0001", &before.tables(), &now.tables());
+    assert_eq!((changes.estimates.len(), &*changes.estimates[0].of), (1, "f1_one"));
+    assert_eq!(changes.estimates[0].because, "configuration classes.one.w: 1.0 became 2.0");
+    let mut now = before.clone();
+    now.lineage.code.methods.insert("estimate".into(), 6);
+    now.estimates[1].value = Some(2.2);
+    let changes = between("0001", &before.tables(), &now.tables());
+    assert_eq!(changes.estimates[0].because, "method `estimate`: version 0 became 6");
+}
+
+#[test]
+fn a_maneuver_is_gone_with_its_flight_or_no_longer_what_it_was() {
+    let mut now = campaign();
+    now.maneuvers.remove(1);
+    now.fits.remove(1);
+    now.estimates.remove(1);
+    now.lineage.flights.remove("f2");
+    now.maneuvers[0].end_s = 21.0;
+    now.fits[0].outcome = "not_converged".into();
+    now.lineage.flights.insert("f1".into(), "02".into());
+    let changes = between("0001", &campaign().tables(), &now.tables());
+    let of = |id: &str| changes.maneuvers.iter().find(|m| m.maneuver_id == id).unwrap();
+    assert_eq!(of("f1_one").words, "10.00-20.00 s became 10.00-21.00 s, converged became not_converged");
+    assert_eq!(of("f1_one").because, "the file of flight f1 changed");
+    assert_eq!((&*of("f2_two").what, &*of("f2_two").because), ("gone", "flight f2 is gone from the archive"));
+    assert!(changes.alert);
+}

@@ -1,0 +1,138 @@
+//! One run at a time, or many shards: a lock on a file that also says which run holds it.
+//!
+//! The lock is the operating system's and goes with the process that holds it, however that ends: the lock of a dead
+//! process blocks nobody, whatever its file still says. On a shared file system it reaches other machines where the file
+//! system carries locks; where it has none, everybody goes on without. Nothing hangs on it but waste: artefacts are named
+//! by what decides them and appear whole by a rename, so two who make the same one make the same bytes, and a leftover that
+//! a run sweeps away from under another costs that one a new try.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime};
+
+use super::log::timestamp;
+use crate::error::{Error, Result};
+
+/// How often a waiting run looks again.
+const AGAIN: Duration = Duration::from_millis(100);
+
+/// Longest note that is read: what is longer is no note of ours.
+const LONGEST_NOTE: u64 = 1000;
+
+/// A lock that is held. It ends with its value.
+#[derive(Debug)]
+pub struct Lock {
+    file: File,
+}
+
+impl Lock {
+    /// Takes the lock at `path`, waiting for it up to `wait`, and notes who holds it. `what` names what is locked.
+    ///
+    /// # Errors
+    /// [`Error::Store`] naming the holder when another has it, [`Error::Io`] when the disk says no.
+    pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
+        let mut lock = Lock::get(path, what, wait, File::try_lock)?;
+        // Only a word for others: a disk that is too full for it stops nobody here.
+        let note = format!("pid {} on {} since {}\n", std::process::id(), host(), timestamp(SystemTime::now()));
+        let file = &mut lock.file;
+        let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(note.as_bytes()));
+        Ok(lock)
+    }
+
+    /// Takes a share of the lock at `path`: any number may hold one, and nobody the whole meanwhile.
+    ///
+    /// # Errors
+    /// As [`Lock::take`].
+    pub fn share(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
+        Lock::get(path, what, wait, File::try_lock_shared)
+    }
+
+    fn get(path: &Path, what: &str, wait: Duration, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Lock> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .map_err(Error::io(path, "cannot create it"))?;
+        let patience = Instant::now() + wait;
+        loop {
+            match lock(&file) {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if Instant::now() < patience => std::thread::sleep(AGAIN),
+                Err(TryLockError::WouldBlock) => return Err(Error::store(folder, &busy(&mut file, what))),
+                Err(TryLockError::Error(e)) if has_none(&e) => break,
+                Err(TryLockError::Error(e)) => return Err(Error::io(path, "cannot lock it")(e)),
+            }
+        }
+        Ok(Lock { file })
+    }
+}
+
+/// Whether an error says that the file system has no locks: not supported, or no lock manager (Linux's `ENOLCK`).
+fn has_none(error: &std::io::Error) -> bool {
+    error.kind() == std::io::ErrorKind::Unsupported || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
+}
+
+fn busy(file: &mut File, what: &str) -> String {
+    let mut note = String::new();
+    let read = file.rewind().and_then(|()| file.take(LONGEST_NOTE).read_to_string(&mut note));
+    let note = note.trim();
+    let who = if read.is_err() || note.is_empty() { String::new() } else { format!(" ({note})") };
+    format!("another run is using this {what}{who}; let harvest wait for it with --wait, or give another --{what}")
+}
+
+/// The machine's name as the kernel knows it.
+fn host() -> String {
+    let name = ["/proc/sys/kernel/hostname", "/etc/hostname"].into_iter().find_map(|f| std::fs::read_to_string(f).ok());
+    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).unwrap_or_default();
+    let name = name.trim();
+    if name.is_empty() { "this machine".to_owned() } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_is_told_who_is_first_and_the_lock_ends_with_its_holder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        std::fs::write(&path, "pid 1 on a machine that is no more\n").unwrap();
+        let first = Lock::take(&path, "store", Duration::ZERO).unwrap();
+        let second = Lock::take(&path, "store", Duration::from_millis(150)).unwrap_err().to_string();
+        let who = format!("another run is using this store (pid {} on ", std::process::id());
+        assert!(second.contains(&who) && !second.contains("no more"), "{second}");
+        drop(first);
+        Lock::take(&path, "store", Duration::ZERO).unwrap();
+    }
+
+    #[test]
+    fn shares_bear_each_other_and_no_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let shares = [(); 3].map(|()| Lock::share(&path, "store", Duration::ZERO).unwrap());
+        assert!(Lock::take(&path, "store", Duration::ZERO).is_err());
+        drop(shares);
+        let whole = Lock::take(&path, "store", Duration::ZERO).unwrap();
+        assert!(Lock::share(&path, "store", Duration::ZERO).is_err());
+        drop(whole);
+        Lock::share(&path, "store", Duration::ZERO).unwrap();
+    }
+
+    #[test]
+    fn who_waits_gets_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let first = Lock::take(&path, "store", Duration::ZERO).unwrap();
+        std::thread::scope(|scope| {
+            let second = scope.spawn(|| Lock::take(&path, "store", Duration::from_mins(1)).map(|_| ()));
+            std::thread::sleep(Duration::from_millis(20));
+            drop(first);
+            assert!(second.join().unwrap().is_ok());
+        });
+    }
+}

@@ -1,0 +1,426 @@
+//! Published nights: each in a folder of its own, and one name that says which of them holds.
+//!
+//! ```text
+//! reports/harv/nights/0007/   everything of one night, with its manifest night.json
+//! reports/harv/current        → nights/0007
+//! reports/harv/fits.csv       → current/fits.csv, and so on
+//! ```
+//!
+//! A night is written beside the others under a temporary name, synced and renamed; then `current` is replaced by one
+//! rename. All paths change with it at once, so a reader sees last night's or tonight's files. One that opens several
+//! while it changes follows `current` once and stays in that folder. Where there are no symbolic links (not Unix),
+//! `current` is a text file and the files beside it are copies.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use super::lock::Lock;
+use super::{Digest, atomic};
+use crate::error::{Error, Problem, Result};
+use crate::lineage::{Lineage, Stage};
+
+const NIGHTS: &str = "nights";
+const CURRENT: &str = "current";
+const MANIFEST: &str = "night.json";
+
+/// What a night has to say in a few numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    pub flights: usize,
+    /// Of them, refused by ingest.
+    pub refused: usize,
+    pub maneuvers: usize,
+    pub converged: usize,
+    pub problems: Vec<Problem>,
+    /// Whether something that was published before moved, is gone or changed.
+    pub alert: bool,
+}
+
+/// A published night's manifest.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Night {
+    /// Its number, as its folder is named.
+    pub name: String,
+    /// How far it was brought; only a night with a report is complete.
+    pub until: Stage,
+    /// The complete night before it, which its changes are held against.
+    pub since: Option<String>,
+    /// What the report prints beside numbers: the archive and the wind-tunnel table as they were named.
+    pub shown: BTreeMap<String, String>,
+    pub lineage: Lineage,
+    pub summary: Summary,
+    /// What it is made of: artefacts of the store with their sizes.
+    pub artefacts: BTreeMap<String, u64>,
+    /// Its files, with fingerprints of their contents.
+    pub files: BTreeMap<String, Digest>,
+    /// Fingerprint of all of the above.
+    pub seal: String,
+}
+
+impl Night {
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.until == Stage::Report
+    }
+
+    fn sealed(mut self) -> Night {
+        self.seal = String::new();
+        let text = serde_json::to_vec(&self).unwrap_or_default();
+        Night { seal: blake3::hash(&text).to_hex()[..16].to_owned(), ..self }
+    }
+}
+
+/// The nights of a folder of reports.
+#[derive(Debug)]
+pub struct Nights {
+    reports: PathBuf,
+    _lock: Option<Lock>,
+}
+
+impl Nights {
+    /// Opens a folder of reports to publish in, waiting up to `wait` for another run, and finishes what a killed run has
+    /// left: a night that is whole is published, anything half-written goes.
+    ///
+    /// # Errors
+    /// [`Error::Store`] when another run publishes there, [`Error::Io`] when the disk says no.
+    pub fn open(reports: &Path, wait: Duration) -> Result<Nights> {
+        let lock = Lock::take(&reports.join(NIGHTS).join("lock"), "reports", wait)?;
+        let nights = Nights { reports: reports.to_owned(), _lock: Some(lock) };
+        atomic::sweep(reports)?;
+        atomic::sweep(&reports.join(NIGHTS))?;
+        if let Some(newest) = nights.names().iter().rev().find_map(|name| nights.night(name)) {
+            nights.point(&newest)?;
+        }
+        Ok(nights)
+    }
+
+    /// The nights to look at while others publish; there need not be any.
+    #[must_use]
+    pub fn look(reports: &Path) -> Nights {
+        Nights { reports: reports.to_owned(), _lock: None }
+    }
+
+    /// The night that holds.
+    #[must_use]
+    pub fn current(&self) -> Option<Night> {
+        self.night(&self.pointed()?)
+    }
+
+    /// The last complete night.
+    #[must_use]
+    pub fn complete(&self) -> Option<Night> {
+        self.names().iter().rev().filter_map(|name| self.night(name)).find(Night::is_complete)
+    }
+
+    /// The manifest of a night; none where there is none or it is damaged.
+    #[must_use]
+    pub fn night(&self, name: &str) -> Option<Night> {
+        let night: Night = serde_json::from_slice(&fs::read(self.folder(name).join(MANIFEST)).ok()?).ok()?;
+        (night.clone().sealed() == night).then_some(night)
+    }
+
+    /// Where a night lies.
+    #[must_use]
+    pub fn folder(&self, name: &str) -> PathBuf {
+        self.reports.join(NIGHTS).join(name)
+    }
+
+    /// The names of all nights, the oldest first.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.reports.join(NIGHTS)).into_iter().flatten().flatten();
+        let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        names.retain(|name| name.parse::<u32>().is_ok());
+        names.sort_by_key(|name| name.parse::<u32>().unwrap_or_default());
+        names
+    }
+
+    /// Whether all files of a night are as they were published.
+    #[must_use]
+    pub fn is_whole(&self, night: &Night) -> bool {
+        self.damaged(night).is_empty()
+    }
+
+    /// The files of a night that are not as they were published.
+    #[must_use]
+    pub fn damaged(&self, night: &Night) -> Vec<String> {
+        let folder = self.folder(&night.name);
+        let is_whole = |(name, digest): &(&String, &Digest)| {
+            Digest::of_file(&folder.join(name)).is_ok_and(|found| found == **digest)
+        };
+        night.files.iter().filter(|file| !is_whole(file)).map(|(name, _)| name.clone()).collect()
+    }
+
+    /// An empty folder to write tonight's files into.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the folder.
+    pub fn tonight(&self) -> Result<PathBuf> {
+        let folder = self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY));
+        if folder.exists() {
+            fs::remove_dir_all(&folder).map_err(Error::io(&folder, "cannot remove a leftover"))?;
+        }
+        fs::create_dir_all(&folder).map_err(Error::io(&folder, "cannot create the folder"))?;
+        Ok(folder)
+    }
+
+    /// Removes what was written of tonight: something went wrong, or there is nothing new in it.
+    pub fn forget_tonight(&self) {
+        let _ = fs::remove_dir_all(self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
+    }
+
+    /// Publishes what lies in tonight's folder as `night`, whose name and files are filled in. The last `keep` complete
+    /// nights stay.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the disk says no; then the night before still holds.
+    pub fn publish(&self, night: Night, keep: usize) -> Result<Night> {
+        let (nights, tonight) =
+            (self.reports.join(NIGHTS), self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
+        let last = self.names().last().and_then(|name| name.parse::<u32>().ok()).unwrap_or(0);
+        let night = Night { name: format!("{:04}", last + 1), files: digests(&tonight)?, ..night }.sealed();
+        write_manifest(&tonight, &night)?;
+        atomic::sync_folder(&tonight)?;
+        let folder = self.folder(&night.name);
+        fs::rename(&tonight, &folder).map_err(Error::io(&folder, "cannot put the night in its place"))?;
+        atomic::sync_folder(&nights)?;
+        self.point(&night)?;
+        self.prune(keep)?;
+        Ok(night)
+    }
+
+    /// Puts the files of tonight's folder in the places of those of `night`, which was made of the same and is damaged.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the disk says no.
+    pub fn repair(&self, night: &Night, made: Night) -> Result<Night> {
+        let tonight = self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY));
+        let night = Night { name: night.name.clone(), files: digests(&tonight)?, ..made }.sealed();
+        let folder = self.folder(&night.name);
+        for name in night.files.keys() {
+            let path = tonight.join(name);
+            let bytes = fs::read(&path).map_err(Error::io(&path, "cannot read it"))?;
+            atomic::place(&folder.join(name), &bytes)?;
+        }
+        write_manifest(&folder, &night)?;
+        self.forget_tonight();
+        self.point(&night)?;
+        Ok(night)
+    }
+
+    /// The nights that `prune` would remove: complete ones before the last `keep`, and incomplete ones that do not hold.
+    #[must_use]
+    pub fn superfluous(&self, keep: usize) -> Vec<String> {
+        let current = self.pointed();
+        let mut kept = 0;
+        let mut superfluous = Vec::new();
+        for name in self.names().into_iter().rev() {
+            let is_current = current.as_ref() == Some(&name);
+            // What a damaged one was nobody knows.
+            let Some(is_complete) = self.night(&name).map(|n| n.is_complete()) else { continue };
+            kept += usize::from(is_complete);
+            if !is_current && (!is_complete || kept > keep.max(1)) {
+                superfluous.push(name);
+            }
+        }
+        superfluous.reverse();
+        superfluous
+    }
+
+    /// Removes the nights that are superfluous.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the folder.
+    pub fn prune(&self, keep: usize) -> Result<()> {
+        for name in self.superfluous(keep) {
+            let (folder, gone) = (self.folder(&name), self.folder(&format!("{}gone-{name}", atomic::TEMPORARY)));
+            fs::rename(&folder, &gone).map_err(Error::io(&folder, "cannot remove the night"))?;
+            fs::remove_dir_all(&gone).map_err(Error::io(&gone, "cannot remove the night"))?;
+        }
+        Ok(())
+    }
+
+    /// Whether the changes of a night have been told already; from now on they have.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file.
+    pub fn tell_once(&self, night: &str) -> Result<bool> {
+        let path = self.reports.join(NIGHTS).join("told");
+        let told = fs::read_to_string(&path).is_ok_and(|told| told.trim() == night);
+        if !told {
+            atomic::place(&path, format!("{night}\n").as_bytes())?;
+        }
+        Ok(told)
+    }
+
+    /// Makes a night the one that holds.
+    fn point(&self, night: &Night) -> Result<()> {
+        if self.pointed().as_ref() != Some(&night.name) {
+            link::place(&self.reports.join(CURRENT), &format!("{NIGHTS}/{}", night.name))?;
+            atomic::sync_folder(&self.reports)?;
+        }
+        link::beside(&self.reports, &self.folder(&night.name), night.files.keys())
+    }
+
+    fn pointed(&self) -> Option<String> {
+        let target = link::target(&self.reports.join(CURRENT))?;
+        Some(target.strip_prefix(NIGHTS)?.trim_start_matches('/').to_owned())
+    }
+}
+
+fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
+    let path = folder.join(MANIFEST);
+    atomic::place(&path, &serde_json::to_vec(night).map_err(|e| Error::store(&path, &e))?)
+}
+
+/// The files of a folder but the manifest, with fingerprints of their contents.
+fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
+    let mut files = BTreeMap::new();
+    let entries = fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
+    for entry in entries.flatten() {
+        let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
+        if name != MANIFEST {
+            files.insert(name, Digest::of_file(&path)?);
+        }
+    }
+    Ok(files)
+}
+
+/// Names that stand for others.
+#[cfg(unix)]
+mod link {
+    use super::{CURRENT, Error, Path, Result, atomic, fs};
+
+    pub fn target(path: &Path) -> Option<String> {
+        Some(fs::read_link(path).ok()?.to_string_lossy().into_owned())
+    }
+
+    /// Puts a link in its place by one rename, whatever was there.
+    pub fn place(path: &Path, target: &str) -> Result<()> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let beside = folder.join(format!("{}link", atomic::TEMPORARY));
+        let _ = fs::remove_file(&beside);
+        std::os::unix::fs::symlink(target, &beside).map_err(Error::io(&beside, "cannot create a link"))?;
+        fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
+    }
+
+    /// Gives each file of a night its name in the folder of reports; names that it does not have go.
+    pub fn beside<'a>(reports: &Path, _: &Path, names: impl Iterator<Item = &'a String>) -> Result<()> {
+        let wanted: std::collections::BTreeMap<String, String> =
+            names.map(|name| (name.clone(), format!("{CURRENT}/{name}"))).collect();
+        for (name, to) in &wanted {
+            let path = reports.join(name);
+            if target(&path).as_ref() != Some(to) {
+                place(&path, to)?;
+            }
+        }
+        for entry in fs::read_dir(reports).map_err(Error::io(reports, "cannot list the folder"))?.flatten() {
+            let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
+            let ours = target(&path).is_some_and(|to| to.starts_with(&format!("{CURRENT}/")));
+            if ours && !wanted.contains_key(&name) {
+                fs::remove_file(&path).map_err(Error::io(&path, "cannot remove it"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where there are no links: the pointer is a text file, the files are copies.
+#[cfg(not(unix))]
+mod link {
+    use super::{Error, Path, Result, atomic, fs};
+
+    pub fn target(path: &Path) -> Option<String> {
+        Some(fs::read_to_string(path).ok()?.trim().to_owned())
+    }
+
+    pub fn place(path: &Path, target: &str) -> Result<()> {
+        atomic::place(path, target.as_bytes())
+    }
+
+    pub fn beside<'a>(reports: &Path, night: &Path, names: impl Iterator<Item = &'a String>) -> Result<()> {
+        for name in names {
+            let from = night.join(name);
+            atomic::place(&reports.join(name), &fs::read(&from).map_err(Error::io(&from, "cannot read it"))?)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn publish(nights: &Nights, text: &str, until: Stage) -> Night {
+        atomic::place(&nights.tonight().unwrap().join("fits.csv"), text.as_bytes()).unwrap();
+        nights.publish(Night { until, ..Night::default() }, 2).unwrap()
+    }
+
+    fn opened() -> (tempfile::TempDir, Nights) {
+        let folder = tempfile::tempdir().unwrap();
+        let nights = Nights::open(folder.path(), Duration::ZERO).unwrap();
+        (folder, nights)
+    }
+
+    #[test]
+    fn a_night_is_read_under_the_same_paths_as_the_one_before() {
+        let (folder, nights) = opened();
+        let read = || fs::read_to_string(folder.path().join("fits.csv")).unwrap();
+        publish(&nights, "one", Stage::Report);
+        assert_eq!(read(), "one");
+        publish(&nights, "two", Stage::Report);
+        assert_eq!((read(), nights.names()), ("two".to_owned(), vec!["0001".to_owned(), "0002".to_owned()]));
+        assert_eq!(fs::read_to_string(folder.path().join("nights/0001/fits.csv")).unwrap(), "one");
+    }
+
+    #[test]
+    fn the_last_complete_nights_stay_and_incomplete_ones_only_while_they_hold() {
+        let (_folder, nights) = opened();
+        for (text, until) in [("a", Stage::Report), ("b", Stage::Report), ("c", Stage::Ingest)] {
+            publish(&nights, text, until);
+        }
+        assert_eq!(nights.names(), ["0001", "0002", "0003"]);
+        publish(&nights, "d", Stage::Report);
+        assert_eq!(nights.names(), ["0002", "0004"]);
+        assert_eq!(nights.current().unwrap().name, "0004");
+    }
+
+    #[test]
+    fn a_night_that_was_whole_when_the_run_was_killed_is_published_by_the_next() {
+        let (folder, nights) = opened();
+        publish(&nights, "one", Stage::Report);
+        publish(&nights, "two", Stage::Report);
+        drop(nights);
+        link::place(&folder.path().join(CURRENT), "nights/0001").unwrap();
+        fs::create_dir(folder.path().join("nights/.harvest-tonight")).unwrap();
+        let nights = Nights::open(folder.path(), Duration::ZERO).unwrap();
+        assert_eq!(nights.current().unwrap().name, "0002");
+        assert!(!folder.path().join("nights/.harvest-tonight").exists());
+    }
+
+    #[test]
+    fn damage_to_a_file_or_to_the_manifest_is_seen() {
+        let (folder, nights) = opened();
+        let night = publish(&nights, "one", Stage::Report);
+        assert!(nights.is_whole(&night));
+        fs::write(folder.path().join("nights/0001/fits.csv"), "onf").unwrap();
+        assert_eq!(nights.damaged(&night), ["fits.csv"]);
+        let manifest = folder.path().join("nights/0001/night.json");
+        let text = fs::read_to_string(&manifest).unwrap();
+        fs::write(&manifest, text.replace("\"refused\":0", "\"refused\":1")).unwrap();
+        assert_eq!(nights.night("0001"), None);
+    }
+
+    #[test]
+    fn files_of_a_program_that_knew_no_nights_are_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("fits.csv"), "old").unwrap();
+        let nights = Nights::open(folder.path(), Duration::ZERO).unwrap();
+        publish(&nights, "one", Stage::Report);
+        assert_eq!(fs::read_to_string(folder.path().join("fits.csv")).unwrap(), "one");
+    }
+}
