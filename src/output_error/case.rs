@@ -288,6 +288,19 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         sum
     }
 
+    /// The coefficients with these parameters, at one point.
+    pub(super) fn coefficients_at(&self, parameters: &[f64], point: usize) -> At<NX> {
+        let mut sum = self.held.at(point);
+        for (acting, value) in self.acting.iter().zip(parameters) {
+            let own = match acting.along {
+                Some(state) => &mut sum.slope[acting.coefficient][state],
+                None => &mut sum.offset[acting.coefficient],
+            };
+            *own += value * self.columns[acting.column][point];
+        }
+        sum
+    }
+
     /// What the free derivatives add to the coefficients.
     pub(super) fn terms(&self, parameters: &[f64]) -> Vec<Term> {
         self.acting.iter().zip(parameters).map(|(acting, value)| Term { acting: *acting, value: *value }).collect()

@@ -14,6 +14,7 @@
 //! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
@@ -51,6 +52,8 @@ pub struct Series {
     /// Means of the sensitivities over the blocks, a row of whole vectors for each; of a block that does not count whole
     /// they are less.
     sensitivities: Aligned,
+    /// Σ s sᵀ of the blocks once their parameters are final: white noise needs it again and again.
+    between: Option<Scatter>,
     /// Σ s sᵀ of the samples' sensitivities about their block's mean.
     within: DMatrix<f64>,
 }
@@ -203,6 +206,7 @@ impl Series {
             fast,
             fast_freedom,
             sensitivities: Aligned::zeros(blocks * width(parameters)),
+            between: None,
             within: squares,
         };
         let rows = series.sensitivities.slice_mut().chunks_exact_mut(width(parameters).max(1));
@@ -246,7 +250,7 @@ impl Series {
                 within[(row, column)] = self.within[(i, j)];
             }
         }
-        Series { parameters, sensitivities, within, ..self.clone() }
+        Series { parameters, sensitivities, within, between: None, ..self.clone() }
     }
 
     /// The weight of a block's mean.
@@ -261,6 +265,9 @@ impl Series {
         let before = std::mem::replace(&mut self.sensitivities, Aligned::zeros(self.used.len() * width));
         let (rows, from) = (rows.slice(), before.slice());
         Arch::new().dispatch(Product { from, matrix: rows, to: self.sensitivities.slice_mut(), width });
+        let mut between = Scatter::zeros(self.parameters);
+        between.add_squares(self.sensitivities.slice(), 1.0);
+        self.between = Some(between);
         self.within = root.transpose() * &self.within * root;
     }
 
@@ -307,9 +314,14 @@ impl Series {
         let width = width(self.parameters);
         filtered.clear();
         filtered.extend_from_slice(self.sensitivities.slice());
+        let factor = self.block_weight().powi(2) * noise.innovation;
+        if let Some(between) = self.between.as_ref().filter(|_| noise.coefficients.is_empty()) {
+            scatter.add_scatter(between, factor);
+            return;
+        }
         filtered.resize(filtered.len() + width * noise.memory(self.used.len()), 0.0);
         Arch::new().dispatch(Filter { noise, series: filtered, width, back: false });
-        scatter.add_squares(filtered, self.block_weight().powi(2) * noise.innovation);
+        scatter.add_squares(filtered, factor);
     }
 
     /// R S of blocks that count, from S filtered.
@@ -335,13 +347,9 @@ impl Series {
         for (scattered, spread) in scattered.slice_mut().iter_mut().zip(spread) {
             *scattered = self.block_weight() * spread - *scattered;
         }
-        let of = |lag: usize| {
-            let shifted = |rows: &[f64], other: &[f64]| {
-                Arch::new().dispatch(Dot { a: &rows[..rows.len() - lag * width], b: &other[lag * width..] })
-            };
-            shifted(scattered.slice(), s) + self.block_weight() * shifted(s, spread)
-        };
-        (0..self.lags()).map(of).collect()
+        let shifted = |a: &[f64], b: &[f64]| Arch::new().dispatch(Shifted { a, b, width, lags: self.lags() });
+        let (before, after) = (shifted(scattered.slice(), s), shifted(s, spread));
+        before.iter().zip(after).map(|(before, after)| before + self.block_weight() * after).collect()
     }
 }
 
@@ -356,7 +364,7 @@ fn rows_of(matrix: &DMatrix<f64>, width: usize) -> Aligned {
 
 /// Samples of a block.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
-fn samples_of_block(step_s: f64) -> usize {
+pub(super) fn samples_of_block(step_s: f64) -> usize {
     (BLOCK_S / step_s).round().max(1.0) as usize
 }
 
@@ -403,6 +411,10 @@ impl Scatter {
         let squares = Squares { rows, parameters: self.parameters, matrix: sum.slice_mut(), width };
         Arch::new().dispatch(squares);
         self.rows.slice_mut().iter_mut().zip(sum.slice()).for_each(|(total, s)| *total += factor * s);
+    }
+
+    fn add_scatter(&mut self, other: &Scatter, factor: f64) {
+        self.rows.slice_mut().iter_mut().zip(other.rows.slice()).for_each(|(total, s)| *total += factor * s);
     }
 
     /// Copies the lower triangle to the upper one.
@@ -454,17 +466,41 @@ impl WithSimd for Product<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
         if self.width == 0 {
             return;
         }
-        for (from, to) in self.from.chunks_exact(self.width).zip(self.to.chunks_exact_mut(self.width)) {
-            for lane in (0..self.width).step_by(S::F64_LANES) {
-                let mut sum = simd.splat_f64s(0.0);
-                for (i, row) in self.matrix.chunks_exact(self.width).enumerate() {
-                    sum = simd.mul_add_f64s(simd.splat_f64s(from[i]), load::<S>(row, lane), sum);
+        let rows = self.from.len() / self.width;
+        let mut row = 0;
+        while row + ROWS_AT_ONCE <= rows {
+            self.some::<S, ROWS_AT_ONCE>(simd, row);
+            row += ROWS_AT_ONCE;
+        }
+        for row in row..rows {
+            self.some::<S, 1>(simd, row);
+        }
+    }
+}
+
+/// As many sums side by side as hide how long one of them waits for itself.
+const ROWS_AT_ONCE: usize = 6;
+
+impl Product<'_> {
+    /// `N` rows from one on.
+    #[inline(always)]
+    fn some<S: Simd, const N: usize>(&mut self, simd: S, row: usize) {
+        let width = self.width;
+        for lane in (0..width).step_by(S::F64_LANES) {
+            let mut sums = [simd.splat_f64s(0.0); N];
+            for (i, matrix) in self.matrix.chunks_exact(width).enumerate() {
+                let entries = load::<S>(matrix, lane);
+                for n in 0..N {
+                    let factor = simd.splat_f64s(self.from[(row + n) * width + i]);
+                    sums[n] = simd.mul_add_f64s(factor, entries, sums[n]);
                 }
-                super::kernel::store::<S>(to, lane, sum);
+            }
+            for n in 0..N {
+                super::kernel::store::<S>(self.to, (row + n) * width + lane, sums[n]);
             }
         }
     }
@@ -492,27 +528,60 @@ impl WithSimd for Filter<'_> {
     }
 }
 
-/// Σ a b, lane by lane and then over the lanes in one order whatever the processor's vectors.
-struct Dot<'a> {
+/// Σ a_k · b_{k+lag} over rows at lags 0, 1, …
+struct Shifted<'a> {
     a: &'a [f64],
     b: &'a [f64],
+    width: usize,
+    lags: usize,
 }
 
-impl WithSimd for Dot<'_> {
-    type Output = f64;
+/// Lags at once, so that a row is read for several.
+const LAGS_AT_ONCE: usize = 4;
+
+impl WithSimd for Shifted<'_> {
+    type Output = Vec<f64>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
-        const SUMS: usize = 4 * VECTOR;
-        let mut sums = [0.0; SUMS];
-        let (a, b) = (self.a.chunks_exact(SUMS), self.b.chunks_exact(SUMS));
-        let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-        for (a, b) in a.zip(b) {
-            for i in 0..SUMS {
-                sums[i] = a[i].mul_add(b[i], sums[i]);
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
+        let rows = self.a.len() / self.width.max(1);
+        let mut sums = vec![0.0; self.lags];
+        for (group, sums) in sums.chunks_mut(LAGS_AT_ONCE).enumerate() {
+            let first = group * LAGS_AT_ONCE;
+            let together = rows.saturating_sub(first + LAGS_AT_ONCE - 1);
+            let at_once = self.some::<S, LAGS_AT_ONCE>(simd, first, 0..together);
+            for (n, sum) in sums.iter_mut().enumerate() {
+                let rest = together..rows.saturating_sub(first + n);
+                *sum = at_once[n] + self.some::<S, 1>(simd, first + n, rest)[0];
             }
         }
-        sums.iter().sum::<f64>() + rest
+        sums
+    }
+}
+
+impl Shifted<'_> {
+    /// Those at `N` lags from one on, over some of the rows. Lanes are summed eight apart and then in one order, so that
+    /// the width of vectors does not show.
+    #[inline(always)]
+    fn some<S: Simd, const N: usize>(&self, simd: S, lag: usize, rows: std::ops::Range<usize>) -> [f64; N] {
+        let width = self.width;
+        let mut lanes = [[0.0; VECTOR]; N];
+        for part in (0..VECTOR).step_by(S::F64_LANES) {
+            let mut sums = [simd.splat_f64s(0.0); N];
+            for k in rows.clone() {
+                for lane in (part..width).step_by(VECTOR) {
+                    let a = load::<S>(self.a, k * width + lane);
+                    for n in 0..N {
+                        let b = load::<S>(self.b, (k + lag + n) * width + lane);
+                        sums[n] = simd.mul_add_f64s(a, b, sums[n]);
+                    }
+                }
+            }
+            for n in 0..N {
+                super::kernel::store::<S>(&mut lanes[n], part, sums[n]);
+            }
+        }
+        lanes.map(|lanes| lanes.iter().sum())
     }
 }
 
@@ -551,6 +620,24 @@ mod tests {
         assert_relative_eq!(said.freedom[0], 8.0, max_relative = 1e-9);
         let longer = said.clone().of_student()[(0, 0)] / said.covariance[(0, 0)];
         assert_relative_eq!(longer.sqrt(), 2.306 / 1.960, max_relative = 1e-3);
+    }
+
+    #[test]
+    fn white_noise_does_to_the_gradient_of_other_parameters_what_their_change_says() {
+        let (count, weight, t) = (40, 3.0, 0.25);
+        let residuals: Vec<f64> = (0..count).map(|k| if k % 4 < 2 { 1.0 } else { -1.0 }).collect();
+        let squares = DMatrix::from_element(1, 1, f64::from(count));
+        let mut series = Series::new(0.1, weight, &residuals, &vec![true; residuals.len()], squares, |samples, row| {
+            row[0] += samples.len() as f64;
+        });
+        let white = Autoregression { coefficients: vec![], innovation: 2.0 };
+        let noise = super::Noise(vec![OutputNoise { slow: white, fast: 1.0 }]);
+        let before = gradient_covariance(&[series.clone()], &noise)[(0, 0)];
+        series.transform(&DMatrix::from_element(1, 1, t));
+        let after = gradient_covariance(&[series], &noise)[(0, 0)];
+        // A block of two samples whose mean has the variance 2 gives the sum over it 8.
+        assert_relative_eq!(before, weight * weight * 8.0 * f64::from(count) / 2.0, max_relative = 1e-12);
+        assert_relative_eq!(after, t * t * before, max_relative = 1e-12);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::coloured;
@@ -69,6 +69,13 @@ pub fn identified(information: &DMatrix<f64>, max_condition_number: f64) -> Iden
     Identified::Determined { inverse: &root * root.transpose(), root, condition_number: most / smallest }
 }
 
+/// The inverse alone, whatever the condition; none where no direction less would do.
+#[must_use]
+pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = scale(information);
+    Some(scaled(&Cholesky::new(scaled(information, &scale))?.inverse(), &scale))
+}
+
 /// Variances of the residuals, with the parameters counted as spread evenly over the outputs.
 #[must_use]
 pub fn variances(residuals: &[[f64; OUTPUTS]], used: &[usize; OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
@@ -87,15 +94,17 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
-/// Bounds of a fit whose information matrix has the inverse T Tᵀ; none where the integration diverges.
+/// Bounds of a fit whose information matrix has the inverse T Tᵀ; none where its response is not whole.
 #[must_use]
 pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Option<Bounds> {
-    let sensitivities = data.sensitivities(&fit.values).ok()?;
-    let series = data.series(&fit.response, &sensitivities, &fit.weights);
+    if !data.sums(&fit.response, &fit.weights).whole {
+        return None;
+    }
+    let series = data.series(&fit.response, &fit.weights);
     let white = data.white_covariance(&fit.response, &fit.weights);
     let inverse = root * root.transpose();
     let covariance = &inverse * white * &inverse;
-    let inputs = data.input_covariance(&fit.values, &sensitivities, &fit.weights);
+    let inputs = data.input_covariance(&fit.values, &fit.response, &fit.weights);
     let corrected =
         never_below(coloured::covariance(root, series).of_student(), &covariance) + &inverse * inputs * &inverse;
     Some(Bounds { covariance, corrected })
@@ -104,13 +113,12 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
 /// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
 #[must_use]
 pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
-    let information = data.sums(&fit.response, &fit.weights).information;
-    match identified(&information, max_condition_number) {
-        Identified::Determined { root, .. } => {
-            let sensitivities = data.sensitivities(&fit.values).ok()?;
-            Some(coloured::noise(&root, data.series(&fit.response, &sensitivities, &fit.weights)))
+    let sums = data.sums(&fit.response, &fit.weights);
+    match identified(&sums.information, max_condition_number) {
+        Identified::Determined { root, .. } if sums.whole => {
+            Some(coloured::noise(&root, data.series(&fit.response, &fit.weights)))
         }
-        Identified::Undetermined { .. } => None,
+        _ => None,
     }
 }
 
@@ -174,7 +182,7 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
             }
         }
     }
-    let Identified::Determined { inverse, .. } = identified(&own, f64::INFINITY) else { return };
+    let Some(inverse) = inverse(&own) else { return };
     let mut held = DMatrix::zeros(n, n);
     for (cross, uncertainty) in crosses.into_iter().zip(uncertainties.values()) {
         let shift = &inverse * cross * *uncertainty;
@@ -189,8 +197,7 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
 /// gradient with one standard deviation of it ([`super::calibration`]).
 pub fn miscalibrated<D: Likelihood>(data: &D, gradient_shifts: &[DVector<f64>], fit: &mut Fit<D::Response>) {
     let Some(corrected) = &mut fit.covariance_corrected else { return };
-    let information = data.sums(&fit.response, &fit.weights).information;
-    let Identified::Determined { inverse, .. } = identified(&information, f64::INFINITY) else { return };
+    let Some(inverse) = inverse(&data.sums(&fit.response, &fit.weights).information) else { return };
     let mut common = DMatrix::zeros(inverse.nrows(), inverse.ncols());
     for gradient_shift in gradient_shifts {
         let shift = &inverse * gradient_shift;

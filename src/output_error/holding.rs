@@ -77,8 +77,7 @@ impl Candidates {
         let mut response = case.response();
         case.respond(values, &mut response).ok()?;
         let information = sums(&response, weights).information;
-        let sensitivities = case.sensitivities(values).ok()?;
-        let scatter = coloured::gradient_covariance(&case.series(&response, &sensitivities, weights), noise);
+        let scatter = coloured::gradient_covariance(&case.series(&response, weights), noise);
         Some(Candidates { information, scatter, uncertainty, max_condition_number })
     }
 

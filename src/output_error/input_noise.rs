@@ -12,12 +12,12 @@
 use nalgebra::{DMatrix, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
-use super::case::{Case, Coefficients, surface_factor};
+use super::case::{Case, surface_factor};
 use super::kernel::{CHUNK, load, store};
 use super::lanes::{Aligned, VECTOR};
-use super::normal::Rows;
-use super::response::Sensitivities;
-use crate::aero::Derivative;
+use super::normal::{Normal, Rows};
+use super::response::Response;
+use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
@@ -35,7 +35,7 @@ pub struct NoisySurface {
 struct Effect {
     coefficient: usize,
     value: Value,
-    /// Coefficient per deflection and unit of the derivative, sample by sample.
+    /// Coefficient per deflection and unit of the derivative, sample by sample; one throughout where empty.
     factors: Vec<f64>,
 }
 
@@ -67,7 +67,10 @@ pub fn noisy_surfaces(
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
-            factors: qbar.iter().step_by(2).map(|qbar| surface_factor(aircraft, *qbar, d)).collect(),
+            factors: match d.regressor {
+                Regressor::Vane(_) => qbar.iter().step_by(2).map(|qbar| surface_factor(aircraft, *qbar, d)).collect(),
+                _ => vec![],
+            },
         };
         (variance > 0.0).then(|| NoisySurface { variance, effects: acting.map(effect).collect() })
     };
@@ -79,51 +82,54 @@ pub fn noisy_surfaces(
 #[must_use]
 pub fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
-    let mut sizes: Vec<f64> =
-        samples.windows(4).map(|u| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs()).filter(|d| d.is_finite()).collect();
+    // Sizes are in the order of their bits, which are compared faster.
+    let sizes = samples.windows(4).map(|u| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs());
+    let mut sizes: Vec<u64> = sizes.filter(|d| d.is_finite()).map(f64::to_bits).collect();
     let middle = sizes.len() / 2;
-    let median = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let median = if sizes.is_empty() { 0.0 } else { f64::from_bits(*sizes.select_nth_unstable(middle).1) };
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 
-/// The gradient's covariance from the noise of the surfaces, along the measured motion.
+/// The gradient's covariance from the noise of the surfaces, along the measured motion, at a whole response.
 #[must_use]
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
-    sensitivities: &Sensitivities,
+    response: &Response,
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
-    let (n, width) = (case.parameters(), sensitivities.width);
+    let (n, width) = (case.parameters(), case.parameters().next_multiple_of(VECTOR));
     if case.noisy_surfaces.is_empty() || n == 0 {
         return DMatrix::zeros(n, n);
     }
-    let coefficients = case.with(parameters);
     let mut scatter = Aligned::zeros(width * width);
-    let adjoint = Adjoint { case, coefficients, parameters, sensitivities, weights, scatter: scatter.slice_mut() };
+    let normal = &response.normal;
+    let adjoint = Adjoint { case, parameters, normal, weights, width, scatter: scatter.slice_mut() };
     Arch::new().dispatch(adjoint);
     let at = |i: usize, j: usize| scatter.slice()[i.max(j) * width + i.min(j)];
-    DMatrix::from_fn(n, n, |i, j| at(sensitivities.lanes[i], sensitivities.lanes[j]))
+    DMatrix::from_fn(n, n, at)
 }
 
-/// The adjoint's run from the last sample to the first.
+/// The adjoint's run from the last block of samples to the first. Sensitivities change little within a block, so its
+/// samples answer alike to the noise.
 struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
-    coefficients: Coefficients<NX>,
     parameters: &'a [f64],
-    sensitivities: &'a Sensitivities,
+    normal: &'a Normal,
     weights: &'a [f64; OUTPUTS],
+    /// Parameters padded to whole vectors.
+    width: usize,
     scatter: &'a mut [f64],
 }
 
-/// What the adjoint needs to know of one sample.
+/// What the adjoint needs to know of one block, in its middle.
 struct At<const NX: usize> {
-    /// How a state leaves its mark on that of the next sample.
-    transition: SMatrix<f64, NX, NX>,
+    /// How a state leaves its mark on that half a block later.
+    half: SMatrix<f64, NX, NX>,
     /// Slopes of the outputs along states and coefficients, times the outputs' weights.
     read: SMatrix<f64, OUTPUTS, NX>,
     direct: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
-    /// What a coefficient leaves in the state over one step.
+    /// What a coefficient at one sample leaves in the state.
     driven: SMatrix<f64, NX, COEFFICIENTS>,
 }
 
@@ -132,55 +138,72 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let width = self.sensitivities.width;
-        let mut adjoint = Aligned::zeros(NX * width);
-        let adjoint = adjoint.slice_mut();
+        let width = self.width;
+        let (mut adjoint, mut sums) = (Aligned::zeros(NX * width), Aligned::zeros(OUTPUTS * width));
+        let (adjoint, sums) = (adjoint.slice_mut(), sums.slice_mut());
         let mut rows = Aligned::zeros(CHUNK * COEFFICIENTS * width);
         let rows = rows.slice_mut();
         let whole = vec![VECTOR; width / VECTOR];
-        let samples = self.case.samples();
-        for k in (0..samples).rev() {
-            let at = self.at(k);
-            let root = root(&self.noise(k));
-            let row = k % CHUNK * COEFFICIENTS * width;
+        let block = self.normal.block_samples();
+        for b in (0..self.normal.blocks()).rev() {
+            let samples = block.min(self.case.samples() - b * block);
+            let middle = b * block + samples / 2;
+            let at = self.at(middle, samples);
+            let root = root(&self.noise(middle));
+            // Each of the block's samples has this part of the outputs' sums, and all of them together its square.
+            let all = (samples as f64).sqrt();
+            let mut part = [0.0; OUTPUTS];
+            sums.fill(0.0);
+            for (o, sums) in sums.chunks_exact_mut(width).enumerate() {
+                let count = self.normal.add_block(b, o, sums);
+                part[o] = 1.0 / (count.max(1.0) * samples as f64).sqrt();
+            }
+            let row = b % CHUNK * COEFFICIENTS * width;
             for lane in (0..width).step_by(S::F64_LANES) {
                 let mut by_coefficient = [simd.splat_f64s(0.0); COEFFICIENTS];
                 let (mut later, mut now) = ([simd.splat_f64s(0.0); NX], [simd.splat_f64s(0.0); NX]);
                 for o in 0..OUTPUTS {
-                    let s = load::<S>(self.sensitivities.row(k, o), lane);
+                    let s = load::<S>(sums, o * width + lane);
                     for i in 0..NX {
                         now[i] = simd.mul_add_f64s(simd.splat_f64s(at.read[(o, i)]), s, now[i]);
                     }
                     for c in 0..COEFFICIENTS {
-                        let slope = simd.splat_f64s(at.direct[(o, c)]);
+                        let slope = simd.splat_f64s(part[o] * at.direct[(o, c)]);
                         by_coefficient[c] = simd.mul_add_f64s(slope, s, by_coefficient[c]);
                     }
                 }
                 for j in 0..NX {
                     let s = load::<S>(adjoint, j * width + lane);
                     for i in 0..NX {
-                        later[i] = simd.mul_add_f64s(simd.splat_f64s(at.transition[(j, i)]), s, later[i]);
+                        later[i] = simd.mul_add_f64s(simd.splat_f64s(at.half[(j, i)]), s, later[i]);
                     }
                 }
+                let mut before = [simd.splat_f64s(0.0); NX];
                 for i in 0..NX {
-                    // A deflection is linear between samples: half of what it leaves behind is there at its own sample.
+                    // On average half of the block comes after a deflection in it.
                     let left = simd.mul_add_f64s(simd.splat_f64s(0.5), now[i], later[i]);
                     for c in 0..COEFFICIENTS {
                         let slope = simd.splat_f64s(at.driven[(i, c)]);
                         by_coefficient[c] = simd.mul_add_f64s(slope, left, by_coefficient[c]);
                     }
-                    store::<S>(adjoint, i * width + lane, simd.add_f64s(later[i], now[i]));
+                    let middle = simd.add_f64s(later[i], now[i]);
+                    for j in 0..NX {
+                        before[j] = simd.mul_add_f64s(simd.splat_f64s(at.half[(i, j)]), middle, before[j]);
+                    }
+                }
+                for i in 0..NX {
+                    store::<S>(adjoint, i * width + lane, before[i]);
                 }
                 for c in 0..COEFFICIENTS {
                     let mut answer = simd.splat_f64s(0.0);
                     for d in c..COEFFICIENTS {
-                        answer = simd.mul_add_f64s(simd.splat_f64s(root[d][c]), by_coefficient[d], answer);
+                        answer = simd.mul_add_f64s(simd.splat_f64s(all * root[d][c]), by_coefficient[d], answer);
                     }
                     store::<S>(rows, row + c * width + lane, answer);
                 }
             }
-            if k % CHUNK == 0 {
-                let samples = COEFFICIENTS * CHUNK.min(samples - k);
+            if b % CHUNK == 0 {
+                let samples = COEFFICIENTS * CHUNK.min(self.normal.blocks() - b);
                 Rows { values: rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
             }
         }
@@ -189,10 +212,10 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
 
 impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     #[inline(always)]
-    fn at(&self, k: usize) -> At<NX> {
+    fn at(&self, k: usize, samples: usize) -> At<NX> {
         let case = self.case;
         let x = &case.states[k];
-        let coefficients = self.coefficients.at(2 * k);
+        let coefficients = case.coefficients_at(self.parameters, 2 * k);
         let c = coefficients.with(x);
         let mut c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::zeros();
         for k in 0..COEFFICIENTS {
@@ -202,9 +225,11 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         }
         let rates = E::rates(&case.known[2 * k], x, &c);
         let read = E::outputs(&case.known[2 * k], &case.sensed[k], x, &c);
-        let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * case.step_s;
+        let half_s = 0.5 * samples as f64 * case.step_s;
+        let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * half_s;
+        let square = by_state * by_state;
         let mut at = At {
-            transition: SMatrix::identity() + by_state + by_state * by_state * 0.5,
+            half: SMatrix::identity() + by_state + square * 0.5 + square * by_state * (1.0 / 6.0),
             read: read.by_state + read.by_coefficient * c_by_state,
             direct: read.by_coefficient,
             driven: rates.by_coefficient * case.step_s,
@@ -227,7 +252,7 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
                     Value::Free(j) => self.parameters[j],
                     Value::Held(value) => value,
                 };
-                shares[effect.coefficient] += value * effect.factors[k];
+                shares[effect.coefficient] += value * effect.factors.get(k).copied().unwrap_or(1.0);
             }
             for (c, row) in covariance.iter_mut().enumerate() {
                 for (d, v) in row.iter_mut().enumerate() {
@@ -339,7 +364,7 @@ mod tests {
             case.names.iter().filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name)).collect();
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
-        let said = gradient_covariance(&case, &parameters, &sensitivities, &TABLE);
+        let said = gradient_covariance(&case, &parameters, &response, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
             let ratio = (scatter[j] / said[(j, j)]).sqrt();

@@ -11,7 +11,7 @@ use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::likelihood::Likelihood;
-use super::response::{Diverged, Response, Sensitivities};
+use super::response::{Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Maneuvers with shared derivatives.
@@ -126,7 +126,6 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 
 impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     type Response = Vec<Response>;
-    type Sensitivities = Vec<Sensitivities>;
 
     fn names(&self) -> &[String] {
         &self.names
@@ -142,10 +141,6 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
 
     fn respond_roughly(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
         self.each(response, |member, response| member.case.respond_roughly(&member.parameters(parameters), response))
-    }
-
-    fn sensitivities(&self, parameters: &[f64]) -> Result<Vec<Sensitivities>, Diverged> {
-        self.members.iter().map(|m| m.case.sensitivities(&m.parameters(parameters))).collect()
     }
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
@@ -183,18 +178,13 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         std::array::from_fn(|o| squares[o] / f64::max(counts[o], 1.0))
     }
 
-    fn series(
-        &self,
-        response: &Vec<Response>,
-        sensitivities: &Vec<Sensitivities>,
-        weights: &[f64; OUTPUTS],
-    ) -> Vec<Series> {
-        let members = self.members.iter().zip(response.iter().zip(sensitivities));
-        members
-            .flat_map(|(m, (r, s))| {
-                m.case.series(r, s, weights).into_iter().map(|s| s.widened(&m.places, self.names.len()))
-            })
-            .collect()
+    fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<Series> {
+        let members = self.members.iter().zip(response);
+        let wide = |(m, r): (&Member<'_, NX, E>, &Response)| {
+            let series = m.case.series(r, weights).into_iter();
+            series.map(|s| s.widened(&m.places, self.names.len())).collect::<Vec<_>>()
+        };
+        members.flat_map(wide).collect()
     }
 
     fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
@@ -205,14 +195,9 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         sum
     }
 
-    fn input_covariance(
-        &self,
-        parameters: &[f64],
-        sensitivities: &Vec<Sensitivities>,
-        weights: &[f64; OUTPUTS],
-    ) -> DMatrix<f64> {
+    fn input_covariance(&self, parameters: &[f64], response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
-        for (member, own) in self.members.iter().zip(sensitivities) {
+        for (member, own) in self.members.iter().zip(response) {
             member.add(&member.case.input_covariance(&member.parameters(parameters), own, weights), &mut sum);
         }
         sum

@@ -7,15 +7,13 @@ use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::cramer_rao;
 use super::input_noise;
-use super::response::{Diverged, Response, Sensitivities};
+use super::response::{Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Data that say something of parameters: cost, gradient and information at any values of them.
 pub trait Likelihood {
     /// Computed outputs with the sums of the normal equations, allocated once and written over at every iteration.
-    type Response;
-    /// The sensitivities of the outputs to the parameters.
-    type Sensitivities;
+    type Response: Default;
 
     /// Names of the parameters in order.
     fn names(&self) -> &[String];
@@ -35,36 +33,22 @@ pub trait Likelihood {
     /// [`Diverged`] when an integration leaves the bounds of sense.
     fn respond_roughly(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
 
-    /// Computes the sensitivities at these parameters.
-    ///
-    /// # Errors
-    /// [`Diverged`] when an integration leaves the bounds of sense.
-    fn sensitivities(&self, parameters: &[f64]) -> Result<Self::Sensitivities, Diverged>;
-
     /// Cost, gradient and information for weights on residuals in deg, deg/s and g.
     fn sums(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Sums;
 
     /// Variances of the residuals, output by output.
     fn variances(&self, response: &Self::Response) -> [f64; OUTPUTS];
 
-    /// Residuals with their sensitivities, output by output; those of different series are independent.
-    fn series(
-        &self,
-        response: &Self::Response,
-        sensitivities: &Self::Sensitivities,
-        weights: &[f64; OUTPUTS],
-    ) -> Vec<Series>;
+    /// Residuals of a whole response with their sensitivities, output by output; those of different series are
+    /// independent.
+    fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
 
     /// Σ Sᵀ W R W S for white residuals.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64>;
 
-    /// What noise of what is taken as exact does to the gradient.
-    fn input_covariance(
-        &self,
-        parameters: &[f64],
-        sensitivities: &Self::Sensitivities,
-        weights: &[f64; OUTPUTS],
-    ) -> DMatrix<f64>;
+    /// What noise of what is taken as exact does to the gradient, at a whole response to these parameters.
+    fn input_covariance(&self, parameters: &[f64], response: &Self::Response, weights: &[f64; OUTPUTS])
+    -> DMatrix<f64>;
 
     /// Where an integration diverged, in words.
     fn place(&self, diverged: Diverged) -> String;
@@ -72,7 +56,6 @@ pub trait Likelihood {
 
 impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
     type Response = Response;
-    type Sensitivities = Sensitivities;
 
     fn names(&self) -> &[String] {
         &self.names
@@ -90,10 +73,6 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         Case::respond_roughly(self, parameters, response)
     }
 
-    fn sensitivities(&self, parameters: &[f64]) -> Result<Sensitivities, Diverged> {
-        Case::sensitivities(self, parameters)
-    }
-
     fn sums(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
         cost::sums(response, weights)
     }
@@ -103,18 +82,15 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         cramer_rao::variances(&residuals, &self.used(), self.parameters())
     }
 
-    fn series(&self, response: &Response, sensitivities: &Sensitivities, weights: &[f64; OUTPUTS]) -> Vec<Series> {
+    fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<Series> {
         let all = cost::residuals(&self.measurements, response);
         let series = |o: usize| {
             let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
             let residuals: Vec<f64> = all.iter().map(|v| v[o]).collect();
             let squares = response.normal.squares(o);
+            let normal = &response.normal;
             Series::new(self.step_s, weights[o], &residuals, &used, squares, |samples, row| {
-                let mut sum = vec![0.0; sensitivities.width];
-                for k in samples {
-                    sum.iter_mut().zip(sensitivities.row(k, o)).for_each(|(sum, s)| *sum += s);
-                }
-                row.iter_mut().zip(&sensitivities.lanes).for_each(|(row, lane)| *row += sum[*lane]);
+                normal.add_block(samples.start / normal.block_samples(), o, row);
             })
         };
         (0..OUTPUTS).map(series).collect()
@@ -125,13 +101,8 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         response.normal.information(&std::array::from_fn(|o| weights[o] * weights[o] * variances[o]))
     }
 
-    fn input_covariance(
-        &self,
-        parameters: &[f64],
-        sensitivities: &Sensitivities,
-        weights: &[f64; OUTPUTS],
-    ) -> DMatrix<f64> {
-        input_noise::gradient_covariance(self, parameters, sensitivities, weights)
+    fn input_covariance(&self, parameters: &[f64], response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        input_noise::gradient_covariance(self, parameters, response, weights)
     }
 
     fn place(&self, diverged: Diverged) -> String {

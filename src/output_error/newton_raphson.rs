@@ -116,7 +116,7 @@ pub fn minimise<D: Likelihood>(
         final_cost: None,
         values: start,
         weights,
-        response: data.response(),
+        response: D::Response::default(),
         condition_number: None,
         undetermined: vec![],
         covariance: None,
@@ -126,6 +126,7 @@ pub fn minimise<D: Likelihood>(
     };
     if let Err(diverged) = data.respond_roughly(&fit.values, &mut response) {
         fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
+        fit.response = data.response();
         return fit;
     }
     let mut at = data.sums(&response, &weights);

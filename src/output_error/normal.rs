@@ -1,6 +1,9 @@
 //! The sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples that count. Weights
 //! come later, so that other weights need no other pass.
 //!
+//! Beside them the rows of a whole pass are added up over blocks of samples: what the corrected bounds see the
+//! sensitivities through, so that they need no pass of their own.
+//!
 //! Σ s sᵀ is most of the work. Far from the minimum it may be that of every fourth sample, times four: it says where to go
 //! well enough, while gradient and cost are those of all samples.
 //!
@@ -30,6 +33,10 @@ pub(super) struct Normal {
     counts: [usize; OUTPUTS],
     /// The squares are of every so many samples.
     every: usize,
+    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole squares only.
+    blocks: Aligned,
+    block: usize,
+    samples: usize,
     lanes: Lanes,
     /// Derivatives, which come before the biases among the parameters; initial states come after them.
     derivatives: usize,
@@ -37,13 +44,17 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    pub fn new(lanes: &Lanes, derivatives: usize, biased: &[usize]) -> Normal {
+    /// The sums of so many samples, seen through blocks of `block` of them.
+    pub fn new(lanes: &Lanes, derivatives: usize, biased: &[usize], samples: usize, block: usize) -> Normal {
         let width = lanes.width();
         Normal {
             squares: std::array::from_fn(|_| Aligned::zeros(width * width)),
             moments: std::array::from_fn(|_| Aligned::zeros(width)),
             counts: [0; OUTPUTS],
             every: 1,
+            blocks: Aligned::default(),
+            block: block.max(1),
+            samples,
             lanes: lanes.clone(),
             derivatives,
             biased: biased.to_vec(),
@@ -54,6 +65,35 @@ impl Normal {
     pub fn clear(&mut self, every: usize) {
         self.squares.iter_mut().chain(&mut self.moments).for_each(|sums| sums.slice_mut().fill(0.0));
         (self.counts, self.every) = ([0; OUTPUTS], every);
+        let blocks = if every == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
+        if self.blocks.slice().len() == blocks {
+            self.blocks.slice_mut().fill(0.0);
+        } else if blocks > 0 {
+            self.blocks = Aligned::zeros(blocks);
+        }
+    }
+
+    /// Samples of a block, the last one may have fewer; and the blocks.
+    pub fn block_samples(&self) -> usize {
+        self.block
+    }
+
+    pub fn blocks(&self) -> usize {
+        self.samples.div_ceil(self.block.max(1))
+    }
+
+    /// The sensitivities of an output to all parameters, added up over a block's samples that count; and how many do.
+    pub fn add_block(&self, block: usize, output: usize, row: &mut [f64]) -> f64 {
+        let width = self.lanes.width();
+        let Some(sums) = self.blocks.slice().get((block * OUTPUTS + output) * width..).filter(|_| self.whole()) else {
+            return 0.0;
+        };
+        let (derivatives, initial) = self.lanes.places.split_at(self.derivatives);
+        let count = sums[self.lanes.one];
+        let biases = self.biased.iter().map(|o| if *o == output { count } else { 0.0 });
+        let slopes = derivatives.iter().map(|lane| sums[*lane]).chain(biases).chain(initial.iter().map(|l| sums[*l]));
+        row.iter_mut().zip(slopes).for_each(|(row, slope)| *row += slope);
+        count
     }
 
     /// Whether the squares are of all samples.
@@ -141,7 +181,7 @@ impl Sink for Summing<'_> {
         rows: &mut [f64],
         meanwhile: &mut impl Meanwhile,
     ) {
-        let Normal { squares, moments, counts, every, lanes, .. } = &mut *self.normal;
+        let Normal { squares, moments, counts, every, lanes, blocks, block, .. } = &mut *self.normal;
         let width = lanes.width();
         for (k, y) in outputs.iter().enumerate() {
             for o in 0..OUTPUTS {
@@ -155,12 +195,42 @@ impl Sink for Summing<'_> {
                 }
             }
         }
+        if *every == 1 {
+            add_blocks(simd, first, *block, rows, outputs.len(), blocks.slice_mut());
+        }
         for o in 0..OUTPUTS {
             let all = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
             all.add_moments(simd, lanes.residual, moments[o].slice_mut());
             let rows = Rows { stride: *every * all.stride, samples: all.samples.div_ceil(*every), ..all };
             rows.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
         }
+    }
+}
+
+/// Adds the rows of some samples, from `first` on, to those of their blocks.
+#[inline(always)]
+fn add_blocks<S: Simd>(simd: S, first: usize, block: usize, rows: &[f64], samples: usize, blocks: &mut [f64]) {
+    let row = rows.len() / super::kernel::CHUNK;
+    let mut k = 0;
+    while k < samples {
+        let within = (first + k) / block;
+        let next = ((within + 1) * block - first).min(samples);
+        let sums = S::as_mut_simd_f64s(&mut blocks[within * row..][..row]).0;
+        let lines = S::as_simd_f64s(&rows[k * row..next * row]).0;
+        let vectors = sums.len();
+        // There are as many vectors of each output: so many sums go on side by side.
+        for (v, sums) in sums.chunks_exact_mut(OUTPUTS).enumerate() {
+            let mut side = [simd.splat_f64s(0.0); OUTPUTS];
+            side.copy_from_slice(sums);
+            for n in 0..next - k {
+                let line = &lines[n * vectors + v * OUTPUTS..][..OUTPUTS];
+                for i in 0..OUTPUTS {
+                    side[i] = simd.add_f64s(side[i], line[i]);
+                }
+            }
+            sums.copy_from_slice(&side);
+        }
+        k = next;
     }
 }
 

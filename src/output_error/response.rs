@@ -4,6 +4,7 @@
 use pulp::Simd;
 
 use super::case::Case;
+use super::coloured::samples_of_block;
 use super::course::Meanwhile;
 use super::kernel::Sink;
 use super::lanes::Aligned;
@@ -85,7 +86,13 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     pub fn response(&self) -> Response {
         Response {
             outputs: vec![[0.0; OUTPUTS]; self.samples()],
-            normal: Normal::new(&self.lanes, self.derivatives(), &self.biased),
+            normal: Normal::new(
+                &self.lanes,
+                self.derivatives(),
+                &self.biased,
+                self.samples(),
+                samples_of_block(self.step_s),
+            ),
         }
     }
 

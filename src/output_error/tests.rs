@@ -177,6 +177,34 @@ fn sensitivities_are_those_of_finite_differences_for_every_parameter() {
     gradients_match::<4, Lateral>();
 }
 
+#[test]
+fn a_whole_pass_adds_its_sensitivities_up_over_blocks_and_leaves_out_what_does_not_count() {
+    let axis = Axis::Longitudinal;
+    let (mut case, parameters) = case::<3, Longitudinal>(&truth(axis), &biases(axis));
+    for k in (0..SAMPLES).filter(|k| k % 5 == 0) {
+        case.measurements.used[k][2] = false;
+    }
+    let mut response = case.response();
+    case.respond(&parameters, &mut response).unwrap();
+    let sensitivities = case.sensitivities(&parameters).unwrap();
+    let (normal, block) = (&response.normal, response.normal.block_samples());
+    assert!(block > 1 && normal.blocks() == SAMPLES.div_ceil(block));
+    for b in 0..normal.blocks() {
+        let samples = b * block..((b + 1) * block).min(SAMPLES);
+        for o in 0..OUTPUTS {
+            let mut sums = vec![0.0; parameters.len()];
+            let count = normal.add_block(b, o, &mut sums);
+            let counted = samples.clone().filter(|&k| case.measurements.used[k][o]).count();
+            assert_abs_diff_eq!(count, counted as f64);
+            for (j, sum) in sums.iter().enumerate() {
+                let each = samples.clone().map(|k| sensitivities.at(k, o, j));
+                let (expected, size) = (each.clone().sum::<f64>(), each.map(f64::abs).sum::<f64>());
+                assert_abs_diff_eq!(*sum, expected, epsilon = 1e-12 * (1.0 + size));
+            }
+        }
+    }
+}
+
 /// Standard deviations of the noise, deg, deg/s, g, in the order of the outputs.
 pub(crate) const NOISE: [f64; OUTPUTS] = [0.08, 0.05, 0.05, 0.01, 0.005];
 
