@@ -5,7 +5,10 @@ use super::failures::TableView;
 use super::notation::{angle, number};
 use crate::overnight::Moved;
 
-/// One sentence about what changed.
+/// So many causes are named in the headline.
+const CAUSES: usize = 3;
+
+/// What changed, in a sentence, and because of what.
 pub fn headline(contents: &Contents) -> String {
     let changes = contents.overnight;
     let Some(since) = &changes.since else {
@@ -26,7 +29,12 @@ pub fn headline(contents: &Contents) -> String {
         (changes.verdicts.len(), "verdicts changed"),
     ];
     let counts: Vec<String> = counts.iter().filter(|c| c.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
-    format!("Since night {since}: {}.", counts.join(", "))
+    let mut causes: Vec<&str> = changes.causes.iter().map(|c| c.words.as_str()).take(CAUSES).collect();
+    if changes.causes.len() > CAUSES {
+        causes.push("and more");
+    }
+    let because = if causes.is_empty() { String::new() } else { format!(" Because: {}.", causes.join(", ")) };
+    format!("Since night {since}: {}.{because}", counts.join(", "))
 }
 
 /// What changed, in tables; those without rows are left out.

@@ -15,7 +15,7 @@ if ! command -v slurmctld >/dev/null; then
         exit 0
     fi
     export DEBIAN_FRONTEND=noninteractive
-    { apt-get update && apt-get install -y --no-install-recommends slurm-wlm munge; } >/dev/null 2>&1 || {
+    { timeout 120 apt-get update && timeout 180 apt-get install -y --no-install-recommends slurm-wlm munge; } >/dev/null 2>&1 || {
         echo "skipped: slurm-wlm could not be installed"
         exit 0
     }
@@ -176,7 +176,7 @@ grep -q "DUE TO JOB REQUEUE\|did not answer" "$work"/transient/store/cluster/man
 # Tasks that take long enough for a node to die under them; each says where it began.
 cat >"$work/slow" <<END
 #!/bin/bash
-[[ "\$*" == estimate* ]] && { echo "\$SLURMD_NODENAME" >>"$work/began"; sleep 3; }
+[[ "\$*" == estimate* ]] && { echo "\$SLURMD_NODENAME" >>"$work/began"; sleep 6; }
 exec "$harvest" "\$@"
 END
 chmod 755 "$work/slow"
@@ -185,7 +185,7 @@ kill_node() {
     grep -q n2 "$work/began" || { echo "no task came to the node that is to die"; exit 1; }
     pkill -9 -f "slurmd -D -N n2 -f $work"
     # shellcheck disable=SC2046
-    kill -9 $(tasks_of n2)
+    kill -9 $(tasks_of n2) || true
     echo "node n2 killed under its tasks"
 }
 HARVEST="$work/slow" campaign node kill_node
