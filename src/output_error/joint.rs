@@ -11,7 +11,7 @@ use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::likelihood::Likelihood;
-use super::response::{Diverged, Response};
+use super::response::{Detail, Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Maneuvers with shared derivatives.
@@ -135,12 +135,14 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         self.members.iter().map(|m| m.case.response()).collect()
     }
 
-    fn respond(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
-        self.each(response, |member, response| member.case.respond(&member.parameters(parameters), response))
+    fn has_coarse(&self) -> bool {
+        self.members.iter().all(|member| member.case.has_coarse())
     }
 
-    fn respond_roughly(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
-        self.each(response, |member, response| member.case.respond_roughly(&member.parameters(parameters), response))
+    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
+        self.each(response, |member, response| {
+            member.case.respond_with(detail, &member.parameters(parameters), response)
+        })
     }
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {

@@ -32,7 +32,7 @@ pub use case::{Case, InitialState, Measurements, Model};
 pub use joint::Joint;
 pub use likelihood::Likelihood;
 pub use outcome::{Fit, Outcome};
-pub use response::{Diverged, Response, Sensitivities};
+pub use response::{Detail, Diverged, Response, Sensitivities};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -1,8 +1,9 @@
 //! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step does not lower the cost.
 //!
-//! Far from the minimum the second gradient may be a rough one (of a part of the samples: subsampled Newton, Byrd et al.
-//! 2011): it costs most of a pass, and the step is wrong anyway. Cost and gradient are exact always, and where the iteration
-//! ends, so is the second gradient.
+//! Far from the minimum the iteration goes by a coarse response, of fewer and longer steps, until it is as near as that can
+//! tell: it is a start, and what follows does not depend on how good it is. From there cost and gradient are exact; the
+//! second gradient may be a rough one (of a part of the samples: subsampled Newton, Byrd et al. 2011), except where the
+//! iteration ends.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -10,6 +11,7 @@ use super::cost::Sums;
 use super::cramer_rao::{self, Identified};
 use super::likelihood::Likelihood;
 use super::outcome::{Fit, Outcome};
+use super::response::Detail;
 use crate::dynamics::OUTPUTS;
 
 /// When the iteration stops.
@@ -85,7 +87,7 @@ pub fn estimate<D: Likelihood>(
                 break;
             }
             let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
-            fit = minimise(data, fit.values, next, settings);
+            fit = descend(data, fit.values, next, settings);
             fit.iterations += iterations;
             fit.initial_cost = initial_cost;
         }
@@ -102,6 +104,59 @@ fn residual_weights<D: Likelihood>(data: &D, fit: &Fit<D::Response>, resolution:
 /// The iteration from a start with fixed weights, without bounds.
 #[must_use]
 pub fn minimise<D: Likelihood>(
+    data: &D,
+    start: Vec<f64>,
+    weights: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit<D::Response> {
+    let Some(near) = approach(data, &start, &weights, settings) else { return descend(data, start, weights, settings) };
+    let mut fit = descend(data, near.values, weights, settings);
+    if fit.initial_cost.is_none() {
+        return descend(data, start, weights, settings);
+    }
+    fit.iterations += near.iterations;
+    fit.initial_cost = Some(near.initial_cost);
+    fit
+}
+
+/// Where coarse steps lead.
+struct Near {
+    values: Vec<f64>,
+    iterations: usize,
+    initial_cost: f64,
+}
+
+/// A full step that would lower the coarse cost by less than this share of it ends in what the samples left out are worth.
+const NEAR: f64 = 0.1;
+
+/// Goes by the coarse response while that is still far from its minimum; none where there is no such response, or where it
+/// leads nowhere.
+fn approach<D: Likelihood>(data: &D, start: &[f64], weights: &[f64; OUTPUTS], settings: &Settings) -> Option<Near> {
+    if !data.has_coarse() {
+        return None;
+    }
+    let mut response = data.response();
+    data.respond(Detail::Coarse, start, &mut response).ok()?;
+    let mut at = data.sums(&response, weights);
+    let mut near = Near { values: start.to_vec(), iterations: 0, initial_cost: at.cost() };
+    let mut damping = 0.0;
+    while near.iterations < settings.max_iterations {
+        let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING))?;
+        near.iterations += 1;
+        if at.gradient.dot(&full) <= NEAR * at.weighted_square {
+            near.values.iter_mut().zip(full.iter()).for_each(|(value, d)| *value += d);
+            break;
+        }
+        let Some(better) = lower(data, &near.values, &at, weights, &mut damping, Detail::Coarse, &mut response) else {
+            break;
+        };
+        (near.values, at) = better;
+    }
+    Some(near)
+}
+
+/// The iteration from a start with exact costs and gradients.
+fn descend<D: Likelihood>(
     data: &D,
     start: Vec<f64>,
     weights: [f64; OUTPUTS],
@@ -124,7 +179,7 @@ pub fn minimise<D: Likelihood>(
         covariance_calibration: None,
         covariance_corrected: None,
     };
-    if let Err(diverged) = data.respond_roughly(&fit.values, &mut response) {
+    if let Err(diverged) = data.respond(Detail::Rough, &fit.values, &mut response) {
         fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
         fit.response = data.response();
         return fit;
@@ -156,7 +211,8 @@ pub fn minimise<D: Likelihood>(
         }
         // Each step does to the gain about what it does to the residuals squared: after this one it may be small enough.
         let last = gain <= settings.tolerance.sqrt() * at.weighted_square;
-        let better = lower(data, &fit.values, &at, &weights, &mut damping, last, &mut trial);
+        let detail = if last { Detail::Whole } else { Detail::Rough };
+        let better = lower(data, &fit.values, &at, &weights, &mut damping, detail, &mut trial);
         if better.is_none() && !at.whole && complete(data, &fit, &mut response, &mut at) {
             damping = 0.0;
             continue;
@@ -180,27 +236,25 @@ pub fn minimise<D: Likelihood>(
 
 /// Makes rough information whole, at the same values.
 fn complete<D: Likelihood>(data: &D, fit: &Fit<D::Response>, response: &mut D::Response, at: &mut Sums) -> bool {
-    let possible = data.respond(&fit.values, response).is_ok();
+    let possible = data.respond(Detail::Whole, &fit.values, response).is_ok();
     *at = data.sums(response, &fit.weights);
     possible
 }
 
-/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`, whole where it may be
-/// the last one.
+/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
 fn lower<D: Likelihood>(
     data: &D,
     values: &[f64],
     at: &Sums,
     weights: &[f64; OUTPUTS],
     damping: &mut f64,
-    last: bool,
+    detail: Detail,
     trial: &mut D::Response,
 ) -> Option<(Vec<f64>, Sums)> {
     while *damping < MOST_DAMPING {
         if let Some(d) = step(at, *damping) {
             let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
-            let possible = if last { data.respond(&next, trial) } else { data.respond_roughly(&next, trial) };
-            if possible.is_ok() {
+            if data.respond(detail, &next, trial).is_ok() {
                 let sums = data.sums(trial, weights);
                 let gain = at.weighted_square - sums.weighted_square;
                 if gain > 0.0 {
