@@ -381,7 +381,7 @@ impl<const NX: usize, E: Equations<NX>> Along<NX, E> {
     fn over(aircraft: &Aircraft, window: &Window) -> Self {
         let (points, samples) = (window.len(), window.samples);
         let mut along = Along {
-            known: Vec::with_capacity(points + 2),
+            known: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
             flow: Vec::with_capacity(points),
             sensed: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),

@@ -147,18 +147,12 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
         let n = self.names.len();
-        let mut sums = Sums {
-            weighted_square: 0.0,
-            gradient: DVector::zeros(n),
-            information: DMatrix::zeros(n, n),
-            count: 0,
-            whole: true,
-        };
+        let mut sums =
+            Sums { weighted_square: 0.0, gradient: DVector::zeros(n), information: DMatrix::zeros(n, n), count: 0 };
         for (member, response) in self.members.iter().zip(response) {
             let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
             sums.count += own.count;
-            sums.whole &= own.whole;
             for (g, &place) in own.gradient.iter().zip(&member.places) {
                 sums.gradient[place] += g;
             }

@@ -86,7 +86,15 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             InitialState::Measured => self.start,
             InitialState::Estimated => SVector::from_fn(|i, _| parameters[first + i]),
         };
-        Arch::new().dispatch(Pass { case: self, parameters, start, biases, stride: stride.clamp(1, WIDEST_STRIDE), outputs, sink })
+        Arch::new().dispatch(Pass {
+            case: self,
+            parameters,
+            start,
+            biases,
+            stride: stride.clamp(1, WIDEST_STRIDE),
+            outputs,
+            sink,
+        })
     }
 }
 
@@ -149,7 +157,13 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 count,
             };
             work.all::<E>();
-            self.sink.take(simd, Spaced { first: stride * first, stride }, &self.outputs[first..next], rows, &mut course);
+            self.sink.take(
+                simd,
+                Spaced { first: stride * first, stride },
+                &self.outputs[first..next],
+                rows,
+                &mut course,
+            );
             course.finish();
             x = course.state();
         }

@@ -4,9 +4,7 @@
 //! Beside them the rows of a whole pass are added up over blocks of samples: what the corrected bounds see the
 //! sensitivities through, so that they need no pass of their own.
 //!
-//! Σ s sᵀ is most of the work. Before the last steps it may be that of every fourth sample, times four: it says where to
-//! go well enough, while gradient and cost are those of all samples. Far from the minimum a pass may leave out samples
-//! altogether, and all sums are those of the others, times as many.
+//! A coarse pass leaves out samples; its sums count the others as many times.
 //!
 //! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one symmetric matrix, updated
 //! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
@@ -32,10 +30,9 @@ pub(super) struct Normal {
     moments: [Aligned; OUTPUTS],
     /// Samples that count.
     counts: [usize; OUTPUTS],
-    /// Moments and counts are of every `stride` samples, the squares of every so many.
+    /// The sums are of every so many samples.
     stride: usize,
-    every: usize,
-    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole squares only.
+    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole sums only.
     blocks: Aligned,
     block: usize,
     samples: usize,
@@ -54,7 +51,6 @@ impl Normal {
             moments: std::array::from_fn(|_| Aligned::zeros(width)),
             counts: [0; OUTPUTS],
             stride: 1,
-            every: 1,
             blocks: Aligned::default(),
             block: block.max(1),
             samples,
@@ -64,11 +60,11 @@ impl Normal {
         }
     }
 
-    /// Begins anew, with moments of every `stride` samples and squares of every so many, a multiple of them.
-    pub fn clear(&mut self, stride: usize, every: usize) {
+    /// Begins anew, with every so many samples.
+    pub fn clear(&mut self, stride: usize) {
         self.squares.iter_mut().chain(&mut self.moments).for_each(|sums| sums.slice_mut().fill(0.0));
-        (self.counts, self.stride, self.every) = ([0; OUTPUTS], stride, every);
-        let blocks = if every == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
+        (self.counts, self.stride) = ([0; OUTPUTS], stride);
+        let blocks = if stride == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
         if self.blocks.slice().len() == blocks {
             self.blocks.slice_mut().fill(0.0);
         } else if blocks > 0 {
@@ -99,9 +95,9 @@ impl Normal {
         count
     }
 
-    /// Whether the squares are of all samples.
-    pub fn whole(&self) -> bool {
-        self.every == 1
+    /// Whether the sums are of all samples.
+    fn whole(&self) -> bool {
+        self.stride == 1
     }
 
     /// Samples of an output that count.
@@ -115,7 +111,7 @@ impl Normal {
     }
 
     fn at(&self, output: usize, i: usize, j: usize) -> f64 {
-        self.every as f64 * self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
+        self.stride as f64 * self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
     }
 
     /// The lane of each parameter; of a bias that of the ones, and the output where alone it is.
@@ -148,7 +144,7 @@ impl Normal {
         let width = self.lanes.width();
         let mut sum = vec![0.0; width * width];
         for (squares, w) in self.squares.iter().zip(weights) {
-            let factor = w * self.every as f64;
+            let factor = w * self.stride as f64;
             sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s);
         }
         let lanes = self.parameters();
@@ -184,7 +180,7 @@ impl Sink for Summing<'_> {
         rows: &mut [f64],
         meanwhile: &mut impl Meanwhile,
     ) {
-        let Normal { squares, moments, counts, stride, every, lanes, blocks, block, .. } = &mut *self.normal;
+        let Normal { squares, moments, counts, stride, lanes, blocks, block, .. } = &mut *self.normal;
         let width = lanes.width();
         for (k, y) in outputs.iter().enumerate() {
             for o in 0..OUTPUTS {
@@ -198,15 +194,13 @@ impl Sink for Summing<'_> {
                 }
             }
         }
-        if *every == 1 {
+        if *stride == 1 {
             add_blocks(simd, samples.first, *block, rows, outputs.len(), blocks.slice_mut());
         }
         for o in 0..OUTPUTS {
             let all = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
             all.add_moments(simd, lanes.residual, moments[o].slice_mut());
-            let step = *every / *stride;
-            let rows = Rows { stride: step * all.stride, samples: all.samples.div_ceil(step), ..all };
-            rows.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
+            all.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
         }
     }
 }

@@ -31,15 +31,14 @@ pub enum Detail {
     /// Integrated in steps of about [`COARSE_STEP_S`] and compared at their ends only: near the minimum, at a fraction of
     /// the work.
     Coarse,
-    /// Integrated and compared sample by sample, with the information of some of them.
-    Rough,
+    /// Sample by sample.
     Whole,
 }
 
 /// Steps by which a maneuver's slow motion is followed well, though not its surfaces, s.
 pub const COARSE_STEP_S: f64 = 0.1;
-/// An information matrix of some samples must have at least so many rows of all outputs a parameter.
-const ROWS_A_PARAMETER: usize = 8;
+/// So many samples a parameter are left at least.
+const SAMPLES_A_PARAMETER: usize = 8;
 
 /// The slopes of every output along every parameter at every sample, zero where a sample does not count.
 #[derive(Clone, Debug, Default)]
@@ -124,20 +123,13 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
-    pub fn respond_with(
-        &self,
-        detail: Detail,
-        parameters: &[f64],
-        response: &mut Response,
-    ) -> Result<(), Diverged> {
-        let (stride, every) = match detail {
-            Detail::Coarse => (self.coarse_stride(), self.coarse_stride()),
-            Detail::Rough if self.spare_rows() >= 4 => (1, 4),
-            Detail::Rough => (1, self.spare_rows().clamp(1, 2)),
-            Detail::Whole => (1, 1),
+    pub fn respond_with(&self, detail: Detail, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        let stride = match detail {
+            Detail::Coarse => self.coarse_stride(),
+            Detail::Whole => 1,
         };
         let Response { outputs, normal } = response;
-        normal.clear(stride, every);
+        normal.clear(stride);
         self.pass(parameters, stride, outputs, &mut Summing { normal, measurements: &self.measurements })
     }
 
@@ -149,12 +141,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 
     fn coarse_stride(&self) -> usize {
         let within = (COARSE_STEP_S / self.step_s).round() as usize;
-        within.min(self.spare_rows()).clamp(1, WIDEST_STRIDE)
-    }
-
-    /// By how much fewer samples would do for an information matrix.
-    fn spare_rows(&self) -> usize {
-        self.samples() / (ROWS_A_PARAMETER * self.parameters().max(1))
+        let spare = self.samples() / (SAMPLES_A_PARAMETER * self.parameters().max(1));
+        within.min(spare).clamp(1, WIDEST_STRIDE)
     }
 
     /// The sensitivities to all parameters.
