@@ -323,12 +323,12 @@ fn step<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
 
 /// The vector that begins at a place of a slice.
 #[inline(always)]
-pub(super) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
+pub(crate) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
     S::as_simd_f64s(&from[at..at + S::F64_LANES]).0[0]
 }
 
 /// Writes a vector to a place of a slice.
 #[inline(always)]
-pub(super) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
+pub(crate) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
     S::as_mut_simd_f64s(&mut to[at..at + S::F64_LANES]).0[0] = value;
 }

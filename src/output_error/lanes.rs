@@ -20,7 +20,7 @@ use crate::dynamics::COEFFICIENTS;
 const GROUPS: usize = COEFFICIENTS + 1;
 
 /// A group is padded to a multiple of this many lanes: the widest vector of doubles there is.
-pub(super) const VECTOR: usize = 8;
+pub(crate) const VECTOR: usize = 8;
 
 /// The layout of one case.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -99,7 +99,7 @@ impl Lanes {
 
 /// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines costs twice.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Aligned {
+pub(crate) struct Aligned {
     buffer: Vec<f64>,
     first: usize,
     length: usize,

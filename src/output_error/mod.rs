@@ -30,7 +30,10 @@ pub mod theil;
 
 pub use case::{Case, InitialState, Measurements, Model};
 pub use joint::Joint;
+pub(crate) use kernel::{load, store};
+pub(crate) use lanes::{Aligned, VECTOR};
 pub use likelihood::Likelihood;
+pub(crate) use normal::Rows;
 pub use outcome::{Fit, Outcome};
 pub use response::{Detail, Diverged, Response, Sensitivities};
 

@@ -237,7 +237,7 @@ const SAMPLES_BETWEEN: usize = 4;
 
 /// Rows of some samples, `stride` apart.
 #[derive(Clone, Copy)]
-pub(super) struct Rows<'a> {
+pub(crate) struct Rows<'a> {
     pub values: &'a [f64],
     pub stride: usize,
     pub samples: usize,
@@ -253,7 +253,7 @@ impl Rows<'_> {
 
     /// The same while something else goes on.
     #[inline(always)]
-    pub fn add_squares_beside<S: Simd>(
+    pub(super) fn add_squares_beside<S: Simd>(
         self,
         simd: S,
         used: &[usize],
