@@ -113,7 +113,7 @@ pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_numb
     let sums = data.sums(&fit.response, &fit.weights);
     match identified(&sums.information, max_condition_number) {
         Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
-        _ => None,
+        Identified::Undetermined { .. } => None,
     }
 }
 

@@ -139,6 +139,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.coarse_stride() > 1
     }
 
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
     fn coarse_stride(&self) -> usize {
         let within = (COARSE_STEP_S / self.step_s).round() as usize;
         let spare = self.samples() / (SAMPLES_A_PARAMETER * self.parameters().max(1));

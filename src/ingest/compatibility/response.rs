@@ -218,7 +218,9 @@ impl<K: Sink> Flight<'_, K> {
             let mut row = [0.0; WIDE];
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
                 let mut slope = Sum::<S>::zero(simd, lane);
-                taps.iter().for_each(|(weight, cell)| slope.add(simd, *weight, cell));
+                for (weight, cell) in taps {
+                    slope.add(simd, weight, cell);
+                }
                 slope.each(|lane, slope| store::<S>(&mut row, lane, slope));
             }
             row[DRIVING] = 1.0;

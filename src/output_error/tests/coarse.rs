@@ -18,7 +18,9 @@ fn gradient_is_the_slope_of_the_cost<const NX: usize, E: Equations<NX>>() {
     let (mut case, mut parameters) = flown::<NX, E>(20_261_121);
     case.measurements.used[7] = [false; OUTPUTS];
     case.measurements.used[8][2] = false;
-    parameters.iter_mut().for_each(|value| *value *= 1.1);
+    for value in &mut parameters {
+        *value *= 1.1;
+    }
     let mut response = case.response();
     let mut at = |parameters: &[f64]| {
         Likelihood::respond(&case, Detail::Coarse, parameters, &mut response).unwrap();
