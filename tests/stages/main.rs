@@ -12,6 +12,8 @@ mod fuzz;
 mod house;
 mod ingest;
 mod nights;
+#[cfg(feature = "s3")]
+mod object_store;
 mod paper;
 mod report;
 mod run;
