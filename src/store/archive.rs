@@ -210,16 +210,13 @@ fn unreadable(e: &dyn std::fmt::Display) -> String {
 
 fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
     let object = object::is_object(path).then(|| object::Reader::open(path)).transpose().map_err(|e| e.to_string())?;
-    let metadata = match &object {
+    let metadata = if let Some(object) = &object {
         // Where its pages lie, a file in an object store is asked for if it knows: then no others are fetched.
-        Some(object) => {
-            let options = ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
-            ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
-        }
-        None => {
-            let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
-            ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?
-        }
+        let options = ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
+        ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
+    } else {
+        let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
+        ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?
     };
     let mut columns = BTreeMap::new();
     for (at, field) in metadata.schema().fields().iter().enumerate() {

@@ -6,6 +6,7 @@ use std::fs;
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use crate::support::{Campaign, Outcome, files, pitch_steps, run, yaw_and_roll_steps};
@@ -93,28 +94,33 @@ impl Server {
     }
 }
 
-/// Two short flights in a folder, and what they come to.
+/// Two short flights in a folder.
 fn local() -> Campaign {
     let campaign = Campaign::of_pitch_steps();
     campaign.add("flight_004", &yaw_and_roll_steps());
     campaign
 }
 
-fn tables_of(campaign: &Campaign) -> BTreeMap<PathBuf, Vec<u8>> {
-    campaign.finishes("run");
-    campaign.tables()
+/// What they come to, from folders.
+fn expected() -> &'static BTreeMap<PathBuf, Vec<u8>> {
+    static TABLES: OnceLock<BTreeMap<PathBuf, Vec<u8>>> = OnceLock::new();
+    TABLES.get_or_init(|| {
+        let campaign = local();
+        campaign.finishes("run");
+        campaign.tables()
+    })
 }
 
 #[test]
 fn the_tables_are_those_of_folders_and_another_machine_finds_all_made() {
     let local = local();
     let Some(server) = Server::start(&local) else { return };
-    let expected = tables_of(&local);
+    let expected = expected();
     let [first, second] = [Campaign::new(), Campaign::new()];
     assert!(server.run(&first, "s3://flights") > 5);
-    assert!(first.tables() == expected, "other tables than from folders");
+    assert!(first.tables() == *expected, "other tables than from folders");
     assert_eq!(server.run(&second, "s3://flights/*.parquet"), 0, "the second machine computed what the first had");
-    assert!(second.tables() == expected);
+    assert!(second.tables() == *expected);
     assert!(!second.path("store/records").exists(), "records were fetched that nobody needs");
     assert_eq!(server.run(&second, "s3://flights"), 0);
     let verified = run(&mut server.command(&second, "verify", "s3://flights"));
@@ -137,7 +143,7 @@ fn what_was_made_and_not_sent_is_sent_and_what_is_damaged_is_made_again() {
     let Some(server) = Server::start(&local) else { return };
     let machine = Campaign::new();
     server.run(&machine, "s3://flights");
-    let expected = machine.tables();
+    let expected = expected();
     // As a kill leaves it between the disk and the network.
     let unsent: Vec<PathBuf> = ["estimate", "records", "ingest"].map(|kind| server.artefacts(kind).remove(0)).into();
     let bytes: Vec<Vec<u8>> = unsent.iter().map(|path| fs::read(path).unwrap()).collect();
@@ -154,14 +160,14 @@ fn what_was_made_and_not_sent_is_sent_and_what_is_damaged_is_made_again() {
     fs::write(&record, &fs::read(&record).unwrap()[1000..]).unwrap();
     let other = Campaign::new();
     assert!(server.run(&other, "s3://flights") >= 3);
-    assert!(other.tables() == expected && fs::read(&estimate).unwrap() == whole);
+    assert!(other.tables() == *expected && fs::read(&estimate).unwrap() == whole);
 }
 
 #[test]
 fn shards_on_machines_of_their_own_share_their_work_through_the_store() {
     let local = local();
     let Some(server) = Server::start(&local) else { return };
-    let expected = tables_of(&local);
+    let expected = expected();
     let machines = [Campaign::new(), Campaign::new(), Campaign::new()];
     let plan_file = |of: &str| format!("s3://store/campaign/{of}.plan.json");
     let plan = |machine: &Campaign, of: &str| {
@@ -192,7 +198,7 @@ fn shards_on_machines_of_their_own_share_their_work_through_the_store() {
     done(run(&mut shard(&machines[0], "estimate", "maneuvers", 2)));
     let merged = run(server.command(&machines[2], "merge", "s3://flights").args(["--plan", &plan_file("maneuvers")]));
     assert!(matches!(merged.code, Some(0 | 2)), "{merged:?}");
-    assert!(machines[2].tables() == expected, "other tables than of one process");
+    assert!(machines[2].tables() == *expected, "other tables than of one process");
 }
 
 #[test]
@@ -305,10 +311,10 @@ fn a_server_that_dies_costs_nothing_but_the_night() {
     server.process.wait().unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(1));
     assert!(!machine.path("reports/fits.csv").exists());
-    let expected = tables_of(&local);
+    let expected = expected();
     let Some(again) = Server::start(&local) else { return };
     again.run(&machine, Path::to_str(&archive).unwrap());
-    assert!(machine.tables() == expected);
+    assert!(machine.tables() == *expected);
     let here = files(&machine.path("store/estimate")).len();
     assert_eq!(again.artefacts("estimate").len(), here, "not all was sent");
 }

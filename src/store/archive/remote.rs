@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use glob::{MatchOptions, Pattern};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
+use parquet::file::page_index::offset_index::OffsetIndexMetaData;
 
 use super::super::object;
 use super::{is_hidden, unreadable};
@@ -69,7 +70,8 @@ pub(super) fn stretches(metadata: &ParquetMetaData, column: usize, rows: &Range<
         }
         let (from, length) = group.column(column).byte_range();
         let whole = from..from.saturating_add(length);
-        let pages = metadata.offset_index().and_then(|i| i.get(index)?.get(column)).map(|i| i.page_locations());
+        let pages = metadata.offset_index().and_then(|i| i.get(index)?.get(column));
+        let pages = pages.map(OffsetIndexMetaData::page_locations);
         let Some(pages) = pages.filter(|pages| !pages.is_empty()) else {
             stretches.push(whole);
             continue;
@@ -98,6 +100,15 @@ pub(super) fn stretches(metadata: &ParquetMetaData, column: usize, rows: &Range<
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, Float64Array, RecordBatch};
+    use arrow::datatypes::{DataType, Field, Schema};
+    use parquet::arrow::ArrowWriter;
+    use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+    use parquet::file::metadata::PageIndexPolicy;
+    use parquet::file::properties::WriterProperties;
+
     use super::*;
 
     #[test]
@@ -125,5 +136,36 @@ mod tests {
         assert!(is_match("s3://b/flights/flight=00*", "s3://b/flights/flight=007/part-0.parquet"));
         assert!(!is_match("s3://b/flights/flight=00*", "s3://b/flights/flight=007/notes.txt"));
         assert!(!is_match("s3://b/flights/flight=00?", "s3://b/flights/flight=010/part-0.parquet"));
+    }
+
+    /// A file of two row groups of 1000 rows in pages of 100, with or without the places of its pages.
+    fn metadata(pages: PageIndexPolicy) -> ArrowReaderMetadata {
+        let schema = Arc::new(Schema::new(["a", "b"].map(|name| Field::new(name, DataType::Float64, false)).to_vec()));
+        let properties = WriterProperties::builder().set_max_row_group_row_count(Some(1000));
+        let properties = properties.set_data_page_row_count_limit(100).set_write_batch_size(100);
+        let values: ArrayRef = Arc::new((0..2000_i32).map(f64::from).collect::<Float64Array>());
+        let batch = RecordBatch::try_new(schema.clone(), vec![values.clone(), values]).unwrap();
+        let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties.build())).unwrap();
+        writer.write(&batch).unwrap();
+        let bytes = bytes::Bytes::from(writer.into_inner().unwrap());
+        ArrowReaderMetadata::load(&bytes, ArrowReaderOptions::default().with_offset_index_policy(pages)).unwrap()
+    }
+
+    #[test]
+    fn only_the_pages_that_hold_the_rows_are_wanted() {
+        let (told, untold) = (metadata(PageIndexPolicy::Required), metadata(PageIndexPolicy::Skip));
+        let column = |group: usize| {
+            let (from, length) = told.metadata().row_group(group).column(1).byte_range();
+            from..from + length
+        };
+        assert_eq!(stretches(untold.metadata(), 1, &(950..1050)), [column(0), column(1)]);
+        assert_eq!(stretches(told.metadata(), 1, &(0..2000)), [column(0), column(1)]);
+        let few = stretches(told.metadata(), 1, &(1310..1390));
+        let bytes: u64 = few.iter().map(|s| s.end - s.start).sum();
+        let whole = column(1);
+        // The dictionary, which holds the thousand values, and one page of ten.
+        assert!(few.iter().all(|s| whole.start <= s.start && s.end <= whole.end), "{few:?} in {whole:?}");
+        assert!(few.len() == 2 && bytes < whole.end - whole.start, "{few:?} in {whole:?}");
+        assert_eq!(stretches(told.metadata(), 1, &(500..500)), []);
     }
 }
