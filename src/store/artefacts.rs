@@ -263,9 +263,19 @@ impl Store {
     /// Whether an artefact, by its name relative to the store, is as it was written; not a record, which has no seal.
     #[must_use]
     pub fn is_whole(&self, name: &str) -> bool {
-        let here = std::fs::read(self.folder.join(name)).ok();
-        let bytes = here.or_else(|| self.shared.as_ref()?.get(name).ok().flatten());
-        bytes.is_some_and(|bytes| unsealed(&bytes).is_some())
+        self.holds(&self.folder.join(name))
+    }
+
+    /// Whether there is an artefact at a path that is as it was written; not a record, which has no seal.
+    #[must_use]
+    pub fn holds(&self, path: &Path) -> bool {
+        let is_sealed = |bytes: &Vec<u8>| unsealed(bytes).is_some();
+        if std::fs::read(path).is_ok_and(|bytes| is_sealed(&bytes)) {
+            self.is_here(path);
+            return true;
+        }
+        let shared = |shared: &Shared| shared.get(&self.name(path)?).ok()?;
+        self.shared.as_ref().and_then(shared).as_ref().is_some_and(is_sealed)
     }
 
     /// Notes that what is published in this folder is made of this store's artefacts, so that none of them is removed.
