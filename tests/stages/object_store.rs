@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::support::{Campaign, Outcome, files, pitch_steps, run, yaw_and_roll_steps};
+use crate::support::{Campaign, Outcome, files, run, yaw_and_roll_steps};
 
 const KEY: &str = "tester";
 const SECRET: &str = "a-secret-of-nobody";
@@ -30,6 +30,7 @@ impl Drop for Server {
 
 impl Server {
     /// With a bucket `flights` of two flights and an empty bucket `store`.
+    #[expect(clippy::print_stderr, reason = "a test that did not run says so")]
     fn start(local: &Campaign) -> Option<Server> {
         let Some(program) = std::env::var_os("HARVEST_S3_SERVER") else {
             eprintln!("skipped: no S3-compatible server (HARVEST_S3_SERVER; tests/cluster/s3.sh installs one)");
@@ -147,7 +148,9 @@ fn what_was_made_and_not_sent_is_sent_and_what_is_damaged_is_made_again() {
     // As a kill leaves it between the disk and the network.
     let unsent: Vec<PathBuf> = ["estimate", "records", "ingest"].map(|kind| server.artefacts(kind).remove(0)).into();
     let bytes: Vec<Vec<u8>> = unsent.iter().map(|path| fs::read(path).unwrap()).collect();
-    unsent.iter().for_each(|path| fs::remove_file(path).unwrap());
+    for path in &unsent {
+        fs::remove_file(path).unwrap();
+    }
     assert_eq!(server.run(&machine, "s3://flights"), 0, "what was here was made again");
     for (path, bytes) in unsent.iter().zip(bytes) {
         assert!(fs::read(path).unwrap() == bytes, "{}", path.display());
