@@ -86,7 +86,7 @@ impl Writer<'_> {
         }
         let set: Vec<Set> = (1..=total).into_par_iter().map(|page| self.set(page)).collect();
         for (page, set) in (1..).zip(set) {
-            self.page(&mut pdf, page, set);
+            Self::page(&mut pdf, page, set);
         }
         self.outline(&mut pdf);
         pdf.finish()
@@ -113,7 +113,7 @@ impl Writer<'_> {
         Set { content: compressed(content.out.as_bytes()), opacities: content.opacities, links }
     }
 
-    fn page(&self, pdf: &mut Pdf, number: usize, set: Set) {
+    fn page(pdf: &mut Pdf, number: usize, set: Set) {
         let (id, content_id) = (page_ref(number), Ref::new(page_ref(number).get() + 1));
         let mut page = pdf.page(id);
         page.media_box(Rect::new(0.0, 0.0, WIDTH, HEIGHT)).parent(Ref::new(TREE)).contents(content_id);
