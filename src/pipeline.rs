@@ -51,8 +51,8 @@ use crate::{estimate, report, trend};
 use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 4;
-const SEGMENT_VERSION: u32 = 4;
+const INGEST_VERSION: u32 = 5;
+const SEGMENT_VERSION: u32 = 5;
 const ESTIMATE_VERSION: u32 = 8;
 const JOINT_VERSION: u32 = 4;
 const PREDICT_VERSION: u32 = 3;
