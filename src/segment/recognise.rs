@@ -2,9 +2,10 @@
 //!
 //! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
 //! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then into as few as possible,
-//! then where most inputs are back at their trim, then at the longest pauses. Two trains between which the pilot has gone over from one control to another are one where more is found in both together. A stretch that fits several
-//! classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one about counts;
-//! where nothing else differs the flags decide.
+//! then where most inputs are back at their trim and steps of one input follow each other, then at the longest pauses. Two
+//! trains between which the pilot has gone over from one control to another are one where more is found in both together. A
+//! stretch that fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes
+//! before one about counts; where nothing else differs the flags decide.
 
 use crate::error::Problem;
 use crate::maneuver::{Class, Recognised, Unknown};
@@ -94,8 +95,9 @@ struct Cut {
     /// Steps that rules about lengths of pulses explain.
     in_pulses: usize,
     stretches: usize,
-    /// How many inputs of stretches do not end where they began.
-    away: usize,
+    /// How many inputs of stretches do not end where they began, and how often one steps again after another has stepped
+    /// meanwhile: a cut in the wrong place makes more of them. Neither counts for more, for a step may pass unseen.
+    loose_ends: usize,
     /// The pauses cut at, s.
     paused_s: f64,
     /// The block at which the last stretch begins, and whether it is one.
@@ -105,7 +107,7 @@ struct Cut {
 
 impl Cut {
     fn is_better_than(&self, other: &Cut) -> bool {
-        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches, c.away);
+        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches, c.loose_ends);
         key(self) < key(other) || (key(self) == key(other) && self.paused_s > other.paused_s)
     }
 }
@@ -169,7 +171,7 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
                 unexplained: before.unexplained + explained.unexplained,
                 in_pulses: before.in_pulses + explained.in_pulses,
                 stretches: before.stretches + 1,
-                away: before.away + explained.away,
+                loose_ends: before.loose_ends + explained.loose_ends,
                 paused_s: before.paused_s + paused_s,
                 from,
                 is_stretch: true,
@@ -195,7 +197,7 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
 struct Explained {
     unexplained: usize,
     in_pulses: usize,
-    away: usize,
+    loose_ends: usize,
 }
 
 /// What the class that explains most of a stretch's edges makes of it; none where it fits no class.
@@ -206,10 +208,17 @@ fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usiz
         let own =
             |signal: &str| -> Vec<f64> { edges.iter().filter(|e| e.signal == signal).map(|e| e.change).collect() };
         let share = seen.scene.settings.outstanding_share;
+        let returns = edges.chunk_by(|a, b| a.signal == b.signal).count().saturating_sub(inputs.len());
+        let away = inputs.iter().filter(|signal| is_away(&own(signal), share)).count();
         Explained {
             unexplained: edges.iter().filter(|e| !inputs.contains(e.signal)).count(),
-            in_pulses: edges.iter().filter(|e| class.recognition.pulses.contains_key(e.signal)).count(),
-            away: inputs.iter().filter(|signal| is_away(&own(signal), share)).count(),
+            in_pulses: class
+                .recognition
+                .pulses
+                .iter()
+                .map(|(signal, p)| own(signal).len().min(p.widths.len() + 1))
+                .sum(),
+            loose_ends: returns + away,
         }
     };
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());

@@ -455,7 +455,8 @@ fn maneuvers_that_follow_each_other_within_two_seconds_are_two_whether_flags_par
                 (pair[0].recognised.last_input_s.unwrap(), pair[1].recognised.first_input_s.unwrap());
             assert!(pair[0].end_s < next_s, "no input of the next is in the window");
             assert!(pair[0].end_s - last_s > 0.4 * (next_s - last_s), "some decay is kept");
-            assert!(next_s - pair[1].start_s > 0.4 * (next_s - last_s), "some lead-in is kept");
+            let lead_in = next_s - pair[1].start_s;
+            assert!(lead_in > 0.4 * (next_s - last_s), "some lead-in is kept");
         }
     }
 }
