@@ -12,6 +12,7 @@ use harvest::aero::{Derivative, Regressor};
 use harvest::bench_case::{self, Subject};
 use harvest::dynamics::motion::Window;
 use harvest::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion, OUTPUTS};
+use harvest::output_error::Detail;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -199,6 +200,7 @@ fn kernel(c: &mut Criterion) {
     c.bench_function("one pass, plain scalar", |b| {
         b.iter(|| plain.pass(&start, state, window.step_s, &case.measurements.values));
     });
+    c.bench_function("one pass, coarse", |b| b.iter(|| case.respond_with(Detail::Coarse, &start, &mut response)));
     c.bench_function("sensitivities kept", |b| b.iter(|| case.sensitivities(&start)));
     c.bench_function("maneuver laid out", |b| b.iter(|| subject.case(&window)));
     let mut pass_s = f64::INFINITY;

@@ -222,7 +222,7 @@ impl Estimated {
         else {
             return None;
         };
-        let bounds = cramer_rao::bounds(&root, &self.case, &self.fit)?;
+        let bounds = cramer_rao::bounds(&root, &self.case, &self.fit);
         Some(bounds.corrected.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 }

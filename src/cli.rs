@@ -300,6 +300,7 @@ struct Options {
 #[must_use]
 #[expect(clippy::print_stderr, reason = "the one place where an error is said")]
 pub fn main() -> ExitCode {
+    crate::memory::keep();
     match run(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {

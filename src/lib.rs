@@ -40,6 +40,7 @@ pub mod store;
 pub mod config;
 
 // Conductor: the stages in order, and the command line.
+pub mod memory;
 pub mod pipeline;
 pub mod simulation;
 pub mod validation;

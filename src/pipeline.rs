@@ -51,11 +51,11 @@ use crate::{estimate, report, trend};
 use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 5;
-const SEGMENT_VERSION: u32 = 5;
-const ESTIMATE_VERSION: u32 = 8;
-const JOINT_VERSION: u32 = 4;
-const PREDICT_VERSION: u32 = 3;
+const INGEST_VERSION: u32 = 6;
+const SEGMENT_VERSION: u32 = 6;
+const ESTIMATE_VERSION: u32 = 9;
+const JOINT_VERSION: u32 = 5;
+const PREDICT_VERSION: u32 = 4;
 const TREND_VERSION: u32 = 2;
 const COMPARE_VERSION: u32 = 1;
 
@@ -105,9 +105,6 @@ struct Found {
     problems: Vec<Problem>,
 }
 
-/// A maneuver's estimate, and its time history as the report draws it.
-type Fitted = (Estimated, Option<History>);
-
 /// The campaign as far as it has been brought.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
@@ -129,8 +126,8 @@ pub struct Campaign {
     /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
-    /// Time histories, thinned for the report, of the maneuvers that have one.
-    pub histories: Vec<History>,
+    /// Where the time history of each maneuver lies, thinned for the report, in the order of the maneuvers.
+    histories: Vec<PathBuf>,
     pub trends: Vec<TrendRow>,
     /// Maneuvers far from their trend.
     pub outliers: Vec<OutlierRow>,
@@ -363,11 +360,10 @@ impl Run<'_> {
         self.progress.begin("estimate", campaign.maneuvers.len());
         let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
         self.progress.end();
-        let (paths, done): (Vec<PathBuf>, Vec<_>) = done?.into_iter().flatten().unzip();
-        let (estimated, histories): (Vec<Estimated>, Vec<Option<History>>) = done.into_iter().unzip();
-        campaign.histories = histories.into_iter().flatten().collect();
+        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
+        campaign.histories = paths.iter().map(|p| self.store.beside(p, "history")).collect();
         self.store.need(&paths);
-        self.store.need(&paths.iter().map(|p| self.store.beside(p, "history")).collect::<Vec<_>>());
+        self.store.need(&campaign.histories);
         self.join(campaign, &paths)?;
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
@@ -386,11 +382,11 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Fitted)>> {
+    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
         let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
         let load =
-            |path: &PathBuf| Some((self.store.load(path)?, self.store.load(&self.store.beside(path, "history"))?));
-        let present: Vec<Option<Fitted>> = paths.iter().map(load).collect();
+            |path: &PathBuf| self.store.load(path).filter(|_| self.store.holds(&self.store.beside(path, "history")));
+        let present: Vec<Option<Estimated>> = paths.iter().map(load).collect();
         let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open()?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
@@ -404,7 +400,7 @@ impl Run<'_> {
                         let history = estimated.history.take().map(|h| report::thinned(&h));
                         self.store.save(&self.store.beside(&path, "history"), &history)?;
                         self.store.save(&path, &estimated)?;
-                        (estimated, history)
+                        estimated
                     }
                     (None, None) => return Err(Error::store(&path, &"its flight's record was not read")),
                 };
@@ -452,6 +448,12 @@ impl Run<'_> {
 
     fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
+        let at = config.report.histories_at_alpha_deg;
+        let (maneuvers, fits, most) = (&campaign.maneuvers, &campaign.fits, config.report.maneuver_pages);
+        let pages = report::pages::chosen(maneuvers, fits, &campaign.overnight, at, most);
+        let with_page = maneuvers.iter().zip(&campaign.histories).filter(|(m, _)| pages.contains(&m.maneuver_id));
+        let histories: Vec<History> =
+            with_page.filter_map(|(_, path)| self.store.load::<Option<History>>(path)?).collect();
         let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
@@ -472,8 +474,9 @@ impl Run<'_> {
             instruments: &campaign.instruments,
             events: &campaign.events,
             problems: &campaign.problems,
-            histories: &campaign.histories,
-            typical_alpha_deg: config.report.histories_at_alpha_deg,
+            pages: &pages,
+            histories: &histories,
+            typical_alpha_deg: at,
             provenance: &self.provenance(),
             order: &config.derivative_names(),
             classes: &classes,

@@ -6,6 +6,9 @@
 /// Degrees in a radian, the paper's R.
 pub const DEG: f64 = 180.0 / std::f64::consts::PI;
 
+/// Radians in a degree: where every sample is converted, a product is a fraction of a quotient's work.
+pub const RAD: f64 = std::f64::consts::PI / 180.0;
+
 /// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is [`crate::aircraft`]'s.
 pub const G0_FT_S2: f64 = 32.174_049;
 

@@ -139,13 +139,19 @@ impl Sensors {
         self.beta_vane.beta_reading(self.vane_model, flow, cg)
     }
 
-    /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the readings inverted by
-    /// fixed-point iteration, which contracts by the ratio of arm times rate to velocity.
+    /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the small-angle readings
+    /// solved for them, the exact ones inverted by fixed-point iteration, which contracts by the ratio of arm times rate to
+    /// velocity.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
         let mut flow =
             Flow { alpha: read.alpha / self.alpha_vane.factor, beta: read.beta / self.beta_vane.factor, ..*read };
+        if self.vane_model == VaneModel::SmallAngle {
+            flow.alpha -= dot(self.alpha_vane.alpha_by_rates(read.velocity, cg), read.rates);
+            flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);
+            return flow;
+        }
         for _ in 0..8 {
             let alpha_error = read.alpha - self.alpha_reading(&flow, cg).angle;
             let beta_error = read.beta - self.beta_reading(&flow, cg).angle;

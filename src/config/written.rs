@@ -52,6 +52,8 @@ pub struct PipelineFile {
 pub struct ReportSettings {
     /// The class's maneuver nearest to this angle of attack shows its time histories.
     pub histories_at_alpha_deg: f64,
+    /// So many maneuvers have a page of their own at most; which ones, `report::pages` says. Default 600.
+    pub maneuver_pages: usize,
     /// A template of the analyst's own instead of the built-in one.
     pub template: Option<PathBuf>,
     /// So many published nights stay; at least one. Default 7: a week to look back over.
@@ -61,7 +63,7 @@ pub struct ReportSettings {
 impl Default for ReportSettings {
     fn default() -> Self {
         // The paper's Figures 4 and 12 are at 30 deg.
-        ReportSettings { histories_at_alpha_deg: 30.0, template: None, keep_nights: 7 }
+        ReportSettings { histories_at_alpha_deg: 30.0, maneuver_pages: 600, template: None, keep_nights: 7 }
     }
 }
 

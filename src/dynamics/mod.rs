@@ -18,6 +18,7 @@ pub use lateral::Lateral;
 pub(crate) use lever::lever;
 pub use longitudinal::Longitudinal;
 pub use motion::Motion;
+pub(crate) use trig::sin_cos;
 
 use nalgebra::{SMatrix, SVector};
 

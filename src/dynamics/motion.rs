@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
 use crate::flight::{Record, signal};
-use crate::units::{DEG, G0_FT_S2};
+use crate::units::{G0_FT_S2, RAD};
 
 /// The motion at one instant, in rad, rad/s, rad/s², ft, ft/s, slug, lbf.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +58,7 @@ const MASS_PROPERTIES: &[&str] =
 #[derive(Clone, Debug)]
 pub struct Window {
     /// Shared by windows that differ in few of them.
-    points: BTreeMap<String, Arc<[f64]>>,
+    points: BTreeMap<String, Arc<Vec<f64>>>,
     pub step_s: f64,
     pub samples: usize,
 }
@@ -85,11 +85,11 @@ impl Window {
                 return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
-            points.insert(name.to_owned(), if mean { constant(values) } else { halved(values) }.into());
+            points.insert(name.to_owned(), Arc::new(if mean { constant(values) } else { halved(values) }));
         }
         for name in [signal::P, signal::Q, signal::R] {
             let slope = slope(record.values(name).unwrap_or_default(), &range, record.step_s);
-            points.insert(slope_name(name), halved(&slope).into());
+            points.insert(slope_name(name), Arc::new(halved(&slope)));
         }
         Ok(Window { points, step_s: record.step_s, samples: range.len() })
     }
@@ -108,7 +108,7 @@ impl Window {
     /// A signal's values at the points; all zero for a signal that was not cut out.
     #[must_use]
     pub fn signal(&self, name: &str) -> &[f64] {
-        self.points.get(name).map_or(&[], |points| points)
+        self.points.get(name).map_or(&[], |points| points.as_slice())
     }
 
     /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
@@ -117,7 +117,7 @@ impl Window {
         let mut window = self.clone();
         let mut change = |name: &str, bias: f64| {
             if let Some(points) = window.points.get_mut(name) {
-                *points = points.iter().map(|value| value + (scale * value + bias)).collect();
+                *points = Arc::new(points.iter().map(|value| value + (scale * value + bias)).collect());
             }
         };
         change(name, bias);
@@ -129,7 +129,7 @@ impl Window {
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {
         let mut window = self.clone();
-        window.points.insert(name.to_owned(), vec![value; self.len()].into());
+        window.points.insert(name.to_owned(), Arc::new(vec![value; self.len()]));
         window
     }
 
@@ -199,12 +199,12 @@ struct Signals<'a> {
 impl Signals<'_> {
     #[inline(always)]
     fn at(&self, aircraft: &Aircraft, gravity: impl Fn(f64) -> f64, i: usize) -> Motion {
-        let rates = self.rates.map(|s| s[i] / DEG);
-        let accelerations = self.slopes.map(|s| s[i] / DEG);
+        let rates = self.rates.map(|s| s[i] * RAD);
+        let accelerations = self.slopes.map(|s| s[i] * RAD);
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
         let cg = Position { x_ft, y_ft, z_ft };
         let [alpha, beta, velocity] = self.flow.map(|s| s[i]);
-        let read = Flow { alpha: alpha / DEG, beta: beta / DEG, velocity, rates };
+        let read = Flow { alpha: alpha * RAD, beta: beta * RAD, velocity, rates };
         let flow = aircraft.sensors.flow_at_cg(&read, cg);
         let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
         let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
@@ -220,8 +220,8 @@ impl Signals<'_> {
             velocity: flow.velocity,
             rates,
             accelerations,
-            theta: self.attitude[0][i] / DEG,
-            phi: self.attitude[1][i] / DEG,
+            theta: self.attitude[0][i] * RAD,
+            phi: self.attitude[1][i] * RAD,
             force_x: G0_FT_S2 * ax - felt(0, aircraft.sensors.ax) + unfelt,
             force_y: G0_FT_S2 * ay - felt(1, aircraft.sensors.ay),
             force_z: -G0_FT_S2 * an - felt(2, aircraft.sensors.an),

@@ -43,6 +43,17 @@ impl Taps {
         (sum, slope)
     }
 
+    /// Where the first and the last tap are, relative to the sample.
+    #[must_use]
+    pub fn first(&self) -> isize {
+        self.first
+    }
+
+    #[must_use]
+    pub fn last(&self) -> isize {
+        self.first + 3
+    }
+
     /// The taps at sample `k`: sample, weight, slope of the weight.
     pub fn each(&self, k: usize, samples: usize) -> impl Iterator<Item = (usize, f64, f64)> {
         let (first, last) = (self.first, samples.saturating_sub(1));

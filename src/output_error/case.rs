@@ -14,8 +14,8 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::input_noise::NoisySurface;
-use super::kernel::{CHUNK, load, store};
-use super::lanes::{Aligned, Lanes, VECTOR};
+use super::kernel::{CHUNK, Spaced};
+use super::lanes::Lanes;
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -32,8 +32,11 @@ pub enum InitialState {
     Measured,
 }
 
-/// Points kept beyond the last sample: those of a chunk that begins there.
-const BEYOND: usize = 2 * CHUNK + VECTOR;
+/// A pass may take every so many samples at most.
+pub(super) const WIDEST_STRIDE: usize = 8;
+
+/// Points kept beyond the last sample: those of a chunk that begins there, of the widest strides.
+const BEYOND: usize = POINTS * WIDEST_STRIDE;
 
 /// The three coefficients at every point as functions of the state: c = offset + slope · x; empty where zero throughout.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,8 +74,8 @@ impl<const NX: usize> Coefficients<NX> {
     }
 }
 
-/// Points of a chunk, and those that vectors reach beyond.
-const POINTS: usize = BEYOND;
+/// Points of a chunk's samples and of the one that follows.
+pub(super) const POINTS: usize = 2 * CHUNK + 1;
 
 /// The three coefficients at the points of a chunk.
 #[repr(align(64))]
@@ -166,8 +169,6 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     columns: Vec<Vec<f64>>,
     /// How each free derivative acts.
     pub(super) acting: Vec<Acting>,
-    /// The same columns point by point in the order of the lanes ([`Lanes`]).
-    pub(super) regressors: Aligned,
     pub(super) lanes: Lanes,
     /// The free derivatives of each coefficient.
     pub(super) ranges: [Range<usize>; COEFFICIENTS],
@@ -201,7 +202,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             column.extend([0.0; BEYOND]);
         }
         // A step needs three points, also the one that would follow the last sample.
-        along.known.extend(along.known.last().cloned().into_iter().cycle().take(2));
+        along.known.extend(along.known.last().cloned().into_iter().cycle().take(2 * WIDEST_STRIDE));
         let mut held_part = Coefficients::zero();
         for (acting, value) in held {
             held_part.add(value, acting, &columns[acting.column]);
@@ -223,7 +224,6 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             known: along.known,
             sensed: along.sensed,
             held: held_part,
-            regressors: lanes.spread(&acting, &columns, window.len()),
             columns,
             acting,
             lanes,
@@ -306,46 +306,33 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.acting.iter().zip(parameters).map(|(acting, value)| Term { acting: *acting, value: *value }).collect()
     }
 
-    /// The coefficients at the points of a chunk that begins at one.
+    /// The coefficients at the points of a chunk.
     #[inline(always)]
-    pub(super) fn near<S: Simd>(&self, simd: S, terms: &[Term], first: usize, near: &mut Near<NX>) {
+    pub(super) fn near(&self, terms: &[Term], points: Spaced, near: &mut Near<NX>) {
         for k in 0..COEFFICIENTS {
-            let terms = &terms[self.ranges[k].clone()];
-            self.sum(simd, terms, None, &self.held.offset[k], &mut near.offset[k], first);
+            near.offset[k].fill(0.0);
+            add(1.0, &self.held.offset[k], points, &mut near.offset[k]);
             for &i in E::FOLLOWED {
-                self.sum(simd, terms, Some(i), &self.held.slope[k][i], &mut near.slope[k][i], first);
+                near.slope[k][i].fill(0.0);
+                add(1.0, &self.held.slope[k][i], points, &mut near.slope[k][i]);
             }
+        }
+        for Term { acting, value } in terms {
+            let sum = match acting.along {
+                Some(state) => &mut near.slope[acting.coefficient][state],
+                None => &mut near.offset[acting.coefficient],
+            };
+            add(*value, &self.columns[acting.column], points, sum);
         }
     }
 
-    /// Held ones and the terms along one state, or along none.
+    /// What the derivatives multiply at the points of a chunk, in the rows that the lanes read.
     #[inline(always)]
-    fn sum<S: Simd>(
-        &self,
-        simd: S,
-        terms: &[Term],
-        along: Option<usize>,
-        held: &[f64],
-        near: &mut [f64; POINTS],
-        first: usize,
-    ) {
-        let held = held.get(first..first + POINTS);
-        for at in (0..POINTS).step_by(VECTOR) {
-            let mut sum = [simd.splat_f64s(0.0); VECTOR];
-            if let Some(held) = held {
-                for n in 0..VECTOR / S::F64_LANES {
-                    sum[n] = load::<S>(held, at + n * S::F64_LANES);
-                }
-            }
-            for term in terms.iter().filter(|t| t.acting.along == along) {
-                let (value, column) = (simd.splat_f64s(term.value), &self.columns[term.acting.column]);
-                let column = &column[first + at..][..VECTOR];
-                for n in 0..VECTOR / S::F64_LANES {
-                    sum[n] = simd.mul_add_f64s(value, load::<S>(column, n * S::F64_LANES), sum[n]);
-                }
-            }
-            for n in 0..VECTOR / S::F64_LANES {
-                store::<S>(near, at + n * S::F64_LANES, sum[n]);
+    pub(super) fn spread(&self, points: Spaced, rows: &mut [f64]) {
+        for &(place, column) in &self.lanes.columns {
+            let column = self.columns[column][points.first..].iter().step_by(points.stride);
+            for (row, value) in rows.chunks_exact_mut(self.lanes.row).zip(column) {
+                row[place] = *value;
             }
         }
     }
@@ -369,6 +356,17 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     }
 }
 
+/// Adds a value times a column's points; a column that is empty is zero throughout.
+#[inline(always)]
+fn add(value: f64, column: &[f64], points: Spaced, sum: &mut [f64; POINTS]) {
+    let Some(column) = column.get(points.first..) else { return };
+    if points.stride == 1 {
+        sum.iter_mut().zip(column).for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
+    } else {
+        sum.iter_mut().zip(column.iter().step_by(points.stride)).for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
+    }
+}
+
 /// What a case keeps of the motion.
 struct Along<const NX: usize, E: Equations<NX>> {
     known: Vec<E::Known>,
@@ -383,7 +381,7 @@ impl<const NX: usize, E: Equations<NX>> Along<NX, E> {
     fn over(aircraft: &Aircraft, window: &Window) -> Self {
         let (points, samples) = (window.len(), window.samples);
         let mut along = Along {
-            known: Vec::with_capacity(points + 2),
+            known: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
             flow: Vec::with_capacity(points),
             sensed: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),

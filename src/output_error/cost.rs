@@ -17,8 +17,6 @@ pub struct Sums {
     pub information: DMatrix<f64>,
     /// Number of output samples that count.
     pub count: usize,
-    /// Whether the information is that of all of them; gradient and cost always are.
-    pub whole: bool,
 }
 
 impl Sums {
@@ -45,7 +43,6 @@ pub fn sums(response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
         gradient: normal.gradient(weights),
         information: normal.information(weights),
         count: (0..OUTPUTS).map(|o| normal.count(o)).sum(),
-        whole: normal.whole(),
     }
 }
 

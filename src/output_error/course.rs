@@ -7,7 +7,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::case::{Case, Near};
-use super::kernel::CHUNK;
+use super::kernel::{CHUNK, Spaced};
 use super::lanes::VECTOR;
 use crate::dynamics::runge_kutta::{POINT, STAGES};
 use crate::dynamics::{COEFFICIENTS, Equations};
@@ -66,7 +66,7 @@ pub(super) struct Course<'a, const NX: usize, E: Equations<NX>> {
     x: SVector<f64, NX>,
     at: SVector<f64, NX>,
     next: SVector<f64, NX>,
-    first: usize,
+    points: Spaced,
     sample: usize,
     stage: usize,
     end: usize,
@@ -76,20 +76,20 @@ pub(super) struct Course<'a, const NX: usize, E: Equations<NX>> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Course<'a, NX, E> {
-    /// The course from the state `x` at the sample `first` over `samples` of them.
+    /// The course from the state `x` over `samples` samples: at the first of these points, at every other of them.
     pub fn new(
         case: &'a Case<NX, E>,
         near: &'a Near<NX>,
         path: &'a mut Path<NX>,
         x: SVector<f64, NX>,
-        first: usize,
+        points: Spaced,
         samples: usize,
     ) -> Self {
-        let h = case.step_s;
+        let h = points.stride as f64 * case.step_s;
         let (ahead_s, part_s) = ([0.5 * h, 0.5 * h, h, 0.0], [h / 6.0, h / 3.0, h / 3.0, h / 6.0]);
         let (at, next) = (x, x);
         let mut course =
-            Course { case, near, path, x, at, next, first, sample: 0, stage: 0, end: samples, ahead_s, part_s };
+            Course { case, near, path, x, at, next, points, sample: 0, stage: 0, end: samples, ahead_s, part_s };
         course.arrive(x);
         course
     }
@@ -129,7 +129,7 @@ impl<const NX: usize, E: Equations<NX>> Meanwhile for Course<'_, NX, E> {
         let (sample, stage) = (self.sample, self.stage);
         let point = POINT[stage];
         let c = self.near.coefficients::<E>(2 * sample + point, &self.at);
-        let rates = E::rates(&self.case.known[2 * (self.first + sample) + point], &self.at, &c);
+        let rates = E::rates(&self.case.known[self.points.at(2 * sample + point)], &self.at, &c);
         for i in 0..NX {
             self.next[i] = rates.rates[i].mul_add(self.part_s[stage], self.next[i]);
         }

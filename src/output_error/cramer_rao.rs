@@ -94,12 +94,9 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
-/// Bounds of a fit whose information matrix has the inverse T Tᵀ; none where its response is not whole.
+/// Bounds of a fit whose information matrix has the inverse T Tᵀ.
 #[must_use]
-pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Option<Bounds> {
-    if !data.sums(&fit.response, &fit.weights).whole {
-        return None;
-    }
+pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
     let series = data.series(&fit.response, &fit.weights);
     let white = data.white_covariance(&fit.response, &fit.weights);
     let inverse = root * root.transpose();
@@ -107,7 +104,7 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     let inputs = data.input_covariance(&fit.values, &fit.response, &fit.weights);
     let corrected =
         never_below(coloured::covariance(root, series).of_student(), &covariance) + &inverse * inputs * &inverse;
-    Some(Bounds { covariance, corrected })
+    Bounds { covariance, corrected }
 }
 
 /// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
@@ -115,10 +112,8 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
 pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
     let sums = data.sums(&fit.response, &fit.weights);
     match identified(&sums.information, max_condition_number) {
-        Identified::Determined { root, .. } if sums.whole => {
-            Some(coloured::noise(&root, data.series(&fit.response, &fit.weights)))
-        }
-        _ => None,
+        Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
+        Identified::Undetermined { .. } => None,
     }
 }
 

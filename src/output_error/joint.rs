@@ -11,7 +11,7 @@ use super::case::Case;
 use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::likelihood::Likelihood;
-use super::response::{Diverged, Response};
+use super::response::{Detail, Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Maneuvers with shared derivatives.
@@ -135,28 +135,24 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         self.members.iter().map(|m| m.case.response()).collect()
     }
 
-    fn respond(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
-        self.each(response, |member, response| member.case.respond(&member.parameters(parameters), response))
+    fn has_coarse(&self) -> bool {
+        self.members.iter().all(|member| member.case.has_coarse())
     }
 
-    fn respond_roughly(&self, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
-        self.each(response, |member, response| member.case.respond_roughly(&member.parameters(parameters), response))
+    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
+        self.each(response, |member, response| {
+            member.case.respond_with(detail, &member.parameters(parameters), response)
+        })
     }
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
         let n = self.names.len();
-        let mut sums = Sums {
-            weighted_square: 0.0,
-            gradient: DVector::zeros(n),
-            information: DMatrix::zeros(n, n),
-            count: 0,
-            whole: true,
-        };
+        let mut sums =
+            Sums { weighted_square: 0.0, gradient: DVector::zeros(n), information: DMatrix::zeros(n, n), count: 0 };
         for (member, response) in self.members.iter().zip(response) {
             let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
             sums.count += own.count;
-            sums.whole &= own.whole;
             for (g, &place) in own.gradient.iter().zip(&member.places) {
                 sums.gradient[place] += g;
             }

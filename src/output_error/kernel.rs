@@ -14,7 +14,7 @@
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::case::{Case, InitialState, Near};
+use super::case::{Case, InitialState, Near, POINTS, WIDEST_STRIDE};
 use super::course::{Course, Meanwhile, Path};
 use super::lanes::{Aligned, Lanes, VECTOR};
 use super::propagators::Propagators;
@@ -25,14 +25,28 @@ use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 /// Samples between two calls of the sink, whole vectors of them: what they leave fits into the fastest memory.
 pub(super) const CHUNK: usize = 24;
 
+/// Samples, or points, at equal distances.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spaced {
+    pub first: usize,
+    pub stride: usize,
+}
+
+impl Spaced {
+    #[inline(always)]
+    pub fn at(self, k: usize) -> usize {
+        self.first + k * self.stride
+    }
+}
+
 /// What becomes of the sensitivities of the outputs.
 pub(super) trait Sink {
-    /// Takes the outputs of some samples from `first` on and their sensitivities: sample by sample, output by output one
-    /// row of lanes. Nobody needs the rows afterwards. There is something to do meanwhile.
+    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by output one row of lanes.
+    /// Nobody needs the rows afterwards. There is something to do meanwhile.
     fn take<S: Simd>(
         &mut self,
         simd: S,
-        first: usize,
+        samples: Spaced,
         outputs: &[[f64; OUTPUTS]],
         rows: &mut [f64],
         meanwhile: &mut impl Meanwhile,
@@ -45,18 +59,21 @@ struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
     parameters: &'a [f64],
     start: SVector<f64, NX>,
     biases: [f64; OUTPUTS],
+    stride: usize,
     outputs: &'a mut [[f64; OUTPUTS]],
     sink: &'a mut K,
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// Integrates with these parameters: outputs to `outputs`, sensitivities to the sink.
+    /// Integrates with these parameters in steps of `stride` samples: outputs to the front of `outputs`, sensitivities to
+    /// the sink.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
     pub(super) fn pass(
         &self,
         parameters: &[f64],
+        stride: usize,
         outputs: &mut [[f64; OUTPUTS]],
         sink: &mut impl Sink,
     ) -> Result<(), Diverged> {
@@ -69,7 +86,15 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             InitialState::Measured => self.start,
             InitialState::Estimated => SVector::from_fn(|i, _| parameters[first + i]),
         };
-        Arch::new().dispatch(Pass { case: self, parameters, start, biases, outputs, sink })
+        Arch::new().dispatch(Pass {
+            case: self,
+            parameters,
+            start,
+            biases,
+            stride: stride.clamp(1, WIDEST_STRIDE),
+            outputs,
+            sink,
+        })
     }
 }
 
@@ -78,22 +103,25 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(), Diverged> {
-        let (case, lanes) = (self.case, &self.case.lanes);
-        let samples = case.samples();
+        let (case, lanes, stride) = (self.case, &self.case.lanes, self.stride);
+        let samples = case.samples().div_ceil(stride);
         let length = |first: usize| CHUNK.min(samples - first);
         let mut sensitivities = at_start::<NX>(case.initial_state, lanes);
         let sensitivities = sensitivities.slice_mut();
         let row = OUTPUTS * lanes.width();
         let mut rows = Aligned::zeros(CHUNK * row);
         let rows = rows.slice_mut();
+        let mut regressors = Aligned::zeros(POINTS * lanes.row);
+        let regressors = regressors.slice_mut();
         let terms = case.terms(self.parameters);
         let mut near = Near::<NX>::NONE;
         let mut paths = [Path::<NX>::NONE; 2];
         let mut propagators = Propagators::<NX>::NONE;
         let mut x = self.start;
         if samples > 0 {
-            case.near(simd, &terms, 0, &mut near);
-            let mut course = Course::new(case, &near, &mut paths[0], x, 0, length(0));
+            let points = Spaced { first: 0, stride };
+            case.near(&terms, points, &mut near);
+            let mut course = Course::new(case, &near, &mut paths[0], x, points, length(0));
             course.finish();
             x = course.state();
         }
@@ -103,23 +131,25 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             let (path, ahead) = if chunk % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
             let count = length(first);
             if let Some(sample) = path.senseless(count) {
-                return Err(Diverged { sample: first + sample });
+                return Err(Diverged { sample: stride * (first + sample) });
             }
             for k in 0..count {
-                let y = propagators.read(case, &near, path, first, k);
+                let y = propagators.read(case, &near, path, stride * (first + k), k);
                 for o in 0..OUTPUTS {
                     self.outputs[first + k][o] = y[o] + self.biases[o];
                 }
             }
-            propagators.set::<S, E>(simd, path, case.step_s);
+            propagators.set::<S, E>(simd, path, count, stride as f64 * case.step_s);
+            case.spread(Spaced { first: 2 * stride * first, stride }, regressors);
             let next = first + count;
             let left = if next < samples { length(next) } else { 0 };
-            case.near(simd, &terms, 2 * next.min(samples - 1), &mut near);
-            let mut course = Course::new(case, &near, ahead, x, next, left);
+            let points = Spaced { first: 2 * stride * next.min(samples - 1), stride };
+            case.near(&terms, points, &mut near);
+            let mut course = Course::new(case, &near, ahead, x, points, left);
             let mut work = Work {
                 simd,
                 lanes,
-                regressors: S::as_simd_f64s(&case.regressors.slice()[2 * first * lanes.derivatives()..]).0,
+                regressors: S::as_simd_f64s(regressors).0,
                 sensitivities: S::as_mut_simd_f64s(sensitivities).0,
                 rows: S::as_mut_simd_f64s(rows).0,
                 path,
@@ -127,7 +157,13 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 count,
             };
             work.all::<E>();
-            self.sink.take(simd, first, &self.outputs[first..next], rows, &mut course);
+            self.sink.take(
+                simd,
+                Spaced { first: stride * first, stride },
+                &self.outputs[first..next],
+                rows,
+                &mut course,
+            );
             course.finish();
             x = course.state();
         }
@@ -150,7 +186,7 @@ fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Alig
 struct Work<'a, S: Simd, const NX: usize> {
     simd: S,
     lanes: &'a Lanes,
-    /// Rows of regressors from the chunk's first point on.
+    /// Rows of regressors, point by point.
     regressors: &'a [S::f64s],
     sensitivities: &'a mut [S::f64s],
     rows: &'a mut [S::f64s],
@@ -211,8 +247,8 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
                 continue;
             }
             for stage in 0..STAGES {
-                let row = (2 * k + POINT[stage]) * self.lanes.derivatives();
-                let regressor = self.regressors[(row + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES];
+                let row = (2 * k + POINT[stage]) * self.lanes.row;
+                let regressor = self.regressors[(row + self.lanes.regressors[groups[n]] + lane) / S::F64_LANES];
                 r[n][stage] = if lane < VECTOR {
                     self.simd.mul_f64s(regressor, load::<S>(&self.path.times[stage][k], lane))
                 } else {
@@ -287,12 +323,12 @@ fn step<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
 
 /// The vector that begins at a place of a slice.
 #[inline(always)]
-pub(super) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
+pub(crate) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
     S::as_simd_f64s(&from[at..at + S::F64_LANES]).0[0]
 }
 
 /// Writes a vector to a place of a slice.
 #[inline(always)]
-pub(super) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
+pub(crate) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
     S::as_mut_simd_f64s(&mut to[at..at + S::F64_LANES]).0[0] = value;
 }

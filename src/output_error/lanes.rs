@@ -5,7 +5,12 @@
 //! for all of a vector's lanes; those along a state come first, in the order of the states, so that they are the same
 //! lanes of each group, and the groups of all coefficients are equally long. Initial states are the last group. Two lanes
 //! that are left over hold the residual and a one when sums are taken.
+//!
+//! What the derivatives multiply stands in rows, point by point. Where the columns of all coefficients together need no
+//! more room than the widest group, all groups read the same stretch of a row: most derivatives come three at a time, one
+//! of each coefficient, along the same surface. Lanes that nobody asked for are then computed too, and never read.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::case::Acting;
@@ -15,7 +20,7 @@ use crate::dynamics::COEFFICIENTS;
 const GROUPS: usize = COEFFICIENTS + 1;
 
 /// A group is padded to a multiple of this many lanes: the widest vector of doubles there is.
-pub(super) const VECTOR: usize = 8;
+pub(crate) const VECTOR: usize = 8;
 
 /// The layout of one case.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,6 +34,11 @@ pub(super) struct Lanes {
     pub biases: Vec<usize>,
     /// Lanes in use of each vector, from its first.
     pub used: Vec<usize>,
+    /// Where the regressors of each group of derivatives begin in a row of them, and how long a row is.
+    pub regressors: [usize; COEFFICIENTS],
+    pub row: usize,
+    /// Which column stands where in a row: (place, column).
+    pub columns: Vec<(usize, usize)>,
 }
 
 fn padded(count: usize) -> usize {
@@ -39,19 +49,28 @@ impl Lanes {
     /// The layout for these derivatives, sorted by coefficient, and this number of free initial states. `followed` are
     /// the states that derivatives can be along.
     pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
-        let of = |k: usize| acting.iter().filter(move |a| a.coefficient == k);
-        let count = |k: usize| followed.len() + of(k).filter(|a| a.along.is_none()).count();
-        let widest = (0..COEFFICIENTS).map(count).max().filter(|_| !acting.is_empty()).map_or(0, padded);
-        let mut lanes = Lanes::default();
+        let of = |k: usize| -> Vec<usize> {
+            acting.iter().filter(|a| a.coefficient == k && a.along.is_none()).map(|a| a.column).collect()
+        };
+        let all: Vec<usize> = (0..COEFFICIENTS).flat_map(of).collect::<BTreeSet<usize>>().into_iter().collect();
+        let room = |columns: &[usize]| padded(followed.len() + columns.len());
+        let widest = (0..COEFFICIENTS).map(|k| room(&of(k))).max().filter(|_| !acting.is_empty()).unwrap_or(0);
+        let shared = room(&all) <= widest;
+        let slots: [Vec<usize>; COEFFICIENTS] = std::array::from_fn(|k| if shared { all.clone() } else { of(k) });
+        let mut lanes = Lanes { row: if shared { widest } else { COEFFICIENTS * widest }, ..Lanes::default() };
         for k in 0..COEFFICIENTS {
             lanes.groups[k] = k * widest..(k + 1) * widest;
-            let mut next = followed.len();
-            for a in of(k) {
-                let slot = a.along.and_then(|state| followed.iter().position(|f| *f == state));
-                lanes.places.push(k * widest + slot.unwrap_or(next));
-                next += usize::from(slot.is_none());
-            }
+            lanes.regressors[k] = if shared { 0 } else { k * widest };
         }
+        for a in acting {
+            let along = a.along.and_then(|state| followed.iter().position(|f| *f == state));
+            let beside = || slots[a.coefficient].iter().position(|column| *column == a.column);
+            let slot = along.or_else(|| beside().map(|slot| followed.len() + slot)).unwrap_or(0);
+            lanes.places.push(lanes.groups[a.coefficient].start + slot);
+            lanes.columns.push((lanes.regressors[a.coefficient] + slot, a.column));
+        }
+        lanes.columns.sort_unstable();
+        lanes.columns.dedup();
         let first = COEFFICIENTS * widest;
         lanes.groups[COEFFICIENTS] = first..first + padded(initial);
         lanes.places.extend(first..first + initial);
@@ -76,27 +95,11 @@ impl Lanes {
     pub fn derivatives(&self) -> usize {
         self.groups[COEFFICIENTS].start
     }
-
-    /// The regressors of the derivatives point by point in the order of the lanes, zero in the padding and at two points
-    /// beyond the last: those of a step from there.
-    pub fn spread(&self, acting: &[Acting], columns: &[Vec<f64>], points: usize) -> Aligned {
-        let width = self.derivatives();
-        let mut rows = Aligned::zeros((points + 2) * width);
-        let filled = rows.slice_mut();
-        let each: Vec<(usize, &[f64])> =
-            acting.iter().zip(&self.places).map(|(a, lane)| (*lane, &columns[a.column][..points])).collect();
-        for (point, row) in filled.chunks_exact_mut(width.max(1)).take(points).enumerate() {
-            for (lane, column) in &each {
-                row[*lane] = column[point];
-            }
-        }
-        rows
-    }
 }
 
 /// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines costs twice.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Aligned {
+pub(crate) struct Aligned {
     buffer: Vec<f64>,
     first: usize,
     length: usize,

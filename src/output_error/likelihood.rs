@@ -7,7 +7,7 @@ use super::coloured::Series;
 use super::cost::{self, Sums};
 use super::cramer_rao;
 use super::input_noise;
-use super::response::{Diverged, Response};
+use super::response::{Detail, Diverged, Response};
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// Data that say something of parameters: cost, gradient and information at any values of them.
@@ -21,17 +21,14 @@ pub trait Likelihood {
     /// A response of the right size to write into.
     fn response(&self) -> Self::Response;
 
+    /// Whether a coarse response is less work than a rough one.
+    fn has_coarse(&self) -> bool;
+
     /// Computes the response to these parameters.
     ///
     /// # Errors
     /// [`Diverged`] when an integration leaves the bounds of sense.
-    fn respond(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
-
-    /// The same with information that tells the way to the minimum, but not how sharp it is.
-    ///
-    /// # Errors
-    /// [`Diverged`] when an integration leaves the bounds of sense.
-    fn respond_roughly(&self, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
+    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
 
     /// Cost, gradient and information for weights on residuals in deg, deg/s and g.
     fn sums(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Sums;
@@ -65,12 +62,12 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         Case::response(self)
     }
 
-    fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
-        Case::respond(self, parameters, response)
+    fn has_coarse(&self) -> bool {
+        Case::has_coarse(self)
     }
 
-    fn respond_roughly(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
-        Case::respond_roughly(self, parameters, response)
+    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        self.respond_with(detail, parameters, response)
     }
 
     fn sums(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Sums {

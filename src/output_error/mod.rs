@@ -30,9 +30,12 @@ pub mod theil;
 
 pub use case::{Case, InitialState, Measurements, Model};
 pub use joint::Joint;
+pub(crate) use kernel::{load, store};
+pub(crate) use lanes::{Aligned, VECTOR};
 pub use likelihood::Likelihood;
+pub(crate) use normal::Rows;
 pub use outcome::{Fit, Outcome};
-pub use response::{Diverged, Response, Sensitivities};
+pub use response::{Detail, Diverged, Response, Sensitivities};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -1,8 +1,7 @@
 //! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step does not lower the cost.
 //!
-//! Far from the minimum the second gradient may be a rough one (of a part of the samples: subsampled Newton, Byrd et al.
-//! 2011): it costs most of a pass, and the step is wrong anyway. Cost and gradient are exact always, and where the iteration
-//! ends, so is the second gradient.
+//! Far from the minimum the iteration goes by a coarse response, of fewer and longer steps, until it is as near as that can
+//! tell. That only makes a better start: from there on everything is exact, and decides where the iteration ends.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -10,6 +9,7 @@ use super::cost::Sums;
 use super::cramer_rao::{self, Identified};
 use super::likelihood::Likelihood;
 use super::outcome::{Fit, Outcome};
+use super::response::Detail;
 use crate::dynamics::OUTPUTS;
 
 /// When the iteration stops.
@@ -85,7 +85,7 @@ pub fn estimate<D: Likelihood>(
                 break;
             }
             let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
-            fit = minimise(data, fit.values, next, settings);
+            fit = descend(data, fit.values, next, settings, fit.response);
             fit.iterations += iterations;
             fit.initial_cost = initial_cost;
         }
@@ -107,7 +107,69 @@ pub fn minimise<D: Likelihood>(
     weights: [f64; OUTPUTS],
     settings: &Settings,
 ) -> Fit<D::Response> {
-    let (mut response, mut trial) = (data.response(), data.response());
+    let mut response = data.response();
+    let Some(near) = approach(data, &start, &weights, settings, &mut response) else {
+        return descend(data, start, weights, settings, response);
+    };
+    let mut fit = descend(data, near.values, weights, settings, response);
+    if fit.initial_cost.is_none() {
+        return descend(data, start, weights, settings, data.response());
+    }
+    fit.iterations += near.iterations;
+    fit.initial_cost = Some(near.initial_cost);
+    fit
+}
+
+/// Where coarse steps lead.
+struct Near {
+    values: Vec<f64>,
+    iterations: usize,
+    initial_cost: f64,
+}
+
+/// A full step that would lower the coarse cost by less than this share of it ends in what the samples left out are worth.
+const NEAR: f64 = 0.1;
+
+/// Goes by the coarse response while that is still far from its minimum; none where there is no such response, or where it
+/// leads nowhere.
+fn approach<D: Likelihood>(
+    data: &D,
+    start: &[f64],
+    weights: &[f64; OUTPUTS],
+    settings: &Settings,
+    response: &mut D::Response,
+) -> Option<Near> {
+    if !data.has_coarse() {
+        return None;
+    }
+    data.respond(Detail::Coarse, start, response).ok()?;
+    let mut at = data.sums(response, weights);
+    let mut near = Near { values: start.to_vec(), iterations: 0, initial_cost: at.cost() };
+    let mut damping = 0.0;
+    while near.iterations < settings.max_iterations {
+        let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING))?;
+        near.iterations += 1;
+        if at.gradient.dot(&full) <= NEAR * at.weighted_square {
+            near.values.iter_mut().zip(full.iter()).for_each(|(value, d)| *value += d);
+            break;
+        }
+        let Some(better) = lower(data, Detail::Coarse, &near.values, &at, weights, &mut damping, response) else {
+            break;
+        };
+        (near.values, at) = better;
+    }
+    Some(near)
+}
+
+/// The iteration from a start with exact costs and gradients; `response` is written over.
+pub(super) fn descend<D: Likelihood>(
+    data: &D,
+    start: Vec<f64>,
+    weights: [f64; OUTPUTS],
+    settings: &Settings,
+    mut response: D::Response,
+) -> Fit<D::Response> {
+    let mut trial = data.response();
     let mut fit = Fit {
         outcome: Outcome::NotConverged,
         reason: format!("not converged after {} iterations", settings.max_iterations),
@@ -124,7 +186,7 @@ pub fn minimise<D: Likelihood>(
         covariance_calibration: None,
         covariance_corrected: None,
     };
-    if let Err(diverged) = data.respond_roughly(&fit.values, &mut response) {
+    if let Err(diverged) = data.respond(Detail::Whole, &fit.values, &mut response) {
         fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
         fit.response = data.response();
         return fit;
@@ -137,31 +199,17 @@ pub fn minimise<D: Likelihood>(
     while fit.iterations < settings.max_iterations {
         let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING));
         let gain = full.as_ref().map(|full| at.gradient.dot(full));
-        let converged = |gain| gain <= settings.tolerance * at.weighted_square + floor;
-        if !at.whole && gain.is_none_or(converged) {
-            // Rough information decides nothing.
-            if !complete(data, &fit, &mut response, &mut at) {
-                break;
-            }
-            continue;
-        }
         let Some(gain) = gain else {
             fit.reason = "the information matrix is singular".into();
             break;
         };
-        if converged(gain) {
+        if gain <= settings.tolerance * at.weighted_square + floor {
             fit.outcome = Outcome::Converged;
             fit.reason = "a further step would not lower the cost".into();
             break;
         }
-        // Each step does to the gain about what it does to the residuals squared: after this one it may be small enough.
-        let last = gain <= settings.tolerance.sqrt() * at.weighted_square;
-        let better = lower(data, &fit.values, &at, &weights, &mut damping, last, &mut trial);
-        if better.is_none() && !at.whole && complete(data, &fit, &mut response, &mut at) {
-            damping = 0.0;
-            continue;
-        }
         fit.iterations += 1;
+        let better = lower(data, Detail::Whole, &fit.values, &at, &weights, &mut damping, &mut trial);
         let Some(better) = better else {
             fit.reason = "no step lowers the cost".into();
             break;
@@ -170,37 +218,25 @@ pub fn minimise<D: Likelihood>(
         at = better.1;
         std::mem::swap(&mut response, &mut trial);
     }
-    if !at.whole {
-        complete(data, &fit, &mut response, &mut at);
-    }
     fit.final_cost = Some(at.cost());
     fit.response = response;
     fit
 }
 
-/// Makes rough information whole, at the same values.
-fn complete<D: Likelihood>(data: &D, fit: &Fit<D::Response>, response: &mut D::Response, at: &mut Sums) -> bool {
-    let possible = data.respond(&fit.values, response).is_ok();
-    *at = data.sums(response, &fit.weights);
-    possible
-}
-
-/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`, whole where it may be
-/// the last one.
+/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
 fn lower<D: Likelihood>(
     data: &D,
+    detail: Detail,
     values: &[f64],
     at: &Sums,
     weights: &[f64; OUTPUTS],
     damping: &mut f64,
-    last: bool,
     trial: &mut D::Response,
 ) -> Option<(Vec<f64>, Sums)> {
     while *damping < MOST_DAMPING {
         if let Some(d) = step(at, *damping) {
             let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
-            let possible = if last { data.respond(&next, trial) } else { data.respond_roughly(&next, trial) };
-            if possible.is_ok() {
+            if data.respond(detail, &next, trial).is_ok() {
                 let sums = data.sums(trial, weights);
                 let gain = at.weighted_square - sums.weighted_square;
                 if gain > 0.0 {
@@ -251,7 +287,7 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
         Identified::Determined { root, condition_number, .. } => {
             fit.condition_number = Some(condition_number);
             let bounds = cramer_rao::bounds(&root, data, fit);
-            (fit.covariance, fit.covariance_corrected) = bounds.map(|b| (b.covariance, b.corrected)).unzip();
+            (fit.covariance, fit.covariance_corrected) = (Some(bounds.covariance), Some(bounds.corrected));
         }
         Identified::Undetermined { condition_number, parameters } => {
             fit.condition_number = condition_number;

@@ -4,8 +4,7 @@
 //! Beside them the rows of a whole pass are added up over blocks of samples: what the corrected bounds see the
 //! sensitivities through, so that they need no pass of their own.
 //!
-//! Σ s sᵀ is most of the work. Far from the minimum it may be that of every fourth sample, times four: it says where to go
-//! well enough, while gradient and cost are those of all samples.
+//! A coarse pass leaves out samples; its sums count the others as many times.
 //!
 //! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one symmetric matrix, updated
 //! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
@@ -18,7 +17,7 @@ use pulp::Simd;
 
 use super::case::Measurements;
 use super::course::{Meanwhile, Nothing};
-use super::kernel::Sink;
+use super::kernel::{Sink, Spaced};
 use super::lanes::{Aligned, Lanes, VECTOR};
 use crate::dynamics::OUTPUTS;
 
@@ -31,9 +30,9 @@ pub(super) struct Normal {
     moments: [Aligned; OUTPUTS],
     /// Samples that count.
     counts: [usize; OUTPUTS],
-    /// The squares are of every so many samples.
-    every: usize,
-    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole squares only.
+    /// The sums are of every so many samples.
+    stride: usize,
+    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole sums only.
     blocks: Aligned,
     block: usize,
     samples: usize,
@@ -51,7 +50,7 @@ impl Normal {
             squares: std::array::from_fn(|_| Aligned::zeros(width * width)),
             moments: std::array::from_fn(|_| Aligned::zeros(width)),
             counts: [0; OUTPUTS],
-            every: 1,
+            stride: 1,
             blocks: Aligned::default(),
             block: block.max(1),
             samples,
@@ -61,11 +60,11 @@ impl Normal {
         }
     }
 
-    /// Begins anew, with the squares of every so many samples, a divisor of a chunk's.
-    pub fn clear(&mut self, every: usize) {
+    /// Begins anew, with every so many samples.
+    pub fn clear(&mut self, stride: usize) {
         self.squares.iter_mut().chain(&mut self.moments).for_each(|sums| sums.slice_mut().fill(0.0));
-        (self.counts, self.every) = ([0; OUTPUTS], every);
-        let blocks = if every == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
+        (self.counts, self.stride) = ([0; OUTPUTS], stride);
+        let blocks = if stride == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
         if self.blocks.slice().len() == blocks {
             self.blocks.slice_mut().fill(0.0);
         } else if blocks > 0 {
@@ -96,23 +95,23 @@ impl Normal {
         count
     }
 
-    /// Whether the squares are of all samples.
-    pub fn whole(&self) -> bool {
-        self.every == 1
+    /// Whether the sums are of all samples.
+    fn whole(&self) -> bool {
+        self.stride == 1
     }
 
     /// Samples of an output that count.
     pub fn count(&self, output: usize) -> usize {
-        self.counts[output]
+        self.stride * self.counts[output]
     }
 
     /// Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
-        self.moments[output].slice()[self.lanes.residual]
+        self.stride as f64 * self.moments[output].slice()[self.lanes.residual]
     }
 
     fn at(&self, output: usize, i: usize, j: usize) -> f64 {
-        self.every as f64 * self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
+        self.stride as f64 * self.squares[output].slice()[i.max(j) * self.lanes.width() + i.min(j)]
     }
 
     /// The lane of each parameter; of a bias that of the ones, and the output where alone it is.
@@ -128,7 +127,7 @@ impl Normal {
         let lanes = self.parameters();
         let of = |(lane, only): (usize, Option<usize>)| -> f64 {
             let outputs = (0..OUTPUTS).filter(|o| only.is_none_or(|only| only == *o));
-            outputs.map(|o| weights[o] * self.moments[o].slice()[lane]).sum()
+            outputs.map(|o| self.stride as f64 * weights[o] * self.moments[o].slice()[lane]).sum()
         };
         DVector::from_iterator(lanes.len(), lanes.iter().map(|lane| of(*lane)))
     }
@@ -145,7 +144,7 @@ impl Normal {
         let width = self.lanes.width();
         let mut sum = vec![0.0; width * width];
         for (squares, w) in self.squares.iter().zip(weights) {
-            let factor = w * self.every as f64;
+            let factor = w * self.stride as f64;
             sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s);
         }
         let lanes = self.parameters();
@@ -176,18 +175,18 @@ impl Sink for Summing<'_> {
     fn take<S: Simd>(
         &mut self,
         simd: S,
-        first: usize,
+        samples: Spaced,
         outputs: &[[f64; OUTPUTS]],
         rows: &mut [f64],
         meanwhile: &mut impl Meanwhile,
     ) {
-        let Normal { squares, moments, counts, every, lanes, blocks, block, .. } = &mut *self.normal;
+        let Normal { squares, moments, counts, stride, lanes, blocks, block, .. } = &mut *self.normal;
         let width = lanes.width();
         for (k, y) in outputs.iter().enumerate() {
             for o in 0..OUTPUTS {
                 let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
-                if self.measurements.used[first + k][o] {
-                    row[lanes.residual] = self.measurements.values[first + k][o] - y[o];
+                if self.measurements.used[samples.at(k)][o] {
+                    row[lanes.residual] = self.measurements.values[samples.at(k)][o] - y[o];
                     row[lanes.one] = 1.0;
                     counts[o] += 1;
                 } else {
@@ -195,14 +194,13 @@ impl Sink for Summing<'_> {
                 }
             }
         }
-        if *every == 1 {
-            add_blocks(simd, first, *block, rows, outputs.len(), blocks.slice_mut());
+        if *stride == 1 {
+            add_blocks(simd, samples.first, *block, rows, outputs.len(), blocks.slice_mut());
         }
         for o in 0..OUTPUTS {
             let all = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
             all.add_moments(simd, lanes.residual, moments[o].slice_mut());
-            let rows = Rows { stride: *every * all.stride, samples: all.samples.div_ceil(*every), ..all };
-            rows.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
+            all.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
         }
     }
 }
@@ -239,7 +237,7 @@ const SAMPLES_BETWEEN: usize = 4;
 
 /// Rows of some samples, `stride` apart.
 #[derive(Clone, Copy)]
-pub(super) struct Rows<'a> {
+pub(crate) struct Rows<'a> {
     pub values: &'a [f64],
     pub stride: usize,
     pub samples: usize,
@@ -255,7 +253,7 @@ impl Rows<'_> {
 
     /// The same while something else goes on.
     #[inline(always)]
-    pub fn add_squares_beside<S: Simd>(
+    pub(super) fn add_squares_beside<S: Simd>(
         self,
         simd: S,
         used: &[usize],

@@ -35,19 +35,19 @@ impl<const NX: usize> Propagators<NX> {
         d: [[[0.0; CHUNK]; COEFFICIENTS]; OUTPUTS],
     };
 
-    /// The outputs at a sample of the chunk that begins at `first`, and their slopes.
+    /// The outputs at a sample of the chunk, the sample `whole` of the maneuver, and their slopes.
     #[inline(always)]
     pub fn read<E: Equations<NX>>(
         &mut self,
         case: &Case<NX, E>,
         near: &Near<NX>,
         path: &Path<NX>,
-        first: usize,
+        whole: usize,
         sample: usize,
     ) -> [f64; OUTPUTS] {
         let x = &path.states[sample];
         let c = near.coefficients::<E>(2 * sample, x);
-        let read = E::outputs(&case.known[2 * (first + sample)], &case.sensed[first + sample], x, &c);
+        let read = E::outputs(&case.known[2 * whole], &case.sensed[whole], x, &c);
         for &(o, k) in E::OUTPUTS_BY_COEFFICIENT {
             self.d[o][k][sample] = read.by_coefficient[(o, k)];
         }
@@ -59,11 +59,11 @@ impl<const NX: usize> Propagators<NX> {
         read.outputs.into()
     }
 
-    /// Φ and Γ of all steps of a chunk.
+    /// Φ and Γ of a chunk's steps.
     #[inline(always)]
-    pub fn set<S: Simd, E: Equations<NX>>(&mut self, simd: S, path: &Path<NX>, step_s: f64) {
+    pub fn set<S: Simd, E: Equations<NX>>(&mut self, simd: S, path: &Path<NX>, samples: usize, step_s: f64) {
         let h = step_s;
-        for at in (0..CHUNK).step_by(S::F64_LANES) {
+        for at in (0..samples).step_by(S::F64_LANES) {
             // M of the last stage is h/6 alone.
             let (mut m, mut product) = ([[simd.splat_f64s(0.0); NX]; NX], [[simd.splat_f64s(0.0); NX]; NX]);
             let mut phi = [[simd.splat_f64s(0.0); NX]; NX];

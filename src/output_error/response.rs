@@ -3,10 +3,10 @@
 
 use pulp::Simd;
 
-use super::case::Case;
+use super::case::{Case, WIDEST_STRIDE};
 use super::coloured::samples_of_block;
 use super::course::Meanwhile;
-use super::kernel::Sink;
+use super::kernel::{Sink, Spaced};
 use super::lanes::Aligned;
 use super::normal::{Normal, Summing};
 use crate::dynamics::{Equations, OUTPUTS};
@@ -24,6 +24,21 @@ pub struct Response {
 pub struct Diverged {
     pub sample: usize,
 }
+
+/// How much of a maneuver a response looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Integrated in steps of about [`COARSE_STEP_S`] and compared at their ends only: near the minimum, at a fraction of
+    /// the work.
+    Coarse,
+    /// Sample by sample.
+    Whole,
+}
+
+/// Steps by which a maneuver's slow motion is followed well, though not its surfaces, s.
+pub const COARSE_STEP_S: f64 = 0.1;
+/// So many samples a parameter are left at least.
+const SAMPLES_A_PARAMETER: usize = 8;
 
 /// The slopes of every output along every parameter at every sample, zero where a sample does not count.
 #[derive(Clone, Debug, Default)]
@@ -60,15 +75,15 @@ impl Sink for Keeping<'_> {
     fn take<S: Simd>(
         &mut self,
         _: S,
-        first: usize,
+        samples: Spaced,
         outputs: &[[f64; OUTPUTS]],
         rows: &mut [f64],
         _: &mut impl Meanwhile,
     ) {
         let row = OUTPUTS * self.kept.width;
-        let kept = &mut self.kept.rows.slice_mut()[first * row..][..outputs.len() * row];
+        let kept = &mut self.kept.rows.slice_mut()[samples.first * row..][..outputs.len() * row];
         kept.copy_from_slice(&rows[..outputs.len() * row]);
-        for (row, used) in kept.chunks_exact_mut(row).zip(&self.used[first..]) {
+        for (row, used) in kept.chunks_exact_mut(row).zip(&self.used[samples.first..]) {
             for (o, row) in row.chunks_exact_mut(self.kept.width).enumerate() {
                 if used[o] {
                     self.biases.iter().for_each(|(lane, output)| row[*lane] = f64::from(u8::from(*output == o)));
@@ -101,25 +116,34 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
     pub fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
-        self.respond_every(1, parameters, response)
+        self.respond_with(Detail::Whole, parameters, response)
     }
 
-    /// The same, with an information matrix of every few samples where there are plenty: at least so many rows of five
-    /// outputs a parameter are left.
+    /// The same in less detail, of which only the sums are of use.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
-    pub fn respond_roughly(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
-        const ROWS_A_PARAMETER: usize = 8;
-        let plenty = self.samples() / (ROWS_A_PARAMETER * self.parameters().max(1));
-        let every = if plenty >= 4 { 4 } else { plenty.clamp(1, 2) };
-        self.respond_every(every, parameters, response)
+    pub fn respond_with(&self, detail: Detail, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+        let stride = match detail {
+            Detail::Coarse => self.coarse_stride(),
+            Detail::Whole => 1,
+        };
+        let Response { outputs, normal } = response;
+        normal.clear(stride);
+        self.pass(parameters, stride, outputs, &mut Summing { normal, measurements: &self.measurements })
     }
 
-    fn respond_every(&self, every: usize, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
-        let Response { outputs, normal } = response;
-        normal.clear(every);
-        self.pass(parameters, outputs, &mut Summing { normal, measurements: &self.measurements })
+    /// Whether coarse steps are longer than the samples' own.
+    #[must_use]
+    pub fn has_coarse(&self) -> bool {
+        self.coarse_stride() > 1
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    fn coarse_stride(&self) -> usize {
+        let within = (COARSE_STEP_S / self.step_s).round() as usize;
+        let spare = self.samples() / (SAMPLES_A_PARAMETER * self.parameters().max(1));
+        within.min(spare).clamp(1, WIDEST_STRIDE)
     }
 
     /// The sensitivities to all parameters.
@@ -136,7 +160,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         };
         let biases = lanes.biases.iter().copied().zip(self.biased.iter().copied()).collect();
         let mut keeping = Keeping { kept: &mut kept, used: &self.measurements.used, biases };
-        self.pass(parameters, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut keeping)?;
+        self.pass(parameters, 1, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut keeping)?;
         Ok(kept)
     }
 }

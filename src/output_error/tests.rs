@@ -1,6 +1,7 @@
 //! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for the bounds.
 
 mod calibration;
+mod coarse;
 mod joint;
 
 use std::collections::BTreeMap;

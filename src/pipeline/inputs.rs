@@ -204,7 +204,7 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
     let classes: Value = config.classes.iter().map(class).collect();
     let estimate = &config.estimate;
     let template = config.template.as_ref().map(fingerprint);
-    let at = config.report.histories_at_alpha_deg;
+    let (at, pages) = (config.report.histories_at_alpha_deg, config.report.maneuver_pages);
     [
         (
             Stage::Ingest,
@@ -234,6 +234,7 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
                 ("title", value(&config.title)),
                 ("template", value(&template)),
                 ("histories_at_alpha_deg", value(&at)),
+                ("maneuver_pages", value(&pages)),
             ]),
         ),
     ]

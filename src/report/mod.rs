@@ -12,6 +12,7 @@ mod histories;
 mod marks;
 mod notation;
 mod overnight;
+pub mod pages;
 pub mod pdf;
 mod predictions;
 mod provenance;
@@ -74,7 +75,8 @@ pub struct Contents<'a> {
     pub instruments: &'a [InstrumentRow],
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
-    /// Time histories of the maneuvers, thinned to what a drawing can show.
+    /// The maneuvers that have a page ([`pages::chosen`]), and their time histories, thinned to what a drawing can show.
+    pub pages: &'a BTreeSet<String>,
     pub histories: &'a [History],
     /// A class is shown by its maneuver nearest to this angle of attack.
     pub typical_alpha_deg: f64,
@@ -210,6 +212,18 @@ fn trend_in_words(trend: &TrendRow) -> String {
     format!("trend of {}: {maneuvers}, order {}, scatter {scatter}", trend.group, trend.order)
 }
 
+/// That not every maneuver has a page, where that is so.
+fn without_page(contents: &Contents) -> String {
+    let (all, with) = (contents.maneuvers.len(), contents.pages.len());
+    if with >= all {
+        return String::new();
+    }
+    format!(
+        "{with} of {all} maneuvers have a page below: those that stand for their class, changed since the night before or \
+         failed, and some of the others; `harvest show maneuver` draws any of them"
+    )
+}
+
 /// Every maneuver with its flight condition and how its fit ended.
 fn maneuvers(contents: &Contents) -> TableView {
     let fits = summary::fits_by_maneuver(contents);
@@ -250,7 +264,8 @@ fn maneuvers(contents: &Contents) -> TableView {
         "left out, %",
         "reason",
     ];
-    let mut table = TableView::new("Maneuvers", "", &heads, contents.maneuvers.iter().map(row).collect());
+    let mut table =
+        TableView::new("Maneuvers", &without_page(contents), &heads, contents.maneuvers.iter().map(row).collect());
     let (marks, anchors) = (gallery::marks(contents), sheets::anchors(contents));
     let anchor = |m: &Maneuver| anchors.get(m.maneuver_id.as_str()).cloned().unwrap_or_default();
     table.links = contents.maneuvers.iter().map(anchor).collect();

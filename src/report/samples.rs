@@ -1,5 +1,7 @@
 //! A small campaign with every kind of row, for the tests of the report.
 
+use std::collections::BTreeSet;
+
 use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::Problem;
@@ -27,6 +29,7 @@ pub struct Campaign {
     pub instruments: Vec<InstrumentRow>,
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
+    pub pages: BTreeSet<String>,
     pub histories: Vec<History>,
     pub provenance: Provenance,
     pub order: Vec<String>,
@@ -54,6 +57,7 @@ impl Campaign {
             instruments: &self.instruments,
             events: &self.events,
             problems: &self.problems,
+            pages: &self.pages,
             histories: &self.histories,
             typical_alpha_deg: 30.0,
             provenance: &self.provenance,
@@ -194,6 +198,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             held_because: None,
         });
     }
+    campaign.pages.insert(maneuver_id.clone());
     campaign.histories.push(history(&maneuver_id, class, alpha_deg));
 }
 

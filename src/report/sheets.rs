@@ -29,13 +29,18 @@ pub struct Sheet {
     pub problems: Vec<String>,
 }
 
-/// Where the page of each maneuver is.
+/// Where the page of each maneuver that has one is.
 #[must_use]
 pub fn anchors<'a>(contents: &Contents<'a>) -> BTreeMap<&'a str, String> {
-    contents.maneuvers.iter().enumerate().map(|(i, m)| (m.maneuver_id.as_str(), format!("m{}", i + 1))).collect()
+    with_page(contents).map(|(i, m)| (m.maneuver_id.as_str(), format!("m{}", i + 1))).collect()
 }
 
-/// A page per maneuver, in their order.
+fn with_page<'a>(contents: &Contents<'a>) -> impl Iterator<Item = (usize, &'a Maneuver)> {
+    let pages = contents.pages;
+    contents.maneuvers.iter().enumerate().filter(|(_, m)| pages.contains(&m.maneuver_id))
+}
+
+/// A page per maneuver that has one, in their order.
 #[must_use]
 pub fn sheets(contents: &Contents) -> Vec<Sheet> {
     let of = Rows {
@@ -46,7 +51,7 @@ pub fn sheets(contents: &Contents) -> Vec<Sheet> {
         predictions: by_name(contents.predictions, |p| &p.maneuver_id),
         problems: by_name(contents.problems, |p| &p.place),
     };
-    contents.maneuvers.iter().enumerate().map(|(i, maneuver)| of.sheet(maneuver, i + 1)).collect()
+    with_page(contents).map(|(i, maneuver)| of.sheet(maneuver, i + 1)).collect()
 }
 
 /// What is known, by maneuver.

@@ -133,7 +133,13 @@ impl Store {
     /// Whether an artefact, by its name relative to the store, is as it was written; not a record, which has no seal.
     #[must_use]
     pub fn is_whole(&self, name: &str) -> bool {
-        std::fs::read(self.folder.join(name)).is_ok_and(|bytes| unsealed(&bytes).is_some())
+        self.holds(&self.folder.join(name))
+    }
+
+    /// Whether there is an artefact at a path that is as it was written; not a record, which has no seal.
+    #[must_use]
+    pub fn holds(&self, path: &Path) -> bool {
+        std::fs::read(path).is_ok_and(|bytes| unsealed(&bytes).is_some())
     }
 
     /// Notes that what is published in this folder is made of this store's artefacts, so that none of them is removed.

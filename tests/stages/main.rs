@@ -11,6 +11,7 @@ mod faults;
 mod fuzz;
 mod house;
 mod ingest;
+mod memory;
 mod nights;
 mod paper;
 mod report;

@@ -9,11 +9,13 @@
 //! An accelerometer on an arm r feels ω̇ × r besides. So that no rate is differentiated the state is, component by component,
 //! the velocity at the sensor of that component, `s_i` = (v + ω × `r_i`)_i: its rate has no ω̇.
 
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::instruments::{INPUTS, OUTPUTS};
 use crate::aircraft::{Aircraft, Flow, Position};
-use crate::dynamics::lever;
+use crate::dynamics::{lever, sin_cos};
 use crate::ingest::motion::atmosphere;
 use crate::units::DEG;
 
@@ -56,11 +58,24 @@ pub struct Readings {
     pub by_rates: SMatrix<f64, OUTPUTS, 3>,
 }
 
+/// Where the slopes of the rates of each state can be other than zero: along which states, along which inputs.
+pub const RATES_BY_STATE: [&[usize]; STATES] =
+    [&[1, 2, 4], &[0, 2, 3, 4], &[0, 1, 3, 4], &[3, 4], &[3], &[3, 4], &[0, 1, 2, 3, 4]];
+pub const RATES_BY_INPUT: [&[usize]; STATES] =
+    [&[0, 1, 2, 3], &[0, 1, 2, 4], &[0, 1, 2, 5], &[0, 1, 2], &[1, 2], &[1, 2], &[0, 1, 2]];
+/// The same of each reading: along which states, along which body rates.
+pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] =
+    [&[0, 1, 2], &[0, 1, 2], &[0, 1, 2], &[4], &[3], &[5], &[6], &[0, 1, 2, 6], &[0, 1, 2, 6]];
+pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] =
+    [&[0, 1, 2], &[0, 1, 2], &[0, 1, 2], &[], &[], &[], &[], &[0, 1, 2], &[0, 1, 2]];
+
+#[inline(always)]
 fn vector(omega: &Driven) -> Vector3<f64> {
     Vector3::new(omega[0], omega[1], omega[2])
 }
 
 /// The velocity at the c.g. and its slopes along ω.
+#[inline(always)]
 fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix3<f64>) {
     let mut velocity = Vector3::new(x[0], x[1], x[2]);
     let mut by_rates = Matrix3::zeros();
@@ -75,10 +90,11 @@ fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix
 }
 
 /// The rates of the states.
+#[inline(always)]
 pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
     let omega = vector(input);
     let (velocity, velocity_by_rates) = at_cg(x, omega, known);
-    let ((sp, cp), (st, ct)) = (x[3].sin_cos(), x[4].sin_cos());
+    let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
     let g = known.gravity;
     let turning = omega + known.earth;
     let mut out = Motion { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
@@ -106,6 +122,7 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
 }
 
 /// Rates of φ, θ, ψ for body rates relative to the horizon.
+#[inline(always)]
 fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
     let tan = st / ct;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
@@ -131,6 +148,7 @@ fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (
 }
 
 /// Rate of climb.
+#[inline(always)]
 fn climb(out: &mut Motion, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
     out.rates[6] = up.dot(&v);
@@ -143,6 +161,7 @@ fn climb(out: &mut Motion, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): 
 }
 
 /// What the output instruments read: α and β vanes, V, θ, φ, ψ, altitude, q̄ and Mach, in deg, ft/s, ft, lbf/ft².
+#[inline(always)]
 pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -> Readings {
     let omega = vector(input);
     let (v, v_by_rates) = at_cg(x, omega, known);

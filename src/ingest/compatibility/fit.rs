@@ -8,6 +8,9 @@
 //! of each parameter as if nothing had been thought of it before, and the one that is surest beyond the ordinary is freed,
 //! until none is; what comes out as large as a fault but not as sure as one is thought ordinary again. A delay common to
 //! all channels is no error: the mean of the delays, with the weights 1/P, is zero.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
+use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
@@ -15,10 +18,10 @@ use rayon::prelude::*;
 
 use super::Compatibility;
 use super::instruments::{ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size};
-use super::response::{LOCAL, Local, ROW, Response, respond, shared_place};
+use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
-use crate::output_error::coloured;
+use crate::output_error::{Aligned, Rows, VECTOR, coloured};
 
 /// Rounds of re-estimating R and P, and steps within each.
 const ROUNDS: usize = 6;
@@ -65,11 +68,21 @@ struct Sums {
     cost: f64,
 }
 
-/// Sums of one output with unit weight: Σ s sᵀ (lower triangle), Σ s v, Σ v².
-struct Raw {
-    information: [f64; ROW * ROW],
-    gradient: [f64; ROW],
-    square: f64,
+/// Sums of one output with unit weight: of its rows (s, v) Σ of their squares, row by row; the lower triangle counts.
+struct Raw(Aligned);
+
+impl Raw {
+    fn information(&self, i: usize, j: usize) -> f64 {
+        self.0.slice()[i.max(j) * WIDE + i.min(j)]
+    }
+
+    fn gradient(&self, i: usize) -> f64 {
+        self.information(RESIDUAL, i)
+    }
+
+    fn square(&self) -> f64 {
+        self.information(RESIDUAL, RESIDUAL)
+    }
 }
 
 /// One window with its own parameters.
@@ -82,7 +95,8 @@ struct Member<'a> {
     sums: Sums,
     /// The window's information and gradient on the shared parameters when its own follow.
     reduced: (DMatrix<f64>, DVector<f64>),
-    response: Response,
+    /// Of each output at every sample; zero where it does not count.
+    residuals: [Vec<f64>; OUTPUTS],
 }
 
 struct Problem<'a> {
@@ -169,6 +183,11 @@ fn total(members: &[Member]) -> DMatrix<f64> {
 }
 
 impl Problem<'_> {
+    /// The samples of a window whose outputs are compared: a delay does not reach beyond the ends.
+    fn compared(&self, window: &Window) -> Range<usize> {
+        self.margin..window.samples.saturating_sub(self.margin)
+    }
+
     /// Steps until the parameters settle, then R anew; how many steps.
     fn settle(
         &self,
@@ -375,17 +394,11 @@ impl<'a> Member<'a> {
         variances: [f64; OUTPUTS],
         shared: &[f64; PARAMETERS],
     ) -> Option<Member<'a>> {
-        let response = respond(window, problem.aircraft, &local, shared)?;
-        let mut member = Member {
-            window,
-            local,
-            variances,
-            raw: Vec::new(),
-            sums: Sums::none(),
-            reduced: (DMatrix::zeros(0, 0), DVector::zeros(0)),
-            response,
-        };
-        member.raw = (0..OUTPUTS).map(|o| member.raw(problem, o)).collect();
+        let mut summing = Summing::over(window);
+        respond(window, problem.aircraft, &local, shared, problem.compared(window), &mut summing)?;
+        let (raw, residuals) = summing.finished();
+        let (sums, reduced) = (Sums::none(), (DMatrix::zeros(0, 0), DVector::zeros(0)));
+        let mut member = Member { window, local, variances, raw, sums, reduced, residuals };
         member.weigh(problem);
         Some(member)
     }
@@ -403,22 +416,12 @@ impl<'a> Member<'a> {
         Member::at(self.window, problem, local, self.variances, shared)
     }
 
-    /// The samples whose outputs are compared: a delay does not reach beyond the ends.
-    fn compared(&self, problem: &Problem) -> std::ops::Range<usize> {
-        problem.margin..self.window.samples.saturating_sub(problem.margin)
-    }
-
-    fn raw(&self, problem: &Problem, o: usize) -> Raw {
-        let (compared, measured) = (self.compared(problem), &self.window.outputs[o]);
-        Arch::new().dispatch(Summing { compared, measured, response: &self.response, output: o })
-    }
-
     /// The outputs' sums together, each with its weight 1/R.
     fn weigh(&mut self, problem: &Problem) {
         let mut sums = Sums::none();
         for (o, raw) in self.raw.iter().enumerate() {
             let weight = 1.0 / self.variances[o];
-            sums.cost += weight * raw.square;
+            sums.cost += weight * raw.square();
             sums.add(o, weight, raw);
         }
         let wind = problem.settings.wind_change_ft_s2;
@@ -434,17 +437,18 @@ impl<'a> Member<'a> {
     /// Of one output: the squares of the slow part of what the equations leave, and of the motion that they explain.
     fn unexplained(&self, problem: &Problem, o: usize) -> (f64, f64) {
         let measured = &self.window.outputs[o];
-        let known = self.compared(problem).filter(|k| measured[*k].is_finite());
-        let both = known.map(|k| (measured[k], self.response.output(k, o).0));
-        let (residuals, values): (Vec<f64>, Vec<f64>) = both.map(|(y, h)| (y - h, h)).unzip();
+        let known = problem.compared(self.window).filter(|k| measured[*k].is_finite());
+        let both = known.map(|k| (self.residuals[o][k], measured[k] - self.residuals[o][k]));
+        let (residuals, values): (Vec<f64>, Vec<f64>) = both.unzip();
         (slow(&residuals), about_mean(&values))
     }
 
     /// R from the residuals, as strong as their slowest part.
     fn reweigh(&mut self, problem: &Problem) {
-        let range = self.compared(problem);
+        let range = problem.compared(self.window);
         for o in 0..OUTPUTS {
-            let residual = |k: usize| self.window.outputs[o][k] - self.response.output(k, o).0;
+            let counts = |k: usize| self.window.outputs[o][k].is_finite();
+            let residual = |k: usize| if counts(k) { self.residuals[o][k] } else { f64::NAN };
             let residuals: Vec<f64> = range.clone().map(residual).collect();
             let floor = 1e-3 * size(&problem.settings.ordinary, INPUTS + o, Kind::Bias);
             self.variances[o] = coloured::level(&residuals, self.window.step_s).max(floor * floor);
@@ -464,47 +468,76 @@ fn about_mean(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - mean).powi(2)).sum()
 }
 
-/// The sums of one output over some samples, compiled for the processor at hand.
+/// Rows of an output that are summed together.
+const CHUNK: usize = 16;
+/// Where the residual stands in a row.
+const RESIDUAL: usize = ROW;
+
+/// Sums what a window's outputs leave, chunk by chunk.
 struct Summing<'a> {
-    compared: std::ops::Range<usize>,
-    measured: &'a [f64],
-    response: &'a Response,
-    output: usize,
+    measured: &'a [Vec<f64>; OUTPUTS],
+    residuals: [Vec<f64>; OUTPUTS],
+    raw: Vec<Raw>,
+    /// Of each output the rows that are not summed yet, and how many.
+    rows: Aligned,
+    filled: [usize; OUTPUTS],
 }
 
-impl WithSimd for Summing<'_> {
-    type Output = Raw;
+impl<'a> Summing<'a> {
+    fn over(window: &'a Window) -> Summing<'a> {
+        Summing {
+            measured: &window.outputs,
+            residuals: std::array::from_fn(|_| vec![0.0; window.samples]),
+            raw: (0..OUTPUTS).map(|_| Raw(Aligned::zeros(WIDE * WIDE))).collect(),
+            rows: Aligned::zeros(OUTPUTS * CHUNK * WIDE),
+            filled: [0; OUTPUTS],
+        }
+    }
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Raw {
-        const VECTOR: usize = 8;
-        const WIDE: usize = ROW.next_multiple_of(VECTOR);
-        let mut raw = Raw { information: [0.0; ROW * ROW], gradient: [0.0; ROW], square: 0.0 };
-        let mut squares = [[0.0; WIDE]; ROW];
-        let mut wide = [0.0; WIDE];
-        for k in self.compared {
-            let measured = self.measured[k];
-            if !measured.is_finite() {
-                continue;
-            }
-            let (value, row) = self.response.output(k, self.output);
-            let residual = measured - value;
-            raw.square += residual * residual;
-            wide[..ROW].copy_from_slice(&row);
-            for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                raw.gradient[i] += a * residual;
-                // Whole vectors up to the diagonal.
-                for block in (0..=i).step_by(VECTOR) {
-                    for c in block..block + VECTOR {
-                        squares[i][c] += a * wide[c];
-                    }
-                }
-            }
+    fn sum<S: Simd>(&mut self, simd: S, output: usize) {
+        let values = &self.rows.slice()[output * CHUNK * WIDE..];
+        let rows = Rows { values, stride: WIDE, samples: self.filled[output] };
+        rows.add_squares(simd, &[VECTOR; WIDE / VECTOR], self.raw[output].0.slice_mut(), WIDE);
+        self.filled[output] = 0;
+    }
+
+    /// The sums and the residuals.
+    fn finished(mut self) -> (Vec<Raw>, [Vec<f64>; OUTPUTS]) {
+        Arch::new().dispatch(Finish(&mut self));
+        (self.raw, self.residuals)
+    }
+}
+
+/// Sums what is left.
+struct Finish<'a, 'b>(&'a mut Summing<'b>);
+
+impl WithSimd for Finish<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        (0..OUTPUTS).for_each(|output| self.0.sum(simd, output));
+    }
+}
+
+impl Sink for Summing<'_> {
+    #[inline(always)]
+    fn looks_at(&self, sample: usize, output: usize) -> bool {
+        self.measured[output][sample].is_finite()
+    }
+
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, simd: S, sample: usize, output: usize, value: f64, row: &mut Row) {
+        let residual = self.measured[output][sample] - value;
+        self.residuals[output][sample] = residual;
+        row[RESIDUAL] = residual;
+        let place = output * CHUNK + self.filled[output];
+        self.rows.slice_mut()[place * WIDE..][..WIDE].copy_from_slice(row);
+        self.filled[output] += 1;
+        if self.filled[output] == CHUNK {
+            self.sum(simd, output);
         }
-        for i in 0..ROW {
-            raw.information[i * ROW..][..=i].copy_from_slice(&squares[i][..=i]);
-        }
-        raw
     }
 }
 
@@ -524,7 +557,7 @@ impl Sums {
     fn add(&mut self, o: usize, weight: f64, raw: &Raw) {
         for i in 0..ROW {
             for j in 0..ROW {
-                let h = weight * raw.information[i.max(j) * ROW + i.min(j)];
+                let h = weight * raw.information(i, j);
                 match (i < LOCAL, j < LOCAL) {
                     (true, true) => self.ll[(i, j)] += h,
                     (true, false) => self.ls[(i, shared_place(j, o))] += h,
@@ -533,9 +566,9 @@ impl Sums {
                 }
             }
             if i < LOCAL {
-                self.gl[i] += weight * raw.gradient[i];
+                self.gl[i] += weight * raw.gradient(i);
             } else {
-                self.gs[shared_place(i, o)] += weight * raw.gradient[i];
+                self.gs[shared_place(i, o)] += weight * raw.gradient(i);
             }
         }
     }

@@ -2,10 +2,11 @@
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};
+use pulp::Simd;
 
 use super::equations::{self, Driven, Known, STATES, State, rates, readings};
 use super::instruments::{INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place};
-use super::response::{LOCAL, ROW, respond, shared_place};
+use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{self, Window, factor};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
@@ -95,6 +96,20 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
         down[j] -= 1e-6;
         let (up, down) = (read(&state(), &up).values, read(&state(), &down).values);
         (0..OUTPUTS).for_each(|o| assert_abs_diff_eq!(at.by_rates[(o, j)], (up[o] - down[o]) / 2e-6, epsilon = 1e-5));
+    }
+}
+
+#[test]
+fn the_patterns_name_every_slope_that_is_not_zero() {
+    let (at, read) = (rates(&state(), &INPUT, &known()), readings(&aircraft(), &state(), &INPUT, &known()));
+    let nonzero = |row: &dyn Fn(usize) -> f64, count: usize| (0..count).filter(|j| row(*j) != 0.0).collect::<Vec<_>>();
+    for i in 0..STATES {
+        assert_eq!(nonzero(&|j| at.by_state[(i, j)], STATES), equations::RATES_BY_STATE[i], "state {i}");
+        assert_eq!(nonzero(&|j| at.by_input[(i, j)], INPUTS), equations::RATES_BY_INPUT[i], "state {i}");
+    }
+    for o in 0..OUTPUTS {
+        assert_eq!(nonzero(&|j| read.by_state[(o, j)], STATES), equations::READINGS_BY_STATE[o], "output {o}");
+        assert_eq!(nonzero(&|j| read.by_rates[(o, j)], 3), equations::READINGS_BY_RATES[o], "output {o}");
     }
 }
 
@@ -222,6 +237,19 @@ fn windows(record: &Record) -> Vec<Window> {
     window::choose(record, &settings).into_iter().map(|w| Window::of(record, w, &aircraft(), &settings)).collect()
 }
 
+/// Keeps the outputs of one sample.
+struct Outputs([(f64, Row); OUTPUTS]);
+
+impl Sink for Outputs {
+    fn looks_at(&self, _: usize, _: usize) -> bool {
+        true
+    }
+
+    fn take<S: Simd>(&mut self, _: S, _: usize, output: usize, value: f64, row: &mut Row) {
+        self.0[output] = (value, *row);
+    }
+}
+
 #[test]
 fn sensitivities_are_those_of_finite_differences() {
     let record = flight(12.0);
@@ -232,14 +260,19 @@ fn sensitivities_are_those_of_finite_differences() {
     let mut local = [0.0; LOCAL];
     local.iter_mut().zip(window.start.iter()).for_each(|(l, x)| *l = *x);
     local[STATES..].copy_from_slice(&[0.05, -0.1, 0.08]);
-    let at = respond(&window, &aircraft(), &local, &shared).unwrap();
     let (k, h) = (window.samples - 40, 1e-6);
+    let outputs = |local: &Local, shared: &[f64; PARAMETERS]| {
+        let mut outputs = Outputs([(0.0, [0.0; WIDE]); OUTPUTS]);
+        respond(&window, &aircraft(), local, shared, k..k + 1, &mut outputs).unwrap();
+        outputs.0
+    };
+    let at = outputs(&local, &shared);
     let compare =
-        |column: usize, outputs: &dyn Fn(usize) -> bool, size: f64, change: &dyn Fn(f64) -> response::Response| {
+        |column: usize, compared: &dyn Fn(usize) -> bool, size: f64, change: &dyn Fn(f64) -> [(f64, Row); OUTPUTS]| {
             let (up, down) = (change(h * size), change(-h * size));
-            for o in (0..OUTPUTS).filter(|o| outputs(*o)) {
-                let numeric = (up.output(k, o).0 - down.output(k, o).0) / (2.0 * h * size);
-                let exact = at.output(k, o).1[column];
+            for o in (0..OUTPUTS).filter(|o| compared(*o)) {
+                let numeric = (up[o].0 - down[o].0) / (2.0 * h * size);
+                let exact = at[o].1[column];
                 let scale = numeric.abs().max(1.0);
                 assert!((exact - numeric).abs() < 2e-4 * scale, "output {o}, column {column}: {exact} not {numeric}");
             }
@@ -249,7 +282,7 @@ fn sensitivities_are_those_of_finite_differences() {
         compare(j, &|_| true, size, &|d| {
             let mut moved = local;
             moved[j] += d;
-            respond(&window, &aircraft(), &moved, &shared).unwrap()
+            outputs(&moved, &shared)
         });
     }
     for column in LOCAL..ROW {
@@ -257,7 +290,7 @@ fn sensitivities_are_those_of_finite_differences() {
             compare(column, &|other| other == o, 1.0, &|d| {
                 let mut moved = shared;
                 moved[shared_place(column, o)] += d;
-                respond(&window, &aircraft(), &local, &moved).unwrap()
+                outputs(&local, &moved)
             });
         }
     }

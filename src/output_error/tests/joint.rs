@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::super::cramer_rao::Considered;
-use super::super::{Joint, Likelihood};
+use super::super::{Detail, Joint, Likelihood};
 use super::*;
 
 type Longitudinals = Case<3, Longitudinal>;
@@ -69,7 +69,7 @@ fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
     }
     let mut response = joint.response();
     let mut sums = |parameters: &[f64]| {
-        joint.respond(parameters, &mut response).unwrap();
+        joint.respond(Detail::Whole, parameters, &mut response).unwrap();
         Likelihood::sums(&joint, &response, &TABLE)
     };
     let gradient = sums(&at).gradient;
