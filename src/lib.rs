@@ -4,7 +4,7 @@
 
 // Vocabulary: what the words mean.
 pub mod units;
-mod trig;
+pub mod trig;
 pub mod error;
 pub mod flight;
 pub mod aircraft;
