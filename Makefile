@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
+.PHONY: cluster object-store status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -102,6 +102,9 @@ torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; t
 cluster: build ## a campaign on a Slurm of this machine's own: plain, with a failing task, with a killed node
 	bash tests/cluster/slurm.sh target/release/harvest
 
+object-store: ## archive and store in an object store: the tests on an S3-compatible server of this machine's own
+	bash tests/cluster/s3.sh
+
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
 	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --release --locked --test stages -- fuzz:: --nocapture
@@ -111,7 +114,7 @@ bench: ## run the benchmarks
 
 lint: ## formatting and lints, as .ci/run has them
 	cargo fmt --check
-	cargo clippy --all-targets --locked -- -D warnings
+	cargo clippy --all-targets --features s3 --locked -- -D warnings
 
 clean: ## remove what runs made: data/store and the folders under reports (cargo clean removes the build)
 	rm -rf data/store reports/*/
@@ -119,7 +122,7 @@ clean: ## remove what runs made: data/store and the folders under reports (cargo
 help: ## this list
 	@echo 'make TARGET [PIPELINE=harv] [ARCHIVE=] [WIND_TUNNEL=] [EVENTS=] [AGAINST=] [STORE=] [REPORTS=] [THREADS=] [MEMORY_MB=]'
 	@echo
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo 'stages also take [WAIT=seconds for another run] [LOG=file]; make explain takes MANEUVER='
 	@echo 'make show takes FLIGHT= or MANEUVER=, an id as in the table maneuvers'

@@ -50,6 +50,10 @@ Examples:
   harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
+Archive and store may lie in an object store (s3://bucket/prefix) where harvest was built for it (cargo build --release
+--features s3). Credentials and endpoint are read from the environment alone: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY,
+AWS_SESSION_TOKEN, AWS_REGION, AWS_ENDPOINT_URL; AWS_ALLOW_HTTP=true for an endpoint without encryption.
+
 Exit codes:
   0  all well
   1  could not run: the configuration, the archive or the disk is at fault; the message says where
@@ -265,7 +269,8 @@ struct Options {
     /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its name under pipelines/
     #[arg(default_value = "harv")]
     pipeline: PathBuf,
-    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also partitioned as flight=…/
+    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also partitioned as flight=…/; or the
+    /// same in an object store, s3://bucket/prefix
     #[arg(long)]
     archive: Option<String>,
     /// Wind-tunnel database instead of the pipeline's: DAVE-ML (.dml, .xml), or CSV or Parquet with derivative, alpha_deg,
@@ -278,9 +283,13 @@ struct Options {
     /// Folder with the tables of an earlier campaign or night to compare with, besides the tunnel; may be given again
     #[arg(long, value_name = "FOLDER")]
     against: Vec<PathBuf>,
-    /// Folder of the intermediate artefacts [default: data/store/<pipeline>]
+    /// Folder of the intermediate artefacts, or a place in an object store, s3://bucket/prefix [default:
+    /// data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     store: Option<PathBuf>,
+    /// Of a store in an object store: the folder that keeps what was fetched or made here [default: data/store/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    store_cache: Option<PathBuf>,
     /// Folder of the tables and the report [default: reports/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     reports: Option<PathBuf>,
@@ -362,7 +371,8 @@ fn brought(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Res
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     if let Some(log) = log {
-        let folders = [&config.store, &config.reports].map(|f| f.display().to_string());
+        let folders =
+            [config.shared_store.as_ref().unwrap_or(&config.store), &config.reports].map(|f| f.display().to_string());
         let [store, reports] = folders;
         log.write(
             "begin",
@@ -534,6 +544,7 @@ impl Options {
             ("--wind-tunnel", self.wind_tunnel.as_deref().map(path)),
             ("--events", self.events.as_deref().map(path)),
             ("--store", self.store.as_deref().map(path)),
+            ("--store-cache", self.store_cache.as_deref().map(path)),
             ("--reports", self.reports.as_deref().map(path)),
             ("--memory-mb", self.memory_mb.map(|mb| mb.to_string())),
         ];
@@ -554,6 +565,7 @@ impl Options {
             archive: self.archive.clone(),
             wind_tunnel: self.wind_tunnel.clone(),
             store: self.store.clone(),
+            store_cache: self.store_cache.clone(),
             reports: self.reports.clone(),
             events: self.events.clone(),
             against: self.against.clone(),
@@ -610,7 +622,10 @@ fn check(options: &Options) -> anyhow::Result<ExitCode> {
         let [free, held, inactive] = [Status::Estimated, Status::Held, Status::Inactive].map(count);
         println!("  {:<10} {free:>7} {held:>5} {inactive:>9}  {}", class.name, class.title);
     }
-    println!("store      {}", config.store.display());
+    match &config.shared_store {
+        Some(shared) => println!("store      {}, kept in {}", shared.display(), config.store.display()),
+        None => println!("store      {}", config.store.display()),
+    }
     println!("reports    {}", config.reports.display());
     println!("The configuration is right.");
     Ok(ExitCode::SUCCESS)

@@ -4,6 +4,7 @@
 
 // Vocabulary: what the words mean.
 pub mod units;
+pub mod trig;
 pub mod error;
 pub mod flight;
 pub mod aircraft;

@@ -40,7 +40,6 @@ use crate::maneuver::{Event, Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::overnight::Changes;
 use crate::store::archive::FlightFiles;
-use crate::store::record_file::RecordFile;
 use crate::store::table::Shelf;
 use crate::store::{Contents, Digest, Fingerprint, Nights, Store, archive, table};
 use crate::tables::{
@@ -51,8 +50,8 @@ use crate::{estimate, report, trend};
 use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 5;
-const SEGMENT_VERSION: u32 = 5;
+const INGEST_VERSION: u32 = 6;
+const SEGMENT_VERSION: u32 = 6;
 const ESTIMATE_VERSION: u32 = 9;
 const JOINT_VERSION: u32 = 5;
 const PREDICT_VERSION: u32 = 4;
@@ -182,7 +181,10 @@ pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progres
         return Ok(done);
     }
     run.publish_into(nights.tonight()?);
-    let made = run.make(&files, until, &nights).and_then(|campaign| run.publish(&nights, &campaign, until));
+    let made = run.make(&files, until, &nights).and_then(|campaign| {
+        run.store.send_rest()?;
+        run.publish(&nights, &campaign, until)
+    });
     if made.is_err() {
         // What is left of tonight takes up room on a disk that may be full.
         nights.forget_tonight();
@@ -193,10 +195,9 @@ pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progres
 /// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
 fn begin<'a>(config: &'a Config, wait: Duration, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
     let files = archive::find(&config.archive)?;
-    let store = Store::open(&config.store, wait)?;
-    let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, store, contents, &files, progress)?;
-    run.contents.save()?;
+    let store = Store::open(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
+    let run = Run::of_store(config, store, &files, progress)?;
+    run.store.remember(&run.contents)?;
     Ok((run, files))
 }
 
@@ -330,26 +331,28 @@ impl Run<'_> {
         self.store.path("segment", &flight.flight_id, &fingerprint, "json")
     }
 
-    /// A flight's record, the analyst's events in it, and where what is found in it lies.
-    fn to_segment(&self, flight: &Flight) -> Result<(RecordFile, Vec<Event>, PathBuf)> {
-        let record = flight.open()?;
-        let events = flight.events(&self.config.events, &record.about);
+    /// The analyst's events in a flight, and where what is found in it lies. Only for events its record is looked at.
+    fn to_segment(&self, flight: &Flight) -> Result<(Vec<Event>, PathBuf)> {
+        let events = match self.config.events.as_slice() {
+            [] => Vec::new(),
+            events => flight.events(events, &flight.open(&self.store)?.about),
+        };
         let path = self.segment_path(flight, &events);
-        Ok((record, events, path))
+        Ok((events, path))
     }
 
     /// What was found in a flight and where that lies, if it is up to date.
     fn segmented(&self, flight: &Flight) -> Option<(PathBuf, Found)> {
-        let (_, _, path) = self.to_segment(flight).ok()?;
+        let (_, path) = self.to_segment(flight).ok()?;
         Some((path.clone(), self.store.load(&path)?))
     }
 
     fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
-        let (record, events, path) = self.to_segment(flight)?;
+        let (events, path) = self.to_segment(flight)?;
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
         }
-        let found = stretches::segmented(self.config, &record, &events)?;
+        let found = stretches::segmented(self.config, &flight.open(&self.store)?, &events)?;
         self.store.save(&path, &found)?;
         Ok((path, found))
     }
@@ -387,7 +390,7 @@ impl Run<'_> {
         let load =
             |path: &PathBuf| self.store.load(path).filter(|_| self.store.holds(&self.store.beside(path, "history")));
         let present: Vec<Option<Estimated>> = paths.iter().map(load).collect();
-        let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open()?) };
+        let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open(&self.store)?) };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()

@@ -7,6 +7,7 @@
 #![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
 
 use super::{Position, Sensors, Vane, VaneModel};
+use crate::trig::sin_cos;
 
 /// The flow at the c.g. and the rotation: angles in rad, velocity in ft/s, body rates in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +38,7 @@ struct Local {
 impl Flow {
     #[inline(always)]
     fn at(&self, arm: [f64; 3]) -> Local {
-        let ((sa, ca), (sb, cb), v) = (self.alpha.sin_cos(), self.beta.sin_cos(), self.velocity);
+        let ([(sa, ca), (sb, cb)], v) = (sin_cos([self.alpha, self.beta]), self.velocity);
         let ([p, q, r], [x, y, z]) = (self.rates, arm);
         Local {
             velocity: [v * ca * cb + q * z - r * y, v * sb + r * x - p * z, v * sa * cb + p * y - q * x],
@@ -48,8 +49,8 @@ impl Flow {
     }
 }
 
-/// An error of a reading that is rounding, rad.
-const ROUNDING: f64 = 1e-15;
+/// From an error of a reading this small, rad, one more step of Newton's leaves no more than rounding.
+const CLOSE: f64 = 1e-7;
 
 impl Vane {
     /// What an α vane reads, rad, with the c.g. at `cg`.
@@ -140,8 +141,7 @@ impl Sensors {
     }
 
     /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the small-angle readings
-    /// solved for them, the exact ones inverted by fixed-point iteration, which contracts by the ratio of arm times rate to
-    /// velocity.
+    /// solved for them, the exact ones inverted by Newton's iteration, for which the readings are almost straight.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
@@ -153,11 +153,12 @@ impl Sensors {
             return flow;
         }
         for _ in 0..8 {
-            let alpha_error = read.alpha - self.alpha_reading(&flow, cg).angle;
-            let beta_error = read.beta - self.beta_reading(&flow, cg).angle;
-            flow.alpha += alpha_error / self.alpha_vane.factor;
-            flow.beta += beta_error / self.beta_vane.factor;
-            if alpha_error.abs().max(beta_error.abs()) < ROUNDING {
+            let (alpha, beta) = (self.alpha_reading(&flow, cg), self.beta_reading(&flow, cg));
+            let (alpha_error, beta_error) = (read.alpha - alpha.angle, read.beta - beta.angle);
+            let determinant = alpha.by_alpha * beta.by_beta - alpha.by_beta * beta.by_alpha;
+            flow.alpha += (alpha_error * beta.by_beta - beta_error * alpha.by_beta) / determinant;
+            flow.beta += (beta_error * alpha.by_alpha - alpha_error * beta.by_alpha) / determinant;
+            if alpha_error.abs().max(beta_error.abs()) < CLOSE {
                 break;
             }
         }
@@ -282,8 +283,8 @@ mod tests {
             let s = sensors(model);
             let read = Flow { alpha: s.alpha_reading(&FLOW, CG).angle, beta: s.beta_reading(&FLOW, CG).angle, ..FLOW };
             let back = s.flow_at_cg(&read, CG);
-            assert_abs_diff_eq!(back.alpha, FLOW.alpha, epsilon = 1e-9);
-            assert_abs_diff_eq!(back.beta, FLOW.beta, epsilon = 1e-9);
+            assert_abs_diff_eq!(back.alpha, FLOW.alpha, epsilon = 1e-15);
+            assert_abs_diff_eq!(back.beta, FLOW.beta, epsilon = 1e-15);
         }
     }
 }

@@ -83,7 +83,8 @@ enum Scheduler {
 }
 
 fn plan_file(config: &Config, of: Of) -> PathBuf {
-    config.store.join(format!("{}.plan.json", of.name()))
+    // Where all machines see it.
+    config.shared_store.as_ref().unwrap_or(&config.store).join(format!("{}.plan.json", of.name()))
 }
 
 /// Deals a campaign's work.

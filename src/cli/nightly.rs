@@ -236,6 +236,14 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
             bytes / 1_000_000,
             litter.nights.len()
         );
+        if let Some(shared) = &config.shared_store {
+            println!(
+                "that is the cache in {}; {} is left as it is, for other machines' nights may be made of it: rules of the \
+                 bucket's lifecycle remove what is old",
+                config.store.display(),
+                shared.display()
+            );
+        }
         if !options.yes && (count > 0 || !litter.nights.is_empty()) {
             println!("harvest gc --yes removes them");
         }

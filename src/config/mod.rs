@@ -5,6 +5,7 @@
 
 mod cards;
 mod check;
+mod places;
 mod source;
 mod written;
 
@@ -27,11 +28,14 @@ pub struct Config {
     /// Name of the pipeline: its folder's.
     pub name: String,
     pub title: String,
-    /// Folder or glob of the flight archive.
+    /// Folder or glob of the flight archive, in the file system or in an object store (`s3://bucket/prefix`).
     pub archive: String,
     /// The wind-tunnel table's file, as the report names it.
     pub wind_tunnel: PathBuf,
+    /// Folder of the artefacts.
     pub store: PathBuf,
+    /// Where they lie in an object store, which the folder then is the cache of.
+    pub shared_store: Option<PathBuf>,
     pub reports: PathBuf,
     pub aircraft: Aircraft,
     pub channels: BTreeMap<String, Channel>,
@@ -60,6 +64,7 @@ pub struct Overrides {
     pub archive: Option<String>,
     pub wind_tunnel: Option<PathBuf>,
     pub store: Option<PathBuf>,
+    pub store_cache: Option<PathBuf>,
     pub reports: Option<PathBuf>,
     pub events: Option<PathBuf>,
     /// Folders of earlier campaigns' tables; the pipeline's own where it is empty.
@@ -83,14 +88,22 @@ impl Config {
         let name = folder.file_name().map_or_else(|| "pipeline".to_owned(), |n| n.to_string_lossy().into_owned());
         let events = overrides.events.or(pipeline.events);
         let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
+        let default = Path::new("data/store").join(&name);
+        let store = overrides.store.or(pipeline.store);
+        let cache = overrides.store_cache.or(pipeline.store_cache);
+        let (store, shared_store) = places::store(store, cache, default, &files.pipeline)?;
+        let reports = overrides.reports.or(pipeline.reports).unwrap_or_else(|| Path::new("reports").join(&name));
+        let archive = overrides.archive.unwrap_or(pipeline.archive);
+        places::reachable(Path::new(&archive))?;
         let config = Config {
             tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
             events: check::events(events.as_deref(), &classes)?,
             title: pipeline.title,
-            archive: overrides.archive.unwrap_or(pipeline.archive),
+            archive,
             wind_tunnel,
-            store: overrides.store.or(pipeline.store).unwrap_or_else(|| Path::new("data/store").join(&name)),
-            reports: overrides.reports.or(pipeline.reports).unwrap_or_else(|| Path::new("reports").join(&name)),
+            store,
+            shared_store,
+            reports: places::in_folder(reports, "reports are published in a folder")?,
             name,
             aircraft: aircraft.aircraft,
             channels: aircraft.channels,

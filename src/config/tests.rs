@@ -546,3 +546,28 @@ fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
         "{e}"
     );
 }
+
+#[test]
+fn a_place_in_an_object_store_is_an_archive_or_a_store_with_a_cache_and_nothing_else() {
+    let copy = Copy::new();
+    let own = |store: &str| Overrides { store: Some(store.into()), ..Overrides::default() };
+    if cfg!(feature = "s3") {
+        copy.spoil("pipeline.yaml", "\narchive: data/demo/flights", "\narchive: s3://fleet/flights");
+        let config = copy.load(own("s3://fleet/store")).unwrap();
+        assert_eq!(config.archive, "s3://fleet/flights");
+        assert_eq!(config.shared_store, Some("s3://fleet/store".into()));
+        assert!(config.store.starts_with("data/store"));
+        let cached = Overrides { store_cache: Some("cache".into()), ..own("s3://fleet/store") };
+        assert_eq!(copy.load(cached).unwrap().store, PathBuf::from("cache"));
+        assert!(copy.load(own("s3:///store")).unwrap_err().contains("expected s3://bucket/prefix"));
+    } else {
+        assert!(copy.load(own("s3://fleet/store")).unwrap_err().contains("--features s3"));
+        let archive = Overrides { archive: Some("s3://fleet/flights".into()), ..Overrides::default() };
+        assert!(copy.load(archive).unwrap_err().starts_with("s3://fleet/flights: "));
+    }
+    let reports = Overrides { reports: Some("s3://fleet/reports".into()), ..Overrides::default() };
+    assert!(copy.load(reports).unwrap_err().contains("it cannot lie in an object store"));
+    let line = copy.spoil("pipeline.yaml", "\n# store_cache: data/store/harv", "\nstore_cache: data/store/harv") + 1;
+    let error = copy.error();
+    assert!(error.starts_with(&format!("pipeline.yaml:{line}: `store_cache`")), "{error}");
+}

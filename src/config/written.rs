@@ -21,6 +21,9 @@ pub struct PipelineFile {
     pub wind_tunnel: PathBuf,
     #[serde(default)]
     pub store: Option<PathBuf>,
+    /// The folder beside a store in an object store.
+    #[serde(default)]
+    pub store_cache: Option<PathBuf>,
     #[serde(default)]
     pub reports: Option<PathBuf>,
     /// CSV of the analyst's events.

@@ -9,10 +9,10 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::lever::lever;
-use super::trig::sin_cos;
 use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
+use crate::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
 /// The longitudinal axis.

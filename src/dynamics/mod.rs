@@ -12,13 +12,11 @@ mod lever;
 mod longitudinal;
 pub mod motion;
 pub mod runge_kutta;
-mod trig;
 
 pub use lateral::Lateral;
 pub(crate) use lever::lever;
 pub use longitudinal::Longitudinal;
 pub use motion::Motion;
-pub(crate) use trig::sin_cos;
 
 use nalgebra::{SMatrix, SVector};
 

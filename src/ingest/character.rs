@@ -22,8 +22,9 @@ const FEW_CHANGES: usize = 20;
 /// Fewer samples than this do not tell how a channel's noise repeats values.
 const FEW_SAMPLES: usize = 200;
 
-/// White noise turns around at two of three samples; motion that is recorded without noise hardly ever does.
-const LEAST_TURNS: f64 = 0.4;
+/// White noise turns around at two of three samples; motion that is recorded without noise hardly ever does. Half of that is
+/// noise enough on a channel that moves.
+const LEAST_TURNS: f64 = 1.0 / 3.0;
 
 /// What noise centred on a step of the recorder repeats, in shares of what it repeats on the average.
 const CENTRED: f64 = 1.5;
@@ -152,13 +153,13 @@ fn held(changes: &[usize]) -> Option<Rate> {
     (2..=LONGEST_PERIOD).rev().find_map(of_period)
 }
 
-/// The runs of one value among the recorded ones, by their lengths.
+/// The runs of one value among the recorded ones, by their lengths; what is missing is in none.
 fn runs(values: &[f64]) -> Vec<usize> {
     let mut runs = Vec::new();
     let mut length = 0;
     let mut before: Option<f64> = None;
     for value in values {
-        if before.is_some_and(|b| b.to_bits() == value.to_bits()) {
+        if value.is_finite() && before.is_some_and(|b| b.to_bits() == value.to_bits()) {
             length += 1;
         } else {
             runs.extend((length > 0).then_some(length));
@@ -290,5 +291,8 @@ mod tests {
         assert_eq!(character(&often).stuck, None);
         let once = spell(|k| if (HALF..HALF + 100).contains(&k) { 0.4 } else { rounded(k, 0.2) });
         assert!(character(&once).stuck.is_some());
+        // Where nothing was recorded between the test points, nothing stands still.
+        let points = spell(|k| if k % 2000 < 1200 { f64::NAN } else { rounded(k, 0.2) });
+        assert_eq!(character(&points).stuck, noisy.stuck);
     }
 }

@@ -5,11 +5,12 @@
 //! trial after which every relation holds names the channel and the cause. Where none does, the channels common to the
 //! failed relations and confirmed by no other are named without a cause.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Checks;
 use super::checks::{self, Check, Verdict};
 use super::motion::Blocks;
+use super::relations;
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, signal};
 use crate::units::Unit;
@@ -59,8 +60,10 @@ pub fn find(
     aircraft: &Aircraft,
     settings: &Checks,
 ) -> Vec<Guilty> {
+    let still = still(blocks, recorded, settings);
     let dead = |s: &str| {
-        found.iter().any(|c| c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks))
+        still.contains(&s)
+            || found.iter().any(|c| c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks))
     };
     let mut guilty = accused(channels, recorded, blocks, &dead);
     if !guilty.is_empty() {
@@ -98,6 +101,18 @@ pub fn find(
     }
     guilty.extend(common(&found, &blocks, channels, recorded));
     guilty
+}
+
+/// The instruments that never change while the aircraft flies and most of the others do change: whatever relation they are
+/// in, it may say nothing for want of them.
+fn still(blocks: &Blocks, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
+    let instruments: BTreeSet<&'static str> =
+        relations::all(settings).iter().flat_map(|r| r.dominant().iter().copied()).collect();
+    let recorded = |s: &&&str| recorded.iter().any(|r| r == *s);
+    let (still, changing): (Vec<&str>, Vec<&str>) = instruments.iter().filter(recorded).partition(|s| blocks.still(s));
+    let long = blocks.count as f64 * blocks.block_s >= settings.dead_s;
+    let tells = long && changing.len() > still.len() && blocks.flies(settings.least_velocity_ft_s);
+    if tells { still } else { Vec::new() }
 }
 
 /// A signal that never changes, in a relation whose other signals do.
@@ -222,10 +237,10 @@ fn accused(
     guilty
 }
 
-/// What the failed checks and the guilty channels amount to; none where nothing failed.
+/// What the failed checks and the guilty channels amount to; none where nothing failed and none is dead.
 pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
     let failed: Vec<String> = found.iter().filter(|c| c.verdict.failed()).map(described).collect();
-    if failed.is_empty() {
+    if failed.is_empty() && guilty.is_empty() {
         return None;
     }
     let named = |g: &Guilty| format!("`{}`", g.channel);
@@ -238,15 +253,20 @@ pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
     } else {
         format!("likely {}", causes.join(", or "))
     };
-    let reason = format!(
-        "{several}{} {} not agree with the other channels ({}); {likely}. Correct the channel map, or leave the flight out",
-        names.join(", "),
-        if names.len() == 1 { "does" } else { "do" },
-        failed.join("; ")
-    );
+    let disagreement = if failed.is_empty() {
+        format!("{} {} one value throughout, while the aircraft flies", names.join(", "), one(&names, "has", "have"))
+    } else {
+        let (names, do_not) = (names.join(", "), one(&names, "does not", "do not"));
+        format!("{names} {do_not} agree with the other channels ({})", failed.join("; "))
+    };
+    let reason = format!("{several}{disagreement}; {likely}. Correct the channel map, or leave the flight out");
     let place = if names.len() == 1 { "channel" } else { "channels" };
     let required = guilty.is_empty() || guilty.iter().any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
     Some(Accusation { place: format!("{place} {}", names.join(", ")), reason, required })
+}
+
+fn one<'a>(names: &[String], singular: &'a str, plural: &'a str) -> &'a str {
+    if names.len() == 1 { singular } else { plural }
 }
 
 fn described(check: &Check) -> String {

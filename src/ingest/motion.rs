@@ -110,6 +110,20 @@ impl Blocks {
         known.next().is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
     }
 
+    /// Whether airspeed, dynamic pressure or Mach number say for most of the record that the aircraft is faster than this,
+    /// ft/s. One of them may be dead.
+    pub fn flies(&self, faster_ft_s: f64) -> bool {
+        // Of this velocity at sea level: higher up it takes more of it.
+        let (density, sound) = atmosphere(0.0);
+        let pressure = 0.5 * density * faster_ft_s * faster_ft_s;
+        let levels = [(signal::VELOCITY, faster_ft_s), (signal::QBAR, pressure), (signal::MACH, faster_ft_s / sound)];
+        let mostly = |(signal, level): (&str, f64)| {
+            let known = || (0..self.count).map(|k| self.at(signal, k)).filter(|v| v.is_finite());
+            2 * known().filter(|v| v.abs() > level).count() > known().count()
+        };
+        levels.into_iter().any(mostly)
+    }
+
     /// These blocks with one signal multiplied: what the record would say if that channel were wrong by the factor.
     pub fn with(&self, signal: &str, factor: f64) -> Blocks {
         let mut changed = self.clone();

@@ -129,6 +129,9 @@ pub struct Checks {
     pub jumps_share: f64,
     /// Below this velocity the aircraft is not flying and the vanes mean nothing, ft/s.
     pub least_velocity_ft_s: f64,
+    /// An instrument that has one and the same value in a whole record of at least this length is dead, s: even a coarse one
+    /// sees some change of speed, height or attitude in a minute of flight.
+    pub dead_s: f64,
     pub excitation: Excitation,
 }
 
@@ -144,6 +147,7 @@ impl Default for Checks {
             standard_errors: 4.0,
             jumps_share: 0.05,
             least_velocity_ft_s: 50.0,
+            dead_s: 60.0,
             excitation: Excitation::default(),
         }
     }

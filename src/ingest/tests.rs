@@ -303,6 +303,24 @@ fn a_channel_of_nothing_but_zeros_is_among_those_that_never_change() {
     assert!(problem.reason.contains("`an`: it never changes"), "{}", problem.reason);
 }
 
+#[test]
+fn an_instrument_that_is_dead_throughout_is_named_though_no_relation_is_excited_without_it() {
+    for (name, signal) in [("V", signal::VELOCITY), (signal::AY, signal::AY)] {
+        let mut flight = Flight::noisy();
+        flight.values(name).fill(0.0);
+        assert_eq!(flight.ingest().map(|i| i.problems), Ok(Vec::new()), "too short a record to tell {signal}");
+        flight.settings.checks.dead_s = 20.0;
+        let problem = flight.refused();
+        assert_eq!(problem.place, format!("channel `{name}`"));
+        assert!(problem.reason.contains("one value throughout, while the aircraft flies"), "{}", problem.reason);
+        // On the ground the airspeed may well be zero.
+        flight.values("qbar").fill(0.3);
+        flight.values("mach").fill(0.01);
+        flight.values("V").fill(0.0);
+        assert_eq!(flight.ingest().map(|i| i.problems), Ok(Vec::new()));
+    }
+}
+
 fn reasons(ingested: &Ingested) -> Vec<&str> {
     ingested.problems.iter().map(|p| p.reason.as_str()).collect()
 }

@@ -54,7 +54,7 @@ pub(super) trait Sink {
 }
 
 /// One pass.
-struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
+pub(super) struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
     case: &'a Case<NX, E>,
     parameters: &'a [f64],
     start: SVector<f64, NX>,
@@ -77,6 +77,17 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         outputs: &mut [[f64; OUTPUTS]],
         sink: &mut impl Sink,
     ) -> Result<(), Diverged> {
+        Arch::new().dispatch(self.prepared(parameters, stride, outputs, sink))
+    }
+
+    /// The same, yet to be done with the vectors of some width.
+    pub(super) fn prepared<'a, K: Sink>(
+        &'a self,
+        parameters: &'a [f64],
+        stride: usize,
+        outputs: &'a mut [[f64; OUTPUTS]],
+        sink: &'a mut K,
+    ) -> Pass<'a, NX, E, K> {
         let mut biases = [0.0; OUTPUTS];
         for (&o, bias) in self.biased.iter().zip(&parameters[self.derivatives()..]) {
             biases[o] += bias;
@@ -86,15 +97,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             InitialState::Measured => self.start,
             InitialState::Estimated => SVector::from_fn(|i, _| parameters[first + i]),
         };
-        Arch::new().dispatch(Pass {
-            case: self,
-            parameters,
-            start,
-            biases,
-            stride: stride.clamp(1, WIDEST_STRIDE),
-            outputs,
-            sink,
-        })
+        Pass { case: self, parameters, start, biases, stride: stride.clamp(1, WIDEST_STRIDE), outputs, sink }
     }
 }
 

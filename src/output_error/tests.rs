@@ -3,6 +3,7 @@
 mod calibration;
 mod coarse;
 mod joint;
+mod width;
 
 use std::collections::BTreeMap;
 

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -19,7 +19,7 @@ use crate::ingest::{self, Basis, Flow, Signature, Surveyed};
 use crate::store::archive::{self, FlightFiles, Opened};
 use crate::store::atomic::Draft;
 use crate::store::record_file::{self, About, GROUP, SignalWriter};
-use crate::store::{Digest, Fingerprint};
+use crate::store::{Digest, Fingerprint, object};
 
 /// What the store keeps of a flight besides its records: what concerns all of it, and its stretches.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -145,6 +145,10 @@ impl Run<'_> {
         }
         let fingerprint = self.ingest_fingerprint(id, content);
         let kept = self.ingest_files(files, &fingerprint)?;
+        // What the network is at fault of is not kept.
+        if let Some((file, why)) = files.files.iter().find_map(|file| Some((file, object::failed(file)?))) {
+            return Ok(self.refused(id, problem("ingest", id, &file.display().to_string(), &why)));
+        }
         // What was read must be what the fingerprint is of.
         if let Some(changed) = files.files.iter().find(|file| !self.contents.is_unchanged(file)) {
             let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
@@ -161,10 +165,20 @@ impl Run<'_> {
         let artefact = self.store.path("ingest", id, &fingerprint, "json");
         let kept: Kept = self.store.load(&artefact)?;
         let is_whole = |(id, ingested): &(String, Ingested)| match &ingested.record {
-            Some(digest) => self.contents.of(&self.record_path(id, &fingerprint)).is_ok_and(|found| found == *digest),
+            Some(digest) => self.has_record(&self.record_path(id, &fingerprint), digest),
             None => !ingested.accepted,
         };
         kept.stretches.iter().all(is_whole).then(|| self.conditioned(kept, &fingerprint, artefact))
+    }
+
+    /// Whether a record is in the store as it was written. One that lies in the object store alone is looked at when it is
+    /// fetched.
+    fn has_record(&self, path: &Path, digest: &Digest) -> bool {
+        let is_here = self.contents.of(path).is_ok_and(|found| found == *digest);
+        if is_here {
+            self.store.is_here(path);
+        }
+        is_here || !path.exists() && self.store.is_shared(path, digest.bytes)
     }
 
     /// The records that an artefact of ingest tells of, relative to the store, with what they hold; none of another kind.
@@ -271,7 +285,7 @@ impl Run<'_> {
         match finished {
             Ok(judged) => {
                 draft.place()?;
-                self.store.note(&path);
+                self.store.keep(&path)?;
                 Ok(Ingested {
                     accepted: true,
                     record: Some(Digest::of_file(&path)?),

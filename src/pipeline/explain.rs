@@ -10,8 +10,8 @@ use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Estimated;
 use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Status};
+use crate::store::Store;
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Contents, Store};
 use crate::tables::EstimateRow;
 
 /// The story as text.
@@ -20,8 +20,8 @@ use crate::tables::EstimateRow;
 /// No archive, or no such maneuver among what the store knows, with what was probably meant.
 pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<String> {
     let files = archive::find(&config.archive)?;
-    let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, Store::look(&config.store), contents, &files, progress)?;
+    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+    let run = Run::of_store(config, store, &files, progress)?;
     let mut known = Vec::new();
     // Ids begin with the flight's: of most flights nothing needs to be read.
     let (likely, others): (Vec<&FlightFiles>, Vec<&FlightFiles>) =

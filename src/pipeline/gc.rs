@@ -1,4 +1,5 @@
-//! Housekeeping: artefacts that no published night is made of, and nights beyond those that stay.
+//! Housekeeping: artefacts that no published night is made of, and nights beyond those that stay. Of a store in an object
+//! store only the cache is kept house in: what other machines have published is not known here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;

@@ -120,6 +120,17 @@ fn source_file(file: &Path, digest: &Digest) -> SourceFile {
 }
 
 impl<'a> Run<'a> {
+    /// A run that believes what its store remembers of files' contents.
+    pub(super) fn of_store(
+        config: &'a Config,
+        store: Store,
+        files: &[FlightFiles],
+        progress: &'a dyn Progress,
+    ) -> Result<Run<'a>> {
+        let contents = store.contents();
+        Run::new(config, store, contents, files, progress)
+    }
+
     pub(super) fn new(
         config: &'a Config,
         store: Store,

@@ -249,7 +249,7 @@ impl Run<'_> {
             ..Night::default()
         };
         self.store.serves(&self.config.reports)?;
-        self.contents.save()?;
+        self.store.remember(&self.contents)?;
         let done = match nights.current().filter(|night| self.is_of_the_same(night)) {
             Some(night) if night.until > until => {
                 nights.forget_tonight();

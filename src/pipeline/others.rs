@@ -16,7 +16,7 @@ use crate::estimate::prediction::{self, Predicted};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
-use crate::store::table;
+use crate::store::{Store, table};
 use crate::tables::{EstimateRow, FitRow, JointRow, PredictedRow};
 
 /// The name of an artefact, which carries its fingerprint; not where it lies.
@@ -37,7 +37,7 @@ impl Run<'_> {
         let paths: Vec<PathBuf> = bins.iter().map(path).collect();
         let present: Vec<Option<Joined>> = paths.iter().map(|p| self.store.load(p)).collect();
         let wanted = bins.iter().zip(&present).filter(|(_, p)| p.is_none()).flat_map(|(b, _)| b.members.clone());
-        let records = parts(campaign, &wanted.collect())?;
+        let records = parts(&self.store, campaign, &wanted.collect())?;
         let items: Vec<_> = bins.iter().zip(&paths).zip(present).collect();
         let work = |((bin, path), present): ((&Bin, &PathBuf), Option<Joined>)| {
             if let Some(joined) = present {
@@ -79,7 +79,7 @@ impl Run<'_> {
         let present: Vec<Option<Predicted>> =
             artefacts.iter().map(|p| p.as_ref().and_then(|p| self.store.load(p))).collect();
         let wanted = (0..others.len()).filter(|&i| artefacts[i].is_some() && present[i].is_none());
-        let records = parts(campaign, &wanted.collect())?;
+        let records = parts(&self.store, campaign, &wanted.collect())?;
         let maneuvers = &campaign.maneuvers;
         let work = |(i, present): (usize, Option<Predicted>)| match (present, &artefacts[i], &others[i]) {
             (Some(predicted), ..) => Ok(predicted),
@@ -133,7 +133,7 @@ impl Run<'_> {
 }
 
 /// The parts of the records that hold these maneuvers.
-fn parts(campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize, Record>> {
+fn parts(store: &Store, campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize, Record>> {
     let of_flight = |id: &str| -> Vec<usize> {
         wanted.iter().copied().filter(|&i| campaign.maneuvers[i].flight_id == id).collect()
     };
@@ -142,7 +142,7 @@ fn parts(campaign: &Campaign, wanted: &BTreeSet<usize>) -> Result<BTreeMap<usize
         if wanted.is_empty() {
             return Ok(vec![]);
         }
-        let record = flight.open()?;
+        let record = flight.open(store)?;
         let part = |&i: &usize| {
             let maneuver = &campaign.maneuvers[i];
             Ok((i, record.part(None, maneuver.start_s, maneuver.end_s)?))

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::flight::is_stretch;
 use crate::maneuver::{Maneuver, Status};
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Contents, Store, atomic, files};
+use crate::store::{Store, files};
 
 /// Reads a plan's file.
 ///
@@ -34,13 +34,14 @@ pub fn read(file: &Path) -> Result<Plan> {
 pub fn plan(config: &Config, of: Of, shards: usize, file: &Path, progress: &dyn Progress) -> Result<Plan> {
     let files = archive::find(&config.archive)?;
     let run = join(config, &files, Duration::ZERO, progress)?;
-    run.contents.save()?;
+    run.store.remember(&run.contents)?;
     let items = match of {
         Of::Flights => run.flights(&files),
         Of::Maneuvers => run.maneuvers(&files)?,
     };
     let plan = Plan::deal(of, shards, items, &run.lineage);
-    atomic::place(file, plan.text().as_bytes())?;
+    run.store.check()?;
+    files::place_text(file, &plan.text())?;
     Ok(plan)
 }
 
@@ -80,6 +81,7 @@ pub fn work(
     if plan.of == Of::Maneuvers {
         run.share(&campaign, &items)?;
     }
+    run.store.send_rest()?;
     Ok(run.store.made())
 }
 
@@ -89,10 +91,12 @@ pub fn work(
 /// No archive, or the plan is of something else.
 pub fn missing(config: &Config, plan: &Plan, progress: &dyn Progress) -> Result<BTreeSet<String>> {
     let files = archive::find(&config.archive)?;
-    let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, Store::look(&config.store), contents, &files, progress)?;
+    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+    let run = Run::of_store(config, store, &files, progress)?;
     run.is_of(plan, None)?;
-    Ok(run.missing(plan, &files))
+    let missing = run.missing(plan, &files);
+    run.store.check()?;
+    Ok(missing)
 }
 
 /// Publishes what the shards of a plan of maneuvers computed: a run that finds everything made.
@@ -120,9 +124,8 @@ pub fn merge(config: &Config, plan: &Plan, wait: Duration, progress: &dyn Progre
 
 /// A run that adds to the store beside others and publishes nothing.
 fn join<'a>(config: &'a Config, files: &[FlightFiles], wait: Duration, progress: &'a dyn Progress) -> Result<Run<'a>> {
-    let store = Store::join(&config.store, wait)?;
-    let contents = Contents::load(&config.store.join("contents.json"));
-    Run::new(config, store, contents, files, progress)
+    let store = Store::join(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
+    Run::of_store(config, store, files, progress)
 }
 
 impl Run<'_> {

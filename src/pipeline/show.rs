@@ -100,7 +100,7 @@ fn known_maneuver(config: &Config, id: &str, campaign: &Campaign) -> Result<()> 
 
 impl Run<'_> {
     fn draw_flight(&self, campaign: &Campaign, id: &str) -> Result<String> {
-        let file = self.flight(campaign, id)?.open()?;
+        let file = self.flight(campaign, id)?.open(&self.store)?;
         let (record, recorded) = (file.outline(DRAWN)?, (file.about.samples, file.about.step_s));
         let events: Vec<_> = campaign.events.iter().filter(|e| e.flight_id == id).cloned().collect();
         Ok(chart::flight(&FlightView {
@@ -118,7 +118,7 @@ impl Run<'_> {
     fn draw_maneuver(&self, campaign: &Campaign, id: &str) -> Result<String> {
         let of_both = campaign.maneuvers.iter().zip(&campaign.fits).find(|(m, _)| m.maneuver_id == id);
         let (maneuver, fit) = of_both.ok_or_else(|| unknown(self.config, format!("there is no maneuver `{id}`")))?;
-        let file = self.flight(campaign, &maneuver.flight_id)?.open()?;
+        let file = self.flight(campaign, &maneuver.flight_id)?.open(&self.store)?;
         let record = file.part(None, maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S)?;
         // Computed again rather than stored, as for the report.
         let history = if fit.outcome == Outcome::Rejected.name() {

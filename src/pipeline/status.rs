@@ -10,7 +10,7 @@ use crate::flight::is_stretch;
 use crate::lineage::{Lineage, Origin};
 use crate::output_error::Outcome;
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Contents, Nights, Store};
+use crate::store::{Nights, Store};
 
 /// One stage: items are flights as far as segment, then maneuvers, then the whole campaign.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,8 +59,8 @@ impl Status {
 /// There is no archive.
 pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
     let files = archive::find(&config.archive)?;
-    let contents = Contents::load(&config.store.join("contents.json"));
-    let run = Run::new(config, Store::look(&config.store), contents, &files, progress)?;
+    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+    let run = Run::of_store(config, store, &files, progress)?;
     let nights = Nights::look(&config.reports);
     let current = nights.current();
     let before = current.as_ref().map(|night| &night.lineage);

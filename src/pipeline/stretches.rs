@@ -9,6 +9,7 @@ use crate::error::{Problem, Result};
 use crate::flight::is_stretch;
 use crate::maneuver::{Event, Maneuver};
 use crate::segment::{self, Segmented};
+use crate::store::Store;
 use crate::store::record_file::{self, About, RecordFile};
 
 /// A flight of which this share is another's rows is the other under another name.
@@ -26,7 +27,8 @@ const EVENT_S: f64 = 10.0;
 
 impl Flight {
     /// Its record, corrected by what its instruments are off by.
-    pub(super) fn open(&self) -> Result<RecordFile> {
+    pub(super) fn open(&self, store: &Store) -> Result<RecordFile> {
+        store.fetch(&self.record, self.ingested.record.as_ref())?;
         Ok(record_file::open(&self.record)?.corrected(self.ingested.corrections.clone()))
     }
 

@@ -52,7 +52,8 @@ pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress:
         Error::store(&config.reports, &format!("there is no such night here; there are {}", nights.names().join(", ")))
     })?;
     let files = archive::find(&config.archive)?;
-    let run = Run::new(config, Store::look(&config.store), Contents::forgetful(), &files, progress)?;
+    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+    let run = Run::new(config, store, Contents::forgetful(), &files, progress)?;
     let damaged = nights.damaged(&night);
     let stem = |file: &str| file.split('.').next().unwrap_or_default().to_owned();
     if let Some(unknown) = tables.iter().find(|t| !night.files.keys().any(|f| stem(f) == **t || f == *t)) {
@@ -91,7 +92,9 @@ impl Run<'_> {
             if !name.starts_with("records/") {
                 return self.store.is_whole(name);
             }
-            let holds = |digest: &Digest| Digest::of_file(&self.store.folder().join(name)).is_ok_and(|f| f == *digest);
+            let path = self.store.folder().join(name);
+            let fetched = |digest: &Digest| self.store.fetch(&path, Some(digest)).is_ok();
+            let holds = |digest: &Digest| fetched(digest) && Digest::of_file(&path).is_ok_and(|f| f == *digest);
             records.get(Path::new(name)).is_some_and(holds)
         };
         night.artefacts.par_iter().map(|(name, _)| name).filter(|name| !is_whole(name)).cloned().collect()

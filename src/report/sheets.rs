@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::failures::TableView;
@@ -51,7 +52,8 @@ pub fn sheets(contents: &Contents) -> Vec<Sheet> {
         predictions: by_name(contents.predictions, |p| &p.maneuver_id),
         problems: by_name(contents.problems, |p| &p.place),
     };
-    with_page(contents).map(|(i, maneuver)| of.sheet(maneuver, i + 1)).collect()
+    let maneuvers: Vec<(usize, &Maneuver)> = with_page(contents).collect();
+    maneuvers.into_par_iter().map(|(i, maneuver)| of.sheet(maneuver, i + 1)).collect()
 }
 
 /// What is known, by maneuver.

@@ -25,6 +25,8 @@ pub(super) struct Scene<'a> {
     pub own: Steps,
     /// Whether one of the pilot's controls is recorded: without any, nothing tells the pilot's hand from the system's.
     pub sees_pilot: bool,
+    /// Whether the excitation flag is recorded and not stuck.
+    flag_speaks: bool,
 }
 
 impl<'a> Scene<'a> {
@@ -32,7 +34,8 @@ impl<'a> Scene<'a> {
         let (steps, deflections) = steps::of_record(record, settings);
         let is_known = |name: &&String| record.values(name).is_some_and(|v| v.iter().any(|v| v.is_finite()));
         let sees_pilot = settings.pilot_controls.iter().any(|name| is_known(&name));
-        let mut scene = Scene { record, settings, own: Steps::default(), steps, deflections, sees_pilot };
+        let flag_speaks = changes(record.values(&settings.excitation_flag).unwrap_or_default());
+        let mut scene = Scene { record, settings, own: Steps::default(), steps, deflections, sees_pilot, flag_speaks };
         scene.own = scene.without_the_pilot_s();
         scene
     }
@@ -50,16 +53,25 @@ impl<'a> Scene<'a> {
         self.settings.pilot_controls.iter().any(|c| c == signal)
     }
 
-    /// Whether the pilot explains what a surface does at a time: a control of his moves then, or has stepped shortly before.
+    /// Whether the pilot explains what a surface does at a time: a control of his moves then, or has stepped shortly before
+    /// and no flag says that the on-board system is at work.
     fn is_answer(&self, time_s: f64) -> bool {
         let settings = self.settings;
+        let system = self.flag_is_up(time_s);
         settings.pilot_controls.iter().any(|control| {
             let Some(smallest) = self.steps.smallest.get(control) else { return false };
             let geared = (time_s - settings.gearing_s, time_s + settings.transit_s);
             let share = settings.geared_share * smallest;
-            !self.steps.between(control, time_s - settings.answer_s, time_s + settings.transit_s).is_empty()
+            let answered = (time_s - settings.answer_s, time_s + settings.transit_s);
+            !system && !self.steps.between(control, answered.0, answered.1).is_empty()
                 || steps::largest_change(self.record, control, settings, geared) >= share
         })
+    }
+
+    /// Whether a flag that is not stuck says that the on-board system is at work.
+    fn flag_is_up(&self, time_s: f64) -> bool {
+        let values = self.record.values(&self.settings.excitation_flag).unwrap_or_default();
+        self.flag_speaks && values.get(self.record.sample_at(time_s)).is_some_and(|v| *v > 0.5)
     }
 
     /// How often the pilot's controls step from one time to another.
@@ -68,11 +80,18 @@ impl<'a> Scene<'a> {
     }
 }
 
+/// Whether a flag is up in some samples and down in others.
+fn changes(flag: &[f64]) -> bool {
+    let mut known = flag.iter().filter(|v| v.is_finite()).map(|v| *v > 0.5);
+    known.next().is_some_and(|first| known.any(|v| v != first))
+}
+
 /// One step of a train.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Edge<'a> {
     pub signal: &'a str,
     pub time_s: f64,
+    pub change: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,6 +108,20 @@ pub(super) struct Train<'a> {
     pub kind: Kind,
     /// In order of time.
     pub edges: Vec<Edge<'a>>,
+}
+
+impl<'a> Train<'a> {
+    /// This train and the next as one, where the pilot may have gone over from one control to another: he rests no longer
+    /// than he may hold a control, and steps first with another than the one that he has stepped with last.
+    pub fn going_over(&self, next: &Train<'a>, scene: &Scene) -> Option<Train<'a>> {
+        let smallest = |signal: &str| scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
+        let whole = |e: &&Edge| e.change.abs() >= smallest(e.signal);
+        let (last, first) = (self.edges.iter().rfind(whole)?, next.edges.iter().find(whole)?);
+        let rest_s = next.edges.first()?.time_s - self.edges.last()?.time_s;
+        let over = self.kind == next.kind && self.kind != Kind::Onboard && last.signal != first.signal;
+        let joins = over && (0.0..=scene.settings.longest_hold_s).contains(&rest_s);
+        joins.then(|| Train { kind: self.kind.clone(), edges: [&self.edges[..], &next.edges[..]].concat() })
+    }
 }
 
 /// The kind of train that a class is flown as.
@@ -118,8 +151,8 @@ pub(super) fn trains<'a>(scene: &'a Scene, classes: &[Class]) -> Vec<Train<'a>> 
 
 fn edges<'a>(steps: &'a Steps, wanted: impl Fn(&str) -> bool, (from_s, to_s): (f64, f64)) -> Vec<Edge<'a>> {
     let signals = steps.of.keys().filter(|s| wanted(s));
-    let of =
-        |signal: &'a String| steps.between(signal, from_s, to_s).iter().map(move |s| Edge { signal, time_s: s.time_s });
+    let edge = |signal: &'a String, s: &Step| Edge { signal, time_s: s.time_s, change: s.change() };
+    let of = |signal: &'a String| steps.between(signal, from_s, to_s).iter().map(move |s| edge(signal, s));
     let mut edges: Vec<Edge> = signals.flat_map(of).collect();
     edges.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     edges
@@ -178,8 +211,9 @@ struct Growing<'a> {
     controls: BTreeMap<&'a str, Control>,
 }
 
-/// A deflection from trim is about half a reversal; a control is at trim when it is nearer to that than to a deflection.
-const TRIM_SHARE: f64 = 0.25;
+/// A deflection from trim is about half a reversal: halfway to it, a quarter of the largest step away, a control is as near
+/// to trim as to a deflection.
+pub(super) const TRIM_SHARE: f64 = 0.25;
 
 /// Where one control of a train stands.
 struct Control {

@@ -39,7 +39,7 @@ pub use steps::Step;
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// The flag signal that is up while the on-board excitation system moves the surfaces: it is drawn, and a record without
-    /// it is a problem.
+    /// it is a problem. While it is up, and not stuck, a surface that steps soon after the pilot does not answer him.
     pub excitation_flag: String,
     /// The pilot's controls. A surface that steps while one of them moves, or right after it has stepped, is the pilot's.
     #[serde(default)]
@@ -82,11 +82,12 @@ pub struct Settings {
     #[serde(default = "default_hold")]
     pub longest_hold_s: f64,
     /// How long all controls of one maneuver may rest at trim between two inputs; a longer rest ends the maneuver, and
-    /// what comes after it is recovery. Default 2 s.
+    /// what comes after it is recovery, unless the pilot has gone over to another control of the same class. Default 2 s.
     #[serde(default = "default_rest")]
     pub longest_rest_s: f64,
-    /// The share of a lead-in that the decay of the maneuver right before it may use: a lead-in need not be quiet from its
-    /// first sample on. Default 0.4.
+    /// Where a maneuver begins before another has decayed: the share of the pause between their inputs that is the decay's
+    /// at least, and of the lead-in that it may use besides. Default 0.25: the lead-in counts for more, for the inputs
+    /// before a decay have told most of their derivatives already.
     #[serde(default = "default_shared")]
     pub shared_lead_in: f64,
     /// Excitation of fewer steps than this is no maneuver and not worth a word: a flag that flickers, a turn. Default 3,
@@ -132,7 +133,7 @@ fn default_rest() -> f64 {
     2.0
 }
 fn default_shared() -> f64 {
-    0.4
+    0.25
 }
 fn default_fewest() -> usize {
     3

@@ -2,14 +2,15 @@
 //!
 //! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
 //! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then into as few as possible,
-//! then at the longest pauses. A stretch that fits
-//! several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one about
-//! counts; where nothing else differs the flags decide.
+//! then where most inputs are back at their trim and steps of one input follow each other, then at the longest pauses. Two
+//! trains between which the pilot has gone over from one control to another are one where more is found in both together. A
+//! stretch that fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes
+//! before one about counts; where nothing else differs the flags decide.
 
 use crate::error::Problem;
 use crate::maneuver::{Class, Recognised, Unknown};
 
-use super::candidates::{Kind, Scene, Train, kind_of};
+use super::candidates::{Kind, Scene, TRIM_SHARE, Train, kind_of};
 use super::seen::{Miss, Seen};
 use super::swings::{self, Swing};
 use super::{patterns, problem};
@@ -33,6 +34,13 @@ pub(super) struct Recognition<'a> {
     pub unknown: Vec<Unknown>,
 }
 
+impl<'a> Recognition<'a> {
+    fn add(&mut self, more: Recognition<'a>) {
+        self.found.extend(more.found);
+        self.unknown.extend(more.unknown);
+    }
+}
+
 /// The verdict on one stretch.
 enum Verdict<'a> {
     Fits(&'a Class),
@@ -44,11 +52,23 @@ enum Verdict<'a> {
 /// Recognises every train, and the sweeps.
 pub(super) fn all<'a>(scene: &Scene, classes: &'a [Class], trains: &[Train]) -> Recognition<'a> {
     let mut recognition = Recognition::default();
+    // The train before, and what was recognised in it.
+    let mut before: Option<(Train, Recognition)> = None;
     for train in trains {
         let of_its_kind: Vec<&Class> =
             classes.iter().filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind).collect();
-        one_train(scene, &of_its_kind, train, &mut recognition);
+        let alone = one_train(scene, &of_its_kind, train);
+        let parted = before.as_ref().map_or(0, |b| b.1.found.len()) + alone.found.len();
+        let joined = before.as_ref().and_then(|b| b.0.going_over(train, scene));
+        let joined = joined.map(|t| (one_train(scene, &of_its_kind, &t), t)).filter(|j| j.0.found.len() > parted);
+        before = if let Some((recognised, joined)) = joined {
+            Some((joined, recognised))
+        } else {
+            recognition.add(before.map(|b| b.1).unwrap_or_default());
+            Some((train.clone(), alone))
+        };
     }
+    recognition.add(before.map(|b| b.1).unwrap_or_default());
     for class in classes {
         for (signal, wanted) in &class.recognition.sweep {
             let smallest = scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
@@ -69,12 +89,15 @@ struct Block {
 }
 
 /// The best way to cut a train as far as some block.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Cut {
     unexplained: usize,
     /// Steps that rules about lengths of pulses explain.
     in_pulses: usize,
     stretches: usize,
+    /// How many inputs of stretches do not end where they began, and how often one steps again after another has stepped
+    /// meanwhile: a cut in the wrong place makes more of them. Neither counts for more, for a step may pass unseen.
+    loose_ends: usize,
     /// The pauses cut at, s.
     paused_s: f64,
     /// The block at which the last stretch begins, and whether it is one.
@@ -84,24 +107,26 @@ struct Cut {
 
 impl Cut {
     fn is_better_than(&self, other: &Cut) -> bool {
-        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches);
+        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches, c.loose_ends);
         key(self) < key(other) || (key(self) == key(other) && self.paused_s > other.paused_s)
     }
 }
 
-fn one_train<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, into: &mut Recognition<'a>) {
+fn one_train<'a>(scene: &Scene, classes: &[&'a Class], train: &Train) -> Recognition<'a> {
+    let mut into = Recognition::default();
     let blocks = blocks(train, scene.settings.shortest_pause_s);
     let mut left: Option<(usize, usize)> = None;
     for (from, to, is_stretch) in cut(scene, classes, train, &blocks) {
         let range = (blocks[from].first, blocks[to - 1].end);
         if is_stretch {
-            leave(scene, classes, train, left.take(), into);
-            stretch(scene, classes, train, range, into);
+            leave(scene, classes, train, left.take(), &mut into);
+            stretch(scene, classes, train, range, &mut into);
         } else {
             left = Some((left.map_or(range.0, |l| l.0), range.1));
         }
     }
-    leave(scene, classes, train, left, into);
+    leave(scene, classes, train, left, &mut into);
+    into
 }
 
 fn blocks(train: &Train, pause_s: f64) -> Vec<Block> {
@@ -123,8 +148,7 @@ fn seen<'s>(scene: &'s Scene, train: &'s Train, (first, end): (usize, usize)) ->
 
 /// The train's stretches and what is between them, as ranges of blocks.
 fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Vec<(usize, usize, bool)> {
-    let nothing = Cut { unexplained: 0, in_pulses: 0, stretches: 0, paused_s: 0.0, from: 0, is_stretch: false };
-    let mut best: Vec<Cut> = vec![nothing];
+    let mut best: Vec<Cut> = vec![Cut::default()];
     for end in 1..=blocks.len() {
         let before = best[end - 1];
         let block = blocks[end - 1];
@@ -144,9 +168,10 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
                 train.edges[range.0].time_s - train.edges[range.0 - 1].time_s
             };
             let candidate = Cut {
-                unexplained: before.unexplained + explained.0,
-                in_pulses: before.in_pulses + explained.1,
+                unexplained: before.unexplained + explained.unexplained,
+                in_pulses: before.in_pulses + explained.in_pulses,
                 stretches: before.stretches + 1,
+                loose_ends: before.loose_ends + explained.loose_ends,
                 paused_s: before.paused_s + paused_s,
                 from,
                 is_stretch: true,
@@ -167,18 +192,44 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
     parts
 }
 
-/// How many of a stretch's edges the class that explains most of them leaves, and how many it has in pulses; none where it
-/// fits no class.
-fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<(usize, usize)> {
+/// How a class explains a stretch.
+#[derive(Clone, Copy, Debug)]
+struct Explained {
+    unexplained: usize,
+    in_pulses: usize,
+    loose_ends: usize,
+}
+
+/// What the class that explains most of a stretch's edges makes of it; none where it fits no class.
+fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<Explained> {
     let edges = train.edges.get(first..end)?;
     let of_class = |class: &&Class| {
         let inputs = seen.inputs(class);
-        let left = edges.iter().filter(|e| !inputs.contains(e.signal)).count();
-        let in_pulses = edges.iter().filter(|e| class.recognition.pulses.contains_key(e.signal)).count();
-        (left, in_pulses)
+        let own =
+            |signal: &str| -> Vec<f64> { edges.iter().filter(|e| e.signal == signal).map(|e| e.change).collect() };
+        let share = seen.scene.settings.outstanding_share;
+        let returns = edges.chunk_by(|a, b| a.signal == b.signal).count().saturating_sub(inputs.len());
+        let away = inputs.iter().filter(|signal| is_away(&own(signal), share)).count();
+        Explained {
+            unexplained: edges.iter().filter(|e| !inputs.contains(e.signal)).count(),
+            in_pulses: class
+                .recognition
+                .pulses
+                .iter()
+                .map(|(signal, p)| own(signal).len().min(p.widths.len() + 1))
+                .sum(),
+            loose_ends: returns + away,
+        }
     };
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
-    fitting.map(of_class).min_by_key(|(left, in_pulses)| (*left, usize::MAX - in_pulses))
+    fitting.map(of_class).min_by_key(|e| (e.unexplained, usize::MAX - e.in_pulses))
+}
+
+/// Whether a signal does not end near where it began, by those of its changes that are not feedback's.
+fn is_away(changes: &[f64], outstanding_share: f64) -> bool {
+    let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);
+    let moved: f64 = changes.iter().filter(|c| c.abs() >= outstanding_share * largest).sum();
+    moved.abs() > TRIM_SHARE * largest
 }
 
 fn verdict<'a>(seen: &Seen, classes: &[&'a Class]) -> Verdict<'a> {
@@ -202,7 +253,9 @@ fn stretch<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, range: (usiz
     match verdict(&seen, classes) {
         Verdict::Fits(class) => {
             let Some((first_s, last_s)) = seen.excited_s(class) else { return };
-            let first_s = opening(scene, &seen, first_s);
+            let before =
+                range.0.checked_sub(1).and_then(|k| train.edges.get(k)).map_or(f64::NEG_INFINITY, |e| e.time_s);
+            let first_s = opening(scene, &seen, (before, first_s));
             let recognised = seen.recognised(class, (first_s, last_s));
             into.found.push(Found { class, first_s, last_s, recognised });
         }
@@ -215,8 +268,8 @@ fn stretch<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, range: (usiz
 }
 
 /// When the first step of a surface was preceded by a smaller one to the other side: a deflection from trim that feedback
-/// made small.
-fn opening(scene: &Scene, seen: &Seen, first_s: f64) -> f64 {
+/// made small. What steps no later than the edge before the stretch belongs to another.
+fn opening(scene: &Scene, seen: &Seen, (after_s, first_s): (f64, f64)) -> f64 {
     if *seen.kind != Kind::Onboard {
         return first_s;
     }
@@ -224,7 +277,8 @@ fn opening(scene: &Scene, seen: &Seen, first_s: f64) -> f64 {
     let before = |signal: &String| -> Option<f64> {
         let steps = scene.own.between(signal, first_s - scene.settings.longest_rest_s, first_s);
         let first = steps.iter().find(at_first)?;
-        let opens = |s: &&super::Step| s.time_s < first.time_s && s.change() * first.change() < 0.0;
+        let opens =
+            |s: &&super::Step| after_s < s.time_s && s.time_s < first.time_s && s.change() * first.change() < 0.0;
         let share =
             |s: &&super::Step| s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs();
         steps.iter().filter(opens).filter(share).map(|s| s.time_s).next_back()
@@ -352,8 +406,8 @@ pub(super) fn keep_apart(recognition: &mut Recognition) {
 }
 
 /// The windows of maneuvers in order of time: the lead-in before the first input, the decay after the last. A window ends
-/// where the pilot takes over. Of a pause too short for both, the next maneuver has its lead-in as far as half of the pause,
-/// and the decay before it may use a share of that lead-in.
+/// where the pilot takes over. Of a pause too short for both, a share is the decay's, the rest the next maneuver's lead-in;
+/// the decay may use the same share of that lead-in.
 pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     let of = |f: &Found| {
         let rule = &f.class.recognition;
@@ -363,9 +417,9 @@ pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     let mut windows: Vec<(f64, f64)> = found.iter().map(of).collect();
     for k in 1..windows.len() {
         let (last_s, next_s) = (found[k - 1].last_s, found[k].first_s);
-        windows[k].0 = windows[k].0.max(f64::midpoint(last_s, next_s));
-        let shared_s = scene.settings.shared_lead_in * (next_s - windows[k].0);
-        windows[k - 1].1 = windows[k - 1].1.min(windows[k].0 + shared_s);
+        let share = scene.settings.shared_lead_in;
+        windows[k].0 = windows[k].0.max(last_s + share * (next_s - last_s));
+        windows[k - 1].1 = windows[k - 1].1.min(windows[k].0 + share * (next_s - windows[k].0));
     }
     windows
 }

@@ -455,7 +455,8 @@ fn maneuvers_that_follow_each_other_within_two_seconds_are_two_whether_flags_par
                 (pair[0].recognised.last_input_s.unwrap(), pair[1].recognised.first_input_s.unwrap());
             assert!(pair[0].end_s < next_s, "no input of the next is in the window");
             assert!(pair[0].end_s - last_s > 0.4 * (next_s - last_s), "some decay is kept");
-            assert!(next_s - pair[1].start_s > 0.4 * (next_s - last_s), "some lead-in is kept");
+            let lead_in = next_s - pair[1].start_s;
+            assert!(lead_in > 0.4 * (next_s - last_s), "some lead-in is kept");
         }
     }
 }
@@ -469,6 +470,72 @@ fn pilot_steps_repeated_at_once_are_two_maneuvers() {
     assert_eq!(classes_of(&segmented), ["PITCH", "PITCH"]);
     assert_abs_diff_eq!(segmented.maneuvers[0].end_s, first_s + 2.5, epsilon = 0.2);
     assert_window(&segmented.maneuvers[1], "PITCH", first_s + 2.5, second_s + 2.5);
+}
+
+#[test]
+fn doublets_of_one_surface_after_another_are_one_maneuver_in_one_round_or_in_two() {
+    for order in [["dsa_deg", "dsa_deg", "de_deg", "de_deg"], ["dsa_deg", "de_deg", "dsa_deg", "de_deg"]] {
+        let mut r = flight(60);
+        for (at, name) in [20.0, 23.2, 26.4, 29.6].into_iter().zip(order) {
+            doublet(&mut r, name, at, 5.0);
+        }
+        assert_one(&r, "DOUBLETS", 19.0, 33.1);
+    }
+}
+
+#[test]
+fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_control_is_at_trim() {
+    let mut r = flight(90);
+    let first_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.4);
+    let second_s = pilot_steps(&mut r, "stick_pitch_in", first_s + 1.0, 1.5, 7, 1.4);
+    let mut classes = classes();
+    for class in &mut classes {
+        for count in class.recognition.steps.values_mut() {
+            count.at_most = count.at_most.min(12);
+        }
+    }
+    let segmented = maneuvers(&r, &classes, &aircraft(), &settings());
+    assert_eq!(classes_of(&segmented), ["PITCH", "PITCH"]);
+    assert_abs_diff_eq!(segmented.maneuvers[0].recognised.last_input_s.unwrap(), first_s, epsilon = 0.1);
+    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), first_s + 1.0, epsilon = 0.1);
+    assert_abs_diff_eq!(segmented.maneuvers[1].end_s, second_s + 2.5, epsilon = 0.2);
+}
+
+#[test]
+fn of_a_pause_too_short_for_both_the_lead_in_has_the_greater_part() {
+    let mut r = flight(60);
+    three_two_one_one(&mut r, 21.0);
+    three_two_one_one(&mut r, 29.0);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["3211", "3211"]);
+    // The first one's last input is at 28 s.
+    assert_abs_diff_eq!(segmented.maneuvers[1].start_s, 28.25, epsilon = 0.1);
+    assert_abs_diff_eq!(segmented.maneuvers[0].end_s, 28.44, epsilon = 0.1);
+}
+
+#[test]
+fn the_pilot_may_rest_when_he_goes_over_from_one_control_to_another_but_not_to_the_same() {
+    let mut r = flight(60);
+    let pedal_s = pilot_steps(&mut r, "pedal_in", 20.0, 1.5, 3, 1.2);
+    let last_s = pilot_steps(&mut r, "stick_lat_in", pedal_s + 2.6, -1.5, 3, 1.2);
+    assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.5);
+    // Steps broken off, and what the pilot recovers with: together as many as a maneuver has.
+    let mut r = flight(60);
+    let broken_off_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 3, 1.2);
+    pilot_steps(&mut r, "stick_pitch_in", broken_off_s + 2.6, 1.5, 1, 1.2);
+    assert_eq!(found(&r).maneuvers, []);
+}
+
+#[test]
+fn the_flag_tells_the_system_s_first_input_from_an_answer_to_the_pilot_s_last() {
+    let mut r = flight(60);
+    let last_s = pilot_steps(&mut r, "stick_pitch_in", 10.0, 1.5, 7, 1.2);
+    three_two_one_one(&mut r, last_s + 0.8);
+    up(&mut r, "obes", last_s + 0.6, last_s + 8.5);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["PITCH", "3211"]);
+    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), last_s + 0.8, epsilon = 0.1);
+    assert_eq!(segmented.unknown, []);
 }
 
 #[test]

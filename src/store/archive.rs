@@ -1,4 +1,5 @@
-//! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned tree.
+//! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned tree; or objects of an
+//! object store under the same names.
 //!
 //! Only the columns of the channel map are read, each by itself, row group by row group and page by page, into numbers;
 //! what a file cannot give is a problem of its flight, never a panic.
@@ -18,12 +19,16 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
 };
+use parquet::file::metadata::PageIndexPolicy;
+use parquet::file::reader::ChunkReader;
 
 use crate::error::{Error, Problem};
 use crate::flight::channel::RawColumn;
 use crate::flight::{Channel, RawFlight};
 use crate::ingest::Source;
 use crate::units::Unit;
+
+use super::object;
 
 /// The files of one flight, in the order of its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,6 +45,11 @@ const DEPTH: usize = 16;
 /// Rows decoded at a time: a few MB, whatever the size of the file's row groups.
 const BATCH_ROWS: usize = 16_384;
 
+/// Whether other programs use such a name for their own.
+fn is_hidden(name: &str) -> bool {
+    name.starts_with(['.', '_'])
+}
+
 /// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels at 200 Hz. A file of a
 /// few kilobytes can claim any number of rows, and would be read for as long.
 const LARGEST_FILE: u64 = 500_000_000;
@@ -55,7 +65,9 @@ pub(super) const UNIT: &str = "unit";
 /// files, as one that cannot be read.
 pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     let mut files = BTreeSet::new();
-    if Path::new(archive).is_dir() {
+    if object::is_object(Path::new(archive)) {
+        files = remote::find(archive)?;
+    } else if Path::new(archive).is_dir() {
         walk(Path::new(archive), DEPTH, &mut files)?;
     } else {
         let nonsense = |what: String| Error::Archive { place: archive.into(), what };
@@ -84,7 +96,7 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
     let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(['.', '_']));
+        let hidden = path.file_name().is_some_and(|n| is_hidden(&n.to_string_lossy()));
         if hidden {
             continue;
         }
@@ -144,6 +156,8 @@ pub struct Opened {
 #[derive(Debug)]
 struct OpenFile {
     path: PathBuf,
+    /// Where the file is an object.
+    object: Option<object::Reader>,
     metadata: ArrowReaderMetadata,
     columns: BTreeMap<String, OpenColumn>,
     rows: usize,
@@ -195,8 +209,15 @@ fn unreadable(e: &dyn std::fmt::Display) -> String {
 }
 
 fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
-    let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
-    let metadata = ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?;
+    let object = object::is_object(path).then(|| object::Reader::open(path)).transpose().map_err(|e| e.to_string())?;
+    let metadata = if let Some(object) = &object {
+        // Where its pages lie, a file in an object store is asked for if it knows: then no others are fetched.
+        let options = ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
+        ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
+    } else {
+        let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
+        ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?
+    };
     let mut columns = BTreeMap::new();
     for (at, field) in metadata.schema().fields().iter().enumerate() {
         let Some(channel) = channels.get(field.name()) else { continue };
@@ -215,7 +236,7 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
         return Err(format!("claims {most} rows of {} mapped columns, more than any recorder writes", columns.len()));
     }
     let rows = usize::try_from(all).unwrap_or_default();
-    Ok(OpenFile { path: path.to_owned(), metadata, columns, rows })
+    Ok(OpenFile { path: path.to_owned(), object, metadata, columns, rows })
 }
 
 impl Source for Opened {
@@ -255,8 +276,23 @@ impl OpenFile {
         if rows.is_empty() {
             return Ok(());
         }
+        if let Some(object) = &self.object {
+            let stretches = remote::stretches(self.metadata.metadata(), column.at, &rows);
+            let read = self.read_from(object.of_stretches(stretches), column, rows, sink);
+            return read.map_err(|e| object::failed(&self.path).unwrap_or(e));
+        }
         let opened = File::open(&self.path).map_err(|e| format!("cannot open the file: {e}"))?;
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(opened, self.metadata.clone());
+        self.read_from(opened, column, rows, sink)
+    }
+
+    fn read_from(
+        &self,
+        source: impl ChunkReader + 'static,
+        column: &OpenColumn,
+        rows: Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), String> {
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(source, self.metadata.clone());
         let mask = ProjectionMask::roots(builder.parquet_schema(), [column.at]);
         let selection = RowSelection::from_consecutive_ranges(std::iter::once(rows.clone()), self.rows);
         let builder = builder.with_projection(mask).with_row_selection(selection).with_batch_size(BATCH_ROWS);
@@ -349,5 +385,6 @@ fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
     Unit::parse(name).ok()?.factor_to(mapped)
 }
 
+mod remote;
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,9 @@
 //! and time of last change, which no program can set. A file that changed within [`SETTLED`] before it was read is not
 //! remembered: it may change again within the tick of the file system's clock. Where the system has no such times (not
 //! Unix), every file is read each time.
+//!
+//! An object is the same while its size and its ETag are: the store's own mark of its content. That holds on every machine,
+//! so what is known of objects is shared where the store is ([`Contents::objects`]).
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
@@ -14,7 +17,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::fingerprint::{sealed, unsealed};
-use super::{Digest, atomic};
+use super::{Digest, atomic, object};
 use crate::error::Result;
 
 /// A file must have been left alone for so long before it was read to be remembered. Clocks of file systems tick at most
@@ -54,11 +57,52 @@ impl Contents {
         Contents { path: PathBuf::new(), known: BTreeMap::new(), seen: Mutex::default() }
     }
 
-    /// What a file holds.
+    /// Adds what others remember of objects, as [`Contents::objects`] gave it; nothing where it is damaged.
+    #[must_use]
+    pub fn with_objects(mut self, text: &[u8]) -> Contents {
+        let theirs = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
+        let theirs: BTreeMap<PathBuf, Known> = theirs.unwrap_or_default();
+        let unknown = theirs.into_iter().filter(|(path, _)| object::is_object(path) && !self.known.contains_key(path));
+        let unknown: Vec<(PathBuf, Known)> = unknown.collect();
+        self.known.extend(unknown);
+        self
+    }
+
+    /// What is known of objects, as text for other machines; none where nothing of it is new.
+    #[must_use]
+    pub fn objects(&self) -> Option<Vec<u8>> {
+        let now = self.remembered();
+        let objects = |known: &BTreeMap<PathBuf, Known>| -> BTreeMap<PathBuf, Known> {
+            known.iter().filter(|(path, _)| object::is_object(path)).map(|(p, k)| (p.clone(), k.clone())).collect()
+        };
+        let (now, before) = (objects(&now), objects(&self.known));
+        (now != before).then(|| sealed(serde_json::to_vec(&now).unwrap_or_default()))
+    }
+
+    /// What an object holds; only one that is not known is read.
+    fn of_object(&self, path: &Path) -> Result<Digest, String> {
+        let about = object::listed(path).map_err(|e| e.to_string())?;
+        let stamp = stamp_of(&about.ok_or("is no more")?);
+        if let Some(known) = self.known.get(path).filter(|known| known.stamp == stamp) {
+            self.see(path, &stamp, Some(known.clone()));
+            return Ok(known.content.clone());
+        }
+        let mut reader = object::Reader::open(path).map_err(|e| e.to_string())?;
+        let content = Digest::of(&mut reader).map_err(|e| e.to_string())?;
+        let stamp = stamp_of(reader.about());
+        let is_marked = reader.about().tag.is_some();
+        self.see(path, &stamp, is_marked.then(|| Known { stamp: stamp.clone(), content: content.clone() }));
+        Ok(content)
+    }
+
+    /// What a file or an object holds.
     ///
     /// # Errors
     /// The reason in words: no regular file, cannot be read, or changes while it is read.
     pub fn of(&self, path: &Path) -> Result<Digest, String> {
+        if object::is_object(path) {
+            return self.of_object(path);
+        }
         let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
         // Anything else may block for ever: a pipe that nobody writes into.
         if !metadata.is_file() {
@@ -94,7 +138,9 @@ impl Contents {
     /// Whether a file still is as it was when its fingerprint was taken.
     #[must_use]
     pub fn is_unchanged(&self, path: &Path) -> bool {
-        let now = std::fs::metadata(path).ok().and_then(|m| stamp(&m));
+        let of_object = || object::about(path).ok().flatten().map(|about| stamp_of(&about));
+        let of_file = || std::fs::metadata(path).ok().and_then(|m| stamp(&m));
+        let now = if object::is_object(path) { of_object() } else { of_file() };
         let seen = self.seen.lock().ok().and_then(|seen| seen.get(path).map(|(stamp, _)| stamp.clone()));
         // Where there are no stamps there is nothing to compare.
         if cfg!(unix) { now.is_some() && now == seen } else { path.exists() }
@@ -105,14 +151,21 @@ impl Contents {
     /// # Errors
     /// [`crate::error::Error::Io`] naming the file.
     pub fn save(&self) -> Result<()> {
-        let seen = self.seen.lock().map(|seen| seen.clone()).unwrap_or_default();
-        let unasked = self.known.iter().filter(|(path, _)| !seen.contains_key(*path) && path.exists());
-        let mut known: BTreeMap<PathBuf, Known> = unasked.map(|(path, known)| (path.clone(), known.clone())).collect();
-        known.extend(seen.into_iter().filter_map(|(path, (_, known))| Some((path, known?))));
+        let known = self.remembered();
         if known == self.known {
             return Ok(());
         }
         atomic::place(&self.path, &sealed(serde_json::to_vec(&known).unwrap_or_default()))
+    }
+
+    fn remembered(&self) -> BTreeMap<PathBuf, Known> {
+        let seen = self.seen.lock().map(|seen| seen.clone()).unwrap_or_default();
+        // Whether an object that was not asked for is still there is not worth a question.
+        let is_there = |path: &Path| object::is_object(path) || path.exists();
+        let unasked = self.known.iter().filter(|(path, _)| !seen.contains_key(*path) && is_there(path));
+        let mut known: BTreeMap<PathBuf, Known> = unasked.map(|(path, known)| (path.clone(), known.clone())).collect();
+        known.extend(seen.into_iter().filter_map(|(path, (_, known))| Some((path, known?))));
+        known
     }
 
     fn see(&self, path: &Path, stamp: &str, known: Option<Known>) {
@@ -120,6 +173,10 @@ impl Contents {
             seen.insert(path.to_owned(), (stamp.to_owned(), known));
         }
     }
+}
+
+fn stamp_of(about: &object::About) -> Stamp {
+    format!("{}:{}", about.bytes, about.tag.as_deref().unwrap_or_default())
 }
 
 #[cfg(unix)]

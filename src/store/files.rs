@@ -6,18 +6,35 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::atomic;
+use super::{atomic, object};
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::error::{Error, Result};
 use crate::maneuver::Event;
 use crate::tables::PublishedTrend;
 
-/// A text file whole.
+/// A text file whole; it may be an object.
 ///
 /// # Errors
-/// [`Error::Io`] naming the file.
+/// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn text(path: &Path) -> Result<String> {
+    if object::is_object(path) {
+        let bytes = object::get(path).map_err(|e| e.at(path))?;
+        let bytes =
+            bytes.ok_or_else(|| Error::Archive { place: path.to_owned(), what: "there is no such object".into() })?;
+        return String::from_utf8(bytes).map_err(|_| Error::config(path, None, "it is no text"));
+    }
     std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))
+}
+
+/// Places a small text file whole or not at all; it may be an object.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the file.
+pub fn place_text(path: &Path, text: &str) -> Result<()> {
+    if object::is_object(path) {
+        return object::put(path, text.as_bytes().to_vec()).map_err(|e| e.at(path));
+    }
+    atomic::place(path, text.as_bytes())
 }
 
 /// The files of a folder with this extension, sorted.

@@ -9,8 +9,10 @@ pub mod fingerprint;
 pub mod lock;
 pub mod log;
 pub mod nights;
+pub mod object;
 pub mod record_file;
 pub mod recorder;
+mod shared;
 pub mod table;
 pub mod tunnel;
 

@@ -13,6 +13,7 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Problem;
@@ -158,30 +159,39 @@ pub struct Trends {
 /// single class of so few is passed over. A trend is published at the multiples of the step and at the derivative's
 /// `breakpoints`, deg, as far as they lie inside its data.
 #[must_use]
-pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl Fn(&str) -> Vec<f64>) -> Trends {
+pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl Fn(&str) -> Vec<f64> + Sync) -> Trends {
+    let each: Vec<Trends> = by_derivative(estimates, settings)
+        .into_par_iter()
+        .map(|(derivative, of_it)| of_derivative(derivative, &of_it, settings, &breakpoints(derivative)))
+        .collect();
     let mut trends = Trends::default();
-    for (derivative, of_it) in by_derivative(estimates, settings) {
-        let further = breakpoints(derivative);
-        let group = settings.group_of(derivative);
-        if let Some(group) = group {
-            let members: Vec<&EstimateRow> = of_it.iter().filter(|e| group.has(&e.class)).copied().collect();
-            let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
-            match trend(&members, &group.name, settings, knots, &further) {
-                Ok((rows, outliers)) => {
-                    trends.rows.extend(rows);
-                    trends.outliers.extend(outliers);
-                }
-                Err(reason) => trends.problems.push(problem(derivative, &group.name, reason)),
-            }
+    for own in each {
+        trends.rows.extend(own.rows);
+        trends.outliers.extend(own.outliers);
+        trends.problems.extend(own.problems);
+    }
+    trends
+}
+
+/// Those of one derivative.
+fn of_derivative(derivative: &str, of_it: &[&EstimateRow], settings: &Settings, further: &[f64]) -> Trends {
+    let mut trends = Trends::default();
+    let group = settings.group_of(derivative);
+    if let Some(group) = group {
+        let members: Vec<&EstimateRow> = of_it.iter().filter(|e| group.has(&e.class)).copied().collect();
+        let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
+        match trend(&members, &group.name, settings, knots, further) {
+            Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
+            Err(reason) => trends.problems.push(problem(derivative, &group.name, reason)),
         }
-        if settings.per_class {
-            let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
-            for class in names.into_iter().filter(|name| group.is_none_or(|g| g.name != *name)) {
-                let members: Vec<&EstimateRow> = of_it.iter().filter(|e| e.class == class).copied().collect();
-                // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
-                let of_class = trend(&members, class, settings, &settings.knots_deg, &further);
-                trends.rows.extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
-            }
+    }
+    if settings.per_class {
+        let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
+        for class in names.into_iter().filter(|name| group.is_none_or(|g| g.name != *name)) {
+            let members: Vec<&EstimateRow> = of_it.iter().filter(|e| e.class == class).copied().collect();
+            // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
+            let of_class = trend(&members, class, settings, &settings.knots_deg, further);
+            trends.rows.extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
         }
     }
     trends

@@ -139,6 +139,11 @@ tables "$work/alone/reports" >"$work/expected"
 campaign() {
     local name=$1 meanwhile=$2 begun job state
     begun=$(date +%s)
+    # All but the first find their flights ingested and segmented: what is tried on them is the estimates.
+    if [ "$name" != plain ]; then
+        mkdir -p "$work/$name/store"
+        cp -r "$work"/plain/store/{ingest,records,segment} "$work/$name/store/"
+    fi
     # shellcheck disable=SC2046
     "$harvest" submit $(options "$name") --engine slurm --go --quiet >"$work/$name.jobs"
     job=$(awk '/^merge/ {print $2}' "$work/$name.jobs")

@@ -13,6 +13,8 @@ mod house;
 mod ingest;
 mod memory;
 mod nights;
+#[cfg(feature = "s3")]
+mod object_store;
 mod paper;
 mod report;
 mod run;

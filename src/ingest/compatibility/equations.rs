@@ -15,8 +15,9 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::instruments::{INPUTS, OUTPUTS};
 use crate::aircraft::{Aircraft, Flow, Position};
-use crate::dynamics::{lever, sin_cos};
+use crate::dynamics::lever;
 use crate::ingest::motion::atmosphere;
+use crate::trig::sin_cos;
 use crate::units::DEG;
 
 /// States: three velocities at the sensors (ft/s), φ, θ, ψ (rad), altitude (ft).

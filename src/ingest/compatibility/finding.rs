@@ -155,7 +155,8 @@ fn estimate(errors: &Errors, instrument: usize, kind: Kind, settings: &Compatibi
     }
     let bound = errors.bounds[j].hypot(model);
     let limit = size(&settings.faulty, instrument, kind);
-    let fault = value.abs() > limit && value.abs() > settings.fault_standard_errors * bound;
+    let surely = settings.needed(kind, value) * errors.fault_bounds[j].hypot(model);
+    let fault = value.abs() > limit && value.abs() > surely;
     let action = match kind {
         Kind::Bias => settings.bias,
         Kind::Scale => settings.scale,
@@ -255,5 +256,39 @@ fn name(kind: Kind) -> &'static str {
         Kind::Bias => "bias",
         Kind::Scale => "scale",
         Kind::Delay => "delay",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::instruments::PARAMETERS;
+    use super::*;
+
+    /// What is said of the first vane's error of a kind.
+    fn said(kind: Kind, value: f64, bound: f64, fault_bound: f64) -> Estimate {
+        let j = place(6, kind);
+        let mut errors = Errors {
+            values: [0.0; PARAMETERS],
+            bounds: [bound; PARAMETERS],
+            fault_bounds: [fault_bound; PARAMETERS],
+            prior: [1.0; PARAMETERS],
+        };
+        errors.values[j] = value;
+        estimate(&errors, 6, kind, &Compatibility::default()).unwrap()
+    }
+
+    #[test]
+    fn a_channel_ahead_of_all_others_needs_more_to_be_named_than_one_that_is_late() {
+        assert!(said(Kind::Delay, 0.1, 0.02, 0.02).fault);
+        let ahead = said(Kind::Delay, -0.1, 0.02, 0.02);
+        assert!(!ahead.fault && ahead.doubtful && !ahead.applied);
+        assert!(said(Kind::Delay, -0.1, 0.01, 0.01).fault);
+    }
+
+    #[test]
+    fn what_gusts_may_make_of_a_scale_is_neither_named_nor_corrected() {
+        assert!(said(Kind::Scale, -0.35, 0.05, 0.05).fault);
+        let gusts = said(Kind::Scale, -0.35, 0.05, 0.2);
+        assert!(!gusts.fault && gusts.doubtful && !gusts.applied);
     }
 }

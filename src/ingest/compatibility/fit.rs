@@ -39,6 +39,9 @@ const FREED: f64 = 4.0;
 const MOST_FREED: usize = 4;
 /// The first round thinks every fault as likely as not: this many times the least size of one.
 const BROAD: f64 = 2.0;
+/// What the equations do not explain of a vane's motion is gusts, and the aircraft turns into a gust: as much of it as this
+/// goes with the motion that they do explain, and is taken for a scale error.
+const ANSWERED: f64 = 0.5;
 /// How closely the mean of the delays is held at zero, s.
 const COMMON_DELAY_S: f64 = 1e-4;
 
@@ -48,6 +51,8 @@ pub struct Errors {
     pub values: [f64; PARAMETERS],
     /// Standard deviations; none for what nothing determines.
     pub bounds: [f64; PARAMETERS],
+    /// What a fault is to be measured against: the bounds, and of an output's scale what gusts may make of it.
+    pub fault_bounds: [f64; PARAMETERS],
     /// What was thought of each before (√P).
     pub prior: [f64; PARAMETERS],
 }
@@ -127,7 +132,7 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         problem.settle(&mut members, &mut shared, &prior)?;
     }
     let mut bounds = problem.bounds(&members, &shared, &prior, windows)?;
-    let doubted = problem.doubted(&shared, &bounds, &prior);
+    let doubted = problem.doubted(&shared, &problem.fault_bounds(&members, &bounds), &prior);
     if !doubted.is_empty() {
         for j in doubted {
             prior[j] = size_of(&settings.ordinary, j);
@@ -135,7 +140,8 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         problem.settle(&mut members, &mut shared, &prior)?;
         bounds = problem.bounds(&members, &shared, &prior, windows)?;
     }
-    Some(Errors { values: shared, bounds, prior })
+    let fault_bounds = problem.fault_bounds(&members, &bounds);
+    Some(Errors { values: shared, bounds, fault_bounds, prior })
 }
 
 /// How many times larger than the swings of each accelerometer (forward, right, up) those of ω × v are which they are
@@ -330,12 +336,27 @@ impl Problem<'_> {
         Some(bounds)
     }
 
+    /// The bounds with what gusts may make of an output's scale.
+    fn fault_bounds(&self, members: &[Member], bounds: &[f64; PARAMETERS]) -> [f64; PARAMETERS] {
+        let mut wider = *bounds;
+        for o in 0..OUTPUTS {
+            let sums = members.iter().map(|m| m.unexplained(self, o));
+            let (slow, moved) = sums.fold((0.0, 0.0), |(slow, moved), (s, m)| (slow + s, moved + m));
+            let j = place(INPUTS + o, Kind::Scale);
+            if moved > 0.0 {
+                wider[j] = wider[j].hypot(ANSWERED * (slow / moved).sqrt());
+            }
+        }
+        wider
+    }
+
     /// Parameters that came out as large as a fault but, seen by their bounds, not as sure as one: no ordinary error is
     /// that large, so they are thought ordinary after all.
     fn doubted(&self, shared: &[f64; PARAMETERS], bounds: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> Vec<usize> {
         let freed = |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
         let large = |j: &usize| shared[*j].abs() > size_of(&self.settings.faulty, *j);
-        let unsure = |j: &usize| shared[*j].abs() <= self.settings.fault_standard_errors * bounds[*j];
+        let needed = |j: usize| self.settings.needed(ALL_KINDS[j % KINDS], shared[j]);
+        let unsure = |j: &usize| shared[*j].abs() <= needed(*j) * bounds[*j];
         (0..PARAMETERS).filter(freed).filter(large).filter(unsure).collect()
     }
 
@@ -413,6 +434,15 @@ impl<'a> Member<'a> {
         self.sums = sums;
     }
 
+    /// Of one output: the squares of the slow part of what the equations leave, and of the motion that they explain.
+    fn unexplained(&self, problem: &Problem, o: usize) -> (f64, f64) {
+        let measured = &self.window.outputs[o];
+        let known = problem.compared(self.window).filter(|k| measured[*k].is_finite());
+        let both = known.map(|k| (self.residuals[o][k], measured[k] - self.residuals[o][k]));
+        let (residuals, values): (Vec<f64>, Vec<f64>) = both.unzip();
+        (slow(&residuals), about_mean(&values))
+    }
+
     /// R from the residuals, as strong as their slowest part.
     fn reweigh(&mut self, problem: &Problem) {
         let range = problem.compared(self.window);
@@ -425,6 +455,17 @@ impl<'a> Member<'a> {
         }
         self.weigh(problem);
     }
+}
+
+/// The sum of squares without that of what does not continue from sample to sample.
+fn slow(values: &[f64]) -> f64 {
+    let noise = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / 2.0;
+    (values.iter().map(|v| v * v).sum::<f64>() - noise).max(0.0)
+}
+
+fn about_mean(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter().map(|v| (v - mean).powi(2)).sum()
 }
 
 /// Rows of an output that are summed together.
@@ -540,5 +581,18 @@ impl Sums {
             }
             None => (DMatrix::zeros(PARAMETERS, PARAMETERS), DVector::zeros(PARAMETERS)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_from_sample_to_sample_is_no_gust() {
+        let noise: Vec<f64> = (0_u64..4000).map(|k| (k * k * 7 % 101) as f64 / 50.0 - 1.0).collect();
+        let gust: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 0.03).sin()).collect();
+        assert!(slow(&noise) < 0.1 * about_mean(&noise), "{} of {}", slow(&noise), about_mean(&noise));
+        assert!((slow(&gust) / about_mean(&gust) - 1.0).abs() < 0.01);
     }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::instruments::Kind;
+
 /// How flight-path reconstruction is done and what follows from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -16,7 +18,9 @@ pub struct Compatibility {
     pub fault: OnFault,
     /// A correction counts when it is this many times its bound.
     pub standard_errors: f64,
-    /// A fault is named when it is this many times its bound, besides being beyond what is ordinary.
+    /// A fault is named when it is this many times its bound, besides being beyond what is ordinary. A channel that is
+    /// ahead of the others needs twice as many: instruments and recorders delay, and for one to be ahead all others must
+    /// be late alike.
     pub fault_standard_errors: f64,
     /// Length of the windows, s: some periods of the Dutch roll, and short enough that wind stays what it is.
     pub window_s: f64,
@@ -33,6 +37,14 @@ pub struct Compatibility {
     pub ordinary: Errors,
     /// From where it is no longer an instrument's ordinary error but a fault to be named.
     pub faulty: Errors,
+}
+
+impl Compatibility {
+    /// How many times its bound an error is when it counts as a fault.
+    pub(super) fn needed(&self, kind: Kind, value: f64) -> f64 {
+        let ahead = kind == Kind::Delay && value < 0.0;
+        if ahead { 2.0 * self.fault_standard_errors } else { self.fault_standard_errors }
+    }
 }
 
 impl Default for Compatibility {

@@ -1,6 +1,6 @@
 //! The page's elements as items: headings, paragraphs, lists, figures, and what stands side by side.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use roxmltree::Node;
 
@@ -183,7 +183,7 @@ impl<'a> Flow<'a> {
         let drawing = drawing::drawing(node, self.fonts);
         let scale = (width / drawing.width.max(1.0)).min(LARGEST);
         let height = drawing.height * scale;
-        let mark = Mark::Drawing { x: 0.0, y: 0.0, scale, drawing: Rc::new(drawing) };
+        let mark = Mark::Drawing { x: 0.0, y: 0.0, scale, drawing: Arc::new(drawing) };
         vec![Item { height, marks: vec![mark], ..Item::default() }]
     }
 

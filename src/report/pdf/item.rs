@@ -1,6 +1,6 @@
 //! What the pages are filled with: items, one under the other, each with marks at places within it, y downwards.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::drawing::Drawing;
 use super::fonts::Weight;
@@ -40,7 +40,7 @@ pub enum Mark {
     /// A text from its base line's left end.
     Text { x: f32, y: f32, style: Style, text: String },
     /// A drawing from its upper left corner, so many times as large as it is.
-    Drawing { x: f32, y: f32, scale: f32, drawing: Rc<Drawing> },
+    Drawing { x: f32, y: f32, scale: f32, drawing: Arc<Drawing> },
     /// A filled rectangle.
     Fill { x: f32, y: f32, width: f32, height: f32, colour: Colour },
     /// What leads to an anchor when it is pointed at.
@@ -61,7 +61,7 @@ pub struct Item {
     /// Stays with what follows.
     pub keep: bool,
     /// Stands again at the top of a page that the item begins.
-    pub head: Option<Rc<Item>>,
+    pub head: Option<Arc<Item>>,
     /// Nothing but room, which no page begins with.
     pub is_room: bool,
     /// A new page begins here.

@@ -17,6 +17,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use pdf_writer::types::{ActionType, AnnotationType, PageMode};
 use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
+use rayon::prelude::*;
 use roxmltree::{Document, ParsingOptions};
 
 use drawing::number;
@@ -83,14 +84,16 @@ impl Writer<'_> {
         for weight in Weight::ALL {
             self.fonts.write(&mut pdf, weight, font_ref(weight), &compressed);
         }
-        for page in 1..=total {
-            self.page(&mut pdf, page);
+        let set: Vec<Set> = (1..=total).into_par_iter().map(|page| self.set(page)).collect();
+        for (page, set) in (1..).zip(set) {
+            Self::page(&mut pdf, page, set);
         }
         self.outline(&mut pdf);
         pdf.finish()
     }
 
-    fn page(&self, pdf: &mut Pdf, number: usize) {
+    /// What stands on a page.
+    fn set(&self, number: usize) -> Set {
         let mut content = Content { fonts: self.fonts, out: String::new(), opacities: BTreeSet::from([100]) };
         let mut links = Vec::new();
         for mark in self.pages.sheets.get(number - 1).map_or(&[][..], |p| &p.marks) {
@@ -107,6 +110,10 @@ impl Writer<'_> {
             }
         }
         self.footer(&mut content, number);
+        Set { content: compressed(content.out.as_bytes()), opacities: content.opacities, links }
+    }
+
+    fn page(pdf: &mut Pdf, number: usize, set: Set) {
         let (id, content_id) = (page_ref(number), Ref::new(page_ref(number).get() + 1));
         let mut page = pdf.page(id);
         page.media_box(Rect::new(0.0, 0.0, WIDTH, HEIGHT)).parent(Ref::new(TREE)).contents(content_id);
@@ -117,7 +124,7 @@ impl Writer<'_> {
         }
         fonts.finish();
         let mut states = resources.ext_g_states();
-        for percent in &content.opacities {
+        for percent in &set.opacities {
             let opacity = f32::from(*percent) / 100.0;
             let name = format!("A{percent}");
             states
@@ -127,9 +134,9 @@ impl Writer<'_> {
         }
         states.finish();
         resources.finish();
-        if !links.is_empty() {
+        if !set.links.is_empty() {
             let mut annotations = page.insert(Name(b"Annots")).array();
-            for ([x, y, width, height], (target, top)) in links {
+            for ([x, y, width, height], (target, top)) in set.links {
                 let mut link = annotations.push().start::<pdf_writer::writers::Annotation>();
                 link.subtype(AnnotationType::Link).rect(Rect::new(x, HEIGHT - y - height, x + width, HEIGHT - y));
                 link.border(0.0, 0.0, 0.0, None);
@@ -139,7 +146,7 @@ impl Writer<'_> {
             }
         }
         page.finish();
-        pdf.stream(content_id, &compressed(content.out.as_bytes())).filter(Filter::FlateDecode);
+        pdf.stream(content_id, &set.content).filter(Filter::FlateDecode);
     }
 
     fn footer(&self, content: &mut Content, page: usize) {
@@ -202,6 +209,14 @@ fn describe(item: &mut pdf_writer::writers::OutlineItem, heading: &Heading, pare
 }
 
 /// The operators of one page.
+/// A page that is set: its content, compressed; the opacities that it uses, in percent; where its links are, and to which
+/// height of which page they lead.
+struct Set {
+    content: Vec<u8>,
+    opacities: BTreeSet<u8>,
+    links: Vec<([f32; 4], (usize, f32))>,
+}
+
 struct Content<'a> {
     fonts: &'a Fonts,
     out: String,

@@ -1,7 +1,7 @@
 //! A table as items, a row each: columns as wide as their words want where the page has the room, else narrower, at last
 //! in smaller type.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use roxmltree::Node;
 
@@ -45,7 +45,7 @@ pub fn rows(table: Node, width: f32, fonts: &Fonts, is_dense: bool) -> Vec<Item>
         }
     }
     let full: f32 = columns.iter().sum::<f32>() + GAP * columns.len().saturating_sub(1) as f32;
-    let mut head: Option<Rc<Item>> = None;
+    let mut head: Option<Arc<Item>> = None;
     let mut items = Vec::new();
     for (is_head, row) in &grid {
         let mut item = row_item(row, &columns, size, if is_dense { 0.3 } else { 1.2 }, fonts);
@@ -56,7 +56,7 @@ pub fn rows(table: Node, width: f32, fonts: &Fonts, is_dense: bool) -> Vec<Item>
         }
         if *is_head {
             item.keep = true;
-            head = Some(Rc::new(item.clone()));
+            head = Some(Arc::new(item.clone()));
         } else {
             item.head.clone_from(&head);
         }

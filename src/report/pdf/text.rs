@@ -1,6 +1,6 @@
 //! Running text: the inline elements of the page as words, and words as lines of a given width.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use roxmltree::Node;
 
@@ -20,7 +20,7 @@ enum Part {
         text: String,
         style: Style,
     },
-    Drawing(Rc<Drawing>),
+    Drawing(Arc<Drawing>),
     /// Room for the page that a link leads to.
     PageOf {
         style: Style,
@@ -140,7 +140,7 @@ impl<'a> Reader<'a> {
         let drawing = drawing::drawing(svg, self.fonts);
         // Its margin to the word it stands before.
         let width = drawing.width * PX + 3.0;
-        self.part(Part::Drawing(Rc::new(drawing)), width, link);
+        self.part(Part::Drawing(Arc::new(drawing)), width, link);
     }
 
     fn page_of(&mut self, target: &str, style: Style) {
@@ -277,7 +277,7 @@ fn set(line: &[Word], setting: Setting, fonts: &Fonts) -> Item {
                 Part::Drawing(drawing) => {
                     end(&mut run, &mut item);
                     let y = base - 0.36 * setting.size - 0.5 * drawing.height * PX;
-                    item.marks.push(Mark::Drawing { x, y, scale: PX, drawing: Rc::clone(drawing) });
+                    item.marks.push(Mark::Drawing { x, y, scale: PX, drawing: Arc::clone(drawing) });
                     x += drawing.width * PX + 3.0;
                 }
                 Part::PageOf { style, width } => {

@@ -1,0 +1,267 @@
+//! Objects of an S3-compatible store, `s3://bucket/key`, as archive and store use them: listed, read by ranges, put whole.
+//!
+//! What connects is the environment's alone (`AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_SESSION_TOKEN`, `AWS_REGION`,
+//! `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP` and what else the `object_store` crate reads there): no file of the pipeline and no
+//! option holds a secret. An object is replaced by a single request or not at all, so none is ever half written.
+
+#[cfg(not(feature = "s3"))]
+#[path = "object/absent.rs"]
+mod client;
+#[cfg(feature = "s3")]
+mod client;
+mod reader;
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use crate::error::{Error, Result};
+use client::Client;
+
+pub use reader::Reader;
+
+const SCHEME: &str = "s3://";
+
+/// What is held in memory of an object that goes to or comes from a file, bytes.
+const PART: usize = 16 << 20;
+
+/// Why an object cannot be had, in words that say what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// It may go well another time: nobody answers, or the object was replaced meanwhile.
+    Passing(String),
+    /// It will not: no such bucket, no right to it, or nothing to ask with.
+    Lasting(String),
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (Failure::Passing(what) | Failure::Lasting(what)) = self;
+        f.write_str(what)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl Failure {
+    /// The error that stops a run.
+    #[must_use]
+    pub fn at(self, place: &Path) -> Error {
+        match self {
+            Failure::Passing(what) => Error::Store { path: place.to_owned(), what },
+            Failure::Lasting(what) => Error::Archive { place: place.to_owned(), what },
+        }
+    }
+}
+
+/// What is known of an object without reading it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct About {
+    pub bytes: u64,
+    /// The store's own mark of its content; another content has another one. Not every store lists it.
+    pub tag: Option<String>,
+}
+
+/// Whether a path is an object's, or the prefix of some.
+#[must_use]
+pub fn is_object(path: &Path) -> bool {
+    path.to_str().is_some_and(|text| text.starts_with(SCHEME))
+}
+
+/// Bucket and key.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Address {
+    bucket: String,
+    key: String,
+}
+
+impl Address {
+    fn parse(path: &Path) -> Result<Address, Failure> {
+        let text = path.to_string_lossy();
+        let wrong = |what: &str| Failure::Lasting(format!("{what}; expected s3://bucket/prefix"));
+        let rest = text.strip_prefix(SCHEME).ok_or_else(|| wrong("not in an object store"))?;
+        let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
+        let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+        if bucket.is_empty() || !bucket.chars().all(is_name) {
+            return Err(wrong(&format!("`{bucket}` is no name of a bucket")));
+        }
+        let key = key.trim_end_matches('/');
+        if key.split('/').any(|part| matches!(part, "." | "..")) || key.contains("//") || key.starts_with('/') {
+            return Err(wrong(&format!("`{key}` is no key: its parts have names")));
+        }
+        Ok(Address { bucket: bucket.to_owned(), key: key.to_owned() })
+    }
+
+    fn client(&self) -> Result<Arc<Client>, Failure> {
+        // Connections are the process's, as its environment is.
+        static OPENED: OnceLock<Mutex<BTreeMap<String, Arc<Client>>>> = OnceLock::new();
+        let mut opened = OPENED.get_or_init(Mutex::default).lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(client) = opened.get(&self.bucket) {
+            return Ok(client.clone());
+        }
+        let client = Arc::new(Client::open(&self.bucket)?);
+        opened.insert(self.bucket.clone(), client.clone());
+        Ok(client)
+    }
+}
+
+fn at(path: &Path) -> Result<(Arc<Client>, String), Failure> {
+    let address = Address::parse(path)?;
+    Ok((address.client()?, address.key))
+}
+
+/// Checks that a path is one that objects can have; nobody is asked.
+///
+/// # Errors
+/// What is wrong with it, or that this program knows no object stores.
+pub fn check(path: &Path) -> Result<(), Failure> {
+    Address::parse(path)?;
+    client::available()
+}
+
+/// The objects whose key begins with the path's (a bucket alone: all), in the order of their keys.
+///
+/// # Errors
+/// Why they cannot be listed.
+pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, About>, Failure> {
+    let address = Address::parse(path)?;
+    let listed = address.client()?.list(&address.key)?;
+    Ok(listed
+        .into_iter()
+        .map(|(key, about)| (PathBuf::from(format!("{SCHEME}{}/{key}", address.bucket)), about))
+        .collect())
+}
+
+/// Remembers what was listed of an object, so that [`listed`] need not ask.
+///
+/// # Errors
+/// It is no object's path.
+pub fn remember(path: &Path, about: &About) -> Result<(), Failure> {
+    let (client, key) = at(path)?;
+    client.remember(key, about.clone());
+    Ok(())
+}
+
+/// What is known of an object now; none where there is none.
+///
+/// # Errors
+/// Why it cannot be asked for.
+pub fn about(path: &Path) -> Result<Option<About>, Failure> {
+    let (client, key) = at(path)?;
+    client.about(&key)
+}
+
+/// What is known of an object, as it was remembered where that tells enough.
+///
+/// # Errors
+/// Why it cannot be asked for.
+pub fn listed(path: &Path) -> Result<Option<About>, Failure> {
+    let (client, key) = at(path)?;
+    match client.listed(&key) {
+        Some(about) if about.tag.is_some() => Ok(Some(about)),
+        _ => client.about(&key),
+    }
+}
+
+/// Why an object could not be read a while ago, if that was not for its bytes.
+#[must_use]
+pub fn failed(path: &Path) -> Option<String> {
+    let (client, key) = at(path).ok()?;
+    client.failed(&key)
+}
+
+/// A small object whole; none where there is none.
+///
+/// # Errors
+/// Why it cannot be read.
+pub fn get(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+    let (client, key) = at(path)?;
+    Ok(client.get(&key)?.map(|bytes| bytes.to_vec()))
+}
+
+/// Puts an object, whole.
+///
+/// # Errors
+/// Why it cannot be written.
+pub fn put(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
+    let (client, key) = at(path)?;
+    client.put(&key, bytes)
+}
+
+/// Removes an object, where there is one.
+///
+/// # Errors
+/// Why it cannot be removed.
+pub fn remove(path: &Path) -> Result<(), Failure> {
+    let (client, key) = at(path)?;
+    client.remove(&key)
+}
+
+/// Puts a file as an object, whole, in parts where it is large.
+///
+/// # Errors
+/// Why file or object cannot be used.
+pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
+    let (client, key) = at(path)?;
+    let unreadable = |e: std::io::Error| Failure::Passing(format!("{} cannot be read: {e}", file.display()));
+    let mut from = std::fs::File::open(file).map_err(unreadable)?;
+    let mut part = || {
+        let mut bytes = Vec::new();
+        (&mut from).take(PART as u64).read_to_end(&mut bytes).map(|_| bytes).map_err(unreadable)
+    };
+    let first = part()?;
+    if first.len() < PART { client.put(&key, first) } else { client.put_parts(&key, first, &mut part) }
+}
+
+/// Writes an object out, part by part; false where there is none.
+///
+/// # Errors
+/// Why it cannot be read or written out.
+pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, Failure> {
+    let Some(mut reader) = Reader::of(path)? else { return Ok(false) };
+    std::io::copy(&mut reader, out).map_err(|e| match e.downcast::<Failure>() {
+        Ok(failure) => failure,
+        Err(e) => Failure::Passing(format!("cannot be copied: {e}")),
+    })?;
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_a_bucket_and_a_key() {
+        let parsed = |text: &str| Address::parse(Path::new(text)).map(|a| (a.bucket, a.key));
+        let expected = |bucket: &str, key: &str| Ok((bucket.to_owned(), key.to_owned()));
+        assert_eq!(
+            parsed("s3://flights/1995/flight=007/part-0.parquet"),
+            expected("flights", "1995/flight=007/part-0.parquet")
+        );
+        assert_eq!(parsed("s3://flights"), expected("flights", ""));
+        assert_eq!(parsed("s3://flights/1995/"), expected("flights", "1995"));
+        for wrong in ["s3://", "s3:///key", "s3://a b/c", "flights/1995", "s3://flights/../x", "s3://flights//x"] {
+            let failure = parsed(wrong).unwrap_err();
+            assert!(
+                matches!(&failure, Failure::Lasting(what) if what.contains("s3://bucket/prefix")),
+                "{wrong}: {failure}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_path_in_a_folder_is_no_object() {
+        assert!(is_object(Path::new("s3://flights/a.parquet")));
+        for file in ["data/s3", "/s3://x", "S3/a.parquet", "s3:/flights"] {
+            assert!(!is_object(Path::new(file)), "{file}");
+        }
+    }
+
+    #[cfg(not(feature = "s3"))]
+    #[test]
+    fn a_program_without_object_stores_says_which_one_has_them() {
+        let failure = list(Path::new("s3://flights")).unwrap_err();
+        assert!(failure.to_string().contains("--features s3"), "{failure}");
+    }
+}

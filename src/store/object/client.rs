@@ -1,0 +1,330 @@
+//! The connection to a bucket: requests of the `object_store` crate, each waited for by the thread that makes it.
+//!
+//! Retries with backoff are that crate's; they end within half a minute, and after [`SILENT`] requests in a row without an
+//! answer nobody is asked again in this run: a dead endpoint costs a minute, not a minute for every flight.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use bytes::Bytes;
+use object_store::aws::{AmazonS3, AmazonS3Builder};
+use object_store::list::{PaginatedListOptions, PaginatedListStore};
+use object_store::path::Path as Key;
+use object_store::{
+    BackoffConfig, Error, GetOptions, GetRange, MultipartUpload, ObjectMeta, ObjectStore, ObjectStoreExt, RetryConfig,
+};
+use tokio::runtime::Runtime;
+
+use super::{About, Failure};
+
+/// So many requests in a row without an answer, and the endpoint is taken for dead.
+const SILENT: usize = 3;
+
+/// After so long a request that failed is not tried again. What was begun before may take as long once more.
+const PATIENCE: Duration = Duration::from_secs(25);
+
+const ENDPOINTS: [&str; 3] = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
+
+/// Other sources of credentials than a key and its secret. Without any, machines in Amazon's cloud would be asked for
+/// theirs, and elsewhere nobody answers that.
+const CREDENTIALS: [&str; 4] = [
+    "AWS_WEB_IDENTITY_TOKEN_FILE",
+    "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+    "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+    "AWS_SKIP_SIGNATURE",
+];
+
+pub struct Client {
+    runtime: Runtime,
+    store: AmazonS3,
+    bucket: String,
+    /// As messages name it.
+    endpoint: String,
+    /// What lists have told, where it was asked to be remembered.
+    listed: Mutex<BTreeMap<String, About>>,
+    trouble: Mutex<Trouble>,
+}
+
+/// What did not go well.
+#[derive(Default)]
+struct Trouble {
+    silent: usize,
+    /// Keys whose request was not granted, and why.
+    failed: BTreeMap<String, String>,
+}
+
+impl std::fmt::Debug for Client {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Nothing more: the rest knows the credentials.
+        f.debug_struct("Client").field("bucket", &self.bucket).field("endpoint", &self.endpoint).finish_non_exhaustive()
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "as where there are no object stores")]
+pub fn available() -> Result<(), Failure> {
+    Ok(())
+}
+
+fn set(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+/// What is missing in the environment, or at odds there.
+fn refuse_environment() -> Result<(), Failure> {
+    let has_key = set("AWS_ACCESS_KEY_ID").is_some() && set("AWS_SECRET_ACCESS_KEY").is_some();
+    if !has_key && !CREDENTIALS.iter().any(|name| set(name).is_some()) {
+        let what = "no credentials in the environment: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (and AWS_REGION, \
+                    AWS_SESSION_TOKEN, AWS_ENDPOINT_URL where they are needed)";
+        return Err(Failure::Lasting(what.to_owned()));
+    }
+    let allowed =
+        set("AWS_ALLOW_HTTP").is_some_and(|v| matches!(v.to_lowercase().as_str(), "true" | "1" | "yes" | "on"));
+    match ENDPOINTS.iter().find_map(|name| set(name)) {
+        Some(endpoint) if endpoint.starts_with("http://") && !allowed => Err(Failure::Lasting(format!(
+            "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true where nobody listens"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// An error and what caused it, each once.
+fn words(error: &dyn std::error::Error) -> Vec<String> {
+    std::iter::successors(Some(error), |e| e.source()).map(ToString::to_string).collect()
+}
+
+/// What S3 calls an error.
+fn code(text: &str) -> Option<&str> {
+    text.split_once("<Code>")?.1.split_once("</Code>").map(|(code, _)| code)
+}
+
+impl Client {
+    pub fn open(bucket: &str) -> Result<Client, Failure> {
+        refuse_environment()?;
+        let backoff = BackoffConfig { max_backoff: Duration::from_secs(5), ..BackoffConfig::default() };
+        let retry = RetryConfig { max_retries: 6, retry_timeout: PATIENCE, backoff };
+        let store = AmazonS3Builder::from_env().with_bucket_name(bucket).with_retry(retry).build();
+        let store = store.map_err(|e| {
+            Failure::Lasting(format!(
+                "cannot connect as the environment's AWS_ variables say: {}",
+                words(&e).join(": ")
+            ))
+        })?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime = runtime.map_err(|e| Failure::Passing(format!("cannot connect: {e}")))?;
+        let region = || {
+            format!(
+                "Amazon S3 in {}",
+                set("AWS_REGION").or_else(|| set("AWS_DEFAULT_REGION")).unwrap_or("us-east-1".to_owned())
+            )
+        };
+        let endpoint = ENDPOINTS.iter().find_map(|name| set(name)).unwrap_or_else(region);
+        Ok(Client {
+            runtime,
+            store,
+            bucket: bucket.to_owned(),
+            endpoint,
+            listed: Mutex::default(),
+            trouble: Mutex::default(),
+        })
+    }
+
+    /// The answer to a request about a key; none where there is no such object.
+    fn ask<T>(&self, key: &str, request: impl Future<Output = Result<T, Error>>) -> Result<Option<T>, Failure> {
+        let trouble = || self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
+        let unanswered = |what: String| {
+            trouble().failed.insert(key.to_owned(), what.clone());
+            Failure::Passing(what)
+        };
+        if trouble().silent >= SILENT {
+            return Err(unanswered(format!(
+                "{} did not answer {SILENT} requests in a row and is not asked again; run again when it does",
+                self.endpoint
+            )));
+        }
+        let error = match self.runtime.block_on(request) {
+            Ok(answer) => {
+                trouble().silent = 0;
+                return Ok(Some(answer));
+            }
+            Err(error) => error,
+        };
+        match self.told(&error) {
+            Told::Missing => {
+                trouble().silent = 0;
+                Ok(None)
+            }
+            Told::Refused(failure) => {
+                trouble().silent = 0;
+                trouble().failed.insert(key.to_owned(), failure.to_string());
+                Err(failure)
+            }
+            Told::Nothing(what) => {
+                trouble().silent += 1;
+                Err(unanswered(what))
+            }
+        }
+    }
+
+    /// What an error tells of its request.
+    fn told(&self, error: &Error) -> Told {
+        let (words, endpoint, bucket) = (words(error), &self.endpoint, &self.bucket);
+        let text = words.join("\n");
+        let code = code(&text);
+        let status = text.split_once("status code: ").map(|(_, rest)| rest.get(..3).unwrap_or_default());
+        let said = code.map(str::to_owned).or(status.map(|s| format!("status {s}"))).unwrap_or_default();
+        let refused = |what: String| Told::Refused(Failure::Lasting(what));
+        match (error, status) {
+            _ if code == Some("NoSuchBucket") => {
+                refused(format!("there is no bucket `{bucket}` at {endpoint}: create it, or name another"))
+            }
+            (Error::NotFound { .. }, _) | (_, Some("404")) => Told::Missing,
+            (Error::Precondition { .. }, _) => {
+                Told::Refused(Failure::Passing("was replaced while it was read; the next run will read it".to_owned()))
+            }
+            (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) | (_, Some("401" | "403")) => {
+                refused(format!(
+                    "{endpoint} denies it ({said}): look at AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN \
+                     in the environment, at AWS_REGION, and at what they may do in bucket `{bucket}`"
+                ))
+            }
+            (_, Some(status)) if status.starts_with(['3', '4']) => refused(format!(
+                "{endpoint} does not take the request ({said}): look at AWS_REGION and AWS_ENDPOINT_URL in the environment"
+            )),
+            _ => {
+                let last = words.last().map(String::as_str).unwrap_or_default();
+                let said = if said.is_empty() { last.to_owned() } else { said };
+                Told::Nothing(format!(
+                    "{endpoint} does not answer ({said}): look at AWS_ENDPOINT_URL and AWS_REGION in the environment, and at \
+                     the network"
+                ))
+            }
+        }
+    }
+
+    fn key(key: &str) -> Result<Key, Failure> {
+        Key::parse(key).map_err(|e| Failure::Lasting(format!("no key of an object: {e}")))
+    }
+
+    pub fn failed(&self, key: &str) -> Option<String> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).failed.get(key).cloned()
+    }
+
+    /// All objects whose keys begin with this.
+    pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, About>, Failure> {
+        let (mut found, mut page_token) = (BTreeMap::new(), None);
+        loop {
+            let options = PaginatedListOptions { page_token, ..PaginatedListOptions::default() };
+            let prefix = (!prefix.is_empty()).then_some(prefix);
+            let page = self.ask(prefix.unwrap_or_default(), self.store.list_paginated(prefix, options))?;
+            let Some(page) = page else {
+                let what =
+                    format!("there is no bucket `{}` at {}: create it, or name another", self.bucket, self.endpoint);
+                return Err(Failure::Lasting(what));
+            };
+            found.extend(page.result.objects.into_iter().map(|o| (o.location.to_string(), about(&o))));
+            page_token = page.page_token;
+            if page_token.is_none() {
+                return Ok(found);
+            }
+        }
+    }
+
+    pub fn remember(&self, key: String, about: About) {
+        self.listed.lock().unwrap_or_else(PoisonError::into_inner).insert(key, about);
+    }
+
+    pub fn listed(&self, key: &str) -> Option<About> {
+        self.listed.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned()
+    }
+
+    pub fn about(&self, key: &str) -> Result<Option<About>, Failure> {
+        let path = Self::key(key)?;
+        Ok(self.ask(key, self.store.head(&path))?.as_ref().map(about))
+    }
+
+    pub fn get(&self, key: &str) -> Result<Option<Bytes>, Failure> {
+        let path = Self::key(key)?;
+        self.ask(key, async { self.store.get(&path).await?.bytes().await })
+    }
+
+    /// A part of an object, of the content that had this tag.
+    pub fn range(&self, key: &str, range: Range<u64>, tag: Option<&str>) -> Result<Bytes, Failure> {
+        let path = Self::key(key)?;
+        let expected = range.end - range.start;
+        let options = GetOptions {
+            range: Some(GetRange::Bounded(range)),
+            if_match: tag.map(str::to_owned),
+            ..GetOptions::default()
+        };
+        let bytes = self.ask(key, async { self.store.get_opts(&path, options).await?.bytes().await })?;
+        let gone = || Failure::Passing("vanished while it was read; the next run will see".to_owned());
+        let bytes = bytes.ok_or_else(gone)?;
+        if bytes.len() as u64 == expected {
+            return Ok(bytes);
+        }
+        Err(Failure::Passing(format!("gave {} bytes where {expected} were asked for", bytes.len())))
+    }
+
+    pub fn put(&self, key: &str, bytes: Vec<u8>) -> Result<(), Failure> {
+        let path = Self::key(key)?;
+        self.written(self.ask(key, self.store.put(&path, bytes.into()))?).map(|_| ())
+    }
+
+    pub fn remove(&self, key: &str) -> Result<(), Failure> {
+        let path = Self::key(key)?;
+        self.ask(key, self.store.delete(&path)).map(|_| ())
+    }
+
+    /// Puts an object in parts, until one is empty; it appears with the last one.
+    pub fn put_parts(
+        &self,
+        key: &str,
+        first: Vec<u8>,
+        next: &mut dyn FnMut() -> Result<Vec<u8>, Failure>,
+    ) -> Result<(), Failure> {
+        let path = Self::key(key)?;
+        let upload = self.ask(key, self.store.put_multipart(&path))?;
+        let mut upload = self.written(upload)?;
+        let sent = self.send_parts(key, first, next, &mut *upload);
+        if sent.is_err() {
+            // Parts that cannot be taken back either are the bucket's lifecycle rules' to remove.
+            let _ = self.runtime.block_on(upload.abort());
+        }
+        sent
+    }
+
+    fn send_parts(
+        &self,
+        key: &str,
+        first: Vec<u8>,
+        next: &mut dyn FnMut() -> Result<Vec<u8>, Failure>,
+        upload: &mut dyn MultipartUpload,
+    ) -> Result<(), Failure> {
+        let mut part = first;
+        while !part.is_empty() {
+            self.written(self.ask(key, upload.put_part(part.into()))?)?;
+            part = next()?;
+        }
+        self.written(self.ask(key, upload.complete())?).map(|_| ())
+    }
+
+    /// What is written is missing only where its bucket is.
+    fn written<T>(&self, answer: Option<T>) -> Result<T, Failure> {
+        let what = || format!("there is no bucket `{}` at {}: create it, or name another", self.bucket, self.endpoint);
+        answer.ok_or_else(|| Failure::Lasting(what()))
+    }
+}
+
+/// What came of a request that was not granted.
+enum Told {
+    Missing,
+    Refused(Failure),
+    /// Nobody answered, or with nothing that could be understood.
+    Nothing(String),
+}
+
+fn about(object: &ObjectMeta) -> About {
+    About { bytes: object.size, tag: object.e_tag.clone() }
+}
