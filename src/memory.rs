@@ -2,7 +2,7 @@
 //!
 //! A maneuver made ready is some two megabytes in vectors of a few hundred kilobytes. glibc returns such blocks at once and
 //! takes them anew, page by page, and on a virtual machine those faults cost more than what is computed in the pages: a
-//! third of an estimate. Only blocks up to [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the
+//! quarter of an estimate. Only blocks up to [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the
 //! heap, so that a large flight's pages go back as before.
 
 /// Larger blocks, the buffers of the archive's files among them, are taken from the kernel and returned to it, bytes.

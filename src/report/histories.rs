@@ -1,15 +1,13 @@
 //! The time history of a maneuver: inputs, and outputs measured and computed with their residuals, as in the paper's
 //! Figures 4 and 12.
 
-use std::collections::BTreeMap;
-
-use super::Contents;
 use super::figure::stack::{self, Stack, Strip, StripLine};
 use super::figure::{self};
 use super::marks::{LegendView, key, line};
 use super::notation::{angle, without_unit};
 use super::scale::{Scale, extent};
 use super::subject::by_name;
+use super::{Contents, pages};
 use crate::tables::{History, HistoryOutput};
 use crate::units::Unit;
 
@@ -23,21 +21,15 @@ const HARDLY: f64 = 0.1;
 /// More inputs than these make the column longer than that of the outputs.
 const MOST_INPUTS: usize = 9;
 
-/// The maneuver that stands for its class: the converged one nearest to the configured angle of attack.
+/// The history of the maneuver that stands for its class ([`pages::typical`]), class by class.
 #[must_use]
 pub fn typical<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
-    let outcomes: BTreeMap<&str, &str> =
-        contents.fits.iter().map(|f| (f.maneuver_id.as_str(), f.outcome.as_str())).collect();
-    let has_converged = |h: &&History| outcomes.get(h.maneuver_id.as_str()) == Some(&"converged");
-    let off = |h: &History| (h.alpha_deg - contents.typical_alpha_deg).abs();
+    let typical = pages::typical(contents.maneuvers, &pages::converged(contents.fits), contents.typical_alpha_deg);
     let of_class = by_name(contents.histories, |h| &h.class);
     let configured: Vec<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
     let others = of_class.keys().copied().filter(|c| !configured.contains(c));
-    let nearest = |class: &str| {
-        let own = of_class.get(class)?.iter().copied().filter(has_converged);
-        own.min_by(|a, b| off(a).total_cmp(&off(b)).then_with(|| a.maneuver_id.cmp(&b.maneuver_id)))
-    };
-    configured.iter().copied().chain(others).filter_map(nearest).collect()
+    let stands = |class: &str| of_class.get(class)?.iter().copied().find(|h| typical.contains(h.maneuver_id.as_str()));
+    configured.iter().copied().chain(others).filter_map(stands).collect()
 }
 
 /// So many samples are kept of one signal at most: more cannot be told apart in a column.

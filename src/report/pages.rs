@@ -19,8 +19,7 @@ pub fn chosen(
     typical_alpha_deg: f64,
     most: usize,
 ) -> BTreeSet<String> {
-    let converged: BTreeSet<&str> =
-        fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).map(|f| f.maneuver_id.as_str()).collect();
+    let converged = converged(fits);
     let changed: BTreeSet<&str> = changes
         .maneuvers
         .iter()
@@ -35,8 +34,13 @@ pub fn chosen(
     chosen.into_iter().map(str::to_owned).collect()
 }
 
-/// The converged maneuver of each class nearest to an angle of attack.
-fn typical<'a>(maneuvers: &'a [Maneuver], converged: &BTreeSet<&str>, alpha_deg: f64) -> BTreeSet<&'a str> {
+/// The maneuvers whose fit converged.
+pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
+    fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).map(|f| f.maneuver_id.as_str()).collect()
+}
+
+/// The maneuver that stands for its class: of each the converged one nearest to an angle of attack.
+pub(super) fn typical<'a>(maneuvers: &'a [Maneuver], converged: &BTreeSet<&str>, alpha_deg: f64) -> BTreeSet<&'a str> {
     let off = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
     let mut nearest: BTreeMap<&str, &Maneuver> = BTreeMap::new();
     for maneuver in maneuvers.iter().filter(|m| converged.contains(m.maneuver_id.as_str())) {

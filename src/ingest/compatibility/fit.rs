@@ -95,7 +95,7 @@ struct Member<'a> {
     sums: Sums,
     /// The window's information and gradient on the shared parameters when its own follow.
     reduced: (DMatrix<f64>, DVector<f64>),
-    /// Of each output at every sample; zero where it does not count.
+    /// Of each output at every sample; NaN where it does not count.
     residuals: [Vec<f64>; OUTPUTS],
 }
 
@@ -447,11 +447,9 @@ impl<'a> Member<'a> {
     fn reweigh(&mut self, problem: &Problem) {
         let range = problem.compared(self.window);
         for o in 0..OUTPUTS {
-            let counts = |k: usize| self.window.outputs[o][k].is_finite();
-            let residual = |k: usize| if counts(k) { self.residuals[o][k] } else { f64::NAN };
-            let residuals: Vec<f64> = range.clone().map(residual).collect();
+            let residuals = self.residuals[o].get(range.clone()).unwrap_or_default();
             let floor = 1e-3 * size(&problem.settings.ordinary, INPUTS + o, Kind::Bias);
-            self.variances[o] = coloured::level(&residuals, self.window.step_s).max(floor * floor);
+            self.variances[o] = coloured::level(residuals, self.window.step_s).max(floor * floor);
         }
         self.weigh(problem);
     }
@@ -487,7 +485,7 @@ impl<'a> Summing<'a> {
     fn over(window: &'a Window) -> Summing<'a> {
         Summing {
             measured: &window.outputs,
-            residuals: std::array::from_fn(|_| vec![0.0; window.samples]),
+            residuals: std::array::from_fn(|_| vec![f64::NAN; window.samples]),
             raw: (0..OUTPUTS).map(|_| Raw(Aligned::zeros(WIDE * WIDE))).collect(),
             rows: Aligned::zeros(OUTPUTS * CHUNK * WIDE),
             filled: [0; OUTPUTS],
