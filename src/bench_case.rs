@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use nalgebra::Cholesky;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::error::{Error, Result};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
-use crate::output_error::cramer_rao::Identified;
+use crate::output_error::cost::Sums;
 use crate::output_error::input_noise::noisy_surfaces;
 use crate::output_error::newton_raphson::{self, Settings};
 use crate::output_error::{Case, Fit, InitialState, Likelihood, Measurements, Model, Outcome, cramer_rao};
@@ -198,14 +198,14 @@ pub fn batch(folder: &Path, repetitions: usize) -> Result<Batch> {
     Ok(Batch { count: results.len(), wall_s, cpu_s, results })
 }
 
-/// One estimate: the fit and its standard errors.
+/// One estimate: the fit, the inverse of its information matrix and its standard errors.
 struct Estimated {
     window: Window,
     case: Case<3, Longitudinal>,
     fit: Fit,
+    inverse: Option<DMatrix<f64>>,
     std: Vec<f64>,
     ready_s: f64,
-    settings: Settings,
 }
 
 impl Estimated {
@@ -216,13 +216,7 @@ impl Estimated {
         free.sort_by_key(|d| names.iter().position(|name| *name == d.name));
         let held: Vec<(&Derivative, f64)> = subject.held.iter().map(|(d, v)| (d, *v)).collect();
         self.case.noisy_surfaces = noisy_surfaces(&subject.aircraft, &self.window, &free, &held);
-        let information = self.case.sums(&self.fit.response, &self.fit.weights).information;
-        let Identified::Determined { root, .. } =
-            cramer_rao::identified(&information, self.settings.max_condition_number)
-        else {
-            return None;
-        };
-        let bounds = cramer_rao::bounds(&root, &self.case, &self.fit);
+        let bounds = cramer_rao::bounds(self.inverse.as_ref()?, &self.case, &self.fit);
         Some(bounds.corrected.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 }
@@ -236,8 +230,11 @@ impl Subject {
         let settings = Settings { tolerance: STEPS_AHEAD * self.given.ftol, ..Settings::default() };
         let (start, weights) = self.start(&case);
         let fit = newton_raphson::minimise(&case, start, weights, &settings);
-        let std = standard_errors(&case, &fit).unwrap_or_default();
-        Ok(Estimated { window, case, fit, std, ready_s, settings })
+        let sums = case.sums(&fit.response, &fit.weights);
+        let inverse = Some(&sums).filter(|_| fit.outcome == Outcome::Converged);
+        let inverse = inverse.and_then(|sums| cramer_rao::inverse(&sums.information));
+        let std = inverse.as_ref().map_or(vec![], |inverse| standard_errors(inverse, &sums));
+        Ok(Estimated { window, case, fit, inverse, std, ready_s })
     }
 
     /// The case's signals at samples and between them.
@@ -285,15 +282,9 @@ impl Subject {
 }
 
 /// Square roots of the diagonal of H⁻¹, scaled by the residuals' variance 2 n J/(n − parameters).
-fn standard_errors(case: &Case<3, Longitudinal>, fit: &Fit) -> Option<Vec<f64>> {
-    if fit.outcome != Outcome::Converged {
-        return None;
-    }
-    let sums = case.sums(&fit.response, &fit.weights);
-    let scale = cramer_rao::scale(&sums.information);
-    let inverse = Cholesky::new(cramer_rao::scaled(&sums.information, &scale))?.inverse();
-    let variance = sums.weighted_square / (sums.count - case.parameters()) as f64;
-    Some((0..case.parameters()).map(|j| (inverse[(j, j)] * variance).sqrt() * scale[j]).collect())
+fn standard_errors(inverse: &DMatrix<f64>, sums: &Sums) -> Vec<f64> {
+    let variance = sums.weighted_square / (sums.count - inverse.nrows()) as f64;
+    inverse.diagonal().iter().map(|v| (v * variance).sqrt()).collect()
 }
 
 /// `an_bias`, `ax_bias`: the output that a bias shifts.

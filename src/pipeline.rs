@@ -52,8 +52,8 @@ use conditioning::Shares;
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
 const INGEST_VERSION: u32 = 6;
 const SEGMENT_VERSION: u32 = 6;
-const ESTIMATE_VERSION: u32 = 9;
-const JOINT_VERSION: u32 = 5;
+const ESTIMATE_VERSION: u32 = 10;
+const JOINT_VERSION: u32 = 6;
 const PREDICT_VERSION: u32 = 4;
 const TREND_VERSION: u32 = 2;
 const COMPARE_VERSION: u32 = 1;

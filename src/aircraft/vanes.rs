@@ -145,8 +145,11 @@ impl Sensors {
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
-        let mut flow =
-            Flow { alpha: read.alpha / self.alpha_vane.factor, beta: read.beta / self.beta_vane.factor, ..*read };
+        let mut flow = Flow {
+            alpha: read.alpha * (1.0 / self.alpha_vane.factor),
+            beta: read.beta * (1.0 / self.beta_vane.factor),
+            ..*read
+        };
         if self.vane_model == VaneModel::SmallAngle {
             flow.alpha -= dot(self.alpha_vane.alpha_by_rates(read.velocity, cg), read.rates);
             flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);

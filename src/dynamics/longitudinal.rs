@@ -86,25 +86,27 @@ impl Equations<3> for Longitudinal {
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
         let [(sin_beta, cos_beta), (sin_phi, cos_phi)] = sin_cos([m.beta, m.phi]);
-        let per_speed = 1.0 / (m.velocity * cos_beta);
+        // Divisions are most of what laying out a maneuver costs: one for each denominator, here and below.
+        let (per_speed, per_mass, per_iy) = (1.0 / (m.velocity * cos_beta), 1.0 / m.mass, 1.0 / m.iy);
+        let tan_beta = sin_beta * m.velocity * per_speed;
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
         Known {
-            slip_cos: sin_beta / cos_beta * p,
-            slip_sin: sin_beta / cos_beta * r,
-            force: per_speed * m.qbar * aircraft.wing_area_ft2 / m.mass,
-            thrust: per_speed * m.thrust / m.mass,
+            slip_cos: tan_beta * p,
+            slip_sin: tan_beta * r,
+            force: per_speed * m.qbar * aircraft.wing_area_ft2 * per_mass,
+            thrust: per_speed * m.thrust * per_mass,
             weight: per_speed * m.gravity,
             cos_phi,
             turn: r * sin_phi,
-            pitch: (coupling + gyroscopic) / m.iy,
-            moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft / m.iy,
+            pitch: (coupling + gyroscopic) * per_iy,
+            moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft * per_iy,
         }
     }
 
     #[inline(always)]
     fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
-        let sensors = &aircraft.sensors;
+        let (sensors, per_mass) = (&aircraft.sensors, 1.0 / m.mass);
         Sensed {
             velocity: m.velocity,
             beta: m.beta,
@@ -114,8 +116,8 @@ impl Equations<3> for Longitudinal {
             r_dot: m.accelerations[2],
             an: sensors.an.arm(m.cg),
             ax: sensors.ax.arm(m.cg),
-            force: m.qbar * aircraft.wing_area_ft2 / m.mass,
-            thrust: if sensors.thrust_in_ax { m.thrust / m.mass } else { 0.0 },
+            force: m.qbar * aircraft.wing_area_ft2 * per_mass,
+            thrust: if sensors.thrust_in_ax { m.thrust * per_mass } else { 0.0 },
             cg: m.cg,
             vane: sensors.alpha_vane,
             model: sensors.vane_model,
@@ -146,8 +148,8 @@ impl Equations<3> for Longitudinal {
 
     #[inline(always)]
     fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
-        let (force, thrust) = (m.qbar * aircraft.wing_area_ft2 / m.mass, m.thrust / m.mass);
-        [-m.force_z / force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) / force]
+        let (per_force, thrust) = (m.mass / (m.qbar * aircraft.wing_area_ft2), m.thrust * (1.0 / m.mass));
+        [-m.force_z * per_force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) * per_force]
     }
 
     #[inline(always)]

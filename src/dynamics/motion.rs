@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use pulp::Arch;
+
 use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
 use crate::flight::{Record, signal};
@@ -78,8 +80,7 @@ impl Window {
         for name in signal::REQUIRED.iter().copied().chain(surfaces) {
             let values = record.values(name).and_then(|v| v.get(range.clone()));
             let values = values.ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
-            // Whether one is missing is asked of all at once: that is faster than looking for the first.
-            if values.iter().fold(false, |missing, v| missing | !v.is_finite()) {
+            if some_missing(values) {
                 let gap = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
                 let time_s = record.time_s(range.start + gap);
                 return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
@@ -213,7 +214,7 @@ impl Signals<'_> {
         let [ax, ay, an] = self.forces.map(|s| s[i]);
         let mass = self.mass[i];
         // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
-        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { thrust / mass };
+        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { thrust * (1.0 / mass) };
         Motion {
             alpha: flow.alpha,
             beta: flow.beta,
@@ -245,13 +246,20 @@ fn slope_name(name: &str) -> String {
     format!("slope of {name}")
 }
 
+/// Asked of all at once: that is faster than looking for the first.
+fn some_missing(values: &[f64]) -> bool {
+    Arch::new().dispatch(|| values.iter().fold(false, |missing, v| missing | !v.is_finite()))
+}
+
 /// Samples and the means of neighbours between them.
 fn halved(values: &[f64]) -> Vec<f64> {
     let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
-    for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
-        points[0] = pair[0];
-        points[1] = 0.5 * (pair[0] + pair[1]);
-    }
+    Arch::new().dispatch(|| {
+        for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
+            points[0] = pair[0];
+            points[1] = 0.5 * (pair[0] + pair[1]);
+        }
+    });
     if let (Some(point), Some(value)) = (points.last_mut(), values.last()) {
         *point = *value;
     }
@@ -259,7 +267,10 @@ fn halved(values: &[f64]) -> Vec<f64> {
 }
 
 fn constant(values: &[f64]) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    // Several sums side by side, of which none waits for the others.
+    let (whole, rest) = values.as_chunks::<8>();
+    let sums = whole.iter().fold([0.0; 8], |sums, v| std::array::from_fn(|i| sums[i] + v[i]));
+    let mean = sums.iter().chain(rest).sum::<f64>() / values.len().max(1) as f64;
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }
 

@@ -15,7 +15,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::input_noise::NoisySurface;
 use super::kernel::{CHUNK, Spaced};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, VECTOR};
 use crate::aero::{Bias, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -74,19 +74,19 @@ impl<const NX: usize> Coefficients<NX> {
     }
 }
 
-/// Points of a chunk's samples and of the one that follows.
+/// Points of a chunk's samples and of the one that follows, and the same in whole vectors.
 pub(super) const POINTS: usize = 2 * CHUNK + 1;
+const WHOLE: usize = POINTS.next_multiple_of(VECTOR);
 
 /// The three coefficients at the points of a chunk.
 #[repr(align(64))]
 pub(super) struct Near<const NX: usize> {
-    pub offset: [[f64; POINTS]; COEFFICIENTS],
-    pub slope: [[[f64; POINTS]; NX]; COEFFICIENTS],
+    pub offset: [[f64; WHOLE]; COEFFICIENTS],
+    pub slope: [[[f64; WHOLE]; NX]; COEFFICIENTS],
 }
 
 impl<const NX: usize> Near<NX> {
-    pub const NONE: Near<NX> =
-        Near { offset: [[0.0; POINTS]; COEFFICIENTS], slope: [[[0.0; POINTS]; NX]; COEFFICIENTS] };
+    pub const NONE: Near<NX> = Near { offset: [[0.0; WHOLE]; COEFFICIENTS], slope: [[[0.0; WHOLE]; NX]; COEFFICIENTS] };
 
     /// Their values at one of the points when the state is x.
     #[inline(always)]
@@ -330,9 +330,9 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     #[inline(always)]
     pub(super) fn spread(&self, points: Spaced, rows: &mut [f64]) {
         for &(place, column) in &self.lanes.columns {
-            let column = self.columns[column][points.first..].iter().step_by(points.stride);
-            for (row, value) in rows.chunks_exact_mut(self.lanes.row).zip(column) {
-                row[place] = *value;
+            let column = &self.columns[column][points.first..][..points.stride * (POINTS - 1) + 1];
+            for k in 0..POINTS {
+                rows[k * self.lanes.row + place] = column[k * points.stride];
             }
         }
     }
@@ -358,10 +358,13 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 
 /// Adds a value times a column's points; a column that is empty is zero throughout.
 #[inline(always)]
-fn add(value: f64, column: &[f64], points: Spaced, sum: &mut [f64; POINTS]) {
+fn add(value: f64, column: &[f64], points: Spaced, sum: &mut [f64; WHOLE]) {
     let Some(column) = column.get(points.first..) else { return };
     if points.stride == 1 {
-        sum.iter_mut().zip(column).for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
+        let Some(column) = column.first_chunk::<WHOLE>() else { return };
+        for k in 0..WHOLE {
+            sum[k] = value.mul_add(column[k], sum[k]);
+        }
     } else {
         sum.iter_mut().zip(column.iter().step_by(points.stride)).for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
     }

@@ -1,11 +1,14 @@
 //! Scatter of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R W S] H⁻¹ with R the
 //! autocovariance of the noise, in a form that stays positive and counts the degrees of freedom.
 //!
-//! Residuals are not the noise: the parameters have followed it, most where it is slow. With P = S H⁻¹ Sᵀ W their
-//! covariance is (I − P) R (I − P)ᵀ, so what P took is added back, round after round until R settles. R of each output is
-//! that of an autoregressive process, by which the sensitivities are filtered: every variance is a sum of squares.
+//! Residuals are not the noise: the parameters have followed it, most where it is slow. With C = S H⁻¹ W, the change of the
+//! estimates with each value, the residuals are (I − S Cᵀ) times the noise and their covariance is
+//! (I − S Cᵀ) R (I − C Sᵀ), so what the parameters took, R C Sᵀ + S Cᵀ R − S K Sᵀ with K = Cᵀ R C their own covariance, is
+//! added back, round after round until R settles. R of each output is that of an autoregressive process, by which the
+//! changes are filtered: every variance is a sum of squares.
 //!
-//! For this sensitivities are taken as S T with T Tᵀ = H⁻¹, which makes H the unit matrix.
+//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a number. An output whose
+//! noise has settled is left alone while others go on.
 //!
 //! Variances from a noise that is itself estimated are known with few degrees of freedom ([`freedom`]).
 //!
@@ -13,27 +16,24 @@
 //! coefficients even where it is far slower; what moves faster is white within the blocks. Parameters act slower than a
 //! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
 
-#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
-
 use nalgebra::DMatrix;
-use pulp::{Arch, Simd, WithSimd};
 
 use super::autoregression::Autoregression;
 use super::freedom::{self, Known, Part};
-use super::kernel::load;
-use super::lanes::{Aligned, VECTOR};
-use super::normal::Rows;
+use super::padded::{LONGEST_LAG, Padded};
 
 /// Length of a block, s: the short period and the test inputs are several times longer.
 const BLOCK_S: f64 = 0.2;
 /// Longest memory of a process, blocks.
 const ORDER: usize = 12;
+const _: () = assert!(ORDER <= LONGEST_LAG);
 /// A process has at most one coefficient per so many blocks.
 const BLOCKS_PER_COEFFICIENT: usize = 10;
 const ROUNDS: usize = 30;
-/// R is settled when no output's long-run variance changes by more than this share.
+/// An output's noise is settled when its long-run variance changes by no more than this share.
 const SETTLED: f64 = 0.01;
+/// By how much a round makes noise stronger at most.
+const MOST_AT_ONCE: f64 = 2.0;
 
 /// One output of one maneuver, seen through blocks of samples.
 #[derive(Clone, Debug)]
@@ -41,21 +41,27 @@ pub struct Series {
     /// Of a sample.
     weight: f64,
     /// Samples of a block.
-    block: usize,
-    parameters: usize,
-    /// Which blocks have a sample that counts, and the means of their residuals.
-    used: Vec<bool>,
-    residuals: Vec<f64>,
+    block: f64,
+    /// Means of the blocks' residuals.
+    residuals: Padded,
     /// Variance of the samples about their block's mean, and the degrees of freedom with which it is known.
     fast: f64,
     fast_freedom: f64,
-    /// Means of the sensitivities over the blocks, a row of whole vectors for each; of a block that does not count whole
-    /// they are less.
-    sensitivities: Aligned,
-    /// Σ s sᵀ of the blocks once their parameters are final: white noise needs it again and again.
-    between: Option<Scatter>,
-    /// Σ s sᵀ of the samples' sensitivities about their block's mean.
-    within: DMatrix<f64>,
+    /// Of each block how many samples count, and the sums of their sensitivities.
+    pub(super) counts: Vec<f64>,
+    pub(super) sensitivities: Padded,
+    /// Σ s sᵀ of these sums, and of the samples' sensitivities about their block's mean.
+    between: Padded,
+    within: Padded,
+}
+
+/// What the samples of a block that count add up to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block {
+    /// How many they are.
+    pub count: f64,
+    /// Sum of their residuals.
+    pub residual: f64,
 }
 
 /// The noise of each output.
@@ -91,275 +97,55 @@ impl Estimated {
     }
 }
 
-/// Covariance of the parameters, where T Tᵀ = H⁻¹ and each output has independent noise.
+/// Covariance of the parameters, given H⁻¹, where each output has independent noise.
 #[must_use]
-pub fn covariance(root: &DMatrix<f64>, outputs: Vec<Series>) -> Estimated {
-    let outputs = transformed(root, outputs);
-    let noise = settled(&outputs);
-    let covariance = root * gradient_covariance(&outputs, &noise) * root.transpose();
-    let mut known = Known::nothing(root.nrows());
-    for (output, noise) in outputs.iter().zip(&noise.0) {
-        output.know(noise, root, &mut known);
+pub(super) fn covariance(inverse: &Padded, outputs: &[Series]) -> Estimated {
+    let outputs = settled(inverse, outputs);
+    let mut known = Known::nothing(inverse.columns());
+    for output in &outputs {
+        output.know(&mut known);
     }
-    Estimated { covariance, freedom: known.freedom() }
+    Estimated { covariance: scatter(&outputs, inverse.columns()).matrix(), freedom: known.freedom() }
 }
 
-/// The noise that residuals of a fit speak for, where T Tᵀ = H⁻¹.
+/// The noise that residuals of a fit speak for, given H⁻¹.
 #[must_use]
-pub fn noise(root: &DMatrix<f64>, outputs: Vec<Series>) -> Noise {
-    settled(&transformed(root, outputs))
+pub fn noise(inverse: &DMatrix<f64>, outputs: &[Series]) -> Noise {
+    let inverse = Padded::symmetric(inverse);
+    let settled = settled(&inverse, outputs).into_iter();
+    Noise(settled.map(|o| OutputNoise { slow: o.slow, fast: o.output.fast }).collect())
 }
 
 /// The variance of white noise that is as strong as the slowest part of these values, NaN where one does not count, and
 /// never weaker than the values are.
 #[must_use]
 pub fn level(values: &[f64], step_s: f64) -> f64 {
-    let used: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
-    let count = used.iter().filter(|used| **used).count().max(1) as f64;
-    let residuals: Vec<f64> = values.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect();
-    let variance = residuals.iter().map(|v| v * v).sum::<f64>() / count;
-    let series = Series::new(step_s, 1.0, &residuals, &used, DMatrix::zeros(1, 1), |_, _| ());
-    let slow = series.fitted(&series.autocovariances()).long_run_variance();
-    (slow * series.block as f64).max(variance)
+    let counted = |values: &[f64]| {
+        let finite = || values.iter().filter(|v| v.is_finite());
+        (Block { count: finite().count() as f64, residual: finite().sum() }, finite().map(|v| v * v).sum::<f64>())
+    };
+    let (all, square) = counted(values);
+    let series =
+        Series::new(step_s, 1.0, values.len(), square, DMatrix::zeros(1, 1), |samples, _| counted(&values[samples]).0);
+    let pairs = series.pairs();
+    let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]).long_run_variance();
+    (slow * series.block).max(square / all.count.max(1.0))
 }
 
 /// Σ Sᵀ W R W S: what noise does to the gradient.
 #[must_use]
 pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
-    let mut scatter = Scatter::zeros(outputs.first().map_or(0, |o| o.parameters));
-    let mut filtered = Vec::new();
+    let parameters = outputs.first().map_or(0, |o| o.between.columns());
+    let mut scatter = Padded::zeros(parameters, parameters);
     for (output, noise) in outputs.iter().zip(&noise.0) {
-        scatter.add(&output.within, output.weight * output.weight * noise.fast);
-        output.filter(&noise.slow, &mut filtered, &mut scatter);
-    }
-    scatter.whole()
-}
-
-fn transformed(root: &DMatrix<f64>, mut outputs: Vec<Series>) -> Vec<Series> {
-    for output in &mut outputs {
-        output.transform(root);
-    }
-    outputs
-}
-
-/// The noise of outputs whose H is the unit matrix, when what the parameters took is added back.
-fn settled(outputs: &[Series]) -> Noise {
-    let observed: Vec<Vec<f64>> = outputs.iter().map(Series::autocovariances).collect();
-    let pairs: Vec<Vec<f64>> = outputs.iter().map(Series::pairs).collect();
-    let mut slow: Vec<_> = outputs.iter().zip(&observed).map(|(o, seen)| o.fitted(seen)).collect();
-    let mut fast = Scatter::zeros(outputs.first().map_or(0, |o| o.parameters));
-    for output in outputs {
-        fast.add(&output.within, output.weight * output.weight * output.fast);
-    }
-    let mut spread: Vec<Vec<f64>> = vec![Vec::new(); outputs.len()];
-    for _ in 0..ROUNDS {
-        let mut scatter = fast.clone();
-        for ((output, noise), spread) in outputs.iter().zip(&slow).zip(&mut spread) {
-            output.filter(noise, spread, &mut scatter);
-            output.filter_back(noise, spread);
-        }
-        scatter.mirror();
-        let mut next = Vec::with_capacity(slow.len());
-        for (((output, seen), pairs), spread) in outputs.iter().zip(&observed).zip(&pairs).zip(&spread) {
-            let taken = output.taken(spread, &scatter);
-            let whole: Vec<f64> = seen.iter().zip(taken.iter().zip(pairs)).map(|(s, (t, n))| s + t / n).collect();
-            next.push(output.fitted(&whole));
-        }
-        let settled = slow.iter().zip(&next).all(|(a, b)| {
-            let (a, b) = (a.long_run_variance(), b.long_run_variance());
-            (a - b).abs() <= SETTLED * b
-        });
-        slow = next;
-        if settled {
-            break;
+        scatter.add(&output.within, output.weight.powi(2) * noise.fast);
+        let factor = output.weight.powi(2) * noise.slow.innovation;
+        match noise.slow.is_white() {
+            true => scatter.add(&output.between, factor),
+            false => scatter.add(&output.filtered(&output.sensitivities, &noise.slow).squares(), factor),
         }
     }
-    Noise(outputs.iter().zip(slow).map(|(o, slow)| OutputNoise { slow, fast: o.fast }).collect())
-}
-
-/// Parameters padded to whole vectors.
-fn width(parameters: usize) -> usize {
-    parameters.next_multiple_of(VECTOR)
-}
-
-impl Series {
-    /// Sees one output through blocks. `residuals` are zero where a sample does not count, `add_sum` adds the
-    /// sensitivities of some samples' to a row, zero those of what does not count, and `squares` is Σ s sᵀ over all.
-    #[must_use]
-    pub fn new(
-        step_s: f64,
-        weight: f64,
-        residuals: &[f64],
-        used: &[bool],
-        squares: DMatrix<f64>,
-        add_sum: impl Fn(std::ops::Range<usize>, &mut [f64]),
-    ) -> Series {
-        let (block, parameters) = (samples_of_block(step_s), squares.nrows());
-        let blocks = used.len().div_ceil(block);
-        let (fast, fast_freedom) = fast_variance(residuals, used, block);
-        let mut series = Series {
-            weight,
-            block,
-            parameters,
-            used: Vec::with_capacity(blocks),
-            residuals: Vec::with_capacity(blocks),
-            fast,
-            fast_freedom,
-            sensitivities: Aligned::zeros(blocks * width(parameters)),
-            between: None,
-            within: squares,
-        };
-        let rows = series.sensitivities.slice_mut().chunks_exact_mut(width(parameters).max(1));
-        for ((k, used), row) in used.chunks(block).enumerate().zip(rows) {
-            let count = used.iter().filter(|used| **used).count();
-            let samples = k * block..k * block + used.len();
-            series.used.push(count > 0);
-            series.residuals.push(residuals[samples.clone()].iter().sum::<f64>() / count.max(1) as f64);
-            add_sum(samples, row);
-            // So that a sum's square counts per sample.
-            let scale = 1.0 / (count.max(1) as f64).sqrt();
-            for s in row.iter_mut() {
-                *s *= scale;
-            }
-        }
-        let mut between = Scatter::zeros(parameters);
-        between.add_squares(series.sensitivities.slice(), 1.0);
-        series.within -= between.whole();
-        let rows = series.sensitivities.slice_mut().chunks_exact_mut(width(parameters).max(1));
-        for (used, row) in used.chunks(block).zip(rows) {
-            let count = used.iter().filter(|used| **used).count().max(1) as f64;
-            for s in row.iter_mut() {
-                *s *= count.sqrt() / block as f64;
-            }
-        }
-        series
-    }
-
-    /// The same with other parameters: `places` says where each stands among them.
-    #[must_use]
-    pub fn widened(&self, places: &[usize], parameters: usize) -> Series {
-        let (own, wide) = (width(self.parameters).max(1), width(parameters).max(1));
-        let mut sensitivities = Aligned::zeros(self.used.len() * wide);
-        let rows = sensitivities.slice_mut().chunks_exact_mut(wide).zip(self.sensitivities.slice().chunks_exact(own));
-        for (wide, own) in rows {
-            places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
-        }
-        let mut within = DMatrix::zeros(parameters, parameters);
-        for (j, &column) in places.iter().enumerate() {
-            for (i, &row) in places.iter().enumerate() {
-                within[(row, column)] = self.within[(i, j)];
-            }
-        }
-        Series { parameters, sensitivities, within, between: None, ..self.clone() }
-    }
-
-    /// The weight of a block's mean.
-    fn block_weight(&self) -> f64 {
-        self.weight * self.block as f64
-    }
-
-    /// S to S T.
-    fn transform(&mut self, root: &DMatrix<f64>) {
-        let width = width(self.parameters);
-        let rows = rows_of(root, width);
-        let before = std::mem::replace(&mut self.sensitivities, Aligned::zeros(self.used.len() * width));
-        let (rows, from) = (rows.slice(), before.slice());
-        Arch::new().dispatch(Product { from, matrix: rows, to: self.sensitivities.slice_mut(), width });
-        let mut between = Scatter::zeros(self.parameters);
-        between.add_squares(self.sensitivities.slice(), 1.0);
-        self.between = Some(between);
-        self.within = root.transpose() * &self.within * root;
-    }
-
-    /// Adds what this output's noise gives the parameters, and how well that is known. Sensitivities are S T.
-    fn know(&self, noise: &OutputNoise, root: &DMatrix<f64>, known: &mut Known) {
-        let (width, weight) = (width(self.parameters), self.block_weight());
-        let own = root * &self.within * root.transpose();
-        let within = self.weight * self.weight * noise.fast;
-        known.add(own.diagonal().iter().map(|v| within * v), self.fast_freedom);
-        let matrix = rows_of(&root.transpose(), width);
-        let mut changes = vec![0.0; (self.used.len() + noise.slow.memory(self.used.len())) * width];
-        let from = self.sensitivities.slice();
-        Arch::new().dispatch(Product { from, matrix: matrix.slice(), to: &mut changes[..from.len()], width });
-        for change in &mut changes {
-            *change *= weight;
-        }
-        // With H the unit matrix, this is what the parameters took of the blocks.
-        let taken = weight * from.iter().map(|s| s * s).sum::<f64>();
-        let freedom = self.used.iter().filter(|used| **used).count() as f64 - taken;
-        Arch::new().dispatch(Part { noise: &noise.slow, changes, width, freedom, known });
-    }
-
-    fn fitted(&self, autocovariances: &[f64]) -> Autoregression {
-        Autoregression::fitted(autocovariances, self.used.iter().filter(|used| **used).count())
-    }
-
-    fn lags(&self) -> usize {
-        1 + ORDER.min(self.used.len() / BLOCKS_PER_COEFFICIENT)
-    }
-
-    /// Pairs of blocks that count, at lags 0, 1, …, at least one.
-    fn pairs(&self) -> Vec<f64> {
-        let count = |lag: usize| self.used.iter().zip(&self.used[lag..]).filter(|(a, b)| **a && **b).count();
-        (0..self.lags()).map(|lag| count(lag).max(1) as f64).collect()
-    }
-
-    fn autocovariances(&self) -> Vec<f64> {
-        let sum = |lag: usize| self.residuals.iter().zip(&self.residuals[lag..]).map(|(a, b)| a * b).sum::<f64>();
-        self.pairs().iter().enumerate().map(|(lag, pairs)| sum(lag) / pairs).collect()
-    }
-
-    /// S filtered by the noise; adds Sᵀ W R W S to the lower triangle of the scatter.
-    fn filter(&self, noise: &Autoregression, filtered: &mut Vec<f64>, scatter: &mut Scatter) {
-        let width = width(self.parameters);
-        filtered.clear();
-        filtered.extend_from_slice(self.sensitivities.slice());
-        let factor = self.block_weight().powi(2) * noise.innovation;
-        if let Some(between) = self.between.as_ref().filter(|_| noise.coefficients.is_empty()) {
-            scatter.add_scatter(between, factor);
-            return;
-        }
-        filtered.resize(filtered.len() + width * noise.memory(self.used.len()), 0.0);
-        Arch::new().dispatch(Filter { noise, series: filtered, width, back: false });
-        scatter.add_squares(filtered, factor);
-    }
-
-    /// R S of blocks that count, from S filtered.
-    fn filter_back(&self, noise: &Autoregression, filtered: &mut Vec<f64>) {
-        let width = width(self.parameters);
-        Arch::new().dispatch(Filter { noise, series: filtered, width, back: true });
-        filtered.truncate(self.used.len() * width);
-        for (row, used) in filtered.chunks_exact_mut(width.max(1)).zip(&self.used) {
-            let factor = if *used { noise.innovation } else { 0.0 };
-            for s in row.iter_mut() {
-                *s *= factor;
-            }
-        }
-    }
-
-    /// What the parameters have taken out of the noise's autocovariances: R − (I − P) R (I − P)ᵀ summed along its
-    /// diagonals.
-    fn taken(&self, spread: &[f64], scatter: &Scatter) -> Vec<f64> {
-        let width = width(self.parameters);
-        let mut scattered = Aligned::zeros(self.used.len() * width);
-        let s = self.sensitivities.slice();
-        Arch::new().dispatch(Product { from: s, matrix: scatter.rows.slice(), to: scattered.slice_mut(), width });
-        for (scattered, spread) in scattered.slice_mut().iter_mut().zip(spread) {
-            *scattered = self.block_weight() * spread - *scattered;
-        }
-        let shifted = |a: &[f64], b: &[f64]| Arch::new().dispatch(Shifted { a, b, width, lags: self.lags() });
-        let (before, after) = (shifted(scattered.slice(), s), shifted(s, spread));
-        before.iter().zip(after).map(|(before, after)| before + self.block_weight() * after).collect()
-    }
-}
-
-/// A matrix row by row, each padded to `width`.
-fn rows_of(matrix: &DMatrix<f64>, width: usize) -> Aligned {
-    let mut rows = Aligned::zeros(matrix.nrows() * width);
-    for (i, row) in rows.slice_mut().chunks_exact_mut(width.max(1)).enumerate() {
-        row.iter_mut().zip(matrix.row(i).iter()).for_each(|(row, v)| *row = *v);
-    }
-    rows
+    scatter.matrix()
 }
 
 /// Samples of a block.
@@ -368,220 +154,229 @@ pub(super) fn samples_of_block(step_s: f64) -> usize {
     (BLOCK_S / step_s).round().max(1.0) as usize
 }
 
-/// Variance of the residuals about their block's mean, and its degrees of freedom.
-fn fast_variance(residuals: &[f64], used: &[bool], block: usize) -> (f64, f64) {
-    let (mut square, mut freedom) = (0.0, 0);
-    for (v, used) in residuals.chunks(block).zip(used.chunks(block)) {
-        let counted = || v.iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| *v);
-        let count = counted().count();
-        let mean = counted().sum::<f64>() / count.max(1) as f64;
-        square += counted().map(|v| (v - mean) * (v - mean)).sum::<f64>();
-        freedom += count.saturating_sub(1);
-    }
-    let freedom = freedom.max(1) as f64;
-    (square / freedom, freedom)
-}
-
-/// Σ Sᵀ W R W S, rows of whole vectors.
-#[derive(Clone, Debug)]
-struct Scatter {
-    parameters: usize,
-    rows: Aligned,
-}
-
-impl Scatter {
-    fn zeros(parameters: usize) -> Scatter {
-        Scatter { parameters, rows: Aligned::zeros(width(parameters) * width(parameters)) }
-    }
-
-    fn add(&mut self, matrix: &DMatrix<f64>, factor: f64) {
-        let width = width(self.parameters);
-        for (row, own) in self.rows.slice_mut().chunks_exact_mut(width.max(1)).zip(matrix.column_iter()) {
-            row.iter_mut().zip(own.iter()).for_each(|(sum, v)| *sum += factor * v);
-        }
-    }
-
-    /// Adds factor Σ s sᵀ of rows to the lower triangle.
-    fn add_squares(&mut self, rows: &[f64], factor: f64) {
-        let width = width(self.parameters);
-        if width == 0 {
-            return;
-        }
-        let mut sum = Aligned::zeros(width * width);
-        let squares = Squares { rows, parameters: self.parameters, matrix: sum.slice_mut(), width };
-        Arch::new().dispatch(squares);
-        self.rows.slice_mut().iter_mut().zip(sum.slice()).for_each(|(total, s)| *total += factor * s);
-    }
-
-    fn add_scatter(&mut self, other: &Scatter, factor: f64) {
-        self.rows.slice_mut().iter_mut().zip(other.rows.slice()).for_each(|(total, s)| *total += factor * s);
-    }
-
-    /// Copies the lower triangle to the upper one.
-    fn mirror(&mut self) {
-        let width = width(self.parameters);
-        let rows = self.rows.slice_mut();
-        for i in 0..self.parameters {
-            for j in 0..i {
-                rows[j * width + i] = rows[i * width + j];
+impl Series {
+    /// Sees one output's `samples` through blocks: of each `block_of` writes the sensitivities of some samples that count,
+    /// added up, to a row. `square` and `squares` are Σ v² and Σ s sᵀ of all samples that count.
+    #[must_use]
+    pub fn new(
+        step_s: f64,
+        weight: f64,
+        samples: usize,
+        square: f64,
+        squares: DMatrix<f64>,
+        mut block_of: impl FnMut(std::ops::Range<usize>, &mut [f64]) -> Block,
+    ) -> Series {
+        let (length, parameters) = (samples_of_block(step_s), squares.nrows());
+        let (blocks, block) = (samples.div_ceil(length), length as f64);
+        let mut sensitivities = Padded::zeros(blocks, parameters);
+        let (mut counts, mut residuals) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
+        let (mut square, mut freedom) = (square, 0.0);
+        // Of blocks that do not count whole, what their mean's square is larger by.
+        let mut more = Vec::new();
+        for (k, row) in sensitivities.rows_mut().enumerate() {
+            let Block { count, residual } = block_of(k * length..samples.min((k + 1) * length), row);
+            let mean = residual / count.max(1.0);
+            counts.push(count);
+            residuals.push(mean);
+            square -= residual * mean;
+            freedom += (count - 1.0).max(0.0);
+            if count > 0.0 && count < block {
+                let factor = (1.0 / count - 1.0 / block).sqrt();
+                more.extend(row.iter().map(|s| factor * s));
             }
         }
+        let between = sensitivities.squares();
+        let mut within = Padded::symmetric(&squares);
+        within.add(&between, -1.0 / block);
+        within.add(&Padded::of_rows(&more, parameters).squares(), -1.0);
+        let fast_freedom = f64::max(freedom, 1.0);
+        let fast = square.max(0.0) / fast_freedom;
+        let residuals = Padded::column(&residuals);
+        Series { weight, block, counts, residuals, fast, fast_freedom, sensitivities, between, within }
     }
 
-    fn whole(&self) -> DMatrix<f64> {
-        let width = width(self.parameters);
-        let at = |i: usize, j: usize| self.rows.slice()[i.max(j) * width + i.min(j)];
-        DMatrix::from_fn(self.parameters, self.parameters, at)
-    }
-}
-
-/// Σ s sᵀ of rows into the lower triangle of a matrix.
-struct Squares<'a> {
-    rows: &'a [f64],
-    parameters: usize,
-    matrix: &'a mut [f64],
-    width: usize,
-}
-
-impl WithSimd for Squares<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let used: Vec<usize> = (0..self.width / VECTOR).map(|v| (self.parameters - v * VECTOR).min(VECTOR)).collect();
-        let rows = Rows { values: self.rows, stride: self.width, samples: self.rows.len() / self.width };
-        rows.add_squares(simd, &used, self.matrix, self.width);
-    }
-}
-
-/// Rows times a matrix, all of `width`; of the matrix there are as many rows as count.
-struct Product<'a> {
-    from: &'a [f64],
-    matrix: &'a [f64],
-    to: &'a mut [f64],
-    width: usize,
-}
-
-impl WithSimd for Product<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        if self.width == 0 {
-            return;
-        }
-        let rows = self.from.len() / self.width;
-        let mut row = 0;
-        while row + ROWS_AT_ONCE <= rows {
-            self.some::<S, ROWS_AT_ONCE>(simd, row);
-            row += ROWS_AT_ONCE;
-        }
-        for row in row..rows {
-            self.some::<S, 1>(simd, row);
-        }
-    }
-}
-
-/// As many sums side by side as hide how long one of them waits for itself.
-const ROWS_AT_ONCE: usize = 6;
-
-impl Product<'_> {
-    /// `N` rows from one on.
-    #[inline(always)]
-    fn some<S: Simd, const N: usize>(&mut self, simd: S, row: usize) {
-        let width = self.width;
-        for lane in (0..width).step_by(S::F64_LANES) {
-            let mut sums = [simd.splat_f64s(0.0); N];
-            for (i, matrix) in self.matrix.chunks_exact(width).enumerate() {
-                let entries = load::<S>(matrix, lane);
-                for n in 0..N {
-                    let factor = simd.splat_f64s(self.from[(row + n) * width + i]);
-                    sums[n] = simd.mul_add_f64s(factor, entries, sums[n]);
-                }
+    /// The same with other parameters: `places` says where each stands among them.
+    #[must_use]
+    pub fn widened(&self, places: &[usize], parameters: usize) -> Series {
+        let place = |own: &[f64], wide: &mut [f64]| places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
+        let mut sensitivities = Padded::zeros(self.blocks(), parameters);
+        self.sensitivities.rows().zip(sensitivities.rows_mut()).for_each(|(own, wide)| place(own, wide));
+        let square = |own: &Padded| {
+            let mut wide = Padded::zeros(parameters, parameters);
+            for (own, &row) in own.rows().zip(places) {
+                wide.rows_mut().skip(row).take(1).for_each(|wide| place(own, wide));
             }
-            for n in 0..N {
-                super::kernel::store::<S>(self.to, (row + n) * width + lane, sums[n]);
-            }
-        }
+            wide
+        };
+        let (between, within) = (square(&self.between), square(&self.within));
+        Series { sensitivities, between, within, ..self.clone() }
+    }
+
+    fn blocks(&self) -> usize {
+        self.counts.len()
+    }
+
+    fn lags(&self) -> usize {
+        1 + ORDER.min(self.blocks() / BLOCKS_PER_COEFFICIENT)
+    }
+
+    /// Pairs of blocks that count, at lags 0, 1, …, at least one.
+    fn pairs(&self) -> Vec<f64> {
+        let used: Vec<f64> = self.counts.iter().map(|count| count.min(1.0)).collect();
+        let used = Padded::column(&used);
+        used.lagged(&used, self.lags()).iter().map(|pairs| pairs.max(1.0)).collect()
+    }
+
+    fn autocovariances(&self, pairs: &[f64]) -> Vec<f64> {
+        let sums = self.residuals.lagged(&self.residuals, self.lags());
+        sums.iter().zip(pairs).map(|(sum, pairs)| sum / pairs).collect()
+    }
+
+    /// Rows of the blocks filtered by a process, until that has died away.
+    fn filtered(&self, rows: &Padded, process: &Autoregression) -> Padded {
+        let mut filtered = rows.followed_by(process.memory(self.blocks()));
+        filtered.filter(process);
+        filtered
+    }
+
+    /// R times rows of which these are the filtered ones, of noise with unit innovation.
+    fn spread(&self, mut filtered: Padded, process: &Autoregression) -> Padded {
+        filtered.filter_back(process);
+        filtered.truncate(self.blocks());
+        let unused = filtered.rows_mut().zip(&self.counts).filter(|(_, count)| **count <= 0.0);
+        unused.for_each(|(row, _)| row.fill(0.0));
+        filtered
     }
 }
 
-/// Rows filtered by a process in place.
-struct Filter<'a> {
-    noise: &'a Autoregression,
-    series: &'a mut [f64],
-    width: usize,
-    back: bool,
+/// The outputs with the noise that is left when what the parameters took is added back.
+fn settled<'a>(inverse: &'a Padded, outputs: &'a [Series]) -> Vec<Settling<'a>> {
+    let mut outputs: Vec<_> = outputs.iter().map(|output| Settling::new(inverse, output)).collect();
+    for _ in 0..ROUNDS {
+        let scatter = scatter(&outputs, inverse.columns());
+        outputs.iter_mut().filter(|o| !o.settled).for_each(|o| o.settle(&scatter));
+        if outputs.iter().all(|o| o.settled) {
+            break;
+        }
+    }
+    outputs
 }
 
-impl WithSimd for Filter<'_> {
-    type Output = ();
+/// The parameters' covariance by all outputs' noise.
+fn scatter(outputs: &[Settling], parameters: usize) -> Padded {
+    let mut sum = Padded::zeros(parameters, parameters);
+    for output in outputs {
+        sum.add(&output.by_fast, 1.0);
+        sum.add(&output.by_slow, 1.0);
+    }
+    sum
+}
 
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        if self.width == 0 {
-        } else if self.back {
-            self.noise.filter_back(self.series, self.width);
+/// One output while its noise settles, and what that does to the parameters.
+struct Settling<'a> {
+    output: &'a Series,
+    inverse: &'a Padded,
+    /// Pairs of blocks and the residuals' autocovariances at lags 0, 1, …
+    pairs: Vec<f64>,
+    observed: Vec<f64>,
+    /// The noise of the blocks' means, and its variance.
+    slow: Autoregression,
+    variance: f64,
+    /// Parts of the parameters' covariance: by the noise within blocks, by that of their means, and by the latter were it
+    /// white with unit variance.
+    by_fast: Padded,
+    by_slow: Padded,
+    by_white: Padded,
+    /// The change of the parameters with each block's mean, and R times it for unit innovation; none as long as the noise
+    /// is white.
+    changes: Option<Padded>,
+    spread: Option<Padded>,
+    settled: bool,
+}
+
+impl<'a> Settling<'a> {
+    fn new(inverse: &'a Padded, output: &'a Series) -> Settling<'a> {
+        let square = output.weight.powi(2);
+        let by_white = inverse.about(&output.between).times(square);
+        let pairs = output.pairs();
+        let observed = output.autocovariances(&pairs);
+        let mut settling = Settling {
+            output,
+            inverse,
+            pairs,
+            slow: Autoregression::white(0.0),
+            variance: 0.0,
+            by_fast: inverse.about(&output.within).times(square * output.fast),
+            by_slow: by_white.clone(),
+            by_white,
+            changes: None,
+            spread: None,
+            settled: false,
+            observed: vec![],
+        };
+        settling.take(&observed);
+        settling.observed = observed;
+        settling
+    }
+
+    /// Takes the process with these autocovariances for its noise.
+    fn take(&mut self, autocovariances: &[f64]) {
+        let (output, inverse) = (self.output, self.inverse);
+        let slow = Autoregression::fitted(autocovariances, self.pairs[0]);
+        if slow.is_white() {
+            self.by_slow = self.by_white.clone().times(slow.innovation);
         } else {
-            self.noise.filter(self.series, self.width);
+            let new = || output.sensitivities.product(inverse).times(output.weight);
+            let filtered = output.filtered(self.changes.get_or_insert_with(new), &slow);
+            self.by_slow = filtered.squares().times(slow.innovation);
+            self.spread = Some(output.spread(filtered, &slow));
+        }
+        self.slow = slow;
+        self.variance = autocovariances.first().copied().unwrap_or(0.0);
+    }
+
+    /// Adds back what the parameters, of this covariance, took: of noise as strong as leaves residuals as strong as they
+    /// are.
+    fn settle(&mut self, scatter: &Padded) {
+        let taken = self.taken(scatter);
+        let left = self.pairs[0] * self.variance - taken[0];
+        let stronger = (self.pairs[0] * self.observed[0] / left).clamp(1.0 / MOST_AT_ONCE, MOST_AT_ONCE);
+        let shares = taken.iter().zip(&self.pairs).map(|(taken, pairs)| stronger * taken / pairs);
+        let whole: Vec<f64> = self.observed.iter().zip(shares).map(|(observed, share)| observed + share).collect();
+        let expected = stronger * self.slow.long_run_variance();
+        self.take(&whole);
+        let found = self.slow.long_run_variance();
+        self.settled = (expected - found).abs() <= SETTLED * found;
+    }
+
+    /// R C Sᵀ + S Cᵀ R − S K Sᵀ summed along its diagonals.
+    fn taken(&mut self, scatter: &Padded) -> Vec<f64> {
+        let (sums, block, lags) = (&self.output.sensitivities, self.output.block, self.output.lags());
+        let factor = self.slow.innovation / block;
+        let mut inner = scatter.clone().times(-0.5 / (block * block));
+        if let Some(mut half) = self.spread.take() {
+            half.add_product(sums, &inner.times(1.0 / factor));
+            let both = half.lagged(sums, lags).into_iter().zip(sums.lagged(&half, lags));
+            both.map(|(before, after)| factor * (before + after)).collect()
+        } else {
+            inner.add(self.inverse, factor * self.output.weight);
+            sums.product(&inner).lagged(sums, lags).iter().map(|half| 2.0 * half).collect()
         }
     }
-}
 
-/// Σ a_k · b_{k+lag} over rows at lags 0, 1, …
-struct Shifted<'a> {
-    a: &'a [f64],
-    b: &'a [f64],
-    width: usize,
-    lags: usize,
-}
-
-/// Lags at once, so that a row is read for several.
-const LAGS_AT_ONCE: usize = 4;
-
-impl WithSimd for Shifted<'_> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
-        let rows = self.a.len() / self.width.max(1);
-        let mut sums = vec![0.0; self.lags];
-        for (group, sums) in sums.chunks_mut(LAGS_AT_ONCE).enumerate() {
-            let first = group * LAGS_AT_ONCE;
-            let together = rows.saturating_sub(first + LAGS_AT_ONCE - 1);
-            let at_once = self.some::<S, LAGS_AT_ONCE>(simd, first, 0..together);
-            for (n, sum) in sums.iter_mut().enumerate() {
-                let rest = together..rows.saturating_sub(first + n);
-                *sum = at_once[n] + self.some::<S, 1>(simd, first + n, rest)[0];
+    /// Adds what the noise gives the parameters, and how well that is known.
+    fn know(&self, known: &mut Known) {
+        known.add(self.by_fast.diagonal(), self.output.fast_freedom);
+        // What the parameters took of the blocks.
+        let taken = self.output.weight / self.output.block * self.inverse.lagged(&self.output.between, 1)[0];
+        let freedom = self.pairs[0] - taken;
+        match &self.changes {
+            Some(changes) if !self.slow.is_white() => {
+                let filtered = self.output.filtered(changes, &self.slow);
+                Part { noise: &self.slow, filtered, freedom, known }.add();
             }
+            _ => known.add(self.by_slow.diagonal(), freedom),
         }
-        sums
-    }
-}
-
-impl Shifted<'_> {
-    /// Those at `N` lags from one on, over some of the rows. Lanes are summed eight apart and then in one order, so that
-    /// the width of vectors does not show.
-    #[inline(always)]
-    fn some<S: Simd, const N: usize>(&self, simd: S, lag: usize, rows: std::ops::Range<usize>) -> [f64; N] {
-        let width = self.width;
-        let mut lanes = [[0.0; VECTOR]; N];
-        for part in (0..VECTOR).step_by(S::F64_LANES) {
-            let mut sums = [simd.splat_f64s(0.0); N];
-            for k in rows.clone() {
-                for lane in (part..width).step_by(VECTOR) {
-                    let a = load::<S>(self.a, k * width + lane);
-                    for n in 0..N {
-                        let b = load::<S>(self.b, (k + lag + n) * width + lane);
-                        sums[n] = simd.mul_add_f64s(a, b, sums[n]);
-                    }
-                }
-            }
-            for n in 0..N {
-                super::kernel::store::<S>(&mut lanes[n], part, sums[n]);
-            }
-        }
-        lanes.map(|lanes| lanes.iter().sum())
     }
 }
 
@@ -592,18 +387,26 @@ mod tests {
     use super::super::tests::Noise;
     use super::*;
 
-    /// The variance stated for the mean of values, given their residuals from it; H = w N and T = 1/√H.
+    /// An output whose sensitivity is one wherever it counts.
+    fn of_a_sum(weight: f64, residuals: &[f64], used: &[bool]) -> Series {
+        let count = |used: &[bool]| used.iter().filter(|used| **used).count() as f64;
+        let (square, squares) = (residuals.iter().map(|v| v * v).sum(), DMatrix::from_element(1, 1, count(used)));
+        Series::new(0.1, weight, residuals.len(), square, squares, |samples, row| {
+            let block = Block { count: count(&used[samples.clone()]), residual: residuals[samples].iter().sum() };
+            row[0] += block.count;
+            block
+        })
+    }
+
+    /// The variance stated for the mean of values, given their residuals from it; H = w N and H⁻¹ = 1/H.
     fn of_the_mean(values: &[f64], used: &[bool]) -> Estimated {
         let weight = 3.0;
         let count = used.iter().filter(|used| **used).count() as f64;
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
         let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
         let residuals: Vec<f64> = values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect();
-        let squares = DMatrix::from_element(1, 1, count);
-        let series = Series::new(0.1, weight, &residuals, used, squares, |samples, row| {
-            row[0] += used[samples].iter().map(|used| of(*used, 1.0)).sum::<f64>();
-        });
-        covariance(&DMatrix::from_element(1, 1, 1.0 / (weight * count).sqrt()), vec![series])
+        let series = of_a_sum(weight, &residuals, used);
+        covariance(&Padded::symmetric(&DMatrix::from_element(1, 1, 1.0 / (weight * count))), &[series])
     }
 
     #[test]
@@ -623,21 +426,14 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_does_to_the_gradient_of_other_parameters_what_their_change_says() {
-        let (count, weight, t) = (40, 3.0, 0.25);
+    fn white_noise_does_to_the_gradient_what_it_does_to_the_blocks() {
+        let (count, weight) = (40, 3.0);
         let residuals: Vec<f64> = (0..count).map(|k| if k % 4 < 2 { 1.0 } else { -1.0 }).collect();
-        let squares = DMatrix::from_element(1, 1, f64::from(count));
-        let mut series = Series::new(0.1, weight, &residuals, &vec![true; residuals.len()], squares, |samples, row| {
-            row[0] += samples.len() as f64;
-        });
-        let white = Autoregression { coefficients: vec![], innovation: 2.0 };
-        let noise = super::Noise(vec![OutputNoise { slow: white, fast: 1.0 }]);
-        let before = gradient_covariance(&[series.clone()], &noise)[(0, 0)];
-        series.transform(&DMatrix::from_element(1, 1, t));
-        let after = gradient_covariance(&[series], &noise)[(0, 0)];
+        let series = of_a_sum(weight, &residuals, &vec![true; residuals.len()]);
+        let noise = super::Noise(vec![OutputNoise { slow: Autoregression::white(2.0), fast: 1.0 }]);
         // A block of two samples whose mean has the variance 2 gives the sum over it 8.
-        assert_relative_eq!(before, weight * weight * 8.0 * f64::from(count) / 2.0, max_relative = 1e-12);
-        assert_relative_eq!(after, t * t * before, max_relative = 1e-12);
+        let expected = weight * weight * 8.0 * f64::from(count) / 2.0;
+        assert_relative_eq!(gradient_covariance(&[series], &noise)[(0, 0)], expected, max_relative = 1e-12);
     }
 
     #[test]

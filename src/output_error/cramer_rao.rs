@@ -8,13 +8,14 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::case::Case;
 use super::coloured;
 use super::cost::sums;
 use super::likelihood::Likelihood;
 use super::outcome::Fit;
+use super::padded::Padded;
 use crate::dynamics::{Equations, OUTPUTS};
 
 /// 1/√H_jj, one where the data say nothing of a parameter.
@@ -34,12 +35,13 @@ pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> 
 pub enum Identified {
     Determined {
         inverse: DMatrix<f64>,
-        /// T with T Tᵀ = H⁻¹.
-        root: DMatrix<f64>,
         condition_number: f64,
     },
     /// The parameters that take part in the least determined direction.
-    Undetermined { condition_number: Option<f64>, parameters: Vec<usize> },
+    Undetermined {
+        condition_number: Option<f64>,
+        parameters: Vec<usize>,
+    },
 }
 
 /// A parameter takes part in a direction when its share of the unit vector's square is at least this: the few that a reader
@@ -53,38 +55,32 @@ pub fn identified(information: &DMatrix<f64>, max_condition_number: f64) -> Iden
     if !silent.is_empty() || !information.iter().all(|h| h.is_finite()) {
         return Identified::Undetermined { condition_number: None, parameters: silent };
     }
-    let scale = scale(information);
-    let eigen = SymmetricEigen::new(scaled(information, &scale));
-    let (least, most) = (eigen.eigenvalues.imin(), eigen.eigenvalues.max());
-    let smallest = eigen.eigenvalues[least];
-    if smallest <= most / max_condition_number {
-        let direction = eigen.eigenvectors.column(least);
-        let parameters = (0..direction.len()).filter(|&j| direction[j] * direction[j] >= TAKES_PART).collect();
-        let condition_number = (smallest > 0.0).then(|| most / smallest);
-        return Identified::Undetermined { condition_number, parameters };
+    let scaled = scaled(information, &scale(information));
+    let eigenvalues = scaled.symmetric_eigenvalues();
+    let (smallest, most) = (eigenvalues.min(), eigenvalues.max());
+    if let Some(inverse) = inverse(information).filter(|_| smallest > most / max_condition_number) {
+        return Identified::Determined { inverse, condition_number: most / smallest };
     }
-    let root = DMatrix::from_diagonal(&scale)
-        * &eigen.eigenvectors
-        * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l.sqrt()));
-    Identified::Determined { inverse: &root * root.transpose(), root, condition_number: most / smallest }
+    let eigen = SymmetricEigen::new(scaled);
+    let direction = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let parameters = (0..direction.len()).filter(|&j| direction[j] * direction[j] >= TAKES_PART).collect();
+    Identified::Undetermined { condition_number: (smallest > 0.0).then(|| most / smallest), parameters }
 }
 
 /// The inverse alone, whatever the condition; none where no direction less would do.
 #[must_use]
 pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(information);
-    Some(scaled(&Cholesky::new(scaled(information, &scale))?.inverse(), &scale))
+    Some(scaled(&Padded::symmetric(&scaled(information, &scale)).inverse()?.matrix(), &scale))
 }
 
-/// Variances of the residuals, with the parameters counted as spread evenly over the outputs.
+/// Variances of the residuals from Σ v² and the samples of each output, with the parameters counted as spread evenly over
+/// the outputs.
 #[must_use]
-pub fn variances(residuals: &[[f64; OUTPUTS]], used: &[usize; OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
-    let total: usize = used.iter().sum();
+pub fn variances(outputs: [(f64, usize); OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
+    let total: usize = outputs.iter().map(|(_, used)| used).sum();
     let freedom = 1.0 - (parameters as f64 / total.max(1) as f64).min(0.9);
-    std::array::from_fn(|o| {
-        let square: f64 = residuals.iter().map(|v| v[o] * v[o]).sum();
-        square / (used[o].max(1) as f64 * freedom)
-    })
+    outputs.map(|(square, used)| square / (used.max(1) as f64 * freedom))
 }
 
 /// The two covariances of the parameters.
@@ -94,16 +90,15 @@ pub struct Bounds {
     pub corrected: DMatrix<f64>,
 }
 
-/// Bounds of a fit whose information matrix has the inverse T Tᵀ.
+/// Bounds of a fit, given the inverse of its information matrix.
 #[must_use]
-pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
-    let series = data.series(&fit.response, &fit.weights);
-    let white = data.white_covariance(&fit.response, &fit.weights);
-    let inverse = root * root.transpose();
-    let covariance = &inverse * white * &inverse;
-    let inputs = data.input_covariance(&fit.values, &fit.response, &fit.weights);
-    let corrected =
-        never_below(coloured::covariance(root, series).of_student(), &covariance) + &inverse * inputs * &inverse;
+pub fn bounds<D: Likelihood>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
+    let inverse = Padded::symmetric(inverse);
+    let scattered = |gradient: DMatrix<f64>| inverse.about(&Padded::symmetric(&gradient)).matrix();
+    let covariance = scattered(data.white_covariance(&fit.response, &fit.weights));
+    let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
+    let residuals = coloured::covariance(&inverse, &series).of_student();
+    let corrected = never_below(residuals, &covariance) + scattered(inputs);
     Bounds { covariance, corrected }
 }
 
@@ -112,7 +107,9 @@ pub fn bounds<D: Likelihood>(root: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
 pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
     let sums = data.sums(&fit.response, &fit.weights);
     match identified(&sums.information, max_condition_number) {
-        Identified::Determined { root, .. } => Some(coloured::noise(&root, data.series(&fit.response, &fit.weights))),
+        Identified::Determined { inverse, .. } => {
+            Some(coloured::noise(&inverse, &data.series(&fit.response, &fit.weights)))
+        }
         Identified::Undetermined { .. } => None,
     }
 }

@@ -6,11 +6,9 @@
 //! each other (Brockwell and Davis 1991, sections 8.1 and 10.8), with σ² Γ⁻¹ = L Lᵀ − U Uᵀ of its own coefficients
 //! (Siddiqui 1958). Then var V = 2V²/N + σ⁴ ∇Qᵀ cov φ ∇Q (delta method), where ∂u/∂φ_i is −u filtered once more, i samples
 //! late. Variances of several outputs add up to V with ν = 2V²/Σ var V degrees of freedom (Satterthwaite 1946).
-#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-
-use pulp::{Simd, WithSimd};
 
 use super::autoregression::Autoregression;
+use super::padded::Padded;
 
 /// A variance, and the variance of it as an estimate, of each parameter.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,53 +43,32 @@ impl Known {
 /// What one output's process gives each parameter.
 pub(super) struct Part<'a> {
     pub noise: &'a Autoregression,
-    /// The change of the estimates with each value of the output, `width` numbers a value, and room for the process's
-    /// memory.
-    pub changes: Vec<f64>,
-    pub width: usize,
+    /// The change of the estimates with each value of the output, filtered by the process until that has died away.
+    pub filtered: Padded,
     /// Values the process is known from, less what the parameters took of them.
     pub freedom: f64,
     pub known: &'a mut Known,
 }
 
-impl WithSimd for Part<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Part { noise, changes: mut once, width, freedom, known } = self;
+impl Part<'_> {
+    /// Adds it to what is known.
+    pub fn add(self) {
+        let Part { noise, filtered, freedom, known } = self;
         let order = noise.coefficients.len();
-        noise.filter(&mut once, width);
-        let mut twice = once.clone();
-        if order > 0 {
-            noise.filter(&mut twice, width);
-        }
+        let mut twice = filtered.clone();
+        twice.filter(noise);
         let covariance = coefficient_covariance(&noise.coefficients, freedom);
         // Σ u², and −½ of its slopes along the coefficients.
-        let mut sums = vec![vec![0.0; width]; order + 1];
-        add_products(&once, &once, width, &mut sums[0]);
-        for (i, sums) in sums.iter_mut().enumerate().skip(1) {
-            add_products(once.get(i * width..).unwrap_or_default(), &twice, width, sums);
-        }
+        let square = filtered.column_products(&filtered, 0);
+        let slopes: Vec<Vec<f64>> = (1..=order).map(|i| twice.column_products(&filtered, i)).collect();
         for (j, (known, of_known)) in known.variance.iter_mut().zip(&mut known.of_variance).enumerate() {
-            let sum = |i: usize| noise.innovation * sums[i][j];
-            let (variance, slope) = (sum(0), |i: usize| -2.0 * sum(i + 1));
+            let (variance, slope) = (noise.innovation * square[j], |i: usize| -2.0 * noise.innovation * slopes[i][j]);
             let mut of_variance = 2.0 * variance * variance / freedom.max(1.0);
             for (i, row) in covariance.iter().enumerate() {
                 of_variance += row.iter().enumerate().map(|(l, c)| slope(i) * c * slope(l)).sum::<f64>();
             }
             *known += variance;
             *of_known += of_variance;
-        }
-    }
-}
-
-/// Σ a b of each of the numbers of a value.
-#[inline(always)]
-fn add_products(a: &[f64], b: &[f64], width: usize, sums: &mut [f64]) {
-    for (a, b) in a.chunks_exact(width).zip(b.chunks_exact(width)) {
-        for i in 0..width {
-            sums[i] = a[i].mul_add(b[i], sums[i]);
         }
     }
 }
@@ -126,7 +103,6 @@ pub fn longer(freedom: f64) -> f64 {
 mod tests {
     use approx::assert_relative_eq;
     use nalgebra::DMatrix;
-    use pulp::Arch;
     use statrs::distribution::{ContinuousCDF, StudentsT};
 
     use super::super::tests::Noise;
@@ -159,10 +135,11 @@ mod tests {
 
     /// Degrees of freedom of the variance of the mean of so many values.
     fn of_the_mean(noise: &Autoregression, values: usize) -> (f64, f64) {
-        let mut changes = vec![1.0 / values as f64; values];
-        changes.resize(values + noise.memory(values), 0.0);
+        let changes = Padded::column(&vec![1.0 / values as f64; values]);
+        let mut filtered = changes.followed_by(noise.memory(values));
+        filtered.filter(noise);
         let mut known = Known::nothing(1);
-        Arch::new().dispatch(Part { noise, changes, width: 1, freedom: values as f64 - 1.0, known: &mut known });
+        Part { noise, filtered, freedom: values as f64 - 1.0, known: &mut known }.add();
         (known.variance[0], known.freedom()[0])
     }
 
@@ -191,7 +168,7 @@ mod tests {
                 })
                 .collect();
             let lag = |l: usize| series.iter().zip(&series[l..]).map(|(a, b)| a * b).sum::<f64>() / values as f64;
-            let fitted = Autoregression::fitted(&[lag(0), lag(1)], values);
+            let fitted = Autoregression::fitted(&[lag(0), lag(1)], values as f64);
             variances.push(of_the_mean(&fitted, values).0);
         }
         let mean = variances.iter().sum::<f64>() / f64::from(draws);

@@ -13,10 +13,10 @@ use nalgebra::{DMatrix, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::case::{Case, surface_factor};
+use super::coloured::{Series, samples_of_block};
 use super::kernel::{CHUNK, load, store};
 use super::lanes::{Aligned, VECTOR};
-use super::normal::{Normal, Rows};
-use super::response::Response;
+use super::normal::Rows;
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -61,14 +61,17 @@ pub fn noisy_surfaces(
     names.sort_unstable();
     names.dedup();
     let surface = |name: &&str| {
-        let samples: Vec<f64> = window.signal(name).iter().step_by(2).copied().collect();
+        let samples: Vec<f64> = window.signal(name).chunks(2).map(|points| points[0]).collect();
         let variance = white_variance(&samples);
         let acting = all.iter().filter(|(d, _)| d.regressor.surface() == Some(name));
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
             factors: match d.regressor {
-                Regressor::Vane(_) => qbar.iter().step_by(2).map(|qbar| surface_factor(aircraft, *qbar, d)).collect(),
+                Regressor::Vane(_) => {
+                    let times_qbar = surface_factor(aircraft, 1.0, d);
+                    qbar.chunks(2).map(|qbar| times_qbar / qbar[0]).collect()
+                }
                 _ => vec![],
             },
         };
@@ -82,20 +85,20 @@ pub fn noisy_surfaces(
 #[must_use]
 pub fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
-    // Sizes are in the order of their bits, which are compared faster.
-    let sizes = samples.windows(4).map(|u| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs());
-    let mut sizes: Vec<u64> = sizes.filter(|d| d.is_finite()).map(f64::to_bits).collect();
-    let middle = sizes.len() / 2;
-    let median = if sizes.is_empty() { 0.0 } else { f64::from_bits(*sizes.select_nth_unstable(middle).1) };
+    // Sizes are in the order of their bits, which are compared faster; what is no number comes last.
+    let size = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
+    let mut sizes: Vec<u64> = samples.windows(4).map(size).collect();
+    let finite = sizes.iter().filter(|size| **size < f64::INFINITY.to_bits()).count();
+    let median = if finite == 0 { 0.0 } else { f64::from_bits(*sizes.select_nth_unstable(finite / 2).1) };
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 
-/// The gradient's covariance from the noise of the surfaces, along the measured motion, at a whole response.
+/// The gradient's covariance from the noise of the surfaces, along the measured motion, given the outputs' series.
 #[must_use]
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
-    response: &Response,
+    series: &[Series],
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
     let (n, width) = (case.parameters(), case.parameters().next_multiple_of(VECTOR));
@@ -103,8 +106,7 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
         return DMatrix::zeros(n, n);
     }
     let mut scatter = Aligned::zeros(width * width);
-    let normal = &response.normal;
-    let adjoint = Adjoint { case, parameters, normal, weights, width, scatter: scatter.slice_mut() };
+    let adjoint = Adjoint { case, parameters, series, weights, width, scatter: scatter.slice_mut() };
     Arch::new().dispatch(adjoint);
     let at = |i: usize, j: usize| scatter.slice()[i.max(j) * width + i.min(j)];
     DMatrix::from_fn(n, n, at)
@@ -115,7 +117,7 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
 struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
     parameters: &'a [f64],
-    normal: &'a Normal,
+    series: &'a [Series],
     weights: &'a [f64; OUTPUTS],
     /// Parameters padded to whole vectors.
     width: usize,
@@ -139,13 +141,14 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let width = self.width;
-        let (mut adjoint, mut sums) = (Aligned::zeros(NX * width), Aligned::zeros(OUTPUTS * width));
-        let (adjoint, sums) = (adjoint.slice_mut(), sums.slice_mut());
+        let mut adjoint = Aligned::zeros(NX * width);
+        let adjoint = adjoint.slice_mut();
         let mut rows = Aligned::zeros(CHUNK * COEFFICIENTS * width);
         let rows = rows.slice_mut();
         let whole = vec![VECTOR; width / VECTOR];
-        let block = self.normal.block_samples();
-        for b in (0..self.normal.blocks()).rev() {
+        let block = samples_of_block(self.case.step_s);
+        let blocks = self.case.samples().div_ceil(block);
+        for b in (0..blocks).rev() {
             let samples = block.min(self.case.samples() - b * block);
             let middle = b * block + samples / 2;
             let at = self.at(middle, samples);
@@ -153,24 +156,23 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
             // Each of the block's samples has this part of the outputs' sums, and all of them together its square.
             let all = (samples as f64).sqrt();
             let mut part = [0.0; OUTPUTS];
-            sums.fill(0.0);
-            for (o, sums) in sums.chunks_exact_mut(width).enumerate() {
-                let count = self.normal.add_block(b, o, sums);
-                part[o] = 1.0 / (count.max(1.0) * samples as f64).sqrt();
+            for (part, series) in part.iter_mut().zip(self.series) {
+                *part = 1.0 / (series.counts[b].max(1.0) * samples as f64).sqrt();
             }
             let row = b % CHUNK * COEFFICIENTS * width;
             for lane in (0..width).step_by(S::F64_LANES) {
                 let mut by_coefficient = [simd.splat_f64s(0.0); COEFFICIENTS];
                 let (mut later, mut now) = ([simd.splat_f64s(0.0); NX], [simd.splat_f64s(0.0); NX]);
-                for o in 0..OUTPUTS {
-                    let s = load::<S>(sums, o * width + lane);
-                    for i in 0..NX {
-                        now[i] = simd.mul_add_f64s(simd.splat_f64s(at.read[(o, i)]), s, now[i]);
-                    }
-                    for c in 0..COEFFICIENTS {
-                        let slope = simd.splat_f64s(part[o] * at.direct[(o, c)]);
-                        by_coefficient[c] = simd.mul_add_f64s(slope, s, by_coefficient[c]);
-                    }
+                let mut sums = [simd.splat_f64s(0.0); OUTPUTS];
+                for (sums, series) in sums.iter_mut().zip(self.series) {
+                    *sums = load::<S>(series.sensitivities.values(), b * width + lane);
+                }
+                for &(o, i) in E::OUTPUTS_BY_STATE {
+                    now[i] = simd.mul_add_f64s(simd.splat_f64s(at.read[(o, i)]), sums[o], now[i]);
+                }
+                for &(o, c) in E::OUTPUTS_BY_COEFFICIENT {
+                    let slope = simd.splat_f64s(part[o] * at.direct[(o, c)]);
+                    by_coefficient[c] = simd.mul_add_f64s(slope, sums[o], by_coefficient[c]);
                 }
                 for j in 0..NX {
                     let s = load::<S>(adjoint, j * width + lane);
@@ -203,7 +205,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                 }
             }
             if b % CHUNK == 0 {
-                let samples = COEFFICIENTS * CHUNK.min(self.normal.blocks() - b);
+                let samples = COEFFICIENTS * CHUNK.min(blocks - b);
                 Rows { values: rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
             }
         }
@@ -288,7 +290,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::super::tests::{Noise, SAMPLES, TABLE, nothing_measured, record, truth};
-    use super::super::{InitialState, Model};
+    use super::super::{InitialState, Likelihood, Model};
     use super::*;
     use crate::dynamics::motion::MassProperties;
     use crate::dynamics::tests::aircraft;
@@ -364,7 +366,8 @@ mod tests {
             case.names.iter().filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name)).collect();
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
-        let said = gradient_covariance(&case, &parameters, &response, &TABLE);
+        let series = case.series(&response, &TABLE);
+        let said = gradient_covariance(&case, &parameters, &series, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
             let ratio = (scatter[j] / said[(j, j)]).sqrt();

@@ -35,6 +35,10 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
         self.places.iter().map(|&place| joint[place]).collect()
     }
 
+    fn widened(&self, series: &[Series], parameters: usize) -> Vec<Series> {
+        series.iter().map(|own| own.widened(&self.places, parameters)).collect()
+    }
+
     fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
         for (j, &column) in self.places.iter().enumerate() {
             for (i, &row) in self.places.iter().enumerate() {
@@ -176,11 +180,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
 
     fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<Series> {
         let members = self.members.iter().zip(response);
-        let wide = |(m, r): (&Member<'_, NX, E>, &Response)| {
-            let series = m.case.series(r, weights).into_iter();
-            series.map(|s| s.widened(&m.places, self.names.len())).collect::<Vec<_>>()
-        };
-        members.flat_map(wide).collect()
+        members.flat_map(|(m, r)| m.widened(&m.case.series(r, weights), self.names.len())).collect()
     }
 
     fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
@@ -191,12 +191,20 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         sum
     }
 
-    fn input_covariance(&self, parameters: &[f64], response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
-        let mut sum = DMatrix::zeros(self.names.len(), self.names.len());
+    fn noisy(
+        &self,
+        parameters: &[f64],
+        response: &Vec<Response>,
+        weights: &[f64; OUTPUTS],
+    ) -> (Vec<Series>, DMatrix<f64>) {
+        let n = self.names.len();
+        let (mut all, mut sum) = (Vec::new(), DMatrix::zeros(n, n));
         for (member, own) in self.members.iter().zip(response) {
-            member.add(&member.case.input_covariance(&member.parameters(parameters), own, weights), &mut sum);
+            let (series, inputs) = member.case.noisy(&member.parameters(parameters), own, weights);
+            all.extend(member.widened(&series, n));
+            member.add(&inputs, &mut sum);
         }
-        sum
+        (all, sum)
     }
 
     fn place(&self, diverged: Diverged) -> String {

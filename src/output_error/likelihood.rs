@@ -43,9 +43,14 @@ pub trait Likelihood {
     /// Σ Sᵀ W R W S for white residuals.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64>;
 
-    /// What noise of what is taken as exact does to the gradient, at a whole response to these parameters.
-    fn input_covariance(&self, parameters: &[f64], response: &Self::Response, weights: &[f64; OUTPUTS])
-    -> DMatrix<f64>;
+    /// These series, and what noise of what is taken as exact does to the gradient, at a whole response to these
+    /// parameters.
+    fn noisy(
+        &self,
+        parameters: &[f64],
+        response: &Self::Response,
+        weights: &[f64; OUTPUTS],
+    ) -> (Vec<Series>, DMatrix<f64>);
 
     /// Where an integration diverged, in words.
     fn place(&self, diverged: Diverged) -> String;
@@ -75,19 +80,17 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
     }
 
     fn variances(&self, response: &Response) -> [f64; OUTPUTS] {
-        let residuals = cost::residuals(&self.measurements, response);
-        cramer_rao::variances(&residuals, &self.used(), self.parameters())
+        let normal = &response.normal;
+        let output = |o: usize| (normal.square(o), normal.count(o));
+        cramer_rao::variances(std::array::from_fn(output), self.parameters())
     }
 
     fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<Series> {
-        let all = cost::residuals(&self.measurements, response);
+        let normal = &response.normal;
         let series = |o: usize| {
-            let used: Vec<bool> = self.measurements.used.iter().map(|used| used[o]).collect();
-            let residuals: Vec<f64> = all.iter().map(|v| v[o]).collect();
-            let squares = response.normal.squares(o);
-            let normal = &response.normal;
-            Series::new(self.step_s, weights[o], &residuals, &used, squares, |samples, row| {
-                normal.add_block(samples.start / normal.block_samples(), o, row);
+            let (square, squares) = (normal.square(o), normal.squares(o));
+            Series::new(self.step_s, weights[o], self.samples(), square, squares, |samples, row| {
+                normal.block(samples.start / normal.block_samples(), o, row)
             })
         };
         (0..OUTPUTS).map(series).collect()
@@ -98,8 +101,10 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         response.normal.information(&std::array::from_fn(|o| weights[o] * weights[o] * variances[o]))
     }
 
-    fn input_covariance(&self, parameters: &[f64], response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
-        input_noise::gradient_covariance(self, parameters, response, weights)
+    fn noisy(&self, parameters: &[f64], response: &Response, weights: &[f64; OUTPUTS]) -> (Vec<Series>, DMatrix<f64>) {
+        let series = self.series(response, weights);
+        let inputs = input_noise::gradient_covariance(self, parameters, &series, weights);
+        (series, inputs)
     }
 
     fn place(&self, diverged: Diverged) -> String {

@@ -24,6 +24,7 @@ pub mod mean;
 pub mod newton_raphson;
 mod normal;
 mod outcome;
+mod padded;
 mod propagators;
 mod response;
 pub mod theil;

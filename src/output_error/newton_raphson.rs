@@ -284,9 +284,9 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
     }
     let at = data.sums(&fit.response, &fit.weights);
     match cramer_rao::identified(&at.information, settings.max_condition_number) {
-        Identified::Determined { root, condition_number, .. } => {
+        Identified::Determined { inverse, condition_number } => {
             fit.condition_number = Some(condition_number);
-            let bounds = cramer_rao::bounds(&root, data, fit);
+            let bounds = cramer_rao::bounds(&inverse, data, fit);
             (fit.covariance, fit.covariance_corrected) = (Some(bounds.covariance), Some(bounds.corrected));
         }
         Identified::Undetermined { condition_number, parameters } => {

@@ -13,9 +13,10 @@
 #![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
 
 use nalgebra::{DMatrix, DVector};
-use pulp::Simd;
+use pulp::{Arch, Simd};
 
 use super::case::Measurements;
+use super::coloured::Block;
 use super::course::{Meanwhile, Nothing};
 use super::kernel::{Sink, Spaced};
 use super::lanes::{Aligned, Lanes, VECTOR};
@@ -81,18 +82,22 @@ impl Normal {
         self.samples.div_ceil(self.block.max(1))
     }
 
-    /// The sensitivities of an output to all parameters, added up over a block's samples that count; and how many do.
-    pub fn add_block(&self, block: usize, output: usize, row: &mut [f64]) -> f64 {
+    /// Writes the sensitivities of an output to all parameters, added up over a block's samples that count.
+    pub fn block(&self, block: usize, output: usize, row: &mut [f64]) -> Block {
         let width = self.lanes.width();
         let Some(sums) = self.blocks.slice().get((block * OUTPUTS + output) * width..).filter(|_| self.whole()) else {
-            return 0.0;
+            return Block { count: 0.0, residual: 0.0 };
         };
+        let sums = &sums[..width];
         let (derivatives, initial) = self.lanes.places.split_at(self.derivatives);
+        let (of_derivatives, others) = row.split_at_mut(self.derivatives);
+        let (of_biases, of_initial) = others.split_at_mut(self.biased.len());
+        of_derivatives.iter_mut().zip(derivatives).for_each(|(to, &lane)| *to = sums[lane]);
+        of_initial.iter_mut().zip(initial).for_each(|(to, &lane)| *to = sums[lane]);
         let count = sums[self.lanes.one];
-        let biases = self.biased.iter().map(|o| if *o == output { count } else { 0.0 });
-        let slopes = derivatives.iter().map(|lane| sums[*lane]).chain(biases).chain(initial.iter().map(|l| sums[*l]));
-        row.iter_mut().zip(slopes).for_each(|(row, slope)| *row += slope);
-        count
+        let biases = of_biases.iter_mut().zip(&self.biased);
+        biases.for_each(|(to, biased)| *to = if *biased == output { count } else { 0.0 });
+        Block { count, residual: sums[self.lanes.residual] }
     }
 
     /// Whether the sums are of all samples.
@@ -134,9 +139,17 @@ impl Normal {
 
     /// Σ s sᵀ of one output, for all parameters.
     pub fn squares(&self, output: usize) -> DMatrix<f64> {
-        let mut weights = [0.0; OUTPUTS];
-        weights[output] = 1.0;
-        self.information(&weights)
+        let lanes = self.parameters();
+        let mut whole = DMatrix::zeros(lanes.len(), lanes.len());
+        for (column, &(j, second)) in lanes.iter().enumerate() {
+            for (row, &(i, first)) in lanes.iter().enumerate().skip(column) {
+                if [first, second].iter().flatten().all(|only| *only == output) {
+                    whole[(row, column)] = self.at(output, i, j);
+                }
+            }
+        }
+        whole.fill_upper_triangle_with_lower_triangle();
+        whole
     }
 
     /// Σ_o w_o Σ s sᵀ of all parameters.
@@ -145,7 +158,7 @@ impl Normal {
         let mut sum = vec![0.0; width * width];
         for (squares, w) in self.squares.iter().zip(weights) {
             let factor = w * self.stride as f64;
-            sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s);
+            Arch::new().dispatch(|| sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s));
         }
         let lanes = self.parameters();
         let both = |(i, first): (usize, Option<usize>), (j, second): (usize, Option<usize>)| match (first, second) {

@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 
+use super::coloured::Block;
 use super::newton_raphson::{Settings, Weights, estimate};
-use super::{Case, Fit, InitialState, Measurements, Model, Outcome, cramer_rao, equation_error};
+use super::{Case, Fit, InitialState, Measurements, Model, Outcome, cost, cramer_rao, equation_error};
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Regressor};
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::tests::aircraft;
@@ -189,15 +190,17 @@ fn a_whole_pass_adds_its_sensitivities_up_over_blocks_and_leaves_out_what_does_n
     let mut response = case.response();
     case.respond(&parameters, &mut response).unwrap();
     let sensitivities = case.sensitivities(&parameters).unwrap();
+    let residuals = cost::residuals(&case.measurements, &response);
     let (normal, block) = (&response.normal, response.normal.block_samples());
     assert!(block > 1 && normal.blocks() == SAMPLES.div_ceil(block));
     for b in 0..normal.blocks() {
         let samples = b * block..((b + 1) * block).min(SAMPLES);
         for o in 0..OUTPUTS {
             let mut sums = vec![0.0; parameters.len()];
-            let count = normal.add_block(b, o, &mut sums);
+            let Block { count, residual } = normal.block(b, o, &mut sums);
             let counted = samples.clone().filter(|&k| case.measurements.used[k][o]).count();
             assert_abs_diff_eq!(count, counted as f64);
+            assert_abs_diff_eq!(residual, samples.clone().map(|k| residuals[k][o]).sum::<f64>(), epsilon = 1e-12);
             for (j, sum) in sums.iter().enumerate() {
                 let each = samples.clone().map(|k| sensitivities.at(k, o, j));
                 let (expected, size) = (each.clone().sum::<f64>(), each.map(f64::abs).sum::<f64>());
