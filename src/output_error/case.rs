@@ -330,7 +330,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     #[inline(always)]
     pub(super) fn spread(&self, points: Spaced, rows: &mut [f64]) {
         for &(place, column) in &self.lanes.columns {
-            let column = &self.columns[column][points.first..][..points.stride * (POINTS - 1) + 1];
+            let column = &self.columns[column][points.first..][..=points.stride * (POINTS - 1)];
             for k in 0..POINTS {
                 rows[k * self.lanes.row + place] = column[k * points.stride];
             }

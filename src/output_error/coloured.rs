@@ -7,8 +7,8 @@
 //! added back, round after round until R settles. R of each output is that of an autoregressive process, by which the
 //! changes are filtered: every variance is a sum of squares.
 //!
-//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a number. An output whose
-//! noise has settled is left alone while others go on.
+//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a number. White noise that
+//! has settled is left alone while that of other outputs goes on.
 //!
 //! Variances from a noise that is itself estimated are known with few degrees of freedom ([`freedom`]).
 //!
@@ -32,8 +32,10 @@ const BLOCKS_PER_COEFFICIENT: usize = 10;
 const ROUNDS: usize = 30;
 /// An output's noise is settled when its long-run variance changes by no more than this share.
 const SETTLED: f64 = 0.01;
-/// By how much a round makes noise stronger at most.
-const MOST_AT_ONCE: f64 = 2.0;
+/// White noise that has settled is left alone while the parameters follow it alike, to this share of its variance.
+const STILL: f64 = 1e-3;
+/// Where the parameters leave at least this share of white noise, its strength follows from the residuals' at once.
+const LITTLE: f64 = 0.95;
 
 /// One output of one maneuver, seen through blocks of samples.
 #[derive(Clone, Debug)]
@@ -126,7 +128,7 @@ pub fn level(values: &[f64], step_s: f64) -> f64 {
     };
     let (all, square) = counted(values);
     let series =
-        Series::new(step_s, 1.0, values.len(), square, DMatrix::zeros(1, 1), |samples, _| counted(&values[samples]).0);
+        Series::new(step_s, 1.0, values.len(), square, &DMatrix::zeros(1, 1), |samples, _| counted(&values[samples]).0);
     let pairs = series.pairs();
     let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]).long_run_variance();
     (slow * series.block).max(square / all.count.max(1.0))
@@ -140,9 +142,10 @@ pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
     for (output, noise) in outputs.iter().zip(&noise.0) {
         scatter.add(&output.within, output.weight.powi(2) * noise.fast);
         let factor = output.weight.powi(2) * noise.slow.innovation;
-        match noise.slow.is_white() {
-            true => scatter.add(&output.between, factor),
-            false => scatter.add(&output.filtered(&output.sensitivities, &noise.slow).squares(), factor),
+        if noise.slow.is_white() {
+            scatter.add(&output.between, factor);
+        } else {
+            scatter.add(&output.filtered(&output.sensitivities, &noise.slow).squares(), factor);
         }
     }
     scatter.matrix()
@@ -163,7 +166,7 @@ impl Series {
         weight: f64,
         samples: usize,
         square: f64,
-        squares: DMatrix<f64>,
+        squares: &DMatrix<f64>,
         mut block_of: impl FnMut(std::ops::Range<usize>, &mut [f64]) -> Block,
     ) -> Series {
         let (length, parameters) = (samples_of_block(step_s), squares.nrows());
@@ -186,13 +189,15 @@ impl Series {
             }
         }
         let between = sensitivities.squares();
-        let mut within = Padded::symmetric(&squares);
+        let mut within = Padded::symmetric(squares);
         within.add(&between, -1.0 / block);
-        within.add(&Padded::of_rows(&more, parameters).squares(), -1.0);
+        if !more.is_empty() {
+            within.add(&Padded::of_rows(&more, parameters).squares(), -1.0);
+        }
         let fast_freedom = f64::max(freedom, 1.0);
         let fast = square.max(0.0) / fast_freedom;
         let residuals = Padded::column(&residuals);
-        Series { weight, block, counts, residuals, fast, fast_freedom, sensitivities, between, within }
+        Series { weight, block, residuals, fast, fast_freedom, counts, sensitivities, between, within }
     }
 
     /// The same with other parameters: `places` says where each stands among them.
@@ -254,7 +259,9 @@ fn settled<'a>(inverse: &'a Padded, outputs: &'a [Series]) -> Vec<Settling<'a>> 
     let mut outputs: Vec<_> = outputs.iter().map(|output| Settling::new(inverse, output)).collect();
     for _ in 0..ROUNDS {
         let scatter = scatter(&outputs, inverse.columns());
-        outputs.iter_mut().filter(|o| !o.settled).for_each(|o| o.settle(&scatter));
+        for output in &mut outputs {
+            output.settle(&scatter);
+        }
         if outputs.iter().all(|o| o.settled) {
             break;
         }
@@ -291,6 +298,8 @@ struct Settling<'a> {
     /// is white.
     changes: Option<Padded>,
     spread: Option<Padded>,
+    /// Variance of what the parameters made of the noise, S K Sᵀ, when that was last added back.
+    followed: f64,
     settled: bool,
 }
 
@@ -311,6 +320,7 @@ impl<'a> Settling<'a> {
             by_white,
             changes: None,
             spread: None,
+            followed: 0.0,
             settled: false,
             observed: vec![],
         };
@@ -335,12 +345,20 @@ impl<'a> Settling<'a> {
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Adds back what the parameters, of this covariance, took: of noise as strong as leaves residuals as strong as they
-    /// are.
+    /// Adds back what the parameters, of this covariance, took. White noise is at once made as strong as leaves residuals
+    /// as strong as they are; then only what others do to the parameters can change it.
     fn settle(&mut self, scatter: &Padded) {
+        let (pairs, block) = (self.pairs[0], self.output.block);
+        let followed = scatter.dot(&self.output.between) / (block * block * pairs);
+        let still = (followed - self.followed).abs() <= STILL * self.variance;
+        if self.settled && still && self.slow.is_white() {
+            return;
+        }
+        self.followed = followed;
         let taken = self.taken(scatter);
-        let left = self.pairs[0] * self.variance - taken[0];
-        let stronger = (self.pairs[0] * self.observed[0] / left).clamp(1.0 / MOST_AT_ONCE, MOST_AT_ONCE);
+        let left = self.variance - taken[0] / pairs;
+        let stronger =
+            if self.slow.is_white() && left > LITTLE * self.variance { self.observed[0] / left } else { 1.0 };
         let shares = taken.iter().zip(&self.pairs).map(|(taken, pairs)| stronger * taken / pairs);
         let whole: Vec<f64> = self.observed.iter().zip(shares).map(|(observed, share)| observed + share).collect();
         let expected = stronger * self.slow.long_run_variance();
@@ -368,7 +386,7 @@ impl<'a> Settling<'a> {
     fn know(&self, known: &mut Known) {
         known.add(self.by_fast.diagonal(), self.output.fast_freedom);
         // What the parameters took of the blocks.
-        let taken = self.output.weight / self.output.block * self.inverse.lagged(&self.output.between, 1)[0];
+        let taken = self.output.weight / self.output.block * self.inverse.dot(&self.output.between);
         let freedom = self.pairs[0] - taken;
         match &self.changes {
             Some(changes) if !self.slow.is_white() => {
@@ -391,7 +409,7 @@ mod tests {
     fn of_a_sum(weight: f64, residuals: &[f64], used: &[bool]) -> Series {
         let count = |used: &[bool]| used.iter().filter(|used| **used).count() as f64;
         let (square, squares) = (residuals.iter().map(|v| v * v).sum(), DMatrix::from_element(1, 1, count(used)));
-        Series::new(0.1, weight, residuals.len(), square, squares, |samples, row| {
+        Series::new(0.1, weight, residuals.len(), square, &squares, |samples, row| {
             let block = Block { count: count(&used[samples.clone()]), residual: residuals[samples].iter().sum() };
             row[0] += block.count;
             block

@@ -87,7 +87,7 @@ pub fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
     // Sizes are in the order of their bits, which are compared faster; what is no number comes last.
     let size = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
-    let mut sizes: Vec<u64> = samples.windows(4).map(size).collect();
+    let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.windows(4).map(size).collect());
     let finite = sizes.iter().filter(|size| **size < f64::INFINITY.to_bits()).count();
     let median = if finite == 0 { 0.0 } else { f64::from_bits(*sizes.select_nth_unstable(finite / 2).1) };
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0

@@ -89,7 +89,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         let normal = &response.normal;
         let series = |o: usize| {
             let (square, squares) = (normal.square(o), normal.squares(o));
-            Series::new(self.step_s, weights[o], self.samples(), square, squares, |samples, row| {
+            Series::new(self.step_s, weights[o], self.samples(), square, &squares, |samples, row| {
                 normal.block(samples.start / normal.block_samples(), o, row)
             })
         };

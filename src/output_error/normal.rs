@@ -73,13 +73,9 @@ impl Normal {
         }
     }
 
-    /// Samples of a block, the last one may have fewer; and the blocks.
+    /// Samples of a block; the last one may have fewer.
     pub fn block_samples(&self) -> usize {
         self.block
-    }
-
-    pub fn blocks(&self) -> usize {
-        self.samples.div_ceil(self.block.max(1))
     }
 
     /// Writes the sensitivities of an output to all parameters, added up over a block's samples that count.

@@ -114,6 +114,18 @@ impl Padded {
         self.rows = rows.min(self.rows);
     }
 
+    /// Σ of all numbers times those of another; lanes are summed apart, of which none waits for the others.
+    pub fn dot(&self, other: &Padded) -> f64 {
+        let (a, b) = (self.values().as_chunks::<VECTOR>().0, other.values().as_chunks::<VECTOR>().0);
+        let mut sums = [0.0; VECTOR];
+        for (a, b) in a.iter().zip(b) {
+            for i in 0..VECTOR {
+                sums[i] += a[i] * b[i];
+            }
+        }
+        sums.iter().sum()
+    }
+
     /// Adds another times a factor.
     pub fn add(&mut self, other: &Padded, factor: f64) {
         let (sums, values) = (self.values_mut(), other.values());

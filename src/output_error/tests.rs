@@ -192,8 +192,8 @@ fn a_whole_pass_adds_its_sensitivities_up_over_blocks_and_leaves_out_what_does_n
     let sensitivities = case.sensitivities(&parameters).unwrap();
     let residuals = cost::residuals(&case.measurements, &response);
     let (normal, block) = (&response.normal, response.normal.block_samples());
-    assert!(block > 1 && normal.blocks() == SAMPLES.div_ceil(block));
-    for b in 0..normal.blocks() {
+    assert!(block > 1);
+    for b in 0..SAMPLES.div_ceil(block) {
         let samples = b * block..((b + 1) * block).min(SAMPLES);
         for o in 0..OUTPUTS {
             let mut sums = vec![0.0; parameters.len()];
