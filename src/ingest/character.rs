@@ -92,32 +92,53 @@ pub fn recorded(values: &[f64], first: usize, rate: Rate) -> impl Iterator<Item 
 
 /// How often the channel is recorded; none where the spell does not say.
 fn rate(values: &[f64], first: usize) -> Option<Rate> {
-    let mut distances = [0_usize; LONGEST_PERIOD + 1];
-    let (mut last, mut known) = (None, 0_usize);
-    let mut changes: Vec<usize> = Vec::new();
-    let mut before = f64::NAN;
-    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-        known += 1;
-        if let Some(distance) = last.map(|l| k - l)
-            && distance <= LONGEST_PERIOD
-        {
-            distances[distance] += 1;
-        }
-        if before.is_finite() && value.to_bits() != before.to_bits() {
-            changes.push(first + k);
-        }
-        (last, before) = (Some(k), *value);
-    }
+    let known = values.iter().filter(|v| v.is_finite()).count();
     if known < FEW_CHANGES {
         return None;
     }
-    if let Some(period) = between_nulls(&distances) {
+    if known == values.len() {
+        // Most channels change so often that no period fits: these need no list of changes.
+        let changed = values.windows(2).filter(|pair| pair[0].to_bits() != pair[1].to_bits()).count();
+        if changed < FEW_CHANGES {
+            return None;
+        }
+        if !has_room(changed, values.len(), SHORTEST_PERIOD) {
+            return Some(Rate::FULL);
+        }
+    } else if let Some(period) = between_nulls(&distances(values)) {
         return Some(Rate { period, held: None });
     }
+    let changes = changes(values, first);
     if changes.len() < FEW_CHANGES {
         return None;
     }
     Some(held(&changes).unwrap_or(Rate::FULL))
+}
+
+/// How many recorded samples are how far from the one before.
+fn distances(values: &[f64]) -> [usize; LONGEST_PERIOD + 1] {
+    let mut distances = [0_usize; LONGEST_PERIOD + 1];
+    let mut last = None;
+    for (k, _) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if let Some(count) = last.and_then(|last| distances.get_mut(k - last)) {
+            *count += 1;
+        }
+        last = Some(k);
+    }
+    distances
+}
+
+/// The samples whose value is another than the one before.
+fn changes(values: &[f64], first: usize) -> Vec<usize> {
+    let mut changes = Vec::new();
+    let mut before = f64::NAN;
+    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if before.is_finite() && value.to_bits() != before.to_bits() {
+            changes.push(first + k);
+        }
+        before = *value;
+    }
+    changes
 }
 
 /// The distance that nearly all recorded samples have, where it is more than one; a clock of its own makes it one more
@@ -134,13 +155,20 @@ fn between_nulls(distances: &[usize]) -> Option<usize> {
 /// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one of so many chances.
 const CHANCES: usize = 4;
 
+/// The shortest period of a slow channel in samples of the record.
+const SHORTEST_PERIOD: usize = 2;
+
+/// Whether a span of samples has room for so many changes in one phase of a period.
+fn has_room(changes: usize, span: usize, period: usize) -> bool {
+    (FITS * changes as f64 - 1.0) * period as f64 <= span as f64
+}
+
 /// The longest period of which nearly all changes keep one phase.
 fn held(changes: &[usize]) -> Option<Rate> {
     let span = changes.last()? - changes.first()?;
-    let fitting = FITS * changes.len() as f64;
     let of_period = |period: usize| {
         // Too few to tell, or more than there is room for in one phase: most channels are recorded in every sample.
-        if CHANCES * changes.len() * period < span || (fitting - 1.0) * period as f64 > span as f64 {
+        if CHANCES * changes.len() * period < span || !has_room(changes.len(), span, period) {
             return None;
         }
         let mut phases = vec![0_usize; period];
@@ -148,9 +176,9 @@ fn held(changes: &[usize]) -> Option<Rate> {
             phases[change % period] += 1;
         }
         let (phase, most) = phases.iter().enumerate().max_by_key(|(_, n)| **n)?;
-        (*most as f64 >= fitting).then_some(Rate { period, held: Some(phase) })
+        (*most as f64 >= FITS * changes.len() as f64).then_some(Rate { period, held: Some(phase) })
     };
-    (2..=LONGEST_PERIOD).rev().find_map(of_period)
+    (SHORTEST_PERIOD..=LONGEST_PERIOD).rev().find_map(of_period)
 }
 
 /// The runs of one value among the recorded ones, by their lengths; what is missing is in none.
@@ -176,12 +204,11 @@ fn runs(values: &[f64]) -> Vec<usize> {
 fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> Option<usize> {
     let least = super::clock::index(settings.least_s / step_s).max(4);
     let runs = runs(values);
-    let usual: Vec<usize> = runs.iter().copied().filter(|n| *n < least).collect();
-    let samples: usize = usual.iter().sum();
+    let (usual, samples) = runs.iter().filter(|n| **n < least).fold((0_usize, 0), |(runs, all), n| (runs + 1, all + n));
     if samples < FEW_SAMPLES {
         return before.stuck;
     }
-    let repeats = 1.0 - usual.len() as f64 / samples as f64;
+    let repeats = 1.0 - usual as f64 / samples as f64;
     if repeats > settings.most_repeats || turns(values) < LEAST_TURNS {
         return None;
     }
