@@ -4,6 +4,8 @@
 //! A spell is a fixed number of samples, so the character of a channel does not depend on the pieces in which a flight is
 //! read. Where a spell says nothing, the channel is as it was in the spell before.
 
+use std::ops::Range;
+
 use super::Stuck;
 use super::spikes;
 
@@ -181,21 +183,21 @@ fn held(changes: &[usize]) -> Option<Rate> {
     (SHORTEST_PERIOD..=LONGEST_PERIOD).rev().find_map(of_period)
 }
 
-/// The runs of one value among the recorded ones, by their lengths; what is missing is in none.
-fn runs(values: &[f64]) -> Vec<usize> {
+/// The runs of one value in at least so many samples, one after the other. Not every sample is looked at: a run that is
+/// long enough holds one of every `least`.
+pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
-    let mut length = 0;
-    let mut before: Option<f64> = None;
-    for value in values {
-        if value.is_finite() && before.is_some_and(|b| b.to_bits() == value.to_bits()) {
-            length += 1;
-        } else {
-            runs.extend((length > 0).then_some(length));
-            length = usize::from(value.is_finite());
+    let mut from = 0;
+    while let Some(value) = values.get(from + least.max(1) - 1).copied() {
+        let at = from + least.max(1) - 1;
+        let same = |v: &&f64| value.is_finite() && v.to_bits() == value.to_bits();
+        let start = at - values[from..at].iter().rev().take_while(same).count();
+        let end = at + 1 + values[at + 1..].iter().take_while(same).count();
+        if value.is_finite() && end - start >= least {
+            runs.push(start..end);
         }
-        before = Some(*value);
+        from = end;
     }
-    runs.extend((length > 0).then_some(length));
     runs
 }
 
@@ -203,21 +205,28 @@ fn runs(values: &[f64]) -> Vec<usize> {
 /// stuck.
 fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> Option<usize> {
     let least = super::clock::index(settings.least_s / step_s).max(4);
-    let runs = runs(values);
-    let (usual, samples) = runs.iter().filter(|n| **n < least).fold((0_usize, 0), |(runs, all), n| (runs + 1, all + n));
-    if samples < FEW_SAMPLES {
+    let known = values.iter().filter(|v| v.is_finite()).count();
+    let first = values.first().is_some_and(|v| v.is_finite());
+    let anew = |pair: &&[f64]| pair[1].is_finite() && pair[1].to_bits() != pair[0].to_bits();
+    let runs = usize::from(first) + values.windows(2).filter(anew).count();
+    let long = long_runs(values, least / 3);
+    let (lasting, samples) =
+        long.iter().map(Range::len).filter(|n| *n >= least).fold((0, 0), |(r, s), n| (r + 1, s + n));
+    if known - samples < FEW_SAMPLES {
         return before.stuck;
     }
-    let repeats = 1.0 - usual as f64 / samples as f64;
+    let repeats = 1.0 - (runs - lasting) as f64 / (known - samples) as f64;
     if repeats > settings.most_repeats || turns(values) < LEAST_TURNS {
         return None;
     }
     let chance = CHANCE.ln() / (CENTRED * repeats).max(f64::EPSILON).ln();
     let longest = least.max(super::clock::index(chance));
     // The runs at the ends may be parts of longer ones. Between chance and stuck there is nothing.
-    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
-    let doubtful = inner.iter().any(|n| (longest / 3..longest).contains(n));
-    let many = runs.iter().filter(|n| **n >= longest).count() > MOST_RUNS;
+    let finite = |v: &f64| v.is_finite();
+    let (first, last) = (values.iter().position(finite)?, values.iter().rposition(finite)?);
+    let inner = long.iter().filter(|run| !run.contains(&first) && !run.contains(&last));
+    let doubtful = inner.map(Range::len).any(|n| (longest / 3..longest).contains(&n));
+    let many = long.iter().filter(|run| run.len() >= longest).count() > MOST_RUNS;
     (!doubtful && !many).then_some(longest)
 }
 
@@ -280,6 +289,21 @@ mod tests {
 
     fn character(values: &[f64]) -> Character {
         Character::of(values, 0, 0.025, &Character::UNKNOWN, &Stuck::default())
+    }
+
+    #[test]
+    fn runs_are_found_wherever_they_lie_and_no_shorter_ones() {
+        let values = [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, f64::NAN, f64::NAN, f64::NAN, 4.0, 4.0, 4.0, 4.0, 0.0, -0.0, 0.0];
+        assert_eq!(long_runs(&values, 3), [0..3, 9..13]);
+        assert_eq!(long_runs(&values, 2), [0..3, 4..6, 9..13]);
+        assert_eq!(long_runs(&values, 1).len(), 7);
+        assert!(long_runs(&values, 5).is_empty());
+        assert!(long_runs(&[], 3).is_empty());
+        for start in 0..20 {
+            let mut values: Vec<f64> = (0..40).map(f64::from).collect();
+            values[start..start + 7].fill(-1.0);
+            assert_eq!(long_runs(&values, 7), [start..start + 7]);
+        }
     }
 
     #[test]

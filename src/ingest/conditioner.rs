@@ -5,8 +5,9 @@
 //! about a sample depends on its surroundings and on the character of its spell, never on the pieces.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
-use super::character::{Character, Rate, SPELL, recorded};
+use super::character::{Character, Rate, SPELL, long_runs, recorded};
 use super::{Settings, gaps, spikes};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
@@ -259,7 +260,7 @@ impl Conditioner {
     }
 
     /// The parts of a range of samples that have one character, as offsets.
-    fn parts(&self, from: usize, length: usize) -> Vec<(std::ops::Range<usize>, Character)> {
+    fn parts(&self, from: usize, length: usize) -> Vec<(Range<usize>, Character)> {
         let to = from + length;
         let spells = from / SPELL..to.div_ceil(SPELL);
         let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
@@ -267,7 +268,7 @@ impl Conditioner {
     }
 
     /// Repeated values of a slow channel and stuck values become NaN; returns where it is stuck.
-    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<std::ops::Range<usize>> {
+    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<Range<usize>> {
         let parts = self.parts(from, values.len());
         for (range, character) in &parts {
             let Rate { period, held: Some(phase) } = character.rate else { continue };
@@ -277,27 +278,17 @@ impl Conditioner {
                 }
             }
         }
-        if parts.iter().all(|(_, c)| c.stuck.is_none()) {
-            return Vec::new();
-        }
-        let mut stuck = Vec::new();
-        // From a recorded value to the last one that is the same: places, and how many.
-        let (mut start, mut end, mut count, mut before) = (0, 0, 0_usize, f64::NAN);
-        let mut close = |start: usize, end: usize, count: usize, value: f64| {
-            let least = self.character(from + start).stuck.or(self.character(from + end).stuck);
-            if value.is_finite() && least.is_some_and(|least| count >= least) {
-                stuck.push(start..end + 1);
-            }
+        let Some(fewest) = parts.iter().filter_map(|(_, c)| c.stuck).min() else { return Vec::new() };
+        let is_stuck = |run: &Range<usize>, count: usize| {
+            let least = self.character(from + run.start).stuck.or(self.character(from + run.end - 1).stuck);
+            least.is_some_and(|least| count >= least)
         };
-        for (k, value) in recorded(values, 0, Rate::FULL) {
-            if value.to_bits() == before.to_bits() {
-                (end, count) = (k, count + 1);
-            } else {
-                close(start, end, count, before);
-                (start, end, count, before) = (k, k, 1, value);
-            }
-        }
-        close(start, end, count, before);
+        let stuck: Vec<Range<usize>> = if values.iter().all(|v| v.is_finite()) {
+            long_runs(values, fewest).into_iter().filter(|run| is_stuck(run, run.len())).collect()
+        } else {
+            let runs = lasting(values, fewest);
+            runs.into_iter().filter(|(run, count)| is_stuck(run, *count)).map(|(run, _)| run).collect()
+        };
         for range in &stuck {
             values[range.clone()].fill(f64::NAN);
         }
@@ -347,8 +338,25 @@ impl Conditioner {
     }
 }
 
+/// The runs of one value in at least so many recorded samples, with how many; what is missing between them counts for
+/// nothing.
+fn lasting(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
+    let mut runs = Vec::new();
+    let (mut run, mut count, mut before) = (0..0, 0_usize, f64::NAN);
+    for (k, value) in recorded(values, 0, Rate::FULL) {
+        if value.to_bits() == before.to_bits() {
+            (run.end, count) = (k + 1, count + 1);
+            continue;
+        }
+        runs.extend((count >= least).then(|| (run.clone(), count)));
+        (run, count, before) = (k..k + 1, 1, value);
+    }
+    runs.extend((count >= least).then_some((run, count)));
+    runs
+}
+
 /// A range of the values alone.
-fn only<T>(mut values: Vec<T>, range: &std::ops::Range<usize>) -> Vec<T> {
+fn only<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
     values.truncate(range.end);
     values.drain(..range.start);
     values

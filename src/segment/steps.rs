@@ -192,18 +192,20 @@ fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
     let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
     let (mut low, mut high) = ([f64::INFINITY; SIDE], [f64::NEG_INFINITY; SIDE]);
     for later in samples.windows(levels.len()).take(length) {
-        for (k, v) in later.iter().enumerate() {
+        let of_level = known.iter_mut().zip(&mut sum).zip(low.iter_mut().zip(&mut high));
+        for (v, ((known, sum), (low, high))) in later.iter().zip(of_level) {
             let finite = v.is_finite();
-            known[k] += if finite { 1.0 } else { 0.0 };
-            sum[k] += if finite { *v } else { 0.0 };
-            low[k] = if finite && *v < low[k] { *v } else { low[k] };
-            high[k] = if finite && *v > high[k] { *v } else { high[k] };
+            *known += if finite { 1.0 } else { 0.0 };
+            *sum += if finite { *v } else { 0.0 };
+            *low = if finite && *v < *low { *v } else { *low };
+            *high = if finite && *v > *high { *v } else { *high };
         }
     }
-    for (k, level) in levels.iter_mut().enumerate() {
-        let inner = (sum[k] - low[k] - high[k]) / (known[k] - 2.0);
-        let mean = if known[k] >= 4.0 { inner } else { sum[k] / known[k] };
-        *level = if 2.0 * known[k] < length as f64 { f64::NAN } else { mean };
+    let of_level = known.iter().zip(&sum).zip(low.iter().zip(&high));
+    for (level, ((known, sum), (low, high))) in levels.iter_mut().zip(of_level) {
+        let inner = (sum - low - high) / (known - 2.0);
+        let mean = if *known >= 4.0 { inner } else { sum / known };
+        *level = if 2.0 * known < length as f64 { f64::NAN } else { mean };
     }
 }
 
@@ -219,14 +221,14 @@ mod tests {
     }
 
     /// A level that jumps at the given samples.
-    fn levels(n: usize, jumps: &[(usize, f64)]) -> Vec<f64> {
+    fn jumping(n: usize, jumps: &[(usize, f64)]) -> Vec<f64> {
         (0..n).map(|k| jumps.iter().filter(|j| k >= j.0).map(|j| j.1).sum()).collect()
     }
 
     #[test]
     fn a_step_has_its_time_and_levels_whatever_the_trim() {
         for trim in [-14.0, 0.0, 8.0] {
-            let values: Vec<f64> = levels(80, &[(40, 5.0)]).iter().map(|v| v + trim).collect();
+            let values: Vec<f64> = jumping(80, &[(40, 5.0)]).iter().map(|v| v + trim).collect();
             let found = steps(&values);
             assert_eq!(found.len(), 1);
             assert_abs_diff_eq!(found[0].time_s, 39.5, epsilon = 0.5);
@@ -237,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_edges_of_a_doublet_come_out_with_their_signs() {
-        let found = steps(&levels(120, &[(30, 4.0), (55, -8.0), (80, 4.0)]));
+        let found = steps(&jumping(120, &[(30, 4.0), (55, -8.0), (80, 4.0)]));
         let signs: Vec<f64> = found.iter().map(|s| s.change().signum()).collect();
         assert_eq!(signs, [1.0, -1.0, 1.0]);
         for (step, at) in found.iter().zip([29.5, 54.5, 79.5]) {
@@ -257,8 +259,28 @@ mod tests {
     }
 
     #[test]
+    fn a_level_is_the_mean_without_the_largest_and_the_smallest_of_what_is_known() {
+        let mut values: Vec<f64> = (0..150).map(|k| f64::from(k * k % 17)).collect();
+        for k in [3, 70, 71, 72, 100, 101] {
+            values[k] = f64::NAN;
+        }
+        let found = levels(&values, 5);
+        assert_eq!(found.len(), 146);
+        for (k, level) in found.iter().enumerate() {
+            let mut known: Vec<f64> = values[k..k + 5].iter().copied().filter(|v| v.is_finite()).collect();
+            known.sort_by(f64::total_cmp);
+            let inner = if known.len() >= 4 { &known[1..known.len() - 1] } else { &known[..] };
+            if known.len() < 3 {
+                assert!(level.is_nan());
+            } else {
+                assert_abs_diff_eq!(*level, inner.iter().sum::<f64>() / inner.len() as f64, epsilon = 1e-12);
+            }
+        }
+    }
+
+    #[test]
     fn missing_samples_hide_no_step_and_make_none() {
-        let mut values = levels(80, &[(40, 5.0)]);
+        let mut values = jumping(80, &[(40, 5.0)]);
         for k in [20, 21, 36, 39, 40, 44] {
             values[k] = f64::NAN;
         }
