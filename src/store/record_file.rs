@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, UInt8Array};
+use arrow::array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch, UInt8Array};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, UInt8Type};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
@@ -99,7 +99,8 @@ impl<W: Write + Send> Writer<W> {
     /// The reason in words.
     pub fn create<'s>(about: &About, signals: impl Iterator<Item = &'s str>, out: W) -> Result<Writer<W>, String> {
         let mut fields = Vec::new();
-        // Uncompressed values: to compress what is mostly noise takes longer than to write it. Marks are long runs.
+        // Uncompressed values: to compress what is mostly noise takes longer than to write it. A sample as it was measured,
+        // as nearly all are, has no mark: pages without one cost nothing.
         let mut properties = WriterProperties::builder()
             .set_compression(Compression::UNCOMPRESSED)
             .set_dictionary_enabled(false)
@@ -111,7 +112,7 @@ impl<W: Write + Send> Writer<W> {
             let marks = format!("{signal}{MARK}");
             let path = ColumnPath::from(marks.clone());
             properties = properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
-            fields.push(Field::new(marks, DataType::UInt8, false));
+            fields.push(Field::new(marks, DataType::UInt8, true));
         }
         // Without the serialised Arrow schema, the key-value metadata is all there is and its order is ours.
         let schema = Arc::new(Schema::new(fields));
@@ -136,16 +137,22 @@ impl<W: Write + Send> Writer<W> {
         Ok(signals)
     }
 
-    /// Writes the next row group: what its writers made, in batches, in their order.
+    /// Writes the next row group: what its writers made, in batches, in their order. While one batch is written the next
+    /// is made.
     ///
     /// # Errors
     /// The reason in words.
-    pub fn append(&mut self, mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String>) -> Result<(), String> {
+    pub fn append(
+        &mut self,
+        mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String> + Send,
+    ) -> Result<(), String> {
         let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
-        while let Some(chunks) = next()? {
-            for column in chunks.into_iter().flat_map(|c| c.0) {
-                column.append_to_row_group(&mut group).map_err(|e| refused(&e))?;
-            }
+        let mut made = next()?;
+        while let Some(chunks) = made {
+            let write = || chunks.into_iter().flat_map(|c| c.0).try_for_each(|c| c.append_to_row_group(&mut group));
+            let (written, following) = rayon::join(write, &mut next);
+            written.map_err(|e| refused(&e))?;
+            made = following?;
         }
         group.close().map_err(|e| refused(&e))?;
         Ok(())
@@ -197,9 +204,15 @@ impl SignalWriter {
         let values = self.pending.values.get(range.clone()).unwrap_or_default();
         let marks = self.pending.marks.get(range).unwrap_or_default();
         let values: ArrayRef = Arc::new(Float64Array::from(values.to_vec()));
-        let marks: ArrayRef = Arc::new(marks.iter().map(|m| *m as u8).collect::<UInt8Array>());
-        for (writer, array) in [(&mut self.values, values), (&mut self.marks, marks)] {
-            let field = Field::new("", array.data_type().clone(), false);
+        let code = |mark: &Mark| (*mark != Mark::Measured).then_some(*mark as u8);
+        let marks = if marks.iter().all(|mark| *mark == Mark::Measured) {
+            UInt8Array::new_null(marks.len())
+        } else {
+            marks.iter().map(code).collect()
+        };
+        let marks: ArrayRef = Arc::new(marks);
+        for (writer, array, nullable) in [(&mut self.values, values, false), (&mut self.marks, marks, true)] {
+            let field = Field::new("", array.data_type().clone(), nullable);
             for leaf in compute_leaves(&field, &array).map_err(|e| refused(&e))? {
                 writer.write(&leaf).map_err(|e| refused(&e))?;
             }
@@ -424,7 +437,11 @@ fn add(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result<(), S
         let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
         if field.name().ends_with(MARK) {
             let marks = array.as_primitive_opt::<UInt8Type>().ok_or_else(other)?;
-            series.marks.extend(marks.values().iter().map(|code| Mark::from_u8(*code)));
+            if marks.null_count() == marks.len() {
+                series.marks.resize(series.marks.len() + marks.len(), Mark::Measured);
+            } else {
+                series.marks.extend(marks.iter().map(|code| code.map_or(Mark::Measured, Mark::from_u8)));
+            }
         } else {
             let values = array.as_primitive_opt::<Float64Type>().ok_or_else(other)?;
             series.values.extend_from_slice(values.values());
@@ -441,12 +458,15 @@ mod tests {
         let values = vec![1.5, f64::from_bits(0x7ff8_0000_0000_0001), -0.0, 1e-310, 57.295_779_513_082_32];
         let marks = vec![Mark::Measured, Mark::Missing, Mark::Bridged, Mark::Despiked, Mark::Measured];
         let flag = Series { values: vec![0.0, 0.0, 1.0, 1.0, 1.0], marks: vec![Mark::Measured; 5] };
+        let dead = Series { values: vec![f64::NAN; 5], marks: vec![Mark::Missing; 5] };
+        let alpha = Series { values, marks };
         Record {
             flight_id: "flight 007 ä".to_owned(),
             start_s: 0.1 + 0.2,
             step_s: 0.025_000_000_000_000_3,
             samples: 5,
-            signals: [("alpha_vane_deg".to_owned(), Series { values, marks }), ("obes".to_owned(), flag)].into(),
+            signals: [("alpha_vane_deg".to_owned(), alpha), ("mach".to_owned(), dead), ("obes".to_owned(), flag)]
+                .into(),
         }
     }
 
