@@ -100,7 +100,7 @@ fn rate(values: &[f64], first: usize) -> Option<Rate> {
     }
     if known == values.len() {
         // Most channels change so often that no period fits: these need no list of changes.
-        let changed = values.windows(2).filter(|pair| pair[0].to_bits() != pair[1].to_bits()).count();
+        let changed = pairs(values).filter(|(before, value)| before.to_bits() != value.to_bits()).count();
         if changed < FEW_CHANGES {
             return None;
         }
@@ -207,8 +207,8 @@ fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> O
     let least = super::clock::index(settings.least_s / step_s).max(4);
     let known = values.iter().filter(|v| v.is_finite()).count();
     let first = values.first().is_some_and(|v| v.is_finite());
-    let anew = |pair: &&[f64]| pair[1].is_finite() && pair[1].to_bits() != pair[0].to_bits();
-    let runs = usize::from(first) + values.windows(2).filter(anew).count();
+    let anew = |(before, value): &(&f64, &f64)| value.is_finite() && value.to_bits() != before.to_bits();
+    let runs = usize::from(first) + pairs(values).filter(anew).count();
     let long = long_runs(values, least / 3);
     let (lasting, samples) =
         long.iter().map(Range::len).filter(|n| *n >= least).fold((0, 0), |(r, s), n| (r + 1, s + n));
@@ -230,18 +230,21 @@ fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> O
     (!doubtful && !many).then_some(longest)
 }
 
+/// Each sample with the one after it.
+fn pairs(values: &[f64]) -> impl Iterator<Item = (&f64, &f64)> {
+    values.iter().zip(values.get(1..).unwrap_or_default())
+}
+
 /// The share of changes that turn around.
 fn turns(values: &[f64]) -> f64 {
     let (mut turns, mut all, mut last, mut before) = (0_usize, 0_usize, 0.0_f64, f64::NAN);
     for value in values.iter().take(4096).filter(|v| v.is_finite()) {
+        // Noise has no pattern: whatever a branch would guess is wrong half of the time.
         let change = value - before;
-        if change.is_finite() && change != 0.0 {
-            if last != 0.0 {
-                all += 1;
-                turns += usize::from(change * last < 0.0);
-            }
-            last = change;
-        }
+        let moves = change.abs() > 0.0;
+        all += usize::from(moves & (last != 0.0));
+        turns += usize::from(moves & (change * last < 0.0));
+        last = if moves { change } else { last };
         before = *value;
     }
     turns as f64 / all.max(1) as f64
