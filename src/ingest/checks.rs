@@ -168,9 +168,12 @@ fn without_jumps(relation: &Relation, mut pairs: Vec<(f64, f64)>, settings: &Che
     pairs
 }
 
-/// The slope that half of what the predicting sides weigh lies below.
+/// The slope that half of what the predicting sides weigh lies below. None weighs more than the middle one: a jump of the
+/// predicting side would otherwise speak for all.
 fn middle_slope(pairs: &[(f64, f64)]) -> f64 {
-    let mut slopes: Vec<(f64, f64)> = pairs.iter().filter(|p| p.0 != 0.0).map(|(x, y)| (y / x, x.abs())).collect();
+    let most = median(pairs.iter().map(|p| p.0.abs()).collect());
+    let mut slopes: Vec<(f64, f64)> =
+        pairs.iter().filter(|p| p.0 != 0.0).map(|(x, y)| (y / x, x.abs().min(most))).collect();
     slopes.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = 0.5 * slopes.iter().map(|s| s.1).sum::<f64>();
     let mut sum = 0.0;
@@ -265,8 +268,13 @@ mod tests {
             jumped[k].1 += 60.0;
         }
         assert_eq!(without_jumps(&relation, jumped, &settings).len(), 197);
+        // A part of the flight put together from many: some of it jumps on either side of the relation.
+        let mut patched = windows(1.0);
+        patched.iter_mut().step_by(5).for_each(|p| p.1 += 60.0);
+        patched.iter_mut().skip(2).step_by(10).for_each(|p| p.0 += 300.0);
+        assert_eq!(without_jumps(&relation, patched, &settings).len(), 140);
         let mut often = windows(1.0);
-        often.iter_mut().step_by(5).for_each(|p| p.1 += 60.0);
+        often.iter_mut().step_by(2).for_each(|p| p.1 += 60.0);
         assert_eq!(without_jumps(&relation, often, &settings).len(), 200);
         for slope in [-1.0, 57.3] {
             let pairs = without_jumps(&relation, windows(slope), &settings);

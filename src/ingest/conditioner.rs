@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use super::character::{Character, Rate, SPELL, recorded};
+use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, recorded};
 use super::{Settings, gaps, spikes};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
@@ -27,24 +27,39 @@ struct Unwrap {
     period: f64,
     /// A jump by more than this share of the period is a wrap.
     share: f64,
+    /// Whether it is an attitude or a flow angle, which begins within half a turn of zero, and not a heading.
+    about_zero: bool,
+    /// After more missing samples than this it begins anew: how far it has turned meanwhile nobody knows.
+    longest: usize,
+    missing: usize,
     turns: f64,
     before: f64,
     wraps: usize,
 }
 
 impl Unwrap {
-    fn of(channel: &Channel) -> Option<Unwrap> {
+    fn of(channel: &Channel, step_s: f64, settings: &Settings) -> Option<Unwrap> {
         let unit = Unit::parse(&channel.unit).ok().filter(|u| u.quantity == Quantity::Angle);
         let circle = unit.and_then(|u| Unit::of_signal("_deg").factor_to(u)).map(|f| 360.0 * f);
         let stated = channel.wraps_at.map(|period| (period, 0.5));
         let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
-        Some(Unwrap { period, share, turns: 0.0, before: f64::NAN, wraps: 0 })
+        let longest = gaps::longest(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
+        let about_zero = channel.wraps_at.is_none();
+        Some(Unwrap { period, share, about_zero, longest, missing: 0, turns: 0.0, before: f64::NAN, wraps: 0 })
     }
 
     fn next(&mut self, value: f64) -> f64 {
         if !value.is_finite() {
+            self.missing += 1;
             return value;
         }
+        if self.about_zero && (self.before.is_nan() || self.missing > self.longest) {
+            // What is beyond a whole turn is no angle that wraps around.
+            self.turns = if value.abs() <= self.period { -(value / self.period).round() } else { 0.0 };
+            self.before = value + self.turns * self.period;
+            self.wraps += usize::from(self.turns != 0.0);
+        }
+        self.missing = 0;
         let jump = (value + self.turns * self.period - self.before) / self.period;
         if jump.abs() > self.share {
             self.turns -= jump.round();
@@ -108,7 +123,7 @@ impl Conditioner {
             samples,
             factor: factor * channel.sign * channel.scale,
             flag: channel.unit == FLAG,
-            unwrap: Unwrap::of(channel),
+            unwrap: Unwrap::of(channel, step_s, settings),
             values: VecDeque::new(),
             first: 0,
             settled: 0,
@@ -315,5 +330,33 @@ impl Conditioner {
         self.done.period = self.periods.get(middle(self.periods.len())).copied().unwrap_or(1);
         self.done.wraps = self.unwrap.map_or(0, |u| u.wraps);
         self.done
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::float_cmp, reason = "the values are exact")]
+
+    use super::*;
+
+    fn unwrapped(wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
+        let channel = Channel { signal: "x_deg".into(), unit: "deg".into(), sign: 1.0, scale: 1.0, wraps_at };
+        let mut unwrap = Unwrap::of(&channel, 0.025, &Settings::default()).unwrap();
+        values.iter().map(|v| unwrap.next(*v)).filter(|v| v.is_finite()).collect()
+    }
+
+    #[test]
+    fn an_angle_recorded_from_0_to_360_deg_begins_about_zero_and_again_after_a_long_gap() {
+        assert_eq!(unwrapped(None, &[359.0, 1.0, 350.0, 2.0]), [-1.0, 1.0, -10.0, 2.0]);
+        let gap = |samples: usize| [&[30.0][..], &vec![f64::NAN; samples], &[330.0, 359.0, 1.0]].concat();
+        assert_eq!(unwrapped(None, &gap(41)), [30.0, -30.0, -1.0, 1.0]);
+        // A roll that goes on through a dropout stays as many turns on.
+        assert_eq!(unwrapped(None, &[170.0, 179.0, f64::NAN, -175.0, -170.0]), [170.0, 179.0, 185.0, 190.0]);
+        assert_eq!(unwrapped(None, &[400.0, 410.0]), [400.0, 410.0]);
+    }
+
+    #[test]
+    fn a_heading_stays_as_recorded_where_it_begins() {
+        assert_eq!(unwrapped(Some(360.0), &[310.0, 359.0, 1.0]), [310.0, 359.0, 361.0]);
     }
 }
