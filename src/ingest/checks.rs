@@ -40,6 +40,8 @@ pub struct Check {
     pub relation: Relation,
     pub verdict: Verdict,
     pub fit: Option<Fit>,
+    /// In how many windows the record jumps.
+    pub jumps: usize,
 }
 
 impl Check {
@@ -81,28 +83,52 @@ pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check
     let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
     let relations: Vec<Relation> = relations::all(settings).into_iter().filter(possible).collect();
     let windows = windows(&relations, blocks, aircraft, settings);
-    // Where the record jumps in what one relation compares, it does so in all of them.
-    let jumps = |(relation, pairs): (&Relation, &Vec<Pair>)| {
-        jumps(relation, &chosen(relation, pairs.clone(), settings), settings)
+    let sides: Vec<Sides> =
+        relations.into_iter().zip(windows).map(|(relation, pairs)| Sides::of(relation, pairs, settings)).collect();
+    let jumped: BTreeSet<usize> = sides.iter().flat_map(|s| &s.jumps).copied().collect();
+    let check = |sides: &Sides| {
+        let own = sides.without(&sides.jumps.iter().copied().collect(), settings);
+        // Where the record jumps in what one relation compares, it does so in all; but a channel that is wrong makes jumps
+        // too, and must not hide in them where it shows its sign or its unit.
+        let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
+        if disagrees { sides.without(&jumped, settings) } else { own }
     };
-    let jumped: BTreeSet<usize> = relations.iter().zip(&windows).flat_map(jumps).collect();
-    // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
-    let check = |(relation, mut pairs): (Relation, Vec<Pair>)| {
-        let all = chosen(&relation, pairs.clone(), settings);
-        pairs.retain(|p| !jumped.contains(&p.window));
+    sides.iter().map(check).collect()
+}
+
+/// What a relation compares in a record.
+struct Sides {
+    relation: Relation,
+    /// Of the windows that say something.
+    pairs: Vec<Pair>,
+    /// Those in which the record jumps.
+    jumps: Vec<usize>,
+}
+
+impl Sides {
+    fn of(relation: Relation, pairs: Vec<Pair>, settings: &Checks) -> Sides {
         let pairs = chosen(&relation, pairs, settings);
+        let jumps = jumps(&relation, &pairs, settings);
+        Sides { relation, pairs, jumps }
+    }
+
+    /// How the relation comes out without some windows.
+    fn without(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
+        let relation = self.relation;
+        let pairs: Vec<Pair> = self.pairs.iter().filter(|p| !jumped.contains(&p.window)).copied().collect();
+        let jumps = self.jumps.len();
         if pairs.len() < settings.least_windows.max(2) {
-            return Check { relation, verdict: Verdict::NotExcited, fit: None };
+            return Check { relation, verdict: Verdict::NotExcited, fit: None, jumps };
         }
-        let fit = fit(&pairs, &all);
+        let fit = fit(&pairs, &self.pairs);
+        // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
         let dead = match relation.choice {
             Choice::Above(_) => Verdict::DoesNotAgree,
             Choice::Largest { .. } => Verdict::NotExcited,
         };
         let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
-        Check { relation, verdict, fit }
-    };
-    relations.into_iter().zip(windows).map(check).collect()
+        Check { relation, verdict, fit, jumps }
+    }
 }
 
 /// The signals that some relation confirms.

@@ -45,7 +45,7 @@ pub struct Accusation {
     pub required: bool,
 }
 
-/// Trials whose squared misfit is within this factor of the best explain the failure as well as it does.
+/// Trials whose squared misfit and jumps are within this factor of the best explain the failure as well as it does.
 const AS_GOOD: f64 = 3.0;
 
 /// More independent faults than this are not looked for in one flight.
@@ -183,10 +183,13 @@ fn misfit(checks: &[Check]) -> f64 {
     excited.filter_map(|c| c.fit).map(|f| f.misfit.powi(2)).sum()
 }
 
-/// The best trial and the best ones of other channels that explain the failure as well.
+/// The best trial and the best ones of other channels that explain the failure as well: with as small a misfit, and with as
+/// few windows in which the record would have to jump.
 fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     let mut chosen: Vec<&Trial> = Vec::new();
-    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit) {
+    let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>() as f64;
+    let most = AS_GOOD * jumps(best).max(1.0);
+    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit && jumps(t) <= most) {
         if !chosen.iter().any(|c| c.name == trial.name) {
             chosen.push(trial);
         }

@@ -626,21 +626,6 @@ fn turbulence_makes_no_maneuver_and_hides_none() {
 }
 
 #[test]
-fn halves_of_doublets_that_turbulence_hides_begin_the_maneuver_all_the_same() {
-    for seed in 1..=6 {
-        let mut r = flight(120);
-        for (k, name) in ["de_deg", "dsa_deg", "dpv_deg"].into_iter().enumerate() {
-            turbulence(&mut r, name, 10 * seed + k as u64, 1.1);
-        }
-        doublet(&mut r, "dsa_deg", 60.0, 4.5);
-        doublet(&mut r, "de_deg", 65.0, -4.5);
-        let segmented = found(&r);
-        assert_eq!(classes_of(&segmented), ["DOUBLETS"], "seed {seed}: {:?}", segmented.unknown);
-        assert_window(&segmented.maneuvers[0], "DOUBLETS", 59.0, 68.5);
-    }
-}
-
-#[test]
 fn a_maneuver_that_the_record_cuts_is_unknown() {
     let mut r = flight(27);
     up(&mut r, "obes", 20.0, 33.0);
