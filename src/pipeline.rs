@@ -96,7 +96,7 @@ struct Ingested {
 }
 
 /// What the store keeps of segment.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Found {
     maneuvers: Vec<Maneuver>,
     unknown: Vec<Unknown>,

@@ -28,7 +28,19 @@ impl Correction {
     pub fn apply(&self, record: &mut Record) {
         let delay = self.delay_s / record.step_s;
         if let Some(series) = record.signals.get_mut(&self.signal) {
-            *series = self.corrected(series, delay);
+            if delay == 0.0 {
+                self.correct_in_place(series);
+            } else {
+                *series = self.corrected(series, delay);
+            }
+        }
+    }
+
+    /// Without a delay every sample is its own.
+    fn correct_in_place(&self, series: &mut Series) {
+        for (value, mark) in series.values.iter_mut().zip(&mut series.marks) {
+            *value = (*value - self.bias) / (1.0 + self.scale);
+            *mark = if value.is_finite() { *mark } else { Mark::Missing };
         }
     }
 

@@ -4,6 +4,8 @@
 //! A spell is a fixed number of samples, so the character of a channel does not depend on the pieces in which a flight is
 //! read. Where a spell says nothing, the channel is as it was in the spell before.
 
+use std::ops::Range;
+
 use super::Stuck;
 use super::spikes;
 
@@ -92,32 +94,53 @@ pub fn recorded(values: &[f64], first: usize, rate: Rate) -> impl Iterator<Item 
 
 /// How often the channel is recorded; none where the spell does not say.
 fn rate(values: &[f64], first: usize) -> Option<Rate> {
-    let mut distances = [0_usize; LONGEST_PERIOD + 1];
-    let (mut last, mut known) = (None, 0_usize);
-    let mut changes: Vec<usize> = Vec::new();
-    let mut before = f64::NAN;
-    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-        known += 1;
-        if let Some(distance) = last.map(|l| k - l)
-            && distance <= LONGEST_PERIOD
-        {
-            distances[distance] += 1;
-        }
-        if before.is_finite() && value.to_bits() != before.to_bits() {
-            changes.push(first + k);
-        }
-        (last, before) = (Some(k), *value);
-    }
+    let known = values.iter().filter(|v| v.is_finite()).count();
     if known < FEW_CHANGES {
         return None;
     }
-    if let Some(period) = between_nulls(&distances) {
+    if known == values.len() {
+        // Most channels change so often that no period fits: these need no list of changes.
+        let changed = values.windows(2).filter(|pair| pair[0].to_bits() != pair[1].to_bits()).count();
+        if changed < FEW_CHANGES {
+            return None;
+        }
+        if !has_room(changed, values.len(), SHORTEST_PERIOD) {
+            return Some(Rate::FULL);
+        }
+    } else if let Some(period) = between_nulls(&distances(values)) {
         return Some(Rate { period, held: None });
     }
+    let changes = changes(values, first);
     if changes.len() < FEW_CHANGES {
         return None;
     }
     Some(held(&changes).unwrap_or(Rate::FULL))
+}
+
+/// How many recorded samples are how far from the one before.
+fn distances(values: &[f64]) -> [usize; LONGEST_PERIOD + 1] {
+    let mut distances = [0_usize; LONGEST_PERIOD + 1];
+    let mut last = None;
+    for (k, _) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if let Some(count) = last.and_then(|last| distances.get_mut(k - last)) {
+            *count += 1;
+        }
+        last = Some(k);
+    }
+    distances
+}
+
+/// The samples whose value is another than the one before.
+fn changes(values: &[f64], first: usize) -> Vec<usize> {
+    let mut changes = Vec::new();
+    let mut before = f64::NAN;
+    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if before.is_finite() && value.to_bits() != before.to_bits() {
+            changes.push(first + k);
+        }
+        before = *value;
+    }
+    changes
 }
 
 /// The distance that nearly all recorded samples have, where it is more than one; a clock of its own makes it one more
@@ -134,13 +157,20 @@ fn between_nulls(distances: &[usize]) -> Option<usize> {
 /// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one of so many chances.
 const CHANCES: usize = 4;
 
+/// The shortest period of a slow channel in samples of the record.
+const SHORTEST_PERIOD: usize = 2;
+
+/// Whether a span of samples has room for so many changes in one phase of a period.
+fn has_room(changes: usize, span: usize, period: usize) -> bool {
+    (FITS * changes as f64 - 1.0) * period as f64 <= span as f64
+}
+
 /// The longest period of which nearly all changes keep one phase.
 fn held(changes: &[usize]) -> Option<Rate> {
     let span = changes.last()? - changes.first()?;
-    let fitting = FITS * changes.len() as f64;
     let of_period = |period: usize| {
         // Too few to tell, or more than there is room for in one phase: most channels are recorded in every sample.
-        if CHANCES * changes.len() * period < span || (fitting - 1.0) * period as f64 > span as f64 {
+        if CHANCES * changes.len() * period < span || !has_room(changes.len(), span, period) {
             return None;
         }
         let mut phases = vec![0_usize; period];
@@ -148,26 +178,26 @@ fn held(changes: &[usize]) -> Option<Rate> {
             phases[change % period] += 1;
         }
         let (phase, most) = phases.iter().enumerate().max_by_key(|(_, n)| **n)?;
-        (*most as f64 >= fitting).then_some(Rate { period, held: Some(phase) })
+        (*most as f64 >= FITS * changes.len() as f64).then_some(Rate { period, held: Some(phase) })
     };
-    (2..=LONGEST_PERIOD).rev().find_map(of_period)
+    (SHORTEST_PERIOD..=LONGEST_PERIOD).rev().find_map(of_period)
 }
 
-/// The runs of one value among the recorded ones, by their lengths; what is missing is in none.
-fn runs(values: &[f64]) -> Vec<usize> {
+/// The runs of one value in at least so many samples, one after the other. Not every sample is looked at: a run that is
+/// long enough holds one of every `least`.
+pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
-    let mut length = 0;
-    let mut before: Option<f64> = None;
-    for value in values {
-        if value.is_finite() && before.is_some_and(|b| b.to_bits() == value.to_bits()) {
-            length += 1;
-        } else {
-            runs.extend((length > 0).then_some(length));
-            length = usize::from(value.is_finite());
+    let mut from = 0;
+    while let Some(value) = values.get(from + least.max(1) - 1).copied() {
+        let at = from + least.max(1) - 1;
+        let same = |v: &&f64| value.is_finite() && v.to_bits() == value.to_bits();
+        let start = at - values[from..at].iter().rev().take_while(same).count();
+        let end = at + 1 + values[at + 1..].iter().take_while(same).count();
+        if value.is_finite() && end - start >= least {
+            runs.push(start..end);
         }
-        before = Some(*value);
+        from = end;
     }
-    runs.extend((length > 0).then_some(length));
     runs
 }
 
@@ -175,22 +205,28 @@ fn runs(values: &[f64]) -> Vec<usize> {
 /// stuck.
 fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> Option<usize> {
     let least = super::clock::index(settings.least_s / step_s).max(4);
-    let runs = runs(values);
-    let usual: Vec<usize> = runs.iter().copied().filter(|n| *n < least).collect();
-    let samples: usize = usual.iter().sum();
-    if samples < FEW_SAMPLES {
+    let known = values.iter().filter(|v| v.is_finite()).count();
+    let first = values.first().is_some_and(|v| v.is_finite());
+    let anew = |pair: &&[f64]| pair[1].is_finite() && pair[1].to_bits() != pair[0].to_bits();
+    let runs = usize::from(first) + values.windows(2).filter(anew).count();
+    let long = long_runs(values, least / 3);
+    let (lasting, samples) =
+        long.iter().map(Range::len).filter(|n| *n >= least).fold((0, 0), |(r, s), n| (r + 1, s + n));
+    if known - samples < FEW_SAMPLES {
         return before.stuck;
     }
-    let repeats = 1.0 - usual.len() as f64 / samples as f64;
+    let repeats = 1.0 - (runs - lasting) as f64 / (known - samples) as f64;
     if repeats > settings.most_repeats || turns(values) < LEAST_TURNS {
         return None;
     }
     let chance = CHANCE.ln() / (CENTRED * repeats).max(f64::EPSILON).ln();
     let longest = least.max(super::clock::index(chance));
     // The runs at the ends may be parts of longer ones. Between chance and stuck there is nothing.
-    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
-    let doubtful = inner.iter().any(|n| (longest / 3..longest).contains(n));
-    let many = runs.iter().filter(|n| **n >= longest).count() > MOST_RUNS;
+    let finite = |v: &f64| v.is_finite();
+    let (first, last) = (values.iter().position(finite)?, values.iter().rposition(finite)?);
+    let inner = long.iter().filter(|run| !run.contains(&first) && !run.contains(&last));
+    let doubtful = inner.map(Range::len).any(|n| (longest / 3..longest).contains(&n));
+    let many = long.iter().filter(|run| run.len() >= longest).count() > MOST_RUNS;
     (!doubtful && !many).then_some(longest)
 }
 
@@ -253,6 +289,21 @@ mod tests {
 
     fn character(values: &[f64]) -> Character {
         Character::of(values, 0, 0.025, &Character::UNKNOWN, &Stuck::default())
+    }
+
+    #[test]
+    fn runs_are_found_wherever_they_lie_and_no_shorter_ones() {
+        let values = [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, f64::NAN, f64::NAN, f64::NAN, 4.0, 4.0, 4.0, 4.0, 0.0, -0.0, 0.0];
+        assert_eq!(long_runs(&values, 3), [0..3, 9..13]);
+        assert_eq!(long_runs(&values, 2), [0..3, 4..6, 9..13]);
+        assert_eq!(long_runs(&values, 1).len(), 7);
+        assert!(long_runs(&values, 5).is_empty());
+        assert!(long_runs(&[], 3).is_empty());
+        for start in 0..20 {
+            let mut values: Vec<f64> = (0..40).map(f64::from).collect();
+            values[start..start + 7].fill(-1.0);
+            assert_eq!(long_runs(&values, 7), [start..start + 7]);
+        }
     }
 
     #[test]

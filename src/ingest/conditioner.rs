@@ -5,8 +5,9 @@
 //! about a sample depends on its surroundings and on the character of its spell, never on the pieces.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
-use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, recorded};
+use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, long_runs, recorded};
 use super::{Settings, gaps, spikes};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
@@ -20,6 +21,9 @@ const MARGIN: usize = SPELL / 4;
 
 /// Without a `wraps_at`, only a jump of nearly the whole circle from one sample to the next is a wrap.
 const WHOLE_TURN: f64 = 0.9;
+
+/// Samples that are looked at for a wrap at once.
+const SOME: usize = 1 << 10;
 
 /// Makes a value that wraps around continuous.
 #[derive(Clone, Debug)]
@@ -48,25 +52,48 @@ impl Unwrap {
         Some(Unwrap { period, share, about_zero, longest, missing: 0, turns: 0.0, before: f64::NAN, wraps: 0 })
     }
 
+    /// Whether nothing before the next value says how many turns it is on.
+    fn begins(&self) -> bool {
+        self.about_zero && (self.before.is_nan() || self.missing > self.longest)
+    }
+
     fn next(&mut self, value: f64) -> f64 {
         if !value.is_finite() {
             self.missing += 1;
             return value;
         }
-        if self.about_zero && (self.before.is_nan() || self.missing > self.longest) {
+        if self.begins() {
             // What is beyond a whole turn is no angle that wraps around.
             self.turns = if value.abs() <= self.period { -(value / self.period).round() } else { 0.0 };
             self.before = value + self.turns * self.period;
             self.wraps += usize::from(self.turns != 0.0);
         }
         self.missing = 0;
-        let jump = (value + self.turns * self.period - self.before) / self.period;
-        if jump.abs() > self.share {
-            self.turns -= jump.round();
+        let jump = value + self.turns * self.period - self.before;
+        if jump.abs() > self.share * self.period {
+            self.turns -= (jump / self.period).round();
             self.wraps += 1;
         }
         self.before = value + self.turns * self.period;
         self.before
+    }
+
+    /// What all of these samples are moved by, where none of them is missing or wraps: nearly always.
+    fn common(&mut self, recorded: &[f64]) -> Option<f64> {
+        if self.begins() {
+            return None;
+        }
+        let moved = self.turns * self.period;
+        let jumps = |before: f64, value: f64| (value - before).abs() > self.share * self.period;
+        let (first, last) = (recorded.first()?, recorded.last()?);
+        let known = recorded.iter().fold(true, |all, v| all & v.is_finite());
+        let goes_on = recorded.windows(2).fold(true, |all, pair| all & !jumps(pair[0], pair[1]));
+        if !known || !goes_on || jumps(self.before - moved, *first) {
+            return None;
+        }
+        self.before = last + moved;
+        self.missing = 0;
+        Some(moved)
     }
 }
 
@@ -101,7 +128,7 @@ pub struct Conditioner {
     flag: bool,
     unwrap: Option<Unwrap>,
     /// Converted values from sample `first` on.
-    values: VecDeque<f64>,
+    values: Vec<f64>,
     first: usize,
     settled: usize,
     /// The characters of the spells from `first`'s on.
@@ -124,7 +151,7 @@ impl Conditioner {
             factor: factor * channel.sign * channel.scale,
             flag: channel.unit == FLAG,
             unwrap: Unwrap::of(channel, step_s, settings),
-            values: VecDeque::new(),
+            values: Vec::new(),
             first: 0,
             settled: 0,
             characters: VecDeque::new(),
@@ -163,12 +190,18 @@ impl Conditioner {
 
     /// The next samples as recorded, NaN where there is none.
     pub fn push(&mut self, recorded: &[f64]) {
-        for value in recorded {
-            let value = match &mut self.unwrap {
-                Some(unwrap) => unwrap.next(*value),
-                None => *value,
-            };
-            self.values.push_back(if value.is_finite() { value * self.factor } else { f64::NAN });
+        let factor = self.factor;
+        let converted = |value: f64| if value.is_finite() { value * factor } else { f64::NAN };
+        match &mut self.unwrap {
+            Some(unwrap) => {
+                for some in recorded.chunks(SOME) {
+                    match unwrap.common(some) {
+                        Some(moved) => self.values.extend(some.iter().map(|v| (v + moved) * factor)),
+                        None => self.values.extend(some.iter().map(|v| converted(unwrap.next(*v)))),
+                    }
+                }
+            }
+            None => self.values.extend(recorded.iter().map(|v| converted(*v))),
         }
         loop {
             let spell = self.first_spell + self.characters.len();
@@ -181,8 +214,8 @@ impl Conditioner {
     }
 
     fn characterise(&mut self, from: usize, to: usize) {
-        let spell: Vec<f64> = self.values.range(from - self.first..to - self.first).copied().collect();
-        let mut character = Character::of(&spell, from, self.step_s, &self.latest, &self.settings.stuck);
+        let spell = &self.values[from - self.first..to - self.first];
+        let mut character = Character::of(spell, from, self.step_s, &self.latest, &self.settings.stuck);
         if self.flag {
             (character.stuck, character.rate.held) = (None, None);
         }
@@ -204,7 +237,7 @@ impl Conditioner {
         let until = until.min(self.samples);
         let from = self.settled.saturating_sub(MARGIN).max(self.first);
         let to = (until + MARGIN).min(self.pushed());
-        let mut values: Vec<f64> = self.values.range(from - self.first..to - self.first).copied().collect();
+        let mut values = self.values[from - self.first..to - self.first].to_vec();
         let stuck = self.leave_out(&mut values, from);
         let despiked = if self.flag { Vec::new() } else { self.despike(&mut values, from) };
         let mut marks = self.bridge(&mut values, from);
@@ -218,10 +251,15 @@ impl Conditioner {
         self.count(&marks[core.clone()]);
         self.settled = until;
         self.forget();
-        Series { values: values[core.clone()].to_vec(), marks: marks[core].to_vec() }
+        Series { values: only(values, &core), marks: only(marks, &core) }
     }
 
     fn count(&mut self, marks: &[Mark]) {
+        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
+        if measured == marks.len() {
+            self.done.marks[Mark::Measured as usize] += measured;
+            return;
+        }
         for (k, mark) in marks.iter().enumerate() {
             self.done.marks[*mark as usize] += 1;
             if *mark == Mark::Stuck {
@@ -246,7 +284,7 @@ impl Conditioner {
     }
 
     /// The parts of a range of samples that have one character, as offsets.
-    fn parts(&self, from: usize, length: usize) -> Vec<(std::ops::Range<usize>, Character)> {
+    fn parts(&self, from: usize, length: usize) -> Vec<(Range<usize>, Character)> {
         let to = from + length;
         let spells = from / SPELL..to.div_ceil(SPELL);
         let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
@@ -254,7 +292,7 @@ impl Conditioner {
     }
 
     /// Repeated values of a slow channel and stuck values become NaN; returns where it is stuck.
-    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<std::ops::Range<usize>> {
+    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<Range<usize>> {
         let parts = self.parts(from, values.len());
         for (range, character) in &parts {
             let Rate { period, held: Some(phase) } = character.rate else { continue };
@@ -264,27 +302,17 @@ impl Conditioner {
                 }
             }
         }
-        if parts.iter().all(|(_, c)| c.stuck.is_none()) {
-            return Vec::new();
-        }
-        let mut stuck = Vec::new();
-        // From a recorded value to the last one that is the same: places, and how many.
-        let (mut start, mut end, mut count, mut before) = (0, 0, 0_usize, f64::NAN);
-        let mut close = |start: usize, end: usize, count: usize, value: f64| {
-            let least = self.character(from + start).stuck.or(self.character(from + end).stuck);
-            if value.is_finite() && least.is_some_and(|least| count >= least) {
-                stuck.push(start..end + 1);
-            }
+        let Some(fewest) = parts.iter().filter_map(|(_, c)| c.stuck).min() else { return Vec::new() };
+        let is_stuck = |run: &Range<usize>, count: usize| {
+            let least = self.character(from + run.start).stuck.or(self.character(from + run.end - 1).stuck);
+            least.is_some_and(|least| count >= least)
         };
-        for (k, value) in recorded(values, 0, Rate::FULL) {
-            if value.to_bits() == before.to_bits() {
-                (end, count) = (k, count + 1);
-            } else {
-                close(start, end, count, before);
-                (start, end, count, before) = (k, k, 1, value);
-            }
-        }
-        close(start, end, count, before);
+        let stuck: Vec<Range<usize>> = if values.iter().all(|v| v.is_finite()) {
+            long_runs(values, fewest).into_iter().filter(|run| is_stuck(run, run.len())).collect()
+        } else {
+            let runs = lasting(values, fewest);
+            runs.into_iter().filter(|(run, count)| is_stuck(run, *count)).map(|(run, _)| run).collect()
+        };
         for range in &stuck {
             values[range.clone()].fill(f64::NAN);
         }
@@ -295,15 +323,16 @@ impl Conditioner {
     fn despike(&self, values: &mut [f64], from: usize) -> Vec<usize> {
         let parts = self.parts(from, values.len());
         if parts.iter().all(|(_, c)| c.rate.period == 1) {
-            let floor = |k: usize| self.character(from + k).floor;
-            return spikes::remove(values, self.step_s, floor, &self.settings.spikes);
+            let floors: Vec<_> = parts.into_iter().map(|(range, c)| (range, c.floor)).collect();
+            return spikes::remove(values, self.step_s, &floors, &self.settings.spikes);
         }
         let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
         let places: Vec<usize> = recorded(values, 0, Rate::FULL).map(|(k, _)| k).collect();
         let mut own: Vec<f64> = places.iter().map(|&k| values[k]).collect();
-        let floor = |i: usize| places.get(i).map_or(0.0, |k| self.character(from + k).floor);
+        let place = |sample: usize| places.partition_point(|k| *k < sample);
+        let floors: Vec<_> = parts.iter().map(|(r, c)| (place(r.start)..place(r.end), c.floor)).collect();
         let step_s = self.step_s * period as f64;
-        let spikes = spikes::remove(&mut own, step_s, floor, &self.settings.spikes);
+        let spikes = spikes::remove(&mut own, step_s, &floors, &self.settings.spikes);
         let spikes: Vec<(usize, f64)> =
             spikes.into_iter().filter_map(|i| Some((*places.get(i)?, *own.get(i)?))).collect();
         for (k, value) in &spikes {
@@ -333,16 +362,48 @@ impl Conditioner {
     }
 }
 
+/// The runs of one value in at least so many recorded samples, with how many; what is missing between them counts for
+/// nothing.
+fn lasting(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
+    let mut runs = Vec::new();
+    let (mut run, mut count, mut before) = (0..0, 0_usize, f64::NAN);
+    for (k, value) in recorded(values, 0, Rate::FULL) {
+        if value.to_bits() == before.to_bits() {
+            (run.end, count) = (k + 1, count + 1);
+            continue;
+        }
+        runs.extend((count >= least).then(|| (run.clone(), count)));
+        (run, count, before) = (k..k + 1, 1, value);
+    }
+    runs.extend((count >= least).then_some((run, count)));
+    runs
+}
+
+/// A range of the values alone.
+fn only<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
+    values.truncate(range.end);
+    values.drain(..range.start);
+    values
+}
+
 #[cfg(test)]
 mod tests {
     #![expect(clippy::float_cmp, reason = "the values are exact")]
 
     use super::*;
 
-    fn unwrapped(wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
+    /// As they are put together from pieces of some length.
+    fn unwrapped_in(piece: usize, wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
         let channel = Channel { signal: "x_deg".into(), unit: "deg".into(), sign: 1.0, scale: 1.0, wraps_at };
-        let mut unwrap = Unwrap::of(&channel, 0.025, &Settings::default()).unwrap();
-        values.iter().map(|v| unwrap.next(*v)).filter(|v| v.is_finite()).collect()
+        let mut conditioner = Conditioner::new(&channel, 1.0, 0.025, values.len(), &Settings::default());
+        values.chunks(piece).for_each(|piece| conditioner.push(piece));
+        conditioner.values.into_iter().filter(|v| v.is_finite()).collect()
+    }
+
+    fn unwrapped(wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
+        let whole = unwrapped_in(values.len(), wraps_at, values);
+        assert_eq!(unwrapped_in(1, wraps_at, values), whole);
+        whole
     }
 
     #[test]

@@ -60,7 +60,8 @@ impl<'a> Flow<'a> {
         &self.channel.signal
     }
 
-    /// Hands over the samples up to `until`, settled, in order; they are read in pieces of `piece` samples.
+    /// Hands over the samples up to `until`, settled, in order; they are conditioned in pieces of
+    /// `piece` samples or hardly more.
     ///
     /// # Errors
     /// What cannot be read, or what `sink` says.
@@ -79,7 +80,8 @@ impl<'a> Flow<'a> {
         let mut through = |values: &[f64]| {
             conditioner.push(values);
             let ready = conditioner.ready().min(until);
-            if said.is_ok() && ready > conditioner.settled() {
+            let enough = if ready == until { 1 } else { piece };
+            if said.is_ok() && ready >= conditioner.settled() + enough {
                 let series = conditioner.settle(ready);
                 if let Some(averaging) = averaging {
                     averaging.push(&series.values);
@@ -89,7 +91,7 @@ impl<'a> Flow<'a> {
             }
         };
         let feed = if on_clock(clock) {
-            rows_into(source, self.name, clock, range, piece, &mut through)
+            rows_into(source, self.name, clock, range, &mut through)
         } else {
             let beside: Vec<&Clock> = self.stretch.others.iter().filter(|c| on_clock(c)).collect();
             brought_to(source, self.name, clock, &beside, range, piece, &mut through)
@@ -130,53 +132,15 @@ fn groups(runs: impl Iterator<Item = Run>) -> Vec<Group> {
     groups
 }
 
-/// Collects samples into pieces.
-struct Pieces<'s> {
-    at: usize,
-    piece: usize,
-    buffer: Vec<f64>,
-    sink: &'s mut dyn FnMut(&[f64]),
-}
-
-impl Pieces<'_> {
-    fn add(&mut self, values: &[f64]) {
-        let mut values = values;
-        while !values.is_empty() {
-            let (now, later) = values.split_at(values.len().min(self.piece - self.buffer.len()));
-            self.buffer.extend_from_slice(now);
-            self.at += now.len();
-            values = later;
-            if self.buffer.len() == self.piece {
-                self.flush();
-            }
-        }
-    }
-
-    /// Nothing is there up to a sample.
-    fn nothing_to(&mut self, sample: usize) {
-        const NOTHING: [f64; 64] = [f64::NAN; 64];
-        while self.at < sample {
-            let count = (sample - self.at).min(NOTHING.len());
-            self.add(&NOTHING[..count]);
-        }
-    }
-
-    fn flush(&mut self) {
-        (self.sink)(&self.buffer);
-        self.buffer.clear();
-    }
-}
-
 /// Hands over a range of samples of a channel that is on the clock, NaN where there is no row.
 fn rows_into(
     source: &(impl Source + ?Sized),
     name: &str,
     clock: &Clock,
     range: Range<usize>,
-    piece: usize,
     sink: &mut dyn FnMut(&[f64]),
 ) -> Result<(), Spoilt> {
-    let mut pieces = Pieces { at: range.start, piece, buffer: Vec::with_capacity(piece.min(range.len())), sink };
+    let mut at = range.start;
     for group in groups(clock.runs_of(range.clone())).iter().filter(|g| source.has(g.file, name)) {
         let mut runs = group.runs.iter();
         let mut run = runs.next();
@@ -186,8 +150,10 @@ fn rows_into(
             while let Some(current) = run {
                 let (from, to) = (current.row.max(batch.start), (current.row + current.count).min(batch.end));
                 if from < to {
-                    pieces.nothing_to(current.sample + from - current.row);
-                    pieces.add(values.get(from - batch.start..to - batch.start).unwrap_or_default());
+                    let sample = current.sample + from - current.row;
+                    nothing(at..sample, sink);
+                    sink(values.get(from - batch.start..to - batch.start).unwrap_or_default());
+                    at = sample + to - from;
                 }
                 if current.row + current.count > batch.end {
                     break;
@@ -199,9 +165,16 @@ fn rows_into(
         let read = source.read(group.file, name, group.rows.clone(), &mut place);
         read.map_err(|reason| (source.name(group.file), reason))?;
     }
-    pieces.nothing_to(range.end);
-    pieces.flush();
+    nothing(at..range.end, sink);
     Ok(())
+}
+
+/// In this range of samples nothing is recorded.
+fn nothing(samples: Range<usize>, sink: &mut dyn FnMut(&[f64])) {
+    const NOTHING: [f64; 1024] = [f64::NAN; 1024];
+    for from in samples.clone().step_by(NOTHING.len()) {
+        sink(&NOTHING[..(samples.end - from).min(NOTHING.len())]);
+    }
 }
 
 /// Hands over a range of samples of a channel that has a clock of its own: each of its values at the sample nearest to it,
@@ -227,7 +200,7 @@ fn brought_to(
             let samples = first.min(own.samples)..last.min(own.samples);
             let mut recorded = Vec::with_capacity(samples.len());
             let mut keep = |v: &[f64]| recorded.extend_from_slice(v);
-            rows_into(source, name, own, samples.clone(), samples.len().max(1), &mut keep)?;
+            rows_into(source, name, own, samples.clone(), &mut keep)?;
             for (i, value) in recorded.iter().enumerate().filter(|(_, v)| v.is_finite()) {
                 let time_s = own.time_s(samples.start + i);
                 let sample = index((time_s - clock.start_s) / clock.step_s);

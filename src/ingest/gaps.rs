@@ -25,8 +25,8 @@ pub fn longest(bridge_s: f64, step_s: f64) -> usize {
 pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge, period: impl Fn(usize) -> usize) -> Vec<Mark> {
     let mut marks = vec![Mark::Measured; values.len()];
     let mut from = 0;
-    while let Some(start) = (from..values.len()).find(|&k| values[k].is_nan()) {
-        let end = (start..values.len()).find(|&k| !values[k].is_nan()).unwrap_or(values.len());
+    while let Some(start) = values[from..].iter().position(|v| v.is_nan()).map(|k| from + k) {
+        let end = values[start..].iter().position(|v| !v.is_nan()).map_or(values.len(), |k| start + k);
         let sides = start.checked_sub(1).and_then(|k| values.get(k).copied()).zip(values.get(end).copied());
         let period = period(start);
         let between = period > 1 && end - start <= period;

@@ -52,12 +52,15 @@ impl Averaging {
 
     /// The next samples.
     pub fn push(&mut self, values: &[f64]) {
-        for value in values {
-            if value.is_finite() {
+        let mut values = values;
+        while !values.is_empty() {
+            let (now, later) = values.split_at(values.len().min(self.length - self.seen));
+            for value in now.iter().filter(|v| v.is_finite()) {
                 self.sum += value;
                 self.known += 1;
             }
-            self.seen += 1;
+            self.seen += now.len();
+            values = later;
             if self.seen == self.length {
                 let mean = if 2 * self.known >= self.length { self.sum / self.known as f64 } else { f64::NAN };
                 self.means.push(mean);

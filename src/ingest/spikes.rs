@@ -5,6 +5,8 @@
 //! it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike stands off all three in the same sense. A step, the
 //! reversal of a surface at its full rate, or a stick pulse of two samples stands off at most two of them.
 
+use std::ops::Range;
+
 use super::Spikes;
 
 /// Standard deviations of a normal distribution in its median absolute deviation.
@@ -39,20 +41,23 @@ pub fn floors(values: &[f64]) -> (f64, f64) {
     (noise.max(rounding(values, roughness)), noise)
 }
 
-/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floor` says for a sample what a
-/// spike is measured against.
-pub fn remove(values: &mut [f64], step_s: f64, floor: impl Fn(usize) -> f64, settings: &Spikes) -> Vec<usize> {
+/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floors` says for ranges of samples
+/// what a spike is measured against.
+pub fn remove(values: &mut [f64], step_s: f64, floors: &[(Range<usize>, f64)], settings: &Spikes) -> Vec<usize> {
     if !settings.remove {
         return Vec::new();
     }
     let window = super::gaps::longest(settings.window_s, step_s).max(4);
     let mut spikes = Vec::new();
-    for (k, three) in values.windows(3).enumerate().map(|(i, three)| (i + 1, three)) {
-        let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
-        let floor = floor(k);
-        // Also false beside a gap.
-        if off_mean > settings.deviations * floor && stands_off(values, k, floor, window, settings) {
-            spikes.push(k);
+    for (range, floor) in floors {
+        let (from, to) = (range.start.max(1), range.end.min(values.len().saturating_sub(1)));
+        let around = values.get(from.saturating_sub(1)..=to).unwrap_or_default();
+        for (k, three) in around.windows(3).enumerate().map(|(i, three)| (from + i, three)) {
+            let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
+            // Also false beside a gap.
+            if off_mean > settings.deviations * floor && stands_off(values, k, *floor, window, settings) {
+                spikes.push(k);
+            }
         }
     }
     let repaired: Vec<f64> = spikes.iter().map(|&k| values[k] - off_mean(values, k)).collect();
@@ -65,11 +70,16 @@ pub fn remove(values: &mut [f64], step_s: f64, floor: impl Fn(usize) -> f64, set
 /// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike does.
 fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Spikes) -> bool {
     let Some(height) = height(values, k) else { return false };
+    let stands_off = |noise: f64| {
+        height.off_mean > settings.deviations * noise && height.off_lines > LINES * settings.deviations * noise
+    };
+    let lines_meet = |noise: f64| height.lines_miss <= settings.agreement * height.off_mean + LINES_NOISE * noise;
+    // The noise around a sample takes long to find; of most samples the least and the largest that it could be tell enough.
+    if !stands_off(floor) || !lines_meet(height.off_mean / settings.deviations) {
+        return false;
+    }
     let noise = floor.max(local(values, k, window));
-    let meets = settings.agreement * height.off_mean + LINES_NOISE * noise;
-    height.off_mean > settings.deviations * noise
-        && height.off_lines > LINES * settings.deviations * noise
-        && height.lines_miss <= meets
+    stands_off(noise) && lines_meet(noise)
 }
 
 /// A sample minus the mean of its neighbours; NaN at the ends and beside a gap.
@@ -112,7 +122,7 @@ fn local(values: &[f64], k: usize, window: usize) -> f64 {
 /// nothing. A low quantile, as a repaired or converted sample may lie off the grid; a channel that hardly ever changes has
 /// too few of them to say.
 fn rounding(values: &[f64], mut roughness: Vec<f64>) -> f64 {
-    let largest = values.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let largest = values.iter().step_by(EVERY).map(|v| v.abs()).fold(0.0, f64::max);
     roughness.retain(|r| *r > EXACT * largest);
     if roughness.len() < FEW_STEPS { 0.0 } else { quantile(&mut roughness, 0.05) }
 }
@@ -132,7 +142,8 @@ mod tests {
 
     fn despike(values: &mut [f64]) -> Vec<usize> {
         let floor = floors(values).0;
-        remove(values, 0.025, |_| floor, &Spikes::default())
+        let all = 0..values.len();
+        remove(values, 0.025, &[(all, floor)], &Spikes::default())
     }
 
     fn spikes(values: &[f64]) -> Vec<usize> {

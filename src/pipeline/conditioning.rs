@@ -53,8 +53,8 @@ const LEAST_PIECE: usize = 1 << 14;
 /// What a channel holds per sample of its piece, from the file's numbers to the settled ones, bytes.
 const PER_SAMPLE: f64 = 64.0;
 
-/// What a thread holds of encoded groups that wait for their turn, bytes.
-const ENCODED: f64 = BATCH as f64 * 9.0 * GROUP as f64;
+/// What a thread holds of encoded groups, bytes: a batch is written while the next is encoded.
+const ENCODED: f64 = 2.0 * BATCH as f64 * 9.0 * GROUP as f64;
 
 /// What a channel holds between its pieces, bytes.
 const PER_CHANNEL: f64 = 0.25e6;
@@ -284,11 +284,12 @@ impl Run<'_> {
         });
         match finished {
             Ok(judged) => {
+                let record = Some(draft.digest());
                 draft.place()?;
                 self.store.keep(&path)?;
                 Ok(Ingested {
                     accepted: true,
-                    record: Some(Digest::of_file(&path)?),
+                    record,
                     channels: judged.channels,
                     checks: judged.checks,
                     instruments: judged.instruments,

@@ -2,6 +2,9 @@
 //! rows that two flights have in common.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use super::{Campaign, Flight, Found, problem};
 use crate::config::Config;
@@ -93,39 +96,46 @@ pub(super) fn leave_out_same(campaign: &mut Campaign) {
 
 /// The maneuvers of a record, window by window where it is long.
 pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) -> Result<Found> {
-    let signals = segment::signals(&config.classes, &config.segment);
-    let about = &file.about;
-    let beyond = samples(SURROUNDINGS_S, about.step_s);
-    let mut all = Found { maneuvers: vec![], unknown: vec![], events: vec![], problems: vec![] };
-    let ends = window_ends(about, beyond, events);
-    let mut from = 0_usize;
-    for to in ends {
-        let record = file.window(Some(&signals), from.saturating_sub(beyond)..to + beyond)?;
-        let time_s = |sample: usize| about.start_s + sample as f64 * about.step_s;
-        let (first, last) = (from == 0, to >= about.samples);
-        let own = |t: f64| (first || t >= time_s(from)) && (last || t < time_s(to));
-        let Segmented { maneuvers, unknown, problems } =
-            segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
-        let maneuvers = maneuvers.into_iter().filter(|m| own(m.start_s)).collect();
-        let problems = problems.into_iter().filter(|p| said_at(p).is_none_or(own)).collect();
-        let events: Vec<Event> = events.iter().filter(|e| own(e.start_s)).cloned().collect();
-        let unknown = unknown.into_iter().filter(|u| own(u.start_s)).collect();
-        let mut found = Segmented { maneuvers, unknown, problems };
-        if !events.is_empty() {
-            let limits = &config.segment.quality;
-            let compared = segment::with_events(found, &record, &events, &config.classes, &config.aircraft, limits);
-            all.events.extend(compared.1);
-            found = compared.0;
-        }
+    let ends = window_ends(&file.about, surroundings(&file.about), events);
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    let windows: Vec<Range<usize>> = starts.zip(&ends).map(|(from, to)| from..*to).collect();
+    let found: Result<Vec<Found>> = windows.into_par_iter().map(|own| in_window(config, file, events, own)).collect();
+    let mut all = Found::default();
+    for found in found? {
         all.maneuvers.extend(found.maneuvers);
         all.unknown.extend(found.unknown);
+        all.events.extend(found.events);
         all.problems.extend(found.problems);
-        from = to;
     }
     // What concerns the whole record is said in every window.
     let mut said = BTreeSet::new();
     all.problems.retain(|p| said.insert((p.place.clone(), p.reason.clone())));
     Ok(all)
+}
+
+/// The maneuvers that begin in a range of a record's samples.
+fn in_window(config: &Config, file: &RecordFile, events: &[Event], samples: Range<usize>) -> Result<Found> {
+    let about = &file.about;
+    let signals = segment::signals(&config.classes, &config.segment);
+    let beyond = surroundings(about);
+    let record = file.window(Some(&signals), samples.start.saturating_sub(beyond)..samples.end + beyond)?;
+    let time_s = |sample: usize| about.start_s + sample as f64 * about.step_s;
+    let (first, last) = (samples.start == 0, samples.end >= about.samples);
+    let own = |t: f64| (first || t >= time_s(samples.start)) && (last || t < time_s(samples.end));
+    let mut found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
+    found.maneuvers.retain(|m| own(m.start_s));
+    found.unknown.retain(|u| own(u.start_s));
+    found.problems.retain(|p| said_at(p).is_none_or(own));
+    let events: Vec<Event> = events.iter().filter(|e| own(e.start_s)).cloned().collect();
+    let limits = &config.segment.quality;
+    let (found, events) = segment::with_events(found, &record, &events, &config.classes, &config.aircraft, limits);
+    let Segmented { maneuvers, unknown, problems } = found;
+    Ok(Found { maneuvers, unknown, events, problems })
+}
+
+/// The samples that a window sees beyond its own on either side.
+fn surroundings(about: &About) -> usize {
+    samples(SURROUNDINGS_S, about.step_s)
 }
 
 fn samples(time_s: f64, step_s: f64) -> usize {

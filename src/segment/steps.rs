@@ -59,12 +59,12 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
     for (signal, set) in &settings.steps {
         let Some(values) = record.values(signal) else { continue };
-        let changes = changes(values, window);
-        let noise = noise(&changes);
+        let levels = levels(values, window.level);
+        let noise = noise(&levels, window);
         let smallest = set.max(settings.steps_over_noise * noise);
         let raised = if smallest > *set { noise } else { 0.0 };
         for (kept, size) in [(&mut steps, smallest), (&mut deflections, settings.deflection_share * smallest)] {
-            let mut found = of_changes(&changes, size, window);
+            let mut found = of_levels(&levels, size, window);
             for step in &mut found {
                 step.time_s = record.start_s + step.time_s * record.step_s;
             }
@@ -83,13 +83,12 @@ pub(super) fn largest_change(record: &Record, signal: &str, settings: &Settings,
     let first = record.sample_at(from_s).saturating_sub(reach);
     let end = (record.sample_at(to_s) + reach).min(record.samples);
     let values = record.values(signal).and_then(|v| v.get(first..end)).unwrap_or_default();
-    let sizes = changes(values, window).into_iter().flatten().map(|(before, after)| (after - before).abs());
-    sizes.fold(0.0, f64::max)
+    changes(&levels(values, window.level), window).map(|change| change.size()).fold(0.0, f64::max)
 }
 
 /// The standard deviation of changes that nobody commanded: from the median of all, of which steps are few.
-fn noise(changes: &[Option<(f64, f64)>]) -> f64 {
-    let mut sizes: Vec<f64> = changes.iter().flatten().map(|(before, after)| (after - before).abs()).collect();
+fn noise(levels: &[f64], window: Window) -> f64 {
+    let mut sizes: Vec<f64> = changes(levels, window).map(|change| change.size()).collect();
     let middle = sizes.len() / 2;
     if middle == 0 {
         return 0.0;
@@ -121,35 +120,46 @@ impl Window {
     }
 }
 
-/// The levels before and after each time, in samples; none where one of them does not exist.
-fn changes(values: &[f64], window: Window) -> Vec<Option<(f64, f64)>> {
-    let levels: Vec<Option<f64>> = values.windows(window.level).map(level).collect();
-    let reach = window.half_transit + window.level;
-    let at = |k: usize| -> Option<(f64, f64)> {
-        let before = levels.get(k.checked_sub(reach)?)?;
-        let after = levels.get(k + window.half_transit)?;
-        (*before).zip(*after)
-    };
-    (0..=values.len()).map(at).collect()
+/// The level before and the level after a time, in samples.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    at: usize,
+    before: f64,
+    after: f64,
 }
 
-/// The steps among a signal's changes, their times in samples (a step between samples 9 and 10 is at 9.5).
-fn of_changes(changes: &[Option<(f64, f64)>], smallest: f64, window: Window) -> Vec<Step> {
+impl Change {
+    fn size(&self) -> f64 {
+        (self.after - self.before).abs()
+    }
+}
+
+/// The changes between levels at each time at which both exist.
+fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = Change> {
+    let reach = window.half_transit + window.level;
+    let after = levels.get(reach + window.half_transit..).unwrap_or_default();
+    let change =
+        move |(k, (before, after)): (usize, (&f64, &f64))| Change { at: k + reach, before: *before, after: *after };
+    levels.iter().zip(after).enumerate().map(change).filter(|change| change.size().is_finite())
+}
+
+/// The steps among the changes between levels, their times in samples (a step between samples 9 and 10 is at 9.5).
+fn of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
     let reach = window.half_transit + window.level;
     let mut steps = Vec::new();
-    let mut run: Vec<(usize, f64, f64)> = Vec::new();
-    for (k, change) in changes.iter().enumerate() {
-        // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a step.
-        let Some((before, after)) = *change else { continue };
-        let big = (after - before).abs() >= smallest;
-        let goes_on =
-            |last: &(usize, f64, f64)| big && (after - before) * (last.2 - last.1) > 0.0 && k - last.0 <= reach;
-        if !run.last().is_some_and(goes_on) {
+    let mut run: Vec<Change> = Vec::new();
+    // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a step.
+    for change in changes(levels, window) {
+        let big = change.size() >= smallest;
+        let goes_on = |last: &Change| {
+            big && (change.after - change.before) * (last.after - last.before) > 0.0 && change.at - last.at <= reach
+        };
+        if !run.last().is_none_or(goes_on) {
             steps.extend(peak(&run));
             run.clear();
         }
         if big {
-            run.push((k, before, after));
+            run.push(change);
         }
     }
     steps.extend(peak(&run));
@@ -157,32 +167,50 @@ fn of_changes(changes: &[Option<(f64, f64)>], smallest: f64, window: Window) -> 
 }
 
 /// The one step of a run: where the change is within 5% of its maximum, in the middle.
-fn peak(run: &[(usize, f64, f64)]) -> Option<Step> {
-    let size = |(_, before, after): &(usize, f64, f64)| (after - before).abs();
-    let (top, largest) = run.iter().enumerate().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))?;
-    let near = |c: &&(usize, f64, f64)| size(c) >= 0.95 * size(largest);
+fn peak(run: &[Change]) -> Option<Step> {
+    let (top, largest) = run.iter().enumerate().max_by(|a, b| a.1.size().total_cmp(&b.1.size()))?;
+    let near = |c: &&Change| c.size() >= 0.95 * largest.size();
     let first = run[..top].iter().rev().take_while(near).last().unwrap_or(largest);
     let last = run[top..].iter().take_while(near).last().unwrap_or(largest);
-    let between_samples = (first.0 + last.0) as f64 / 2.0 - 0.5;
-    Some(Step { time_s: between_samples, before: largest.1, after: largest.2 })
+    let between_samples = (first.at + last.at) as f64 / 2.0 - 0.5;
+    Some(Step { time_s: between_samples, before: largest.before, after: largest.after })
 }
 
-/// The mean of a level's finite samples without the largest and the smallest of them.
-fn level(values: &[f64]) -> Option<f64> {
-    let finite = values.iter().copied().filter(|v| v.is_finite());
-    let (mut n, mut sum, mut low, mut high) = (0_usize, 0.0, f64::INFINITY, f64::NEG_INFINITY);
-    for v in finite {
-        n += 1;
-        sum += v;
-        low = low.min(v);
-        high = high.max(v);
+/// Levels that are averaged side by side, in the processor's vectors.
+const SIDE: usize = 64;
+
+/// The level that begins at each sample: the mean of its finite samples without the largest and the smallest of them; NaN
+/// where fewer than half are finite.
+fn levels(values: &[f64], length: usize) -> Vec<f64> {
+    let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
+    let side_by_side = pulp::Arch::new();
+    for (from, levels) in levels.chunks_mut(SIDE).enumerate().map(|(i, levels)| (i * SIDE, levels)) {
+        let samples = &values[from..from + levels.len() + length - 1];
+        side_by_side.dispatch(|| level_each(samples, length, levels));
     }
-    if n == 0 || 2 * n < values.len() {
-        None
-    } else if n >= 4 {
-        Some((sum - low - high) / (n - 2) as f64)
-    } else {
-        Some(sum / n as f64)
+    levels
+}
+
+#[expect(clippy::inline_always, reason = "compiled for each width of vectors")]
+#[inline(always)]
+fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
+    let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
+    let (mut low, mut high) = ([f64::INFINITY; SIDE], [f64::NEG_INFINITY; SIDE]);
+    for later in samples.windows(levels.len()).take(length) {
+        let of_level = known.iter_mut().zip(&mut sum).zip(low.iter_mut().zip(&mut high));
+        for (v, ((known, sum), (low, high))) in later.iter().zip(of_level) {
+            let finite = v.is_finite();
+            *known += if finite { 1.0 } else { 0.0 };
+            *sum += if finite { *v } else { 0.0 };
+            *low = if finite && *v < *low { *v } else { *low };
+            *high = if finite && *v > *high { *v } else { *high };
+        }
+    }
+    let of_level = known.iter().zip(&sum).zip(low.iter().zip(&high));
+    for (level, ((known, sum), (low, high))) in levels.iter_mut().zip(of_level) {
+        let inner = (sum - low - high) / (known - 2.0);
+        let mean = if *known >= 4.0 { inner } else { sum / known };
+        *level = if 2.0 * known < length as f64 { f64::NAN } else { mean };
     }
 }
 
@@ -194,18 +222,18 @@ mod tests {
     const WINDOW: Window = Window { half_transit: 3, level: 5 };
 
     fn steps(values: &[f64]) -> Vec<Step> {
-        of_changes(&changes(values, WINDOW), 2.0, WINDOW)
+        of_levels(&levels(values, WINDOW.level), 2.0, WINDOW)
     }
 
     /// A level that jumps at the given samples.
-    fn levels(n: usize, jumps: &[(usize, f64)]) -> Vec<f64> {
+    fn jumping(n: usize, jumps: &[(usize, f64)]) -> Vec<f64> {
         (0..n).map(|k| jumps.iter().filter(|j| k >= j.0).map(|j| j.1).sum()).collect()
     }
 
     #[test]
     fn a_step_has_its_time_and_levels_whatever_the_trim() {
         for trim in [-14.0, 0.0, 8.0] {
-            let values: Vec<f64> = levels(80, &[(40, 5.0)]).iter().map(|v| v + trim).collect();
+            let values: Vec<f64> = jumping(80, &[(40, 5.0)]).iter().map(|v| v + trim).collect();
             let found = steps(&values);
             assert_eq!(found.len(), 1);
             assert_abs_diff_eq!(found[0].time_s, 39.5, epsilon = 0.5);
@@ -216,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_edges_of_a_doublet_come_out_with_their_signs() {
-        let found = steps(&levels(120, &[(30, 4.0), (55, -8.0), (80, 4.0)]));
+        let found = steps(&jumping(120, &[(30, 4.0), (55, -8.0), (80, 4.0)]));
         let signs: Vec<f64> = found.iter().map(|s| s.change().signum()).collect();
         assert_eq!(signs, [1.0, -1.0, 1.0]);
         for (step, at) in found.iter().zip([29.5, 54.5, 79.5]) {
@@ -236,8 +264,28 @@ mod tests {
     }
 
     #[test]
+    fn a_level_is_the_mean_without_the_largest_and_the_smallest_of_what_is_known() {
+        let mut values: Vec<f64> = (0..150).map(|k| f64::from(k * k % 17)).collect();
+        for k in [3, 70, 71, 72, 100, 101] {
+            values[k] = f64::NAN;
+        }
+        let found = levels(&values, 5);
+        assert_eq!(found.len(), 146);
+        for (k, level) in found.iter().enumerate() {
+            let mut known: Vec<f64> = values[k..k + 5].iter().copied().filter(|v| v.is_finite()).collect();
+            known.sort_by(f64::total_cmp);
+            let inner = if known.len() >= 4 { &known[1..known.len() - 1] } else { &known[..] };
+            if known.len() < 3 {
+                assert!(level.is_nan());
+            } else {
+                assert_abs_diff_eq!(*level, inner.iter().sum::<f64>() / inner.len() as f64, epsilon = 1e-12);
+            }
+        }
+    }
+
+    #[test]
     fn missing_samples_hide_no_step_and_make_none() {
-        let mut values = levels(80, &[(40, 5.0)]);
+        let mut values = jumping(80, &[(40, 5.0)]);
         for k in [20, 21, 36, 39, 40, 44] {
             values[k] = f64::NAN;
         }

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::Digest;
 use crate::error::{Error, Result};
 
 /// How the temporary files of an interrupted run are told from everything else.
@@ -26,7 +27,26 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
 #[derive(Debug)]
 pub struct Draft {
     file: tempfile::NamedTempFile,
+    written: blake3::Hasher,
     path: PathBuf,
+}
+
+/// What a draft is written through: the bytes are digested as they pass.
+struct Digesting<'d> {
+    file: &'d mut fs::File,
+    written: &'d mut blake3::Hasher,
+}
+
+impl Write for Digesting<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let count = self.file.write(bytes)?;
+        self.written.update(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
 }
 
 impl Draft {
@@ -43,12 +63,19 @@ impl Draft {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
         let file = builder.tempfile_in(folder).map_err(Error::io(folder, "cannot create a file in it"))?;
-        Ok(Draft { file, path: path.to_owned() })
+        Ok(Draft { file, written: blake3::Hasher::new(), path: path.to_owned() })
     }
 
     /// What is written goes into the draft.
     pub fn writer(&mut self) -> impl Write + Send {
-        std::io::BufWriter::with_capacity(1 << 20, self.file.as_file_mut())
+        let through = Digesting { file: self.file.as_file_mut(), written: &mut self.written };
+        std::io::BufWriter::with_capacity(1 << 20, through)
+    }
+
+    /// Of what was written, without reading it again.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        Digest::so_far(&self.written)
     }
 
     /// Where the draft lies until it is placed.
@@ -123,6 +150,23 @@ mod tests {
         assert_eq!(fs::metadata(&path).unwrap().modified().unwrap(), before);
         place(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
+    }
+
+    #[test]
+    fn a_drafts_digest_is_the_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("record.parquet");
+        let mut draft = Draft::of(&path).unwrap();
+        let mut writer = draft.writer();
+        for part in [vec![1; 3_000_000], vec![], vec![2; 17]] {
+            writer.write_all(&part).unwrap();
+        }
+        writer.flush().unwrap();
+        drop(writer);
+        let digest = draft.digest();
+        draft.place().unwrap();
+        assert_eq!(digest, Digest::of_file(&path).unwrap());
+        assert_eq!(digest.bytes, 3_000_017);
     }
 
     #[test]

@@ -64,10 +64,15 @@ impl Digest {
         loop {
             let n = reader.read(&mut buffer)?;
             if n == 0 {
-                return Ok(Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() });
+                return Ok(Digest::so_far(&hasher));
             }
             hasher.update(&buffer[..n]);
         }
+    }
+
+    /// Of what was digested so far.
+    pub(super) fn so_far(hasher: &blake3::Hasher) -> Digest {
+        Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() }
     }
 }
 

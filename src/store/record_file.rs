@@ -136,16 +136,22 @@ impl<W: Write + Send> Writer<W> {
         Ok(signals)
     }
 
-    /// Writes the next row group: what its writers made, in batches, in their order.
+    /// Writes the next row group: what its writers made, in batches, in their order. While one batch is written the next
+    /// is made.
     ///
     /// # Errors
     /// The reason in words.
-    pub fn append(&mut self, mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String>) -> Result<(), String> {
+    pub fn append(
+        &mut self,
+        mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String> + Send,
+    ) -> Result<(), String> {
         let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
-        while let Some(chunks) = next()? {
-            for column in chunks.into_iter().flat_map(|c| c.0) {
-                column.append_to_row_group(&mut group).map_err(|e| refused(&e))?;
-            }
+        let mut made = next()?;
+        while let Some(chunks) = made {
+            let write = || chunks.into_iter().flat_map(|c| c.0).try_for_each(|c| c.append_to_row_group(&mut group));
+            let (written, following) = rayon::join(write, &mut next);
+            written.map_err(|e| refused(&e))?;
+            made = following?;
         }
         group.close().map_err(|e| refused(&e))?;
         Ok(())
