@@ -86,14 +86,7 @@ pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check
     let sides: Vec<Sides> =
         relations.into_iter().zip(windows).map(|(relation, pairs)| Sides::of(relation, pairs, settings)).collect();
     let jumped: BTreeSet<usize> = sides.iter().flat_map(|s| &s.jumps).copied().collect();
-    let check = |sides: &Sides| {
-        let own = sides.without(&sides.jumps.iter().copied().collect(), settings);
-        // Where the record jumps in what one relation compares, it does so in all; but a channel that is wrong makes jumps
-        // too, and must not hide in them where it shows its sign or its unit.
-        let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
-        if disagrees { sides.without(&jumped, settings) } else { own }
-    };
-    sides.iter().map(check).collect()
+    sides.iter().map(|s| s.check(&jumped, settings)).collect()
 }
 
 /// What a relation compares in a record.
@@ -110,6 +103,15 @@ impl Sides {
         let pairs = chosen(&relation, pairs, settings);
         let jumps = jumps(&relation, &pairs, settings);
         Sides { relation, pairs, jumps }
+    }
+
+    /// How the relation comes out, `jumped` being the windows in which any relation sees the record jump: where it does so
+    /// in what one compares, it does so in all. But a channel that is wrong makes jumps too, and must not hide in them where
+    /// it shows its sign or its unit.
+    fn check(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
+        let own = self.without(&self.jumps.iter().copied().collect(), settings);
+        let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
+        if disagrees { self.without(jumped, settings) } else { own }
     }
 
     /// How the relation comes out without some windows.
@@ -340,6 +342,25 @@ mod tests {
             assert!(found(&wrong).is_empty());
             assert!((fit(&wrong, &wrong).unwrap().slope / slope - 1.0).abs() < 0.01);
         }
+    }
+
+    #[test]
+    fn a_relation_that_disagrees_only_where_others_jump_says_nothing_and_one_with_a_wrong_sign_is_not_excused() {
+        let settings = Checks::default();
+        let relation = Relation { choice: Choice::Above(1.0), ..relations::all(&settings)[0] };
+        let compared = |slope: f64| {
+            let sides: Vec<(f64, f64)> =
+                (0..12).map(|k| f64::from(k % 5) - 2.0).map(|x| (x, slope * x + 9.0 * (3.0 * x).cos())).collect();
+            Sides::of(relation, if slope < 0.0 { windows(slope) } else { pairs(&sides) }, &settings)
+        };
+        let verdicts = |sides: &Sides| {
+            let jumped: BTreeSet<usize> = (0..200).collect();
+            (sides.check(&BTreeSet::new(), &settings).verdict, sides.check(&jumped, &settings).verdict)
+        };
+        let jumping = compared(0.0);
+        assert!(jumping.jumps.is_empty(), "too many for jumps of its own");
+        assert_eq!(verdicts(&jumping), (Verdict::DoesNotAgree, Verdict::NotExcited));
+        assert_eq!(verdicts(&compared(-1.0)), (Verdict::WrongSign, Verdict::WrongSign));
     }
 
     #[test]
