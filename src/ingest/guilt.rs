@@ -45,7 +45,7 @@ pub struct Accusation {
     pub required: bool,
 }
 
-/// Trials whose squared misfit and jumps are within this factor of the best explain the failure as well as it does.
+/// Trials whose squared misfit is within this factor of the best explain the failure as well as it does.
 const AS_GOOD: f64 = 3.0;
 
 /// More independent faults than this are not looked for in one flight.
@@ -187,9 +187,9 @@ fn misfit(checks: &[Check]) -> f64 {
 /// few windows in which the record would have to jump.
 fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     let mut chosen: Vec<&Trial> = Vec::new();
-    let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>() as f64;
-    let most = AS_GOOD * jumps(best).max(1.0);
-    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit && jumps(t) <= most) {
+    let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
+    let as_few = |t: &&Trial| jumps(t) <= jumps(best);
+    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit).filter(as_few) {
         if !chosen.iter().any(|c| c.name == trial.name) {
             chosen.push(trial);
         }

@@ -34,8 +34,7 @@ pub(super) struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     pub fn of(record: &'a Record, settings: &'a Settings) -> Scene<'a> {
-        let (mut steps, deflections) = steps::of_record(record, settings);
-        completed::complete(&mut steps, &deflections, settings);
+        let (steps, deflections) = steps::of_record(record, settings);
         let is_known = |name: &&String| record.values(name).is_some_and(|v| v.iter().any(|v| v.is_finite()));
         let sees_pilot = settings.pilot_controls.iter().any(|name| is_known(&name));
         let flag = record.values(&settings.excitation_flag).unwrap_or_default();
@@ -43,6 +42,7 @@ impl<'a> Scene<'a> {
         let own = Steps::default();
         let mut scene = Scene { record, settings, own, steps, deflections, sees_pilot, flag_speaks, flag_rests };
         scene.own = scene.without_the_pilot_s();
+        completed::complete(&mut scene.own, &scene.deflections, settings);
         scene
     }
 

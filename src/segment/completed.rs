@@ -19,11 +19,11 @@ const REVERSES: f64 = 1.2;
 /// A deflection of so many standard deviations of what turbulence does is hardly its own.
 const HARDLY: f64 = 3.0;
 
-/// Completes the steps of the surfaces whose smallest step turbulence has raised.
+/// Completes the own steps of the surfaces whose smallest step turbulence has raised.
 pub(super) fn complete(steps: &mut Steps, deflections: &Steps, settings: &Settings) {
     for (signal, found) in &mut steps.of {
         let noise = steps.noise.get(signal).copied().unwrap_or_default();
-        if noise > 0.0 && !settings.pilot_controls.contains(signal) {
+        if noise > 0.0 {
             let hidden = deflections.of.get(signal).map_or(&[][..], Vec::as_slice);
             let smallest = steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
             *found = completed(found, hidden, (smallest, noise), settings.longest_hold_s);
@@ -55,11 +55,12 @@ fn within(deflections: &[Step], (after_s, before_s): (f64, f64)) -> Vec<Step> {
     deflections.iter().filter(|d| d.time_s > after_s && d.time_s < before_s).copied().collect()
 }
 
-/// The hidden half beside the step at one end: the largest deflection to the other side that is about half of it. None
-/// where that step is a half itself beside its neighbour.
+/// The hidden half beside the step at one end: the largest deflection to the other side that is about half of it, or less
+/// by no more than two standard deviations of what turbulence does. None where that step is a half itself beside its neighbour.
 fn half(deflections: &[Step], end: &Step, neighbour: Option<&Step>, noise: f64) -> Option<Step> {
     let beside = neighbour.map_or(1.0, |n| (end.change() / n.change()).abs());
-    let least = if beside < REVERSES { HARDLY * noise } else { 0.0 };
+    let hardly = if beside < REVERSES { HARDLY * noise } else { 0.0 };
+    let least = hardly.max(0.5 * end.change().abs() - 2.0 * noise);
     let share = |d: &Step| -d.change() / end.change();
     let is_half = |d: &&Step| (TRIM_SHARE..=1.0 - TRIM_SHARE).contains(&share(d)) && d.change().abs() >= least;
     let halves = deflections.iter().filter(is_half).filter(|_| beside > 1.0 / REVERSES);
@@ -100,6 +101,9 @@ mod tests {
     fn steps_that_begin_and_end_with_halves_need_no_others() {
         let all = levels(&[(8.5, -3.5), (10.0, 5.0), (11.0, -8.0), (12.0, 5.0), (13.5, -3.5)]);
         assert_eq!(times(&all[1..4], &all), [10.0, 11.0, 12.0]);
+        // Steps so large that a half could not be hidden.
+        let wide = levels(&[(8.5, 3.5), (10.0, -11.0), (11.0, 12.0), (12.0, -10.0)]);
+        assert_eq!(times(&wide[1..], &wide), [10.0, 11.0, 12.0]);
     }
 
     #[test]
