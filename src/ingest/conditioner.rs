@@ -388,8 +388,6 @@ fn only<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::float_cmp, reason = "the values are exact")]
-
     use super::*;
 
     /// As they are put together from pieces of some length.

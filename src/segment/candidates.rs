@@ -40,7 +40,7 @@ impl<'a> Scene<'a> {
         let flag = record.values(&settings.excitation_flag).unwrap_or_default();
         let (flag_speaks, flag_rests) = (changes(flag), rests(flag, record, settings.shortest_pause_s));
         let own = Steps::default();
-        let mut scene = Scene { record, settings, own, steps, deflections, sees_pilot, flag_speaks, flag_rests };
+        let mut scene = Scene { record, settings, steps, deflections, own, sees_pilot, flag_speaks, flag_rests };
         scene.own = scene.without_the_pilot_s();
         completed::complete(&mut scene.own, &scene.deflections, settings);
         scene

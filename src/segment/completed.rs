@@ -102,7 +102,7 @@ mod tests {
         let all = levels(&[(8.5, -3.5), (10.0, 5.0), (11.0, -8.0), (12.0, 5.0), (13.5, -3.5)]);
         assert_eq!(times(&all[1..4], &all), [10.0, 11.0, 12.0]);
         // Steps so large that a half could not be hidden.
-        let wide = levels(&[(8.5, 3.5), (10.0, -11.0), (11.0, 12.0), (12.0, -10.0)]);
+        let wide = levels(&[(8.5, 3.2), (10.0, -11.0), (11.0, 12.0), (12.0, -10.0)]);
         assert_eq!(times(&wide[1..], &wide), [10.0, 11.0, 12.0]);
     }
 
