@@ -50,8 +50,8 @@ use crate::{estimate, report, trend};
 use conditioning::Shares;
 
 /// Versions of the methods: one goes up when its stage's numbers change for the same input.
-const INGEST_VERSION: u32 = 6;
-const SEGMENT_VERSION: u32 = 6;
+const INGEST_VERSION: u32 = 7;
+const SEGMENT_VERSION: u32 = 7;
 const ESTIMATE_VERSION: u32 = 10;
 const JOINT_VERSION: u32 = 6;
 const PREDICT_VERSION: u32 = 4;

@@ -70,8 +70,14 @@ pub struct InstrumentRow {
     pub delay_bound_s: Option<f64>,
     /// What the record was corrected by: `bias scale delay`, some of them or none.
     pub applied: String,
-    /// `ok`, `not excited`, or what is wrong in words.
+    /// `ok`, `ok; its delay is not told`, `not excited`, or what is wrong in words.
     pub verdict: String,
+}
+
+impl InstrumentRow {
+    /// The verdict on an instrument that is not known to be off and whose delay the flight does not tell, for it moves it too
+    /// little.
+    pub const NO_DELAY: &str = "ok; its delay is not told";
 }
 
 /// `events`: the analyst's events against what segment found in the record.

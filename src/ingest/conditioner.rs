@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use super::character::{Character, Rate, SPELL, long_runs, recorded};
+use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, long_runs, recorded};
 use super::{Settings, gaps, spikes};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
@@ -31,24 +31,44 @@ struct Unwrap {
     period: f64,
     /// A jump by more than this share of the period is a wrap.
     share: f64,
+    /// Whether it is an attitude or a flow angle, which begins within half a turn of zero, and not a heading.
+    about_zero: bool,
+    /// After more missing samples than this it begins anew: how far it has turned meanwhile nobody knows.
+    longest: usize,
+    missing: usize,
     turns: f64,
     before: f64,
     wraps: usize,
 }
 
 impl Unwrap {
-    fn of(channel: &Channel) -> Option<Unwrap> {
+    fn of(channel: &Channel, step_s: f64, settings: &Settings) -> Option<Unwrap> {
         let unit = Unit::parse(&channel.unit).ok().filter(|u| u.quantity == Quantity::Angle);
         let circle = unit.and_then(|u| Unit::of_signal("_deg").factor_to(u)).map(|f| 360.0 * f);
         let stated = channel.wraps_at.map(|period| (period, 0.5));
         let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
-        Some(Unwrap { period, share, turns: 0.0, before: f64::NAN, wraps: 0 })
+        let longest = gaps::longest(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
+        let about_zero = channel.wraps_at.is_none();
+        Some(Unwrap { period, share, about_zero, longest, missing: 0, turns: 0.0, before: f64::NAN, wraps: 0 })
+    }
+
+    /// Whether nothing before the next value says how many turns it is on.
+    fn begins(&self) -> bool {
+        self.about_zero && (self.before.is_nan() || self.missing > self.longest)
     }
 
     fn next(&mut self, value: f64) -> f64 {
         if !value.is_finite() {
+            self.missing += 1;
             return value;
         }
+        if self.begins() {
+            // What is beyond a whole turn is no angle that wraps around.
+            self.turns = if value.abs() <= self.period { -(value / self.period).round() } else { 0.0 };
+            self.before = value + self.turns * self.period;
+            self.wraps += usize::from(self.turns != 0.0);
+        }
+        self.missing = 0;
         let jump = value + self.turns * self.period - self.before;
         if jump.abs() > self.share * self.period {
             self.turns -= (jump / self.period).round();
@@ -60,6 +80,9 @@ impl Unwrap {
 
     /// What all of these samples are moved by, where none of them is missing or wraps: nearly always.
     fn common(&mut self, recorded: &[f64]) -> Option<f64> {
+        if self.begins() {
+            return None;
+        }
         let moved = self.turns * self.period;
         let jumps = |before: f64, value: f64| (value - before).abs() > self.share * self.period;
         let (first, last) = (recorded.first()?, recorded.last()?);
@@ -69,6 +92,7 @@ impl Unwrap {
             return None;
         }
         self.before = last + moved;
+        self.missing = 0;
         Some(moved)
     }
 }
@@ -126,7 +150,7 @@ impl Conditioner {
             samples,
             factor: factor * channel.sign * channel.scale,
             flag: channel.unit == FLAG,
-            unwrap: Unwrap::of(channel),
+            unwrap: Unwrap::of(channel, step_s, settings),
             values: Vec::new(),
             first: 0,
             settled: 0,
@@ -360,4 +384,38 @@ fn only<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
     values.truncate(range.end);
     values.drain(..range.start);
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As they are put together from pieces of some length.
+    fn unwrapped_in(piece: usize, wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
+        let channel = Channel { signal: "x_deg".into(), unit: "deg".into(), sign: 1.0, scale: 1.0, wraps_at };
+        let mut conditioner = Conditioner::new(&channel, 1.0, 0.025, values.len(), &Settings::default());
+        values.chunks(piece).for_each(|piece| conditioner.push(piece));
+        conditioner.values.into_iter().filter(|v| v.is_finite()).collect()
+    }
+
+    fn unwrapped(wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
+        let whole = unwrapped_in(values.len(), wraps_at, values);
+        assert_eq!(unwrapped_in(1, wraps_at, values), whole);
+        whole
+    }
+
+    #[test]
+    fn an_angle_recorded_from_0_to_360_deg_begins_about_zero_and_again_after_a_long_gap() {
+        assert_eq!(unwrapped(None, &[359.0, 1.0, 350.0, 2.0]), [-1.0, 1.0, -10.0, 2.0]);
+        let gap = |samples: usize| [&[30.0][..], &vec![f64::NAN; samples], &[330.0, 359.0, 1.0]].concat();
+        assert_eq!(unwrapped(None, &gap(41)), [30.0, -30.0, -1.0, 1.0]);
+        // A roll that goes on through a dropout stays as many turns on.
+        assert_eq!(unwrapped(None, &[170.0, 179.0, f64::NAN, -175.0, -170.0]), [170.0, 179.0, 185.0, 190.0]);
+        assert_eq!(unwrapped(None, &[400.0, 410.0]), [400.0, 410.0]);
+    }
+
+    #[test]
+    fn a_heading_stays_as_recorded_where_it_begins() {
+        assert_eq!(unwrapped(Some(360.0), &[310.0, 359.0, 1.0]), [310.0, 359.0, 361.0]);
+    }
 }

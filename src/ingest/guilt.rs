@@ -183,10 +183,13 @@ fn misfit(checks: &[Check]) -> f64 {
     excited.filter_map(|c| c.fit).map(|f| f.misfit.powi(2)).sum()
 }
 
-/// The best trial and the best ones of other channels that explain the failure as well.
+/// The best trial and the best ones of other channels that explain the failure as well: with as small a misfit, and with as
+/// few windows in which the record would have to jump.
 fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     let mut chosen: Vec<&Trial> = Vec::new();
-    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit) {
+    let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
+    let as_few = |t: &&Trial| jumps(t) <= jumps(best);
+    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit).filter(as_few) {
         if !chosen.iter().any(|c| c.name == trial.name) {
             chosen.push(trial);
         }

@@ -124,8 +124,9 @@ pub struct Checks {
     pub least_attitude_correlation: f64,
     /// How many standard errors of the slope a verdict needs.
     pub standard_errors: f64,
-    /// At most this share of a relation's windows, far off all others, are taken for jumps of the record and left out. A
-    /// channel that is wrong is so in more.
+    /// At most this share of a relation's windows, far off all others, are taken for jumps of the record and left out: parts
+    /// of a flight put together, frames lost without a trace. A channel that is wrong is so wherever it moves; where most
+    /// windows agree closely, the others are the record's.
     pub jumps_share: f64,
     /// Below this velocity the aircraft is not flying and the vanes mean nothing, ft/s.
     pub least_velocity_ft_s: f64,
@@ -145,7 +146,7 @@ impl Default for Checks {
             least_correlation: 0.5,
             least_attitude_correlation: 0.9,
             standard_errors: 4.0,
-            jumps_share: 0.05,
+            jumps_share: 0.4,
             least_velocity_ft_s: 50.0,
             dead_s: 60.0,
             excitation: Excitation::default(),

@@ -58,7 +58,7 @@ fn is_numeric<'a>(cells: impl Iterator<Item = &'a String>) -> bool {
 /// Whether a check of the records passed, or could not be made for want of excitation.
 #[must_use]
 pub fn is_check_passed(verdict: &str) -> bool {
-    matches!(verdict, "ok" | "not excited" | "not checked")
+    matches!(verdict, "ok" | InstrumentRow::NO_DELAY | "not excited" | "not checked")
 }
 
 /// The tables of what went wrong; those without rows are left out.

@@ -10,7 +10,7 @@ use crate::flight::Record;
 use crate::maneuver::Class;
 
 use super::steps::{self, Steps};
-use super::{Settings, Step};
+use super::{Settings, Step, completed};
 
 /// What is looked at in one record.
 #[derive(Clone, Debug)]
@@ -27,6 +27,9 @@ pub(super) struct Scene<'a> {
     pub sees_pilot: bool,
     /// Whether the excitation flag is recorded and not stuck.
     flag_speaks: bool,
+    /// From when to when a flag that is not stuck is down between two times that it is up, for no less than the shortest
+    /// pause.
+    pub flag_rests: Vec<(f64, f64)>,
 }
 
 impl<'a> Scene<'a> {
@@ -34,9 +37,12 @@ impl<'a> Scene<'a> {
         let (steps, deflections) = steps::of_record(record, settings);
         let is_known = |name: &&String| record.values(name).is_some_and(|v| v.iter().any(|v| v.is_finite()));
         let sees_pilot = settings.pilot_controls.iter().any(|name| is_known(&name));
-        let flag_speaks = changes(record.values(&settings.excitation_flag).unwrap_or_default());
-        let mut scene = Scene { record, settings, own: Steps::default(), steps, deflections, sees_pilot, flag_speaks };
+        let flag = record.values(&settings.excitation_flag).unwrap_or_default();
+        let (flag_speaks, flag_rests) = (changes(flag), rests(flag, record, settings.shortest_pause_s));
+        let own = Steps::default();
+        let mut scene = Scene { record, settings, steps, deflections, own, sees_pilot, flag_speaks, flag_rests };
         scene.own = scene.without_the_pilot_s();
+        completed::complete(&mut scene.own, &scene.deflections, settings);
         scene
     }
 
@@ -46,6 +52,7 @@ impl<'a> Scene<'a> {
         Steps {
             of: surfaces.map(|(signal, steps)| (signal.clone(), own(steps))).collect(),
             smallest: self.steps.smallest.clone(),
+            noise: self.steps.noise.clone(),
         }
     }
 
@@ -84,6 +91,17 @@ impl<'a> Scene<'a> {
 fn changes(flag: &[f64]) -> bool {
     let mut known = flag.iter().filter(|v| v.is_finite()).map(|v| *v > 0.5);
     known.next().is_some_and(|first| known.any(|v| v != first))
+}
+
+/// From when to when a flag is down between two times that it is up, for no less than a pause.
+fn rests(flag: &[f64], record: &Record, pause_s: f64) -> Vec<(f64, f64)> {
+    let known: Vec<(usize, bool)> =
+        flag.iter().enumerate().filter(|(_, v)| v.is_finite()).map(|(k, v)| (k, *v > 0.5)).collect();
+    let runs: Vec<&[(usize, bool)]> = known.chunk_by(|a, b| a.1 == b.1).collect();
+    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
+    let down = inner.iter().filter(|run| run.first().is_some_and(|(_, up)| !up));
+    let spans = down.filter_map(|run| Some((record.time_s(run.first()?.0), record.time_s(run.last()?.0))));
+    spans.filter(|(from_s, to_s)| to_s - from_s >= pause_s).collect()
 }
 
 /// One step of a train.

@@ -10,6 +10,7 @@
 //! limit is rejected.
 
 mod candidates;
+mod completed;
 mod condition;
 mod events;
 mod patterns;

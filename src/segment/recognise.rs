@@ -1,9 +1,9 @@
 //! Recognition: which classes the stretches of a train fit, and what fits none.
 //!
 //! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
-//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then into as few as possible,
-//! then where most inputs are back at their trim and steps of one input follow each other, then at the longest pauses. Two
-//! trains between which the pilot has gone over from one control to another are one where more is found in both together. A
+//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then where the flag rests, then
+//! into as few as possible, then where decay and lead-in are whole, then where one repeats the other, then where most inputs
+//! are back at their trim and steps of one input follow each other, then at the longest pauses. Two trains between which the pilot has gone over from one control to another are one where more is found in both together. A
 //! stretch that fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes
 //! before one about counts; where nothing else differs the flags decide.
 
@@ -90,24 +90,33 @@ struct Block {
 
 /// The best way to cut a train as far as some block.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cut {
+struct Cut<'a> {
     unexplained: usize,
     /// Steps that rules about lengths of pulses explain.
     in_pulses: usize,
+    /// Rests of the flag that stretches run across.
+    run_across: usize,
     stretches: usize,
+    /// Stretches that follow another so closely that one's decay and the other's lead-in overlap, where both are whole
+    /// elsewhere.
+    cramped: usize,
+    /// Stretches of the class of the one before that do not repeat its steps: what is flown again at once is mostly the
+    /// same.
+    unlike: usize,
     /// How many inputs of stretches do not end where they began, and how often one steps again after another has stepped
     /// meanwhile: a cut in the wrong place makes more of them. Neither counts for more, for a step may pass unseen.
     loose_ends: usize,
     /// The pauses cut at, s.
     paused_s: f64,
-    /// The block at which the last stretch begins, and whether it is one.
+    /// The block at which the last stretch begins, and its class if it is one.
     from: usize,
-    is_stretch: bool,
+    class: Option<&'a Class>,
 }
 
-impl Cut {
+impl Cut<'_> {
     fn is_better_than(&self, other: &Cut) -> bool {
-        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, c.stretches, c.loose_ends);
+        let parts = |c: &Cut| (c.run_across, c.stretches, c.cramped, c.unlike, c.loose_ends);
+        let key = |c: &Cut| (c.unexplained, usize::MAX - c.in_pulses, parts(c));
         key(self) < key(other) || (key(self) == key(other) && self.paused_s > other.paused_s)
     }
 }
@@ -152,30 +161,12 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
     for end in 1..=blocks.len() {
         let before = best[end - 1];
         let block = blocks[end - 1];
-        let mut chosen = Cut {
-            unexplained: before.unexplained + block.end - block.first,
-            from: end - 1,
-            is_stretch: false,
-            ..before
-        };
+        let mut chosen =
+            Cut { unexplained: before.unexplained + block.end - block.first, from: end - 1, class: None, ..before };
         for from in (end.saturating_sub(MOST_PAUSES)..end).rev() {
             let range = (blocks[from].first, block.end);
             let Some(explained) = explained(&seen(scene, train, range), classes, train, range) else { continue };
-            let before = best[from];
-            let paused_s = if from == 0 || !before.is_stretch {
-                0.0
-            } else {
-                train.edges[range.0].time_s - train.edges[range.0 - 1].time_s
-            };
-            let candidate = Cut {
-                unexplained: before.unexplained + explained.unexplained,
-                in_pulses: before.in_pulses + explained.in_pulses,
-                stretches: before.stretches + 1,
-                loose_ends: before.loose_ends + explained.loose_ends,
-                paused_s: before.paused_s + paused_s,
-                from,
-                is_stretch: true,
-            };
+            let candidate = best[from].and(scene, train, blocks, (from, end), &explained);
             if candidate.is_better_than(&chosen) {
                 chosen = candidate;
             }
@@ -185,44 +176,110 @@ fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Ve
     let mut parts = Vec::new();
     let mut end = blocks.len();
     while end > 0 {
-        parts.push((best[end].from, end, best[end].is_stretch));
+        parts.push((best[end].from, end, best[end].class.is_some()));
         end = best[end].from;
     }
     parts.reverse();
     parts
 }
 
+impl<'a> Cut<'a> {
+    /// This cut and a stretch of some blocks after it.
+    fn and(
+        &self,
+        scene: &Scene,
+        train: &Train,
+        blocks: &[Block],
+        (from, end): (usize, usize),
+        explained: &Explained<'a>,
+    ) -> Cut<'a> {
+        let range = (blocks[from].first, blocks[end - 1].end);
+        let mut cut = Cut {
+            unexplained: self.unexplained + explained.unexplained,
+            in_pulses: self.in_pulses + explained.in_pulses,
+            run_across: self.run_across + explained.run_across,
+            stretches: self.stretches + 1,
+            loose_ends: self.loose_ends + explained.loose_ends,
+            from,
+            class: Some(explained.class),
+            ..*self
+        };
+        if let (Some(class), Some(block)) = (self.class, blocks.get(self.from)) {
+            let (last_s, next_s) = (train.edges[range.0 - 1].time_s, train.edges[range.0].time_s);
+            let whole_s = class.recognition.decay_s + explained.class.recognition.lead_in_s - scene.settings.transit_s;
+            cut.paused_s += next_s - last_s;
+            cut.cramped += usize::from(next_s - last_s < whole_s);
+            let own = (block.first, range.0);
+            let repeats = || repeated(scene, train, class, own) == repeated(scene, train, class, range);
+            cut.unlike += usize::from(class.name == explained.class.name && !repeats());
+        }
+        cut
+    }
+}
+
+/// The steps of a class's inputs in a stretch: which signal steps how often before another does.
+fn repeated<'t>(scene: &Scene, train: &'t Train, class: &Class, range: (usize, usize)) -> Vec<(&'t str, usize)> {
+    let inputs = seen(scene, train, range).inputs(class);
+    let own: Vec<&str> = train
+        .edges
+        .get(range.0..range.1)
+        .unwrap_or_default()
+        .iter()
+        .map(|e| e.signal)
+        .filter(|s| inputs.contains(s))
+        .collect();
+    own.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect()
+}
+
 /// How a class explains a stretch.
 #[derive(Clone, Copy, Debug)]
-struct Explained {
+struct Explained<'a> {
+    class: &'a Class,
     unexplained: usize,
     in_pulses: usize,
+    run_across: usize,
     loose_ends: usize,
 }
 
 /// What the class that explains most of a stretch's edges makes of it; none where it fits no class.
-fn explained(seen: &Seen, classes: &[&Class], train: &Train, (first, end): (usize, usize)) -> Option<Explained> {
+fn explained<'a>(
+    seen: &Seen,
+    classes: &[&'a Class],
+    train: &Train,
+    (first, end): (usize, usize),
+) -> Option<Explained<'a>> {
     let edges = train.edges.get(first..end)?;
-    let of_class = |class: &&Class| {
+    let of_class = |class: &&'a Class| {
         let inputs = seen.inputs(class);
         let own =
             |signal: &str| -> Vec<f64> { edges.iter().filter(|e| e.signal == signal).map(|e| e.change).collect() };
         let share = seen.scene.settings.outstanding_share;
         let returns = edges.chunk_by(|a, b| a.signal == b.signal).count().saturating_sub(inputs.len());
         let away = inputs.iter().filter(|signal| is_away(&own(signal), share)).count();
+        let pulses = &class.recognition.pulses;
         Explained {
+            class,
             unexplained: edges.iter().filter(|e| !inputs.contains(e.signal)).count(),
-            in_pulses: class
-                .recognition
-                .pulses
-                .iter()
-                .map(|(signal, p)| own(signal).len().min(p.widths.len() + 1))
-                .sum(),
+            in_pulses: pulses.iter().map(|(signal, p)| own(signal).len().min(p.widths.len() + 1)).sum(),
+            run_across: run_across(seen, class, edges),
             loose_ends: returns + away,
         }
     };
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
     fitting.map(of_class).min_by_key(|e| (e.unexplained, usize::MAX - e.in_pulses))
+}
+
+/// How many rests of the excitation flag lie within a stretch of a class that it is up for. A flag that rests while there is
+/// more than a step of feedback is late, or wrong.
+fn run_across(seen: &Seen, class: &Class, edges: &[super::candidates::Edge]) -> usize {
+    let scene = seen.scene;
+    if *seen.kind != Kind::Onboard || class.recognition.flags.get(&scene.settings.excitation_flag) != Some(&true) {
+        return 0;
+    }
+    let within = |(from_s, to_s): &&(f64, f64)| seen.from_s < *from_s && *to_s < seen.to_s;
+    let still =
+        |(from_s, to_s): &&(f64, f64)| edges.iter().filter(|e| (*from_s..=*to_s).contains(&e.time_s)).count() <= 1;
+    scene.flag_rests.iter().filter(within).filter(still).count()
 }
 
 /// Whether a signal does not end near where it began, by those of its changes that are not feedback's.

@@ -38,15 +38,16 @@ impl<'a> Seen<'a> {
         self.scene.settings.transit_s / 2.0
     }
 
-    /// The steps of a signal that stand out from feedback's: at least a share of its largest. Of a surface in a train of
-    /// surfaces only those of its own.
+    /// The steps of a signal that stand out from feedback's: at least a share of its largest, less what turbulence may have
+    /// taken from them. Of a surface in a train of surfaces only those of its own.
     pub fn steps_of(&self, signal: &str) -> Vec<&'a Step> {
         let scene = self.scene;
         let own = *self.kind == Kind::Onboard && !scene.is_pilot_s(signal);
         let steps = if own { &scene.own } else { &scene.steps };
         let inside = steps.between(signal, self.from_s - self.slack_s(), self.to_s + self.slack_s());
         let largest = inside.iter().map(|s| s.change().abs()).fold(0.0, f64::max);
-        let least = scene.settings.outstanding_share * largest;
+        let taken = scene.steps.noise.get(signal).copied().unwrap_or_default();
+        let least = scene.settings.outstanding_share * largest - taken;
         inside.iter().filter(|s| s.change().abs() >= least).collect()
     }
 
@@ -102,8 +103,8 @@ impl<'a> Seen<'a> {
         (n > 2).then(|| format!("the pilot's controls step {n} times meanwhile"))
     }
 
-    /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as from side to side. It rests
-    /// within half of the smallest step. Between the two, as where it is not recorded, nothing is known.
+    /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as from side to side; that is
+    /// more where turbulence makes it work. It rests within half of the smallest step. Between the two, as where it is not recorded, nothing is known.
     fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.scene.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
@@ -112,7 +113,7 @@ impl<'a> Seen<'a> {
         known.sort_by(f64::total_cmp);
         let aside = known.len() / 50;
         let range = known.get(known.len().checked_sub(aside + 1)?)? - known.get(aside)?;
-        let smallest = self.scene.settings.steps.get(signal)?;
+        let smallest = self.scene.steps.smallest.get(signal)?;
         let moves = range >= 2.0 * smallest;
         (moves || range <= 0.5 * smallest).then_some(moves)
     }

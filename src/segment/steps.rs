@@ -37,6 +37,8 @@ impl Step {
 pub(super) struct Steps {
     pub of: BTreeMap<String, Vec<Step>>,
     pub smallest: BTreeMap<String, f64>,
+    /// The standard deviation of the signal's own changes, where turbulence has raised its smallest step; else 0.
+    pub noise: BTreeMap<String, f64>,
 }
 
 impl Steps {
@@ -58,7 +60,9 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
     for (signal, set) in &settings.steps {
         let Some(values) = record.values(signal) else { continue };
         let levels = levels(values, window.level);
-        let smallest = set.max(settings.steps_over_noise * noise(&levels, window));
+        let noise = noise(&levels, window);
+        let smallest = set.max(settings.steps_over_noise * noise);
+        let raised = if smallest > *set { noise } else { 0.0 };
         for (kept, size) in [(&mut steps, smallest), (&mut deflections, settings.deflection_share * smallest)] {
             let mut found = of_levels(&levels, size, window);
             for step in &mut found {
@@ -66,6 +70,7 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
             }
             kept.of.insert(signal.clone(), found);
             kept.smallest.insert(signal.clone(), size);
+            kept.noise.insert(signal.clone(), raised);
         }
     }
     (steps, deflections)

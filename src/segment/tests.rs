@@ -484,6 +484,38 @@ fn doublets_of_one_surface_after_another_are_one_maneuver_in_one_round_or_in_two
 }
 
 #[test]
+fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_and_a_late_one_does_not() {
+    for (late_s, classes) in [(0.0, &["DOUBLETS", "DOUBLETS"][..]), (3.0, &["DOUBLETS"])] {
+        let mut r = flight(60);
+        for (at, name) in [20.0, 23.2, 28.6, 31.8].into_iter().zip(["dsa_deg", "de_deg", "dsa_deg", "de_deg"]) {
+            doublet(&mut r, name, at, 5.0);
+        }
+        up(&mut r, "obes", 19.5 + late_s, 26.0 + late_s);
+        up(&mut r, "obes", 28.0 + late_s, 34.5 + late_s);
+        let segmented = found(&r);
+        assert_eq!(classes_of(&segmented), classes);
+        assert_eq!(segmented.unknown, []);
+    }
+}
+
+#[test]
+fn a_series_flown_again_after_its_decay_is_cut_there_and_not_where_its_surface_passes_trim() {
+    let mut r = flight(90);
+    // A series that is held at trim in its midst, and ends away from where it began by what feedback leaves of it.
+    let series = |at: f64| {
+        let mut all: Vec<(f64, f64)> = vec![(at, 4.0)];
+        all.extend((1..=9).map(|k| (at + 0.9 * f64::from(k), if k % 2 == 1 { -8.0 } else { 8.0 })));
+        all.push((at + 9.0, 6.0));
+        all
+    };
+    edges(&mut r, "de_deg", &[series(20.0), series(33.0)].concat());
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["SERIES", "SERIES"]);
+    assert_abs_diff_eq!(segmented.maneuvers[0].recognised.last_input_s.unwrap(), 29.0, epsilon = 0.2);
+    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), 33.0, epsilon = 0.2);
+}
+
+#[test]
 fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_control_is_at_trim() {
     let mut r = flight(90);
     let first_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.4);

@@ -231,6 +231,7 @@ impl Finding {
         let told = self.estimates.iter().any(Option::is_some);
         let verdict = match (faults.is_empty(), told) {
             (false, _) => faults.join(", "),
+            (true, true) if of(Kind::Delay).is_none() => InstrumentRow::NO_DELAY.to_owned(),
             (true, true) => "ok".to_owned(),
             (true, false) => "not excited".to_owned(),
         };
