@@ -242,8 +242,8 @@ fn turns(values: &[f64]) -> f64 {
         // Noise has no pattern: whatever a branch would guess is wrong half of the time.
         let change = value - before;
         let moves = change.abs() > 0.0;
-        all += usize::from(moves & (last != 0.0));
-        turns += usize::from(moves & (change * last < 0.0));
+        all += usize::from(moves) * usize::from(last != 0.0);
+        turns += usize::from(moves) * usize::from(change * last < 0.0);
         last = if moves { change } else { last };
         before = *value;
     }
