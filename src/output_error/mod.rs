@@ -12,7 +12,7 @@ pub mod cost;
 mod course;
 pub mod cramer_rao;
 pub mod equation_error;
-mod freedom;
+pub mod freedom;
 mod likelihood;
 pub mod holding;
 pub mod identifiability;

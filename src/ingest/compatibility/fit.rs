@@ -21,7 +21,7 @@ use super::instruments::{ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, P
 use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
-use crate::output_error::{Aligned, Rows, VECTOR, coloured};
+use crate::output_error::{Aligned, Rows, VECTOR, coloured, freedom};
 
 /// Rounds of re-estimating R and P, and steps within each.
 const ROUNDS: usize = 6;
@@ -360,7 +360,8 @@ impl Problem<'_> {
         (0..PARAMETERS).filter(freed).filter(large).filter(unsure).collect()
     }
 
-    /// Variances of the shared parameters from the scatter between windows: each left out in turn.
+    /// Variances of the shared parameters from the scatter between windows: each left out in turn. Few windows know their
+    /// scatter badly, so these are larger as Student's intervals are longer.
     fn jackknife(
         &self,
         members: &[Member],
@@ -371,9 +372,10 @@ impl Problem<'_> {
         let without = |m: &Member| Some(self.inverse(&(&whole - &m.reduced.0), prior)? * (&all - &m.reduced.1));
         let left_out: Vec<DVector<f64>> = members.iter().filter_map(without).collect();
         let count = left_out.len() as f64;
+        let longer = freedom::longer(count - 1.0).powi(2);
         std::array::from_fn(|j| {
             let mean = left_out.iter().map(|d| d[j]).sum::<f64>() / count.max(1.0);
-            left_out.iter().map(|d| (d[j] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count.max(1.0)
+            longer * left_out.iter().map(|d| (d[j] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count.max(1.0)
         })
     }
 }
