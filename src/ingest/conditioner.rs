@@ -64,7 +64,7 @@ impl Unwrap {
         }
         if self.begins() {
             // What is beyond a whole turn is no angle that wraps around.
-            self.turns = if value.abs() <= self.period { -(value / self.period).round() } else { 0.0 };
+            self.turns = if value.abs() <= self.period { 0.0 - (value / self.period).round() } else { 0.0 };
             self.before = value + self.turns * self.period;
             self.wraps += usize::from(self.turns != 0.0);
         }
