@@ -39,7 +39,7 @@ impl Correction {
     /// Without a delay every sample is its own.
     fn correct_in_place(&self, series: &mut Series) {
         for (value, mark) in series.values.iter_mut().zip(&mut series.marks) {
-            *value = (*value - self.bias) / (1.0 + self.scale);
+            *value = self.truth(*value);
             *mark = if value.is_finite() { *mark } else { Mark::Missing };
         }
     }
@@ -67,8 +67,12 @@ impl Correction {
 
     fn value(&self, taps: &Taps, values: &[f64], k: usize) -> f64 {
         let weighty = taps.each(k, values.len()).filter(|(_, weight, _)| *weight != 0.0);
-        let sum: f64 = weighty.map(|(sample, weight, _)| weight * values[sample]).sum();
-        (sum - self.bias) / (1.0 + self.scale)
+        self.truth(weighty.map(|(sample, weight, _)| weight * values[sample]).sum())
+    }
+
+    /// What is true when the instrument reads this.
+    fn truth(&self, reading: f64) -> f64 {
+        (reading - self.bias) / (1.0 + self.scale)
     }
 }
 

@@ -310,8 +310,11 @@ impl Conditioner {
         let stuck: Vec<Range<usize>> = if values.iter().all(|v| v.is_finite()) {
             long_runs(values, fewest).into_iter().filter(|run| is_stuck(run, run.len())).collect()
         } else {
-            let runs = lasting(values, fewest);
-            runs.into_iter().filter(|(run, count)| is_stuck(run, *count)).map(|(run, _)| run).collect()
+            // What is missing between two values that are the same counts for nothing.
+            let (places, own) = known(values);
+            let runs =
+                long_runs(&own, fewest).into_iter().map(|run| (places[run.start]..places[run.end - 1] + 1, run.len()));
+            runs.filter(|(run, count)| is_stuck(run, *count)).map(|(run, _)| run).collect()
         };
         for range in &stuck {
             values[range.clone()].fill(f64::NAN);
@@ -327,8 +330,7 @@ impl Conditioner {
             return spikes::remove(values, self.step_s, &floors, &self.settings.spikes);
         }
         let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
-        let places: Vec<usize> = recorded(values, 0, Rate::FULL).map(|(k, _)| k).collect();
-        let mut own: Vec<f64> = places.iter().map(|&k| values[k]).collect();
+        let (places, mut own) = known(values);
         let place = |sample: usize| places.partition_point(|k| *k < sample);
         let floors: Vec<_> = parts.iter().map(|(r, c)| (place(r.start)..place(r.end), c.floor)).collect();
         let step_s = self.step_s * period as f64;
@@ -362,21 +364,9 @@ impl Conditioner {
     }
 }
 
-/// The runs of one value in at least so many recorded samples, with how many; what is missing between them counts for
-/// nothing.
-fn lasting(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
-    let mut runs = Vec::new();
-    let (mut run, mut count, mut before) = (0..0, 0_usize, f64::NAN);
-    for (k, value) in recorded(values, 0, Rate::FULL) {
-        if value.to_bits() == before.to_bits() {
-            (run.end, count) = (k + 1, count + 1);
-            continue;
-        }
-        runs.extend((count >= least).then(|| (run.clone(), count)));
-        (run, count, before) = (k..k + 1, 1, value);
-    }
-    runs.extend((count >= least).then_some((run, count)));
-    runs
+/// The recorded values and their places.
+fn known(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
+    recorded(values, 0, Rate::FULL).unzip()
 }
 
 /// A range of the values alone.

@@ -56,7 +56,8 @@ fn within(deflections: &[Step], (after_s, before_s): (f64, f64)) -> Vec<Step> {
 }
 
 /// The hidden half beside the step at one end: the largest deflection to the other side that is about half of it, or less
-/// by no more than two standard deviations of what turbulence does. None where that step is a half itself beside its neighbour.
+/// by no more than two standard deviations of what turbulence does. None where that step is a half itself beside its
+/// neighbour.
 fn half(deflections: &[Step], end: &Step, neighbour: Option<&Step>, noise: f64) -> Option<Step> {
     let beside = neighbour.map_or(1.0, |n| (end.change() / n.change()).abs());
     let hardly = if beside < REVERSES { HARDLY * noise } else { 0.0 };

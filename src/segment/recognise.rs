@@ -1,11 +1,12 @@
 //! Recognition: which classes the stretches of a train fit, and what fits none.
 //!
 //! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
-//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then where the flag rests, then
-//! into as few as possible, then where decay and lead-in are whole, then where one repeats the other, then where most inputs
-//! are back at their trim and steps of one input follow each other, then at the longest pauses. Two trains between which the pilot has gone over from one control to another are one where more is found in both together. A
-//! stretch that fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes
-//! before one about counts; where nothing else differs the flags decide.
+//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then where the flag rests,
+//! then into as few as possible, then where decay and lead-in are whole, then where one repeats the other, then where most
+//! inputs are back at their trim and steps of one input follow each other, then at the longest pauses. Two trains between
+//! which the pilot has gone over from one control to another are one where more is found in both together. A stretch that
+//! fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one
+//! about counts; where nothing else differs the flags decide.
 
 use crate::error::Problem;
 use crate::maneuver::{Class, Recognised, Unknown};

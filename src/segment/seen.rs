@@ -104,7 +104,8 @@ impl<'a> Seen<'a> {
     }
 
     /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as from side to side; that is
-    /// more where turbulence makes it work. It rests within half of the smallest step. Between the two, as where it is not recorded, nothing is known.
+    /// more where turbulence makes it work. It rests within half of the smallest step. Between the two, as where it is not
+    /// recorded, nothing is known.
     fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.scene.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));

@@ -179,7 +179,7 @@ impl Store {
         if path.exists() || shared.size(&name).is_none() {
             return Ok(());
         }
-        shared.fetch(&name, path, |file| Digest::of_file(file).is_ok_and(|found| found == *digest))
+        shared.fetch(&name, path, digest)
     }
 
     /// Sends what an earlier run has made and not sent.

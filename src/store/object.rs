@@ -220,7 +220,8 @@ pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
 /// Why it cannot be read or written out.
 pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, Failure> {
     let Some(mut reader) = Reader::of(path)? else { return Ok(false) };
-    std::io::copy(&mut reader, out).map_err(|e| match e.downcast::<Failure>() {
+    // What a full disk refuses at the end must not be taken for damage to the object.
+    std::io::copy(&mut reader, out).and_then(|_| out.flush()).map_err(|e| match e.downcast::<Failure>() {
         Ok(failure) => failure,
         Err(e) => Failure::Passing(format!("cannot be copied: {e}")),
     })?;

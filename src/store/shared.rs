@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::atomic::Draft;
-use super::object;
+use super::{Digest, object};
 use crate::error::{Error, Result};
 
 /// An object store that is opened: what is there was listed once, and is added to by what this run puts there.
@@ -70,15 +70,16 @@ impl Shared {
         Ok(())
     }
 
-    /// Brings an object to a file, unless it does not pass: then it is removed, for it would be taken for whole again.
-    pub fn fetch(&self, name: &str, file: &Path, passes: impl Fn(&Path) -> bool) -> Result<()> {
+    /// Brings an object to a file, unless it is not what was written: then it is removed, for it would be taken for whole
+    /// again.
+    pub fn fetch(&self, name: &str, file: &Path, written: &Digest) -> Result<()> {
         let path = self.place.join(name);
         let mut draft = Draft::of(file)?;
         if !object::fetch(&path, &mut draft.writer()).map_err(|e| e.at(&path))? {
             self.there().remove(name);
             return Err(Error::store(&path, &"it is gone; run again"));
         }
-        if passes(draft.draft()) {
+        if draft.digest() == *written {
             return draft.place();
         }
         object::remove(&path).map_err(|e| e.at(&path))?;
