@@ -31,7 +31,9 @@ impl Plain<'_> {
     fn regressor(&self, d: &Derivative, point: usize, x: &X) -> f64 {
         let m = &self.motion[point];
         let aircraft = self.subject.aircraft();
-        if let Some((state, factor)) = Longitudinal::state_regressor(aircraft, m.velocity, &d.regressor) {
+        if let Some((state, factor)) =
+            Longitudinal::state_regressor(aircraft, m.velocity, &d.regressor)
+        {
             return factor * x[state];
         }
         let force = m.qbar * aircraft.wing_area_ft2;
@@ -46,15 +48,24 @@ impl Plain<'_> {
     }
 
     /// Coefficients, their slopes along the states, and the regressors of the free derivatives.
-    fn coefficients(&self, point: usize, values: &[f64], x: &X) -> ([f64; 3], [[f64; NX]; 3], Vec<f64>) {
-        let (mut c, mut slopes, mut regressors) = ([0.0; COEFFICIENTS], [[0.0; NX]; COEFFICIENTS], vec![]);
+    fn coefficients(
+        &self,
+        point: usize,
+        values: &[f64],
+        x: &X,
+    ) -> ([f64; 3], [[f64; NX]; 3], Vec<f64>) {
+        let (mut c, mut slopes, mut regressors) =
+            ([0.0; COEFFICIENTS], [[0.0; NX]; COEFFICIENTS], vec![]);
         let free = self.free.iter().copied().zip(values.iter().copied());
         let held = self.subject.derivatives().1.iter().map(|(d, v)| (d, *v));
         for (i, (d, value)) in free.chain(held).enumerate() {
             let (k, r) = (d.coefficient.index(), self.regressor(d, point, x));
             c[k] += value * r;
-            let along =
-                Longitudinal::state_regressor(self.subject.aircraft(), self.motion[point].velocity, &d.regressor);
+            let along = Longitudinal::state_regressor(
+                self.subject.aircraft(),
+                self.motion[point].velocity,
+                &d.regressor,
+            );
             if let Some((state, factor)) = along {
                 slopes[k][state] += value * factor;
             }
@@ -72,12 +83,19 @@ impl Plain<'_> {
         let through = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::from_fn(|k, i| slopes[k][i]);
         let a = rates.by_state + rates.by_coefficient * through;
         let each = self.free.iter().zip(s).zip(&regressors);
-        let ds = each.map(|((d, s), r)| a * s + rates.by_coefficient.column(d.coefficient.index()) * *r);
+        let ds =
+            each.map(|((d, s), r)| a * s + rates.by_coefficient.column(d.coefficient.index()) * *r);
         (rates.rates, ds.collect())
     }
 
     /// Information and gradient for unit weights; biases are left out.
-    fn pass(&self, values: &[f64], start: X, step_s: f64, measured: &[[f64; OUTPUTS]]) -> (Vec<f64>, Vec<f64>) {
+    fn pass(
+        &self,
+        values: &[f64],
+        start: X,
+        step_s: f64,
+        measured: &[[f64; OUTPUTS]],
+    ) -> (Vec<f64>, Vec<f64>) {
         let n = self.free.len();
         let (mut information, mut gradient) = (vec![0.0; n * n], vec![0.0; n]);
         let (mut x, mut s) = (start, vec![X::zeros(); n]);
@@ -86,13 +104,19 @@ impl Plain<'_> {
             let (c, slopes, regressors) = self.coefficients(point, values, &x);
             let aircraft = self.subject.aircraft();
             let known = Longitudinal::known(aircraft, &self.motion[point]);
-            let read = Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &self.motion[point]), &x, &c);
+            let read = Longitudinal::outputs(
+                &known,
+                &Longitudinal::sensed(aircraft, &self.motion[point]),
+                &x,
+                &c,
+            );
             let through = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::from_fn(|k, i| slopes[k][i]);
             let by_state = read.by_state + read.by_coefficient * through;
             for (o, z) in z.iter().enumerate() {
                 let row: Vec<f64> = (0..n)
                     .map(|j| {
-                        let direct = read.by_coefficient[(o, self.free[j].coefficient.index())] * regressors[j];
+                        let direct = read.by_coefficient[(o, self.free[j].coefficient.index())]
+                            * regressors[j];
                         (by_state.row(o) * s[j])[0] + direct
                     })
                     .collect();
@@ -106,12 +130,19 @@ impl Plain<'_> {
             if sample + 1 == measured.len() {
                 break;
             }
-            let ahead = |s: &[X], h: f64, k: &[X]| s.iter().zip(k).map(|(s, k)| s + k * h).collect::<Vec<X>>();
+            let ahead = |s: &[X], h: f64, k: &[X]| {
+                s.iter().zip(k).map(|(s, k)| s + k * h).collect::<Vec<X>>()
+            };
             let (k1, d1) = self.slope(point, values, &x, &s);
             let half = 0.5 * step_s;
             let (k2, d2) = self.slope(point + 1, values, &(x + k1 * half), &ahead(&s, half, &d1));
             let (k3, d3) = self.slope(point + 1, values, &(x + k2 * half), &ahead(&s, half, &d2));
-            let (k4, d4) = self.slope(point + 2, values, &(x + k3 * step_s), &ahead(&s, step_s, &d3));
+            let (k4, d4) = self.slope(
+                point + 2,
+                values,
+                &(x + k3 * step_s),
+                &ahead(&s, step_s, &d3),
+            );
             x += (k1 + (k2 + k3) * 2.0 + k4) * (step_s / 6.0);
             for j in 0..n {
                 s[j] += (d1[j] + (d2[j] + d3[j]) * 2.0 + d4[j]) * (step_s / 6.0);
@@ -134,7 +165,10 @@ impl WithSimd for Fused {
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "compiled for the processor at hand")]
     fn with_simd<S: Simd>(self, simd: S) -> (f64, usize) {
-        let (a, b) = (simd.splat_f64s(black_box(0.999)), simd.splat_f64s(black_box(1e-3)));
+        let (a, b) = (
+            simd.splat_f64s(black_box(0.999)),
+            simd.splat_f64s(black_box(1e-3)),
+        );
         let mut sums = [simd.splat_f64s(0.0); 12];
         for _ in 0..self.rounds {
             if self.chained {
@@ -147,7 +181,10 @@ impl WithSimd for Fused {
                 }
             }
         }
-        (sums.iter().map(|s| simd.reduce_sum_f64s(*s)).sum(), S::F64_LANES)
+        (
+            sums.iter().map(|s| simd.reduce_sum_f64s(*s)).sum(),
+            S::F64_LANES,
+        )
     }
 }
 
@@ -157,7 +194,11 @@ fn fused_s(chained: bool) -> (f64, usize) {
     let (mut best, mut lanes) = (f64::INFINITY, 1);
     for _ in 0..100 {
         let begin = Instant::now();
-        lanes = black_box(Arch::new().dispatch(Fused { rounds: ROUNDS, chained })).1;
+        lanes = black_box(Arch::new().dispatch(Fused {
+            rounds: ROUNDS,
+            chained,
+        }))
+        .1;
         best = best.min(begin.elapsed().as_secs_f64());
     }
     (best / (12 * ROUNDS) as f64, lanes)
@@ -180,13 +221,23 @@ fn floors(samples: usize, lanes: usize, pass_s: f64) {
     println!(
         "fused multiplications of one pass: {operations} ({lane} a lane and sample, {squares} a sample in the sums)"
     );
-    println!("throughput floor {:.0} us, latency floor {:.0} us", 1e6 * floor_s, 1e6 * waiting_s);
-    println!("a pass takes {:.0} us: {:.1} times the throughput floor", 1e6 * pass_s, pass_s / floor_s);
+    println!(
+        "throughput floor {:.0} us, latency floor {:.0} us",
+        1e6 * floor_s,
+        1e6 * waiting_s
+    );
+    println!(
+        "a pass takes {:.0} us: {:.1} times the throughput floor",
+        1e6 * pass_s,
+        pass_s / floor_s
+    );
 }
 
 fn kernel(c: &mut Criterion) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/standard_case.json");
-    let Ok(subject) = bench_case::load(&file) else { return };
+    let Ok(subject) = bench_case::load(&file) else {
+        return;
+    };
     let Ok(window) = subject.window() else { return };
     let case = subject.case(&window);
     let (start, _) = subject.start(&case);
@@ -195,13 +246,24 @@ fn kernel(c: &mut Criterion) {
     free.sort_by_key(|d| d.coefficient.index());
     let motion: Vec<Motion> = window.motion(subject.aircraft()).points().collect();
     let state = Longitudinal::measured_state(&motion[0]);
-    let plain = Plain { motion, window: &window, subject: &subject, free };
-    c.bench_function("one pass, kernel", |b| b.iter(|| case.respond(&start, &mut response)));
+    let plain = Plain {
+        motion,
+        window: &window,
+        subject: &subject,
+        free,
+    };
+    c.bench_function("one pass, kernel", |b| {
+        b.iter(|| case.respond(&start, &mut response))
+    });
     c.bench_function("one pass, plain scalar", |b| {
         b.iter(|| plain.pass(&start, state, window.step_s, &case.measurements.values));
     });
-    c.bench_function("one pass, coarse", |b| b.iter(|| case.respond_with(Detail::Coarse, &start, &mut response)));
-    c.bench_function("sensitivities kept", |b| b.iter(|| case.sensitivities(&start)));
+    c.bench_function("one pass, coarse", |b| {
+        b.iter(|| case.respond_with(Detail::Coarse, &start, &mut response))
+    });
+    c.bench_function("sensitivities kept", |b| {
+        b.iter(|| case.sensitivities(&start))
+    });
     c.bench_function("maneuver laid out", |b| b.iter(|| subject.case(&window)));
     let mut pass_s = f64::INFINITY;
     for _ in 0..1000 {

@@ -29,18 +29,39 @@ struct Bench {
 fn load() -> anyhow::Result<Bench> {
     let config = Config::load(Path::new("pipelines/harv"), Overrides::default())?;
     for files in archive::find(&config.archive)? {
-        let raw = archive::read(&files, &config.channels).map_err(|p| anyhow::anyhow!(p.reason))?.swap_remove(0);
-        let record = ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest)
+        let raw = archive::read(&files, &config.channels)
             .map_err(|p| anyhow::anyhow!(p.reason))?
-            .record;
+            .swap_remove(0);
+        let record = ingest::record(
+            &raw,
+            &config.channels,
+            &config.constants,
+            &config.aircraft,
+            &config.ingest,
+        )
+        .map_err(|p| anyhow::anyhow!(p.reason))?
+        .record;
         let found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
         let most_free = |m: &Maneuver| {
             let class = config.class(&m.class)?;
-            let free = class.statuses.values().filter(|s| **s == Status::Estimated).count();
+            let free = class
+                .statuses
+                .values()
+                .filter(|s| **s == Status::Estimated)
+                .count();
             (class.axis == Axis::Longitudinal && free > 20).then(|| class.clone())
         };
-        if let Some((maneuver, class)) = found.maneuvers.iter().find_map(|m| Some((m.clone(), most_free(m)?))) {
-            return Ok(Bench { config, record, maneuver, class });
+        if let Some((maneuver, class)) = found
+            .maneuvers
+            .iter()
+            .find_map(|m| Some((m.clone(), most_free(m)?)))
+        {
+            return Ok(Bench {
+                config,
+                record,
+                maneuver,
+                class,
+            });
         }
     }
     anyhow::bail!("the demonstration campaign has no longitudinal maneuver with all surfaces")
@@ -48,9 +69,17 @@ fn load() -> anyhow::Result<Bench> {
 
 /// The maneuver's case with the class's derivatives free, or with none.
 fn case(bench: &Bench, free: bool) -> Result<Case<3, Longitudinal>, String> {
-    let derivatives: Vec<_> = bench.config.buildup.derivatives_of(Axis::Longitudinal).collect();
+    let derivatives: Vec<_> = bench
+        .config
+        .buildup
+        .derivatives_of(Axis::Longitudinal)
+        .collect();
     let tunnel = |name: &str| {
-        bench.config.tunnel.value(name, bench.maneuver.alpha_deg, bench.maneuver.mach).map_or(0.0, |v| v.value)
+        bench
+            .config
+            .tunnel
+            .value(name, bench.maneuver.alpha_deg, bench.maneuver.mach)
+            .map_or(0.0, |v| v.value)
     };
     let mut model = Model::default();
     for derivative in derivatives {
@@ -60,12 +89,26 @@ fn case(bench: &Bench, free: bool) -> Result<Case<3, Longitudinal>, String> {
             model.held.push((derivative, tunnel(&derivative.name)));
         }
     }
-    let range = bench.record.sample_at(bench.maneuver.start_s)..bench.record.sample_at(bench.maneuver.end_s) + 1;
+    let range = bench.record.sample_at(bench.maneuver.start_s)
+        ..bench.record.sample_at(bench.maneuver.end_s) + 1;
     let samples = range.len();
-    let surfaces = bench.config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    let surfaces = bench
+        .config
+        .buildup
+        .derivatives
+        .iter()
+        .filter_map(|d| d.regressor.surface());
     let window = Window::cut(&bench.record, range, surfaces, MassProperties::Recorded)?;
-    let measurements = Measurements { values: vec![[0.0; OUTPUTS]; samples], used: vec![[true; OUTPUTS]; samples] };
-    Ok(Case::new(&bench.config.aircraft, &window, measurements, &model))
+    let measurements = Measurements {
+        values: vec![[0.0; OUTPUTS]; samples],
+        used: vec![[true; OUTPUTS]; samples],
+    };
+    Ok(Case::new(
+        &bench.config.aircraft,
+        &window,
+        measurements,
+        &model,
+    ))
 }
 
 fn responses(c: &mut Criterion, bench: &Bench) -> Result<(), String> {
@@ -75,11 +118,18 @@ fn responses(c: &mut Criterion, bench: &Bench) -> Result<(), String> {
         .derivatives
         .iter()
         .filter_map(|d| {
-            let value = bench.config.tunnel.value(&d.name, bench.maneuver.alpha_deg, bench.maneuver.mach)?;
+            let value = bench.config.tunnel.value(
+                &d.name,
+                bench.maneuver.alpha_deg,
+                bench.maneuver.mach,
+            )?;
             Some((d.name.clone(), value.value))
         })
         .collect();
-    for (label, free) in [("response alone", false), ("response with sensitivities", true)] {
+    for (label, free) in [
+        ("response alone", false),
+        ("response with sensitivities", true),
+    ] {
         let case = case(bench, free)?;
         let start = case.starting_values(|name| values.get(name).copied().unwrap_or(0.0));
         let mut response = case.response();
@@ -103,17 +153,44 @@ fn stages(c: &mut Criterion) {
         }
     };
     let config = &bench.config;
-    let Some(files) = archive::find(&config.archive).ok().and_then(|files| files.into_iter().next()) else { return };
-    c.bench_function("read one flight", |b| b.iter(|| archive::read(&files, &config.channels)));
+    let Some(files) = archive::find(&config.archive)
+        .ok()
+        .and_then(|files| files.into_iter().next())
+    else {
+        return;
+    };
+    c.bench_function("read one flight", |b| {
+        b.iter(|| archive::read(&files, &config.channels))
+    });
     if let Ok(raw) = archive::read(&files, &config.channels).map(|mut files| files.swap_remove(0)) {
         c.bench_function("ingest one flight", |b| {
-            b.iter(|| ingest::record(&raw, &config.channels, &config.constants, &config.aircraft, &config.ingest));
+            b.iter(|| {
+                ingest::record(
+                    &raw,
+                    &config.channels,
+                    &config.constants,
+                    &config.aircraft,
+                    &config.ingest,
+                )
+            });
         });
     }
     c.bench_function("segment one flight", |b| {
-        b.iter(|| segment::maneuvers(&bench.record, &config.classes, &config.aircraft, &config.segment));
+        b.iter(|| {
+            segment::maneuvers(
+                &bench.record,
+                &config.classes,
+                &config.aircraft,
+                &config.segment,
+            )
+        });
     });
-    let basis = Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate);
+    let basis = Basis::new(
+        &config.aircraft,
+        &config.buildup,
+        &config.tunnel,
+        &config.estimate,
+    );
     c.bench_function("estimate one maneuver", |b| {
         b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &basis));
     });

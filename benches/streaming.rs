@@ -58,7 +58,10 @@ fn run(archive: Option<&str>, until: Stage) -> anyhow::Result<()> {
 
 fn main() -> anyhow::Result<()> {
     let archive = std::env::args().skip(1).find(|a| !a.starts_with('-'));
-    let own = Overrides { archive: archive.clone(), ..Overrides::default() };
+    let own = Overrides {
+        archive: archive.clone(),
+        ..Overrides::default()
+    };
     let config = Config::load(Path::new("pipelines/harv"), own)?;
     let flights = archive::find(&config.archive)?;
     let mut decoded = 0.0;
@@ -70,10 +73,21 @@ fn main() -> anyhow::Result<()> {
         for path in flights.iter().flat_map(|f| &f.files) {
             let schema = ParquetReader::new(File::open(path)?).schema()?;
             // Polars as it is built here has no columns of small integers: flags are left to harvest.
-            let small = [ArrowDataType::Int8, ArrowDataType::Int16, ArrowDataType::UInt8, ArrowDataType::UInt16];
-            let read = schema.iter_values().filter(|field| !small.contains(&field.dtype));
-            let names = read.map(|field| field.name.to_string()).filter(|name| config.channels.contains_key(name));
-            let frame = ParquetReader::new(File::open(path)?).with_columns(Some(names.collect())).finish()?;
+            let small = [
+                ArrowDataType::Int8,
+                ArrowDataType::Int16,
+                ArrowDataType::UInt8,
+                ArrowDataType::UInt16,
+            ];
+            let read = schema
+                .iter_values()
+                .filter(|field| !small.contains(&field.dtype));
+            let names = read
+                .map(|field| field.name.to_string())
+                .filter(|name| config.channels.contains_key(name));
+            let frame = ParquetReader::new(File::open(path)?)
+                .with_columns(Some(names.collect()))
+                .finish()?;
             decoded += (frame.height() * frame.width() * 8) as f64 / 1e6;
         }
         Ok(())
@@ -81,10 +95,21 @@ fn main() -> anyhow::Result<()> {
     .context("polars")?;
     let rate = |time: Duration| decoded / time.as_secs_f64();
     println!("{} flights, {decoded:.0} MB decoded", flights.len());
-    println!("polars reads the columns                {:8.0} MB/s", rate(polars));
+    println!(
+        "polars reads the columns                {:8.0} MB/s",
+        rate(polars)
+    );
     let ratio = |time: Duration| polars.as_secs_f64() / time.as_secs_f64();
-    println!("ingest, into a new store                {:8.0} MB/s, {:.2} of polars", rate(ingest), ratio(ingest));
-    println!("ingest and segment, into a new store    {:8.0} MB/s, {:.2} of polars", rate(segment), ratio(segment));
+    println!(
+        "ingest, into a new store                {:8.0} MB/s, {:.2} of polars",
+        rate(ingest),
+        ratio(ingest)
+    );
+    println!(
+        "ingest and segment, into a new store    {:8.0} MB/s, {:.2} of polars",
+        rate(segment),
+        ratio(segment)
+    );
     if let Some(memory) = memory {
         println!("highest memory of ingest and segment    {memory:8.0} MB");
     }

@@ -23,7 +23,9 @@ use crate::flight::{Mark, Record, signal};
 use crate::output_error::cost::Sums;
 use crate::output_error::input_noise::noisy_surfaces;
 use crate::output_error::newton_raphson::{self, Settings};
-use crate::output_error::{Case, Fit, InitialState, Likelihood, Measurements, Model, Outcome, cramer_rao};
+use crate::output_error::{
+    Case, Fit, InitialState, Likelihood, Measurements, Model, Outcome, cramer_rao,
+};
 use crate::store::files;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -118,13 +120,21 @@ pub struct Subject {
 /// [`Error`] naming the file that is missing or cannot be understood.
 pub fn load(file: &Path) -> Result<Subject> {
     let begin = Instant::now();
-    let given: Given = serde_json::from_str(&files::text(file)?)
-        .map_err(|e| Error::config(file, Some(e.line()), format!("no case as it should be: {e}")))?;
+    let given: Given = serde_json::from_str(&files::text(file)?).map_err(|e| {
+        Error::config(
+            file,
+            Some(e.line()),
+            format!("no case as it should be: {e}"),
+        )
+    })?;
     let table = file.with_extension("csv");
     let columns = files::columns(&table)?;
     let aircraft = given.aircraft();
-    let record = given.record(&columns).map_err(|what| Error::config(&table, None, what))?;
-    let derivative = |name: &String| derivative(name).map_err(|what| Error::config(file, None, what));
+    let record = given
+        .record(&columns)
+        .map_err(|what| Error::config(&table, None, what))?;
+    let derivative =
+        |name: &String| derivative(name).map_err(|what| Error::config(file, None, what));
     let mut free = Vec::new();
     let mut biases = Vec::new();
     for name in given.start.keys() {
@@ -133,8 +143,20 @@ pub fn load(file: &Path) -> Result<Subject> {
             None => free.push(derivative(name)?),
         }
     }
-    let held = given.fixed.iter().map(|(name, value)| Ok((derivative(name)?, *value))).collect::<Result<_>>()?;
-    Ok(Subject { aircraft, record, free, held, biases, import_s: begin.elapsed().as_secs_f64(), given })
+    let held = given
+        .fixed
+        .iter()
+        .map(|(name, value)| Ok((derivative(name)?, *value)))
+        .collect::<Result<_>>()?;
+    Ok(Subject {
+        aircraft,
+        record,
+        free,
+        held,
+        biases,
+        import_s: begin.elapsed().as_secs_f64(),
+        given,
+    })
 }
 
 /// Estimates a case `repetitions` times.
@@ -158,10 +180,17 @@ pub fn timed(subject: &Subject, repetitions: usize) -> Result<Timed, String> {
         corrected_s.push(clock.wall_s());
     }
     let Estimated { fit, std, case, .. } = &estimated;
-    let unit = |name: &str| if bias(name).is_some() { subject.given.accelerometer_unit() } else { 1.0 };
+    let unit = |name: &str| {
+        if bias(name).is_some() {
+            subject.given.accelerometer_unit()
+        } else {
+            1.0
+        }
+    };
     let named = |values: &[f64]| {
         let both = case.names.iter().zip(values);
-        both.map(|(name, value)| (name.clone(), value * unit(name))).collect()
+        both.map(|(name, value)| (name.clone(), value * unit(name)))
+            .collect()
     };
     Ok(Timed {
         outcome: fit.outcome.name(),
@@ -190,12 +219,25 @@ pub fn batch(folder: &Path, repetitions: usize) -> Result<Batch> {
     let results: Vec<Timed> = subjects
         .par_iter()
         .zip(&paths)
-        .map(|(subject, path)| timed(subject, repetitions).map_err(|what| Error::config(path, None, what)))
+        .map(|(subject, path)| {
+            timed(subject, repetitions).map_err(|what| Error::config(path, None, what))
+        })
         .collect::<Result<_>>()?;
     let (wall_s, cpu_s) = (clock.wall_s(), clock.cpu_s());
-    let name = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let results: BTreeMap<String, Timed> = paths.iter().map(|path| name(path)).zip(results).collect();
-    Ok(Batch { count: results.len(), wall_s, cpu_s, results })
+    let name = |path: &Path| {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let results: BTreeMap<String, Timed> =
+        paths.iter().map(|path| name(path)).zip(results).collect();
+    Ok(Batch {
+        count: results.len(),
+        wall_s,
+        cpu_s,
+        results,
+    })
 }
 
 /// One estimate: the fit, the inverse of its information matrix and its standard errors.
@@ -217,7 +259,14 @@ impl Estimated {
         let held: Vec<(&Derivative, f64)> = subject.held.iter().map(|(d, v)| (d, *v)).collect();
         self.case.noisy_surfaces = noisy_surfaces(&subject.aircraft, &self.window, &free, &held);
         let bounds = cramer_rao::bounds(self.inverse.as_ref()?, &self.case, &self.fit);
-        Some(bounds.corrected.diagonal().iter().map(|v| v.sqrt()).collect())
+        Some(
+            bounds
+                .corrected
+                .diagonal()
+                .iter()
+                .map(|v| v.sqrt())
+                .collect(),
+        )
     }
 }
 
@@ -227,14 +276,26 @@ impl Subject {
         let window = self.window()?;
         let case = self.case(&window);
         let ready_s = clock.wall_s();
-        let settings = Settings { tolerance: STEPS_AHEAD * self.given.ftol, ..Settings::default() };
+        let settings = Settings {
+            tolerance: STEPS_AHEAD * self.given.ftol,
+            ..Settings::default()
+        };
         let (start, weights) = self.start(&case);
         let fit = newton_raphson::minimise(&case, start, weights, &settings);
         let sums = case.sums(&fit.response, &fit.weights);
         let inverse = Some(&sums).filter(|_| fit.outcome == Outcome::Converged);
         let inverse = inverse.and_then(|sums| cramer_rao::inverse(&sums.information));
-        let std = inverse.as_ref().map_or(vec![], |inverse| standard_errors(inverse, &sums));
-        Ok(Estimated { window, case, fit, inverse, std, ready_s })
+        let std = inverse
+            .as_ref()
+            .map_or(vec![], |inverse| standard_errors(inverse, &sums));
+        Ok(Estimated {
+            window,
+            case,
+            fit,
+            inverse,
+            std,
+            ready_s,
+        })
     }
 
     /// The case's signals at samples and between them.
@@ -244,7 +305,12 @@ impl Subject {
     pub fn window(&self) -> Result<Window, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.filter_map(|d| d.regressor.surface());
-        Window::cut(&self.record, 0..self.record.samples, surfaces, MassProperties::Mean)
+        Window::cut(
+            &self.record,
+            0..self.record.samples,
+            surfaces,
+            MassProperties::Mean,
+        )
     }
 
     /// The maneuver laid out for the iteration.
@@ -256,7 +322,12 @@ impl Subject {
             biases: self.biases.iter().collect(),
             initial_state: InitialState::Measured,
         };
-        let mut case = Case::new(&self.aircraft, window, self.given.measurements(&self.record), &model);
+        let mut case = Case::new(
+            &self.aircraft,
+            window,
+            self.given.measurements(&self.record),
+            &model,
+        );
         case.start_from_mean_of(self.given.x0_samples);
         case
     }
@@ -275,7 +346,13 @@ impl Subject {
     /// The case's starting values in the order of its parameters, and its weights.
     #[must_use]
     pub fn start(&self, case: &Case<3, Longitudinal>) -> (Vec<f64>, [f64; OUTPUTS]) {
-        let unit = |name: &str| if bias(name).is_some() { self.given.accelerometer_unit() } else { 1.0 };
+        let unit = |name: &str| {
+            if bias(name).is_some() {
+                self.given.accelerometer_unit()
+            } else {
+                1.0
+            }
+        };
         let value = |name: &String| self.given.start.get(name).map_or(0.0, |v| v / unit(name));
         (case.names.iter().map(value).collect(), self.given.weights())
     }
@@ -284,7 +361,11 @@ impl Subject {
 /// Square roots of the diagonal of H⁻¹, scaled by the residuals' variance 2 n J/(n − parameters).
 fn standard_errors(inverse: &DMatrix<f64>, sums: &Sums) -> Vec<f64> {
     let variance = sums.weighted_square / (sums.count - inverse.nrows()) as f64;
-    inverse.diagonal().iter().map(|v| (v * variance).sqrt()).collect()
+    inverse
+        .diagonal()
+        .iter()
+        .map(|v| (v * variance).sqrt())
+        .collect()
 }
 
 /// `an_bias`, `ax_bias`: the output that a bias shifts.
@@ -292,7 +373,10 @@ fn bias(name: &str) -> Option<Bias> {
     let output = name.strip_suffix("_bias")?;
     let outputs = Axis::Longitudinal.outputs();
     let output = outputs.into_iter().find(|o| o.name() == output)?;
-    Some(Bias { name: name.to_owned(), output })
+    Some(Bias {
+        name: name.to_owned(),
+        output,
+    })
 }
 
 /// Coefficient, then `0`, `a`, `q` or the column of a surface; that of a thrust-vectoring vane ends in `v`.
@@ -300,7 +384,8 @@ fn derivative(name: &str) -> Result<Derivative, String> {
     let coefficients = Axis::Longitudinal.coefficients();
     let of = |c: &Coefficient| name.strip_prefix(format!("{c:?}").as_str());
     let found = coefficients.into_iter().find_map(|c| Some((c, of(&c)?)));
-    let (coefficient, along) = found.ok_or_else(|| format!("`{name}` is no derivative of CN, Cm or CA"))?;
+    let (coefficient, along) =
+        found.ok_or_else(|| format!("`{name}` is no derivative of CN, Cm or CA"))?;
     let regressor = match along {
         "0" => Regressor::Constant,
         "a" => Regressor::Alpha,
@@ -308,7 +393,11 @@ fn derivative(name: &str) -> Result<Derivative, String> {
         vane if vane.ends_with('v') => Regressor::Vane(vane.to_owned()),
         surface => Regressor::Surface(surface.to_owned()),
     };
-    Ok(Derivative { name: name.to_owned(), coefficient, regressor })
+    Ok(Derivative {
+        name: name.to_owned(),
+        coefficient,
+        regressor,
+    })
 }
 
 impl Given {
@@ -327,8 +416,18 @@ impl Given {
                 an: at(c.x_an, c.y_an, c.z_an),
                 ax: at(c.x_ax, c.y_ax, c.z_ax),
                 ay: at(0.0, 0.0, 0.0),
-                alpha_vane: Vane { x_ft: c.x_alpha, y_ft: c.y_alpha, z_ft: 0.0, factor: c.k_alpha },
-                beta_vane: Vane { x_ft: 0.0, y_ft: 0.0, z_ft: 0.0, factor: 1.0 },
+                alpha_vane: Vane {
+                    x_ft: c.x_alpha,
+                    y_ft: c.y_alpha,
+                    z_ft: 0.0,
+                    factor: c.k_alpha,
+                },
+                beta_vane: Vane {
+                    x_ft: 0.0,
+                    y_ft: 0.0,
+                    z_ft: 0.0,
+                    factor: 1.0,
+                },
                 vane_model: VaneModel::SmallAngle,
                 thrust_in_ax: self.ax_thrust_term,
             },
@@ -342,7 +441,9 @@ impl Given {
         let constant = |value: f64| vec![value; samples];
         let mut signals: BTreeMap<String, Vec<f64>> = columns.clone();
         for (ours, theirs) in RECORDED {
-            let values = signals.remove(theirs).ok_or_else(|| format!("the record has no column `{theirs}`"))?;
+            let values = signals
+                .remove(theirs)
+                .ok_or_else(|| format!("the record has no column `{theirs}`"))?;
             signals.insert(ours.to_owned(), values);
         }
         let constants = [
@@ -359,13 +460,19 @@ impl Given {
             (signal::ALTITUDE, altitude_ft(c.g)),
         ];
         signals.extend(constants.map(|(name, value)| (name.to_owned(), constant(value))));
-        let series = |values: Vec<f64>| Series { marks: vec![Mark::Measured; values.len()], values };
+        let series = |values: Vec<f64>| Series {
+            marks: vec![Mark::Measured; values.len()],
+            values,
+        };
         Ok(Record {
             flight_id: "standard case".to_owned(),
             start_s: 0.0,
             step_s: self.dt,
             samples,
-            signals: signals.into_iter().map(|(name, values)| (name, series(values))).collect(),
+            signals: signals
+                .into_iter()
+                .map(|(name, values)| (name, series(values)))
+                .collect(),
         })
     }
 
@@ -386,15 +493,25 @@ impl Given {
         let c = &self.constants;
         let values = |name: &str| record.values(name).unwrap_or_default();
         let [p, q, r] = [signal::P, signal::Q, signal::R].map(values);
-        let [alpha, theta, an, ax] = [signal::ALPHA_VANE, signal::THETA, signal::AN, signal::AX].map(values);
+        let [alpha, theta, an, ax] =
+            [signal::ALPHA_VANE, signal::THETA, signal::AN, signal::AX].map(values);
         let unit = self.accelerometer_unit();
         let row = |k: usize| {
             let (p, r) = (p[k] / DEG, r[k] / DEG);
             // Down at the arm (−x forward, −z down): r p (−x); forward: p r (−z).
             let (down, forward) = (-r * p * c.x_an, -p * r * c.z_ax);
-            [alpha[k], q[k], theta[k], an[k] / unit - down / G0_FT_S2, ax[k] / unit + forward / G0_FT_S2]
+            [
+                alpha[k],
+                q[k],
+                theta[k],
+                an[k] / unit - down / G0_FT_S2,
+                ax[k] / unit + forward / G0_FT_S2,
+            ]
         };
-        Measurements { values: (0..record.samples).map(row).collect(), used: vec![[true; OUTPUTS]; record.samples] }
+        Measurements {
+            values: (0..record.samples).map(row).collect(),
+            used: vec![[true; OUTPUTS]; record.samples],
+        }
     }
 }
 
@@ -427,7 +544,11 @@ fn altitude_ft(g: f64) -> f64 {
     let (mut low, mut high) = (-100_000.0, 1_000_000.0);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
-        if gravity_ft_s2(LATITUDE_DEG, middle) > g { low = middle } else { high = middle }
+        if gravity_ft_s2(LATITUDE_DEG, middle) > g {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -440,7 +561,10 @@ struct Clock {
 
 impl Clock {
     fn start() -> Clock {
-        Clock { wall: Instant::now(), cpu_s: processor_s() }
+        Clock {
+            wall: Instant::now(),
+            cpu_s: processor_s(),
+        }
     }
 
     fn wall_s(&self) -> f64 {

@@ -348,7 +348,9 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
 
 /// A stage of the whole campaign, or of one shard.
 fn stage(until: Stage, options: &StageOptions) -> anyhow::Result<ExitCode> {
-    let shard = options.share.work(until, &options.run.options, &options.run.patience);
+    let shard = options
+        .share
+        .work(until, &options.run.options, &options.run.patience);
     shard.unwrap_or_else(|| logged(until, &options.run))
 }
 
@@ -356,7 +358,10 @@ fn logged(until: Stage, options: &RunOptions) -> anyhow::Result<ExitCode> {
     let log = options.log.as_deref().map(Log::open).transpose()?;
     let done = brought(until, options, log.as_ref());
     if let (Some(log), Err(error)) = (&log, &done) {
-        log.write("end", &[("exit", 1.into()), ("error", format!("{error:#}").into())]);
+        log.write(
+            "end",
+            &[("exit", 1.into()), ("error", format!("{error:#}").into())],
+        );
     }
     let code = done?;
     match log.and_then(|log| log.failure()) {
@@ -371,8 +376,11 @@ fn brought(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Res
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     if let Some(log) = log {
-        let folders =
-            [config.shared_store.as_ref().unwrap_or(&config.store), &config.reports].map(|f| f.display().to_string());
+        let folders = [
+            config.shared_store.as_ref().unwrap_or(&config.store),
+            &config.reports,
+        ]
+        .map(|f| f.display().to_string());
         let [store, reports] = folders;
         log.write(
             "begin",
@@ -408,12 +416,21 @@ fn said(log: &Log, done: &Done, exit: u8, begun: Instant) {
         let (place, reason) = (problem.place.as_str(), problem.reason.as_str());
         log.write(
             "problem",
-            &[("stage", stage.into()), ("flight", flight.into()), ("place", place.into()), ("reason", reason.into())],
+            &[
+                ("stage", stage.into()),
+                ("flight", flight.into()),
+                ("place", place.into()),
+                ("reason", reason.into()),
+            ],
         );
     }
     log.write(
         "night",
-        &[("night", done.night.as_str().into()), ("new", done.is_new.into()), ("alert", summary.alert.into())],
+        &[
+            ("night", done.night.as_str().into()),
+            ("new", done.is_new.into()),
+            ("alert", summary.alert.into()),
+        ],
     );
     log.write(
         "end",
@@ -433,7 +450,10 @@ fn said(log: &Log, done: &Done, exit: u8, begun: Instant) {
 fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
     if let Some(threads) = threads {
         anyhow::ensure!(threads > 0, "--threads must be at least 1");
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .context("cannot start the threads")?;
     }
     Ok(())
 }
@@ -450,11 +470,18 @@ fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
         let flown: usize = flights.iter().map(|f| f.flown.len()).sum();
         println!("{} flights, {flown} maneuvers", flights.len());
         for problem in &problems {
-            println!("  {}: {}: {}", problem.flight_id, problem.place, problem.reason);
+            println!(
+                "  {}: {}: {}",
+                problem.flight_id, problem.place, problem.reason
+            );
         }
         println!("campaign in {}", options.out.display());
     }
-    Ok(if problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+    Ok(if problems.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(2)
+    })
 }
 
 /// Studies the bounds and says where the findings are.
@@ -465,18 +492,32 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     if let Some(realisations) = options.realisations {
         simulation.cards.study.realisations = realisations;
     }
-    anyhow::ensure!(simulation.cards.study.realisations > 1, "a scatter needs two realisations or more");
+    anyhow::ensure!(
+        simulation.cards.study.realisations > 1,
+        "a scatter needs two realisations or more"
+    );
     let bars = Bars::new(options.quiet, None);
-    let command =
-        format!("harvest validate {} --realisations {}", options.cards.display(), simulation.cards.study.realisations);
+    let command = format!(
+        "harvest validate {} --realisations {}",
+        options.cards.display(),
+        simulation.cards.study.realisations
+    );
     let found = validation::run(&simulation, &options.out, &options.page, &command, &bars)?;
     if !options.quiet {
         for problem in &found.problems {
             println!("  {}: {}", problem.place, problem.reason);
         }
-        println!("tables in {}\npage: {}", options.out.display(), options.page.display());
+        println!(
+            "tables in {}\npage: {}",
+            options.out.display(),
+            options.page.display()
+        );
     }
-    Ok(if found.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+    Ok(if found.problems.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(2)
+    })
 }
 
 /// Times a standard case, or a folder of them, and says what came of it as JSON.
@@ -487,7 +528,8 @@ fn bench(options: &BenchCaseOptions) -> anyhow::Result<ExitCode> {
     let text = if case.is_dir() {
         serde_json::to_string_pretty(&bench_case::batch(case, repetitions)?)?
     } else {
-        let timed = bench_case::timed(&bench_case::load(case)?, repetitions).map_err(anyhow::Error::msg)?;
+        let timed =
+            bench_case::timed(&bench_case::load(case)?, repetitions).map_err(anyhow::Error::msg)?;
         serde_json::to_string_pretty(&timed)?
     };
     match &options.out {
@@ -505,10 +547,16 @@ fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let bars = Bars::new(options.options.quiet, None);
-    let folder = options.out.clone().unwrap_or_else(|| config.reports.join("export"));
+    let folder = options
+        .out
+        .clone()
+        .unwrap_or_else(|| config.reports.join("export"));
     let exported = pipeline::export::export(&config, &folder, options.patience.wait(), &bars)?;
     if !options.options.quiet {
-        println!("{} values, {} of them from flight", exported.values, exported.flight);
+        println!(
+            "{} values, {} of them from flight",
+            exported.values, exported.flight
+        );
         if !exported.missing.is_empty() {
             println!("without any value: {}", exported.missing.join(" "));
         }
@@ -516,7 +564,11 @@ fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
             println!("{}", file.display());
         }
     }
-    Ok(if night::rejected(&exported.problems) { ExitCode::from(2) } else { ExitCode::SUCCESS })
+    Ok(if night::rejected(&exported.problems) {
+        ExitCode::from(2)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 /// Draws a flight or a maneuver and says where the picture is.
@@ -525,14 +577,23 @@ fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Res
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let bars = Bars::new(options.options.quiet, None);
-    let picture = show::show(&config, &subject(options.id.clone()), options.out.as_deref(), &bars)?;
+    let picture = show::show(
+        &config,
+        &subject(options.id.clone()),
+        options.out.as_deref(),
+        &bars,
+    )?;
     if !options.options.quiet {
         for problem in &picture.problems {
             println!("  {}: {}: {}", problem.stage, problem.place, problem.reason);
         }
         println!("picture: {}", picture.path.display());
     }
-    Ok(if picture.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+    Ok(if picture.problems.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(2)
+    })
 }
 
 impl Options {
@@ -548,14 +609,25 @@ impl Options {
             ("--reports", self.reports.as_deref().map(path)),
             ("--memory-mb", self.memory_mb.map(|mb| mb.to_string())),
         ];
-        let against = self.against.iter().map(|folder| ("--against", Some(path(folder))));
-        let given = options.into_iter().chain(against).filter_map(|(name, value)| Some([name.to_owned(), value?]));
-        std::iter::once(path(&self.pipeline)).chain(given.flatten()).collect()
+        let against = self
+            .against
+            .iter()
+            .map(|folder| ("--against", Some(path(folder))));
+        let given = options
+            .into_iter()
+            .chain(against)
+            .filter_map(|(name, value)| Some([name.to_owned(), value?]));
+        std::iter::once(path(&self.pipeline))
+            .chain(given.flatten())
+            .collect()
     }
 
     fn load(&self) -> anyhow::Result<Config> {
-        let folder =
-            if self.pipeline.is_dir() { self.pipeline.clone() } else { Path::new("pipelines").join(&self.pipeline) };
+        let folder = if self.pipeline.is_dir() {
+            self.pipeline.clone()
+        } else {
+            Path::new("pipelines").join(&self.pipeline)
+        };
         anyhow::ensure!(
             folder.is_dir(),
             "there is no pipeline {}: give a folder, or the name of one under pipelines/",
@@ -588,10 +660,19 @@ fn summary(config: &Config, done: &Done, until: Stage) {
     for problem in campaign.problems.iter().take(10) {
         let place = [problem.flight_id.as_str(), problem.place.as_str()].map(str::trim);
         let place: Vec<&str> = place.into_iter().filter(|s| !s.is_empty()).collect();
-        println!("  {}: {}: {}", problem.stage, place.join(", "), problem.reason);
+        println!(
+            "  {}: {}: {}",
+            problem.stage,
+            place.join(", "),
+            problem.reason
+        );
     }
     if campaign.problems.len() > 10 {
-        println!("  and {} more in {}", campaign.problems.len() - 10, config.reports.join("problems.csv").display());
+        println!(
+            "  and {} more in {}",
+            campaign.problems.len() - 10,
+            config.reports.join("problems.csv").display()
+        );
     }
     if !done.is_new {
         println!("nothing new: night {} holds", done.night);
@@ -609,21 +690,40 @@ fn check(options: &Options) -> anyhow::Result<ExitCode> {
     let flights = archive::find(&config.archive)?;
     println!("pipeline   {}: {}", config.name, config.title);
     println!("archive    {}: {} flights", config.archive, flights.len());
-    println!("aircraft   {}, {} channels", config.aircraft.name, config.channels.len());
-    println!("model      {} derivatives, {} biases", config.buildup.derivatives.len(), config.buildup.biases.len());
+    println!(
+        "aircraft   {}, {} channels",
+        config.aircraft.name,
+        config.channels.len()
+    );
+    println!(
+        "model      {} derivatives, {} biases",
+        config.buildup.derivatives.len(),
+        config.buildup.biases.len()
+    );
     println!("tunnel     {}", config.wind_tunnel.display());
     println!(
         "events     {}",
-        if config.events.is_empty() { "found in the records".into() } else { format!("{} given", config.events.len()) }
+        if config.events.is_empty() {
+            "found in the records".into()
+        } else {
+            format!("{} given", config.events.len())
+        }
     );
     println!("classes    estimated  held  inactive");
     for class in &config.classes {
         let count = |status| class.statuses.values().filter(|s| **s == status).count();
         let [free, held, inactive] = [Status::Estimated, Status::Held, Status::Inactive].map(count);
-        println!("  {:<10} {free:>7} {held:>5} {inactive:>9}  {}", class.name, class.title);
+        println!(
+            "  {:<10} {free:>7} {held:>5} {inactive:>9}  {}",
+            class.name, class.title
+        );
     }
     match &config.shared_store {
-        Some(shared) => println!("store      {}, kept in {}", shared.display(), config.store.display()),
+        Some(shared) => println!(
+            "store      {}, kept in {}",
+            shared.display(),
+            config.store.display()
+        ),
         None => println!("store      {}", config.store.display()),
     }
     println!("reports    {}", config.reports.display());
@@ -641,7 +741,12 @@ struct Bars<'a> {
 
 impl Bars<'_> {
     fn new(quiet: bool, log: Option<&Log>) -> Bars<'_> {
-        Bars { quiet, log, bar: Mutex::new(ProgressBar::hidden()), stage: Mutex::new(None) }
+        Bars {
+            quiet,
+            log,
+            bar: Mutex::new(ProgressBar::hidden()),
+            stage: Mutex::new(None),
+        }
     }
 
     fn with(&self, act: impl FnOnce(&mut ProgressBar)) {
@@ -656,10 +761,14 @@ impl Progress for Bars<'_> {
         if let Ok(mut begun) = self.stage.lock() {
             *begun = Some((stage.to_owned(), items, Instant::now()));
         }
-        let new = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(items as u64) };
-        if let Ok(style) =
-            ProgressStyle::with_template("{prefix:>9} {bar:32} {pos:>4}/{len:<4} {elapsed:>4}  {wide_msg}")
-        {
+        let new = if self.quiet {
+            ProgressBar::hidden()
+        } else {
+            ProgressBar::new(items as u64)
+        };
+        if let Ok(style) = ProgressStyle::with_template(
+            "{prefix:>9} {bar:32} {pos:>4}/{len:<4} {elapsed:>4}  {wide_msg}",
+        ) {
             new.set_style(style);
         }
         new.set_prefix(stage.to_owned());
@@ -677,7 +786,14 @@ impl Progress for Bars<'_> {
         let begun = self.stage.lock().ok().and_then(|mut begun| begun.take());
         if let (Some(log), Some((stage, items, begun))) = (self.log, begun) {
             let seconds = begun.elapsed().as_secs_f64();
-            log.write("stage", &[("stage", stage.into()), ("items", items.into()), ("seconds", seconds.into())]);
+            log.write(
+                "stage",
+                &[
+                    ("stage", stage.into()),
+                    ("items", items.into()),
+                    ("seconds", seconds.into()),
+                ],
+            );
         }
         self.with(|bar| bar.finish_with_message(""));
     }

@@ -85,18 +85,36 @@ pub fn comparison(
     settings: &Settings,
 ) -> Vec<ComparisonRow> {
     let row = |t: &TrendRow| {
-        let group = groups.group_of(&t.derivative).filter(|g| g.name == t.group)?;
-        let of_it = || trends.iter().filter(|o| o.derivative == t.derivative && o.group == t.group);
+        let group = groups
+            .group_of(&t.derivative)
+            .filter(|g| g.name == t.group)?;
+        let of_it = || {
+            trends
+                .iter()
+                .filter(|o| o.derivative == t.derivative && o.group == t.group)
+        };
         let breakpoints = tunnel.alphas_deg(&t.derivative);
-        let is_breakpoint = |alpha: f64| breakpoints.binary_search_by(|b| b.total_cmp(&alpha)).is_ok();
+        let is_breakpoint = |alpha: f64| {
+            breakpoints
+                .binary_search_by(|b| b.total_cmp(&alpha))
+                .is_ok()
+        };
         let comparable = settings.comparable(&t.derivative);
-        if comparable && !is_breakpoint(t.alpha_deg) && of_it().any(|o| is_breakpoint(o.alpha_deg)) {
+        if comparable && !is_breakpoint(t.alpha_deg) && of_it().any(|o| is_breakpoint(o.alpha_deg))
+        {
             return None;
         }
         let classes = maneuvers.iter().filter(|m| group.has(&m.class));
         let condition = condition_near(classes, tunnel, t.alpha_deg, groups.alpha_step_deg);
-        let value = condition.filter(|_| comparable).and_then(|condition| tunnel.at(&t.derivative, &condition));
-        let judged = judge(t.value, t.standard_error, value.map(|w| (w.value, w.uncertainty)), settings);
+        let value = condition
+            .filter(|_| comparable)
+            .and_then(|condition| tunnel.at(&t.derivative, &condition));
+        let judged = judge(
+            t.value,
+            t.standard_error,
+            value.map(|w| (w.value, w.uncertainty)),
+            settings,
+        );
         Some(ComparisonRow {
             derivative: t.derivative.clone(),
             unit: t.unit.clone(),
@@ -125,14 +143,23 @@ pub fn of_maneuvers(
     tunnel: &WindTunnel,
     settings: &Settings,
 ) -> Vec<ManeuverComparisonRow> {
-    let places: std::collections::BTreeMap<&str, &Maneuver> =
-        maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m)).collect();
+    let places: std::collections::BTreeMap<&str, &Maneuver> = maneuvers
+        .iter()
+        .map(|m| (m.maneuver_id.as_str(), m))
+        .collect();
     let row = |e: &EstimateRow| {
         let (flight, bound) = (e.value?, e.bound_corrected.or(e.bound)?);
         let maneuver = places.get(e.maneuver_id.as_str())?;
         let comparable = settings.comparable(&e.derivative);
-        let value = tunnel.at(&e.derivative, &maneuver.condition(tunnel)).filter(|_| comparable);
-        let judged = judge(flight, bound, value.map(|w| (w.value, w.uncertainty)), settings);
+        let value = tunnel
+            .at(&e.derivative, &maneuver.condition(tunnel))
+            .filter(|_| comparable);
+        let judged = judge(
+            flight,
+            bound,
+            value.map(|w| (w.value, w.uncertainty)),
+            settings,
+        );
         Some(ManeuverComparisonRow {
             maneuver_id: e.maneuver_id.clone(),
             class: e.class.clone(),
@@ -150,7 +177,11 @@ pub fn of_maneuvers(
             verdict: judged.verdict.of_tunnel().to_owned(),
         })
     };
-    estimates.iter().filter(|e| e.status == Status::Estimated.name()).filter_map(row).collect()
+    estimates
+        .iter()
+        .filter(|e| e.status == Status::Estimated.name())
+        .filter_map(row)
+        .collect()
 }
 
 /// Mean flight condition of the maneuvers within half a step of α, or else of the nearest one, at that α.
@@ -161,15 +192,35 @@ pub(crate) fn condition_near<'a>(
     step_deg: f64,
 ) -> Option<Condition> {
     let distance = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
-    let known: Vec<&Maneuver> = maneuvers.filter(|m| m.mach.is_finite() && m.alpha_deg.is_finite()).collect();
-    let mut near: Vec<&Maneuver> = known.iter().copied().filter(|m| distance(m) <= 0.5 * step_deg).collect();
+    let known: Vec<&Maneuver> = maneuvers
+        .filter(|m| m.mach.is_finite() && m.alpha_deg.is_finite())
+        .collect();
+    let mut near: Vec<&Maneuver> = known
+        .iter()
+        .copied()
+        .filter(|m| distance(m) <= 0.5 * step_deg)
+        .collect();
     if near.is_empty() {
-        near.extend(known.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))));
+        near.extend(
+            known
+                .into_iter()
+                .min_by(|a, b| distance(a).total_cmp(&distance(b))),
+        );
     }
-    let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+    let mean = |values: Vec<f64>| {
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
     let mach = mean(near.iter().map(|m| m.mach).collect())?;
-    let third = mean(near.iter().filter_map(|m| m.condition(tunnel).third).collect());
-    Some(Condition { alpha_deg, mach, third })
+    let third = mean(
+        near.iter()
+            .filter_map(|m| m.condition(tunnel).third)
+            .collect(),
+    );
+    Some(Condition {
+        alpha_deg,
+        mach,
+        third,
+    })
 }
 
 /// What two values of one derivative say of each other.
@@ -206,25 +257,37 @@ pub(crate) struct Judged {
 }
 
 /// Judges a value with its standard error by another, whose own may not be known.
-pub(crate) fn judge(flight: f64, error: f64, other: Option<(f64, Option<f64>)>, settings: &Settings) -> Judged {
+pub(crate) fn judge(
+    flight: f64,
+    error: f64,
+    other: Option<(f64, Option<f64>)>,
+    settings: &Settings,
+) -> Judged {
     let Some((other, stated)) = other else {
         let verdict = Verdict::NothingThere;
-        return Judged { difference: None, uncertainty: None, difference_pct: None, z: None, verdict };
+        return Judged {
+            difference: None,
+            uncertainty: None,
+            difference_pct: None,
+            z: None,
+            verdict,
+        };
     };
     let other_error = stated.unwrap_or(0.0);
     let (difference, uncertainty) = (flight - other, error.hypot(other_error));
     let is_nonzero = |value: f64, error: f64| value.abs() > settings.agreement_z * error;
-    let verdict = if flight * other < 0.0 && is_nonzero(flight, error) && is_nonzero(other, other_error) {
-        Verdict::SignDiffers
-    } else if difference.abs() <= settings.agreement_z * uncertainty
-        || difference.abs() <= settings.agreement_pct / 100.0 * other.abs()
-    {
-        Verdict::Agrees
-    } else if difference > 0.0 {
-        Verdict::Higher
-    } else {
-        Verdict::Lower
-    };
+    let verdict =
+        if flight * other < 0.0 && is_nonzero(flight, error) && is_nonzero(other, other_error) {
+            Verdict::SignDiffers
+        } else if difference.abs() <= settings.agreement_z * uncertainty
+            || difference.abs() <= settings.agreement_pct / 100.0 * other.abs()
+        {
+            Verdict::Agrees
+        } else if difference > 0.0 {
+            Verdict::Higher
+        } else {
+            Verdict::Lower
+        };
     let finite = |v: f64| v.is_finite().then_some(v);
     Judged {
         difference: Some(difference),
@@ -286,13 +349,28 @@ mod tests {
 
     fn tunnel(value: f64, uncertainty: Option<f64>) -> WindTunnel {
         let mut tunnel = WindTunnel::default();
-        tunnel.insert("d", TunnelPoint { alpha_deg: 20.0, mach: None, value, uncertainty, source: None });
+        tunnel.insert(
+            "d",
+            TunnelPoint {
+                alpha_deg: 20.0,
+                mach: None,
+                value,
+                uncertainty,
+                source: None,
+            },
+        );
         tunnel
     }
 
     fn one(trend: TrendRow, tunnel: &WindTunnel, settings: &Settings) -> ComparisonRow {
         let maneuvers = [maneuver("A", 20.3, 0.3)];
-        let mut rows = comparison(&[trend], &maneuvers, tunnel, &trend::Settings::default(), settings);
+        let mut rows = comparison(
+            &[trend],
+            &maneuvers,
+            tunnel,
+            &trend::Settings::default(),
+            settings,
+        );
         assert_eq!(rows.len(), 1);
         rows.remove(0)
     }
@@ -311,7 +389,11 @@ mod tests {
     #[test]
     fn the_tunnel_s_uncertainty_counts() {
         assert_eq!(says(flight(1.25, 0.1), 1.0, Some(0.1)), "agrees");
-        let row = one(flight(1.5, 0.3), &tunnel(1.0, Some(0.4)), &Settings::default());
+        let row = one(
+            flight(1.5, 0.3),
+            &tunnel(1.0, Some(0.4)),
+            &Settings::default(),
+        );
         assert_relative_eq!(row.z.expect("z"), 1.0);
     }
 
@@ -331,60 +413,126 @@ mod tests {
 
     #[test]
     fn a_derivative_without_a_tunnel_value_says_so() {
-        let none = one(flight(1.0, 0.1), &WindTunnel::default(), &Settings::default());
-        let settings = Settings { not_comparable: ["d".to_owned()].into(), ..Settings::default() };
+        let none = one(
+            flight(1.0, 0.1),
+            &WindTunnel::default(),
+            &Settings::default(),
+        );
+        let settings = Settings {
+            not_comparable: ["d".to_owned()].into(),
+            ..Settings::default()
+        };
         let refused = one(flight(1.0, 0.1), &tunnel(1.0, None), &settings);
         for row in [none, refused] {
             assert_eq!(row.verdict, "no tunnel value");
-            assert_eq!((row.wind_tunnel, row.difference, row.difference_pct, row.z), (None, None, None, None));
+            assert_eq!(
+                (row.wind_tunnel, row.difference, row.difference_pct, row.z),
+                (None, None, None, None)
+            );
         }
     }
 
     #[test]
     fn the_numbers_of_a_row_are_those_of_their_definitions() {
-        let row = one(flight(-1.5, 0.25), &tunnel(-2.0, None), &Settings::default());
+        let row = one(
+            flight(-1.5, 0.25),
+            &tunnel(-2.0, None),
+            &Settings::default(),
+        );
         assert_relative_eq!(row.difference.expect("difference"), 0.5);
         assert_relative_eq!(row.difference_pct.expect("percent"), 25.0);
         assert_relative_eq!(row.z.expect("z"), 2.0);
         let zero = one(flight(1.0, 0.0), &tunnel(0.0, None), &Settings::default());
-        assert_eq!((zero.difference_pct, zero.z, zero.verdict.as_str()), (None, None, "flight higher"));
+        assert_eq!(
+            (zero.difference_pct, zero.z, zero.verdict.as_str()),
+            (None, None, "flight higher")
+        );
     }
 
     #[test]
     fn the_tunnel_is_read_at_the_mach_of_the_group_s_maneuvers_near_that_alpha() {
         let mut tunnel = WindTunnel::default();
-        for (alpha_deg, mach, value) in [(20.0, 0.2, 2.0), (20.0, 0.6, 6.0), (30.0, 0.2, 2.0), (30.0, 0.6, 6.0)] {
-            let point = TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: None, source: None };
+        for (alpha_deg, mach, value) in [
+            (20.0, 0.2, 2.0),
+            (20.0, 0.6, 6.0),
+            (30.0, 0.2, 2.0),
+            (30.0, 0.6, 6.0),
+        ] {
+            let point = TunnelPoint {
+                alpha_deg,
+                mach: Some(mach),
+                value,
+                uncertainty: None,
+                source: None,
+            };
             tunnel.insert("d", point);
         }
-        let group = trend::Group { name: "A".into(), classes: vec!["A".into()], ..trend::Group::default() };
-        let groups = trend::Settings { groups: vec![group], ..trend::Settings::default() };
-        let maneuvers =
-            [maneuver("A", 19.0, 0.3), maneuver("A", 21.0, 0.4), maneuver("B", 20.0, 0.6), maneuver("A", 40.0, 0.2)];
-        let of = |group: &str, alpha_deg: f64| TrendRow { group: group.into(), alpha_deg, ..flight(3.5, 0.1) };
+        let group = trend::Group {
+            name: "A".into(),
+            classes: vec!["A".into()],
+            ..trend::Group::default()
+        };
+        let groups = trend::Settings {
+            groups: vec![group],
+            ..trend::Settings::default()
+        };
+        let maneuvers = [
+            maneuver("A", 19.0, 0.3),
+            maneuver("A", 21.0, 0.4),
+            maneuver("B", 20.0, 0.6),
+            maneuver("A", 40.0, 0.2),
+        ];
+        let of = |group: &str, alpha_deg: f64| TrendRow {
+            group: group.into(),
+            alpha_deg,
+            ..flight(3.5, 0.1)
+        };
         let trends = [of("A", 20.0), of("B", 20.0), of("A", 30.0)];
         let rows = comparison(&trends, &maneuvers, &tunnel, &groups, &Settings::default());
         // The trend of class B does not speak for the derivative; no maneuver is within half a step of 30°,
         // and the nearest is that at 21°.
         assert_eq!(rows.len(), 2);
-        assert_relative_eq!(rows[0].wind_tunnel.expect("tunnel"), 3.5, max_relative = 1e-12);
-        assert_relative_eq!(rows[1].wind_tunnel.expect("tunnel"), 4.0, max_relative = 1e-12);
+        assert_relative_eq!(
+            rows[0].wind_tunnel.expect("tunnel"),
+            3.5,
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            rows[1].wind_tunnel.expect("tunnel"),
+            4.0,
+            max_relative = 1e-12
+        );
     }
 
     #[test]
     fn the_tunnel_is_compared_at_its_own_breakpoints_where_a_trend_has_some() {
         let mut tunnel = WindTunnel::default();
         for alpha_deg in [12.5, 20.0] {
-            tunnel.insert("d", TunnelPoint { alpha_deg, mach: None, value: 1.0, uncertainty: None, source: None });
+            tunnel.insert(
+                "d",
+                TunnelPoint {
+                    alpha_deg,
+                    mach: None,
+                    value: 1.0,
+                    uncertainty: None,
+                    source: None,
+                },
+            );
         }
-        let at = |alpha_deg: f64| TrendRow { alpha_deg, ..flight(1.0, 0.1) };
+        let at = |alpha_deg: f64| TrendRow {
+            alpha_deg,
+            ..flight(1.0, 0.1)
+        };
         let alphas = |trends: &[TrendRow]| -> Vec<f64> {
             let maneuvers = [maneuver("A", 20.3, 0.3)];
             let groups = trend::Settings::default();
             let rows = comparison(trends, &maneuvers, &tunnel, &groups, &Settings::default());
             rows.iter().map(|r| r.alpha_deg).collect()
         };
-        assert_eq!(alphas(&[at(10.0), at(12.5), at(15.0), at(20.0)]), [12.5, 20.0]);
+        assert_eq!(
+            alphas(&[at(10.0), at(12.5), at(15.0), at(20.0)]),
+            [12.5, 20.0]
+        );
         assert_eq!(alphas(&[at(15.0), at(17.5)]), [15.0, 17.5]);
     }
 
@@ -392,9 +540,21 @@ mod tests {
     fn each_maneuver_is_compared_at_its_own_condition() {
         let mut tunnel = WindTunnel::default();
         for (alpha_deg, value) in [(20.0, 2.0), (30.0, 4.0)] {
-            tunnel.insert("d", TunnelPoint { alpha_deg, mach: None, value, uncertainty: Some(0.3), source: None });
+            tunnel.insert(
+                "d",
+                TunnelPoint {
+                    alpha_deg,
+                    mach: None,
+                    value,
+                    uncertainty: Some(0.3),
+                    source: None,
+                },
+            );
         }
-        let maneuvers = [Maneuver { maneuver_id: "m".into(), ..maneuver("A", 25.0, 0.3) }];
+        let maneuvers = [Maneuver {
+            maneuver_id: "m".into(),
+            ..maneuver("A", 25.0, 0.3)
+        }];
         let mut estimate = EstimateRow {
             maneuver_id: "m".into(),
             flight_id: "f".into(),
@@ -416,13 +576,29 @@ mod tests {
             equation_error: None,
             held_because: None,
         };
-        let rows = of_maneuvers(std::slice::from_ref(&estimate), &maneuvers, &tunnel, &Settings::default());
+        let rows = of_maneuvers(
+            std::slice::from_ref(&estimate),
+            &maneuvers,
+            &tunnel,
+            &Settings::default(),
+        );
         assert_relative_eq!(rows[0].wind_tunnel.expect("tunnel"), 3.0);
-        assert_relative_eq!(rows[0].uncertainty.expect("uncertainty"), 0.5, max_relative = 1e-14);
+        assert_relative_eq!(
+            rows[0].uncertainty.expect("uncertainty"),
+            0.5,
+            max_relative = 1e-14
+        );
         assert_relative_eq!(rows[0].z.expect("z"), 2.0, max_relative = 1e-14);
-        assert_relative_eq!(rows[0].difference_pct.expect("percent"), 100.0 / 3.0, max_relative = 1e-14);
+        assert_relative_eq!(
+            rows[0].difference_pct.expect("percent"),
+            100.0 / 3.0,
+            max_relative = 1e-14
+        );
         assert_eq!(rows[0].verdict, "agrees");
         estimate.status = "held".into();
-        assert_eq!(of_maneuvers(&[estimate], &maneuvers, &tunnel, &Settings::default()), []);
+        assert_eq!(
+            of_maneuvers(&[estimate], &maneuvers, &tunnel, &Settings::default()),
+            []
+        );
     }
 }

@@ -148,7 +148,13 @@ impl<'a> Basis<'a> {
         tunnel: &'a WindTunnel,
         settings: &'a Settings,
     ) -> Basis<'a> {
-        Basis { aircraft, buildup, tunnel, start: tunnel, settings }
+        Basis {
+            aircraft,
+            buildup,
+            tunnel,
+            start: tunnel,
+            settings,
+        }
     }
 }
 
@@ -177,7 +183,12 @@ pub struct Estimated {
 /// Estimates one maneuver. Whatever goes wrong is in the outcome.
 #[must_use]
 pub fn maneuver(record: &Record, maneuver: &Maneuver, class: &Class, basis: &Basis) -> Estimated {
-    let run = Run { record, maneuver, class, basis };
+    let run = Run {
+        record,
+        maneuver,
+        class,
+        basis,
+    };
     if maneuver.is_rejected() {
         return run.rejected(maneuver.quality.reason.clone());
     }
@@ -197,7 +208,11 @@ fn by_evidence(run: &Run) -> Estimated {
         Ok(choice) => choice,
         Err(reason) => return run.rejected(reason),
     };
-    let mut estimated = Run { class: &choice.applied_to(run.class), ..*run }.estimated();
+    let mut estimated = Run {
+        class: &choice.applied_to(run.class),
+        ..*run
+    }
+    .estimated();
     for row in &mut estimated.estimates {
         row.held_because = choice.held_because.get(&row.derivative).cloned();
     }
@@ -214,7 +229,14 @@ impl Estimated {
 
     /// The rows of a maneuver that was not fitted.
     fn without_fit(fit: FitRow, estimates: Vec<EstimateRow>) -> Estimated {
-        Estimated { fit, estimates, combined: vec![], covariance: None, correlations: vec![], history: None }
+        Estimated {
+            fit,
+            estimates,
+            combined: vec![],
+            covariance: None,
+            correlations: vec![],
+            history: None,
+        }
     }
 }
 
@@ -266,7 +288,13 @@ impl<'a> Run<'a> {
         }
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
-        cramer_rao::consider(case, &wide, &values, &self.held_uncertainties(&ready.model), &mut fit);
+        cramer_rao::consider(
+            case,
+            &wide,
+            &values,
+            &self.held_uncertainties(&ready.model),
+            &mut fit,
+        );
         self.miscalibrate(&ready, &mut fit);
         let mut estimated = Estimated {
             estimates: self.rows(Some((&case.names, &fit))),
@@ -281,24 +309,45 @@ impl<'a> Run<'a> {
     }
 
     /// Cuts the maneuver out of the record and lays it out for this model.
-    fn ready<const NX: usize, E: Equations<NX>>(&self, model: Model<'a>) -> Result<Ready<'a, NX, E>, String> {
+    fn ready<const NX: usize, E: Equations<NX>>(
+        &self,
+        model: Model<'a>,
+    ) -> Result<Ready<'a, NX, E>, String> {
         let range = self.range();
-        let derivatives = model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d));
+        let derivatives = model
+            .free
+            .iter()
+            .copied()
+            .chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
         let settings = self.basis.settings;
         self.refuse_marked(&surfaces)?;
-        let window = Window::cut(self.record, range.clone(), surfaces.iter().copied(), settings.mass_properties)?;
+        let window = Window::cut(
+            self.record,
+            range.clone(),
+            surfaces.iter().copied(),
+            settings.mass_properties,
+        )?;
         let measurements = self.measurements(&range)?;
         let mut case = Case::<NX, E>::new(self.basis.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
         if counted <= case.parameters() {
-            return Err(format!("{counted} output samples for {} parameters", case.parameters()));
+            return Err(format!(
+                "{counted} output samples for {} parameters",
+                case.parameters()
+            ));
         }
         let mut free = model.free.clone();
         free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
         case.noisy_surfaces = noisy_surfaces(self.basis.aircraft, &window, &free, &model.held);
-        Ok(Ready { model, surfaces, window, case, left_out })
+        Ok(Ready {
+            model,
+            surfaces,
+            window,
+            case,
+            left_out,
+        })
     }
 
     /// Refuses a maneuver of which too much is repaired or missing. Samples between those of a slow channel do not count:
@@ -306,27 +355,47 @@ impl<'a> Run<'a> {
     fn refuse_marked(&self, surfaces: &[&str]) -> Result<(), String> {
         let Maneuver { start_s, end_s, .. } = *self.maneuver;
         let most = self.basis.settings.max_marked_share;
-        let outputs = self.record.marked_share(self.class.axis.outputs().map(Output::signal), start_s, end_s);
+        let outputs = self.record.marked_share(
+            self.class.axis.outputs().map(Output::signal),
+            start_s,
+            end_s,
+        );
         if outputs > most {
-            return Err(format!("{:.0}% of its output samples are marked", 100.0 * outputs));
+            return Err(format!(
+                "{:.0}% of its output samples are marked",
+                100.0 * outputs
+            ));
         }
         for surface in surfaces {
             let share = self.record.marked_share([*surface], start_s, end_s);
             if share > most {
-                return Err(format!("{:.0}% of the samples of `{surface}` are marked", 100.0 * share));
+                return Err(format!(
+                    "{:.0}% of the samples of `{surface}` are marked",
+                    100.0 * share
+                ));
             }
         }
         Ok(())
     }
 
     /// Output error from the configured start, and from the other one if that does not converge.
-    fn fit<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>) -> Result<(Fit, Start), String> {
+    fn fit<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+    ) -> Result<(Fit, Start), String> {
         if case.parameters() == 0 {
             return Err("nothing is free to be estimated".to_owned());
         }
         let settings = self.basis.settings;
-        let Maneuver { alpha_deg, mach, .. } = *self.maneuver;
-        let value = |name: &str| self.basis.start.value(name, alpha_deg, mach).map_or(0.0, |v| v.value);
+        let Maneuver {
+            alpha_deg, mach, ..
+        } = *self.maneuver;
+        let value = |name: &str| {
+            self.basis
+                .start
+                .value(name, alpha_deg, mach)
+                .map_or(0.0, |v| v.value)
+        };
         let tunnel = case.starting_values(value);
         let implied = equation_error::start(case, &tunnel);
         let (first, second, other_start) = match settings.start {
@@ -335,26 +404,51 @@ impl<'a> Run<'a> {
         };
         let resolution = self.resolution();
         let weights = self.weights()?;
-        let from =
-            |start| newton_raphson::estimate(case, start, weights, settings.weights, resolution, &settings.iteration);
+        let from = |start| {
+            newton_raphson::estimate(
+                case,
+                start,
+                weights,
+                settings.weights,
+                resolution,
+                &settings.iteration,
+            )
+        };
         let fit = from(first);
         if fit.outcome == Outcome::Converged {
             return Ok((fit, settings.start));
         }
         let other = from(second);
-        Ok(if other.outcome == Outcome::Converged { (other, other_start) } else { (fit, settings.start) })
+        Ok(if other.outcome == Outcome::Converged {
+            (other, other_start)
+        } else {
+            (fit, settings.start)
+        })
     }
 
     /// The maneuver with the held derivatives free as well: what an error of theirs would do.
     fn wide<const NX: usize, E: Equations<NX>>(&self, ready: &Ready<'a, NX, E>) -> Case<NX, E> {
-        let Ready { model, window, case, .. } = ready;
+        let Ready {
+            model,
+            window,
+            case,
+            ..
+        } = ready;
         let held = model.held.iter().map(|(d, _)| *d);
-        let all = Model { free: model.free.iter().copied().chain(held).collect(), held: vec![], ..model.clone() };
+        let all = Model {
+            free: model.free.iter().copied().chain(held).collect(),
+            held: vec![],
+            ..model.clone()
+        };
         Case::new(self.basis.aircraft, window, case.measurements.clone(), &all)
     }
 
     fn held_uncertainties(&self, model: &Model<'a>) -> BTreeMap<&'a str, f64> {
-        model.held.iter().map(|(d, _)| (d.name.as_str(), self.held_uncertainty(d))).collect()
+        model
+            .held
+            .iter()
+            .map(|(d, _)| (d.name.as_str(), self.held_uncertainty(d)))
+            .collect()
     }
 
     /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
@@ -362,7 +456,9 @@ impl<'a> Run<'a> {
         let tunnel = self.basis.tunnel;
         let stated = tunnel.at(&derivative.name, &self.maneuver.condition(tunnel));
         let share = self.basis.settings.held_uncertainty_pct / 100.0;
-        stated.and_then(|v| v.uncertainty).unwrap_or_else(|| share * tunnel.root_mean_square(&derivative.name))
+        stated
+            .and_then(|v| v.uncertainty)
+            .unwrap_or_else(|| share * tunnel.root_mean_square(&derivative.name))
     }
 
     fn status(&self, name: &str) -> Option<Status> {
@@ -371,45 +467,71 @@ impl<'a> Run<'a> {
 
     /// Whether a derivative is its coefficient's constant.
     fn is_constant(&self, name: &str) -> bool {
-        self.basis.buildup.derivative(name).is_some_and(|d| d.regressor == Regressor::Constant)
+        self.basis
+            .buildup
+            .derivative(name)
+            .is_some_and(|d| d.regressor == Regressor::Constant)
     }
 
     fn tunnel(&self, name: &str) -> Option<f64> {
-        self.basis.tunnel.at(name, &self.maneuver.condition(self.basis.tunnel)).map(|v| v.value)
+        self.basis
+            .tunnel
+            .at(name, &self.maneuver.condition(self.basis.tunnel))
+            .map(|v| v.value)
     }
 
     /// Sorts the axis's derivatives and biases into free and held.
     fn model(&self) -> Result<Model<'a>, String> {
         let basis = self.basis;
-        let mut model = Model { initial_state: basis.settings.initial_state, ..Model::default() };
+        let mut model = Model {
+            initial_state: basis.settings.initial_state,
+            ..Model::default()
+        };
         for derivative in basis.buildup.derivatives_of(self.class.axis) {
             match self.status(&derivative.name) {
                 Some(Status::Estimated) => model.free.push(derivative),
                 Some(Status::Held) => model.held.push((derivative, self.held(derivative)?)),
                 Some(Status::Inactive) | None => {
                     if basis.settings.inactive_surfaces == InactiveSurfaces::WindTunnel {
-                        model.held.extend(self.tunnel(&derivative.name).map(|value| (derivative, value)));
+                        model.held.extend(
+                            self.tunnel(&derivative.name)
+                                .map(|value| (derivative, value)),
+                        );
                     }
                 }
             }
         }
         let free = |bias: &&Bias| self.status(&bias.name) == Some(Status::Estimated);
-        model.biases = basis.buildup.biases_of(self.class.axis).filter(free).collect();
+        model.biases = basis
+            .buildup
+            .biases_of(self.class.axis)
+            .filter(free)
+            .collect();
         Ok(model)
     }
 
     /// The model with everything free that the class estimates or holds.
     fn model_without_held(&self) -> Result<Model<'a>, String> {
-        let active = |d: &Derivative| matches!(self.status(&d.name), Some(Status::Estimated | Status::Held));
+        let active =
+            |d: &Derivative| matches!(self.status(&d.name), Some(Status::Estimated | Status::Held));
         let mut model = self.model()?;
-        model.free = self.basis.buildup.derivatives_of(self.class.axis).filter(|d| active(d)).collect();
+        model.free = self
+            .basis
+            .buildup
+            .derivatives_of(self.class.axis)
+            .filter(|d| active(d))
+            .collect();
         model.held.retain(|(d, _)| !active(d));
         Ok(model)
     }
 
     fn held(&self, derivative: &Derivative) -> Result<f64, String> {
-        self.tunnel(&derivative.name)
-            .ok_or_else(|| format!("{} is to be held at a wind-tunnel value and has none here", derivative.name))
+        self.tunnel(&derivative.name).ok_or_else(|| {
+            format!(
+                "{} is to be held at a wind-tunnel value and has none here",
+                derivative.name
+            )
+        })
     }
 
     fn weights(&self) -> Result<[f64; OUTPUTS], String> {
@@ -418,37 +540,65 @@ impl<'a> Run<'a> {
             *weight = self
                 .class
                 .weight(output, self.maneuver.alpha_deg)
-                .ok_or_else(|| format!("class {} has no weight for `{}`", self.class.name, output.signal()))?;
+                .ok_or_else(|| {
+                    format!(
+                        "class {} has no weight for `{}`",
+                        self.class.name,
+                        output.signal()
+                    )
+                })?;
         }
         Ok(weights)
     }
 
     fn resolution(&self) -> [f64; OUTPUTS] {
         let resolution = &self.basis.settings.resolution;
-        self.class.axis.outputs().map(|o| resolution.get(&o).copied().unwrap_or(1e-6))
+        self.class
+            .axis
+            .outputs()
+            .map(|o| resolution.get(&o).copied().unwrap_or(1e-6))
     }
 
     fn measurements(&self, range: &Range<usize>) -> Result<Measurements, String> {
         let mut series = Vec::with_capacity(OUTPUTS);
         for output in self.class.axis.outputs() {
             let name = output.signal();
-            series.push(self.record.signals.get(name).ok_or_else(|| format!("the record has no signal `{name}`"))?);
+            series.push(
+                self.record
+                    .signals
+                    .get(name)
+                    .ok_or_else(|| format!("the record has no signal `{name}`"))?,
+            );
         }
-        let used = |o: usize, k: usize| series[o].marks[k] == Mark::Measured && series[o].values[k].is_finite();
-        let row = |k: usize| std::array::from_fn(|o| if used(o, k) { series[o].values[k] } else { 0.0 });
+        let used = |o: usize, k: usize| {
+            series[o].marks[k] == Mark::Measured && series[o].values[k].is_finite()
+        };
+        let row =
+            |k: usize| std::array::from_fn(|o| if used(o, k) { series[o].values[k] } else { 0.0 });
         Ok(Measurements {
             values: range.clone().map(row).collect(),
-            used: range.clone().map(|k| std::array::from_fn(|o| used(o, k))).collect(),
+            used: range
+                .clone()
+                .map(|k| std::array::from_fn(|o| used(o, k)))
+                .collect(),
         })
     }
 
     fn terms(&self) -> Vec<Term<'a>> {
         let (buildup, axis) = (self.basis.buildup, self.class.axis);
-        let derivatives = buildup.derivatives_of(axis).map(|d| (d.name.as_str(), d.unit().name()));
-        let biases = buildup.biases_of(axis).map(|b| (b.name.as_str(), b.unit().name()));
+        let derivatives = buildup
+            .derivatives_of(axis)
+            .map(|d| (d.name.as_str(), d.unit().name()));
+        let biases = buildup
+            .biases_of(axis)
+            .map(|b| (b.name.as_str(), b.unit().name()));
         derivatives
             .chain(biases)
-            .map(|(name, unit)| Term { name, unit, status: self.status(name).unwrap_or(Status::Inactive) })
+            .map(|(name, unit)| Term {
+                name,
+                unit,
+                status: self.status(name).unwrap_or(Status::Inactive),
+            })
             .collect()
     }
 
@@ -478,13 +628,21 @@ impl<'a> Run<'a> {
     fn combined(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
         let at = |name: &str| names.iter().position(|n| n == name);
         let sums = self.basis.buildup.combined.iter();
-        sums.filter_map(|c| self.combined_row(c, at(&c.constant)?, at(&c.slope)?, fit)).collect()
+        sums.filter_map(|c| self.combined_row(c, at(&c.constant)?, at(&c.slope)?, fit))
+            .collect()
     }
 
     /// The row of a sum `constant + slope α` of parameters `i` and `j`.
-    fn combined_row(&self, combined: &Combined, i: usize, j: usize, fit: &Fit) -> Option<EstimateRow> {
+    fn combined_row(
+        &self,
+        combined: &Combined,
+        i: usize,
+        j: usize,
+        fit: &Fit,
+    ) -> Option<EstimateRow> {
         let alpha = self.maneuver.alpha_deg;
-        let variance = |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
+        let variance =
+            |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
         let deviation = |m: &DMatrix<f64>| variance(m).max(0.0).sqrt();
         let unit = self.basis.buildup.unit_of(&combined.name)?.name();
         Some(EstimateRow {
@@ -542,23 +700,42 @@ impl<'a> Run<'a> {
         Estimated::without_fit(rejected(self.maneuver, reason), self.rows(None))
     }
 
-    fn history(&self, measured: &Measurements, fit: &Fit, window: &Window, surfaces: &[&str]) -> History {
-        let outputs = self.class.axis.outputs().into_iter().enumerate().map(|(o, output)| HistoryOutput {
-            label: output.signal().to_owned(),
-            unit: Unit::of_signal(output.signal()).name.to_owned(),
-            measured: measured.values.iter().map(|z| z[o]).collect(),
-            computed: fit.response.outputs.iter().map(|y| y[o]).collect(),
-            marked: measured.used.iter().map(|used| !used[o]).collect(),
-        });
+    fn history(
+        &self,
+        measured: &Measurements,
+        fit: &Fit,
+        window: &Window,
+        surfaces: &[&str],
+    ) -> History {
+        let outputs = self
+            .class
+            .axis
+            .outputs()
+            .into_iter()
+            .enumerate()
+            .map(|(o, output)| HistoryOutput {
+                label: output.signal().to_owned(),
+                unit: Unit::of_signal(output.signal()).name.to_owned(),
+                measured: measured.values.iter().map(|z| z[o]).collect(),
+                computed: fit.response.outputs.iter().map(|y| y[o]).collect(),
+                marked: measured.used.iter().map(|used| !used[o]).collect(),
+            });
         let mut names: Vec<&str> = surfaces.to_vec();
         names.sort_unstable();
         names.dedup();
-        let control = |name: &str| (name.to_owned(), window.signal(name).iter().step_by(2).copied().collect());
+        let control = |name: &str| {
+            (
+                name.to_owned(),
+                window.signal(name).iter().step_by(2).copied().collect(),
+            )
+        };
         History {
             maneuver_id: self.maneuver.maneuver_id.clone(),
             class: self.class.name.clone(),
             alpha_deg: self.maneuver.alpha_deg,
-            time_s: (0..measured.values.len()).map(|k| k as f64 * window.step_s).collect(),
+            time_s: (0..measured.values.len())
+                .map(|k| k as f64 * window.step_s)
+                .collect(),
             outputs: outputs.collect(),
             controls: names.into_iter().map(control).collect(),
         }
@@ -584,12 +761,20 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
 
 /// Every parameter of a maneuver by name: the held ones' values, and the free ones'.
 fn values_of<'a>(model: &'a Model, names: &'a [String], values: &[f64]) -> BTreeMap<&'a str, f64> {
-    let held = model.held.iter().map(|(d, value)| (d.name.as_str(), *value));
-    held.chain(names.iter().map(String::as_str).zip(values.iter().copied())).collect()
+    let held = model
+        .held
+        .iter()
+        .map(|(d, value)| (d.name.as_str(), *value));
+    held.chain(names.iter().map(String::as_str).zip(values.iter().copied()))
+        .collect()
 }
 
 fn covariance(names: &[String], fit: &Fit) -> Option<Covariance> {
     let rows = |m: &DMatrix<f64>| m.transpose().as_slice().to_vec();
     let (white, corrected) = (fit.covariance.as_ref()?, fit.covariance_corrected.as_ref()?);
-    Some(Covariance { names: names.to_vec(), white: rows(white), corrected: rows(corrected) })
+    Some(Covariance {
+        names: names.to_vec(),
+        white: rows(white),
+        corrected: rows(corrected),
+    })
 }

@@ -17,7 +17,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Buildup, Coefficient, Combined, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
+use crate::aero::{
+    Buildup, Coefficient, Combined, Condition, Derivative, Regressor, WindTunnel, wind_tunnel,
+};
 use crate::aircraft::Aircraft;
 use crate::maneuver::Maneuver;
 use crate::tables::{EstimateRow, ExportRow, TrendRow};
@@ -98,7 +100,11 @@ pub fn tables(contents: &Contents) -> Vec<Table> {
     let derivatives = contents.buildup.derivatives.iter().map(|d| &d.name);
     let names = derivatives.chain(contents.buildup.combined.iter().map(|c| &c.name));
     let mut tables: Vec<Table> = names.filter_map(|name| contents.table(name)).collect();
-    contents.buildup.combined.iter().for_each(|sum| keep_sum(&mut tables, sum));
+    contents
+        .buildup
+        .combined
+        .iter()
+        .for_each(|sum| keep_sum(&mut tables, sum));
     tables
 }
 
@@ -106,7 +112,9 @@ pub fn tables(contents: &Contents) -> Vec<Table> {
 /// the sum well and its parts, strongly correlated, badly; trends through each part on its own would not add up to it.
 fn keep_sum(tables: &mut [Table], sum: &Combined) {
     let named = |name: &str| tables.iter().find(|t| t.derivative == name);
-    let (Some(whole), Some(slope), Some(constant)) = (named(&sum.name), named(&sum.slope), named(&sum.constant)) else {
+    let (Some(whole), Some(slope), Some(constant)) =
+        (named(&sum.name), named(&sum.slope), named(&sum.constant))
+    else {
         return;
     };
     let kept = |(at, cell): (Condition, &Cell)| {
@@ -115,28 +123,46 @@ fn keep_sum(tables: &mut [Table], sum: &Combined) {
         let uncertainty = |whole: f64, slope: f64| whole.hypot(slope * at.alpha_deg);
         let source = format!("flight, {} − {} α", sum.name, sum.slope);
         let value = whole.value - slope.value * at.alpha_deg;
-        let uncertainty = whole.uncertainty.zip(slope.uncertainty).map(|(w, s)| uncertainty(w, s));
-        cell.is_flight.then_some(Cell { value, uncertainty, is_flight: true, source })
+        let uncertainty = whole
+            .uncertainty
+            .zip(slope.uncertainty)
+            .map(|(w, s)| uncertainty(w, s));
+        cell.is_flight.then_some(Cell {
+            value,
+            uncertainty,
+            is_flight: true,
+            source,
+        })
     };
     let kept: Vec<Option<Cell>> = constant.points().map(kept).collect();
     if let Some(constant) = tables.iter_mut().find(|t| t.derivative == sum.constant) {
         let replaced = constant.cells.iter_mut().zip(kept);
-        replaced.filter_map(|(cell, kept)| Some((cell, kept?))).for_each(|(cell, kept)| *cell = kept);
+        replaced
+            .filter_map(|(cell, kept)| Some((cell, kept?)))
+            .for_each(|(cell, kept)| *cell = kept);
     }
 }
 
 impl Contents<'_> {
     fn table(&self, name: &str) -> Option<Table> {
         let group = self.groups.group_of(name);
-        let speaks = |t: &&TrendRow| t.derivative == name && group.is_some_and(|g| g.name == t.group);
+        let speaks =
+            |t: &&TrendRow| t.derivative == name && group.is_some_and(|g| g.name == t.group);
         let trend: Vec<&TrendRow> = self.trends.iter().filter(speaks).collect();
         let flown = self.flown(name).filter(|_| !trend.is_empty());
         let clamped = self.tunnel.clamped();
         let alphas_deg = union(clamped.alphas_deg(name), trend.iter().map(|t| t.alpha_deg));
         let of_mach = flown.as_ref().map(|f| [f.mach.0, f.mach.1]);
-        let of_third = flown.as_ref().and_then(|f| f.third).map(|(low, high)| [low, high]);
+        let of_third = flown
+            .as_ref()
+            .and_then(|f| f.third)
+            .map(|(low, high)| [low, high]);
         let widened = |own: Vec<f64>, flown: Option<[f64; 2]>| {
-            if own.is_empty() { own } else { union(own, flown.into_iter().flatten()) }
+            if own.is_empty() {
+                own
+            } else {
+                union(own, flown.into_iter().flatten())
+            }
         };
         let machs = widened(clamped.machs(name), of_mach);
         let thirds = widened(clamped.thirds(name), of_third);
@@ -145,25 +171,51 @@ impl Contents<'_> {
             for mach in each(&machs) {
                 for &alpha_deg in &alphas_deg {
                     let there = trend.iter().copied().find(|t| same(t.alpha_deg, alpha_deg));
-                    let there = there.filter(|_| flown.as_ref().is_none_or(|f| f.holds(mach, third)));
-                    let condition = Condition { alpha_deg, mach: mach.unwrap_or(0.0), third };
-                    cells.push(there.map(of_flight).or_else(|| of_tunnel(&clamped, name, &condition))?);
+                    let there =
+                        there.filter(|_| flown.as_ref().is_none_or(|f| f.holds(mach, third)));
+                    let condition = Condition {
+                        alpha_deg,
+                        mach: mach.unwrap_or(0.0),
+                        third,
+                    };
+                    cells.push(
+                        there
+                            .map(of_flight)
+                            .or_else(|| of_tunnel(&clamped, name, &condition))?,
+                    );
                 }
             }
         }
         let unit = self.buildup.unit_of(name)?.name().to_owned();
-        (!cells.is_empty()).then_some(Table { derivative: name.to_owned(), unit, alphas_deg, machs, thirds, cells })
+        (!cells.is_empty()).then_some(Table {
+            derivative: name.to_owned(),
+            unit,
+            alphas_deg,
+            machs,
+            thirds,
+            cells,
+        })
     }
 
     /// Between which Mach numbers and third values the maneuvers flew that speak for a derivative.
     fn flown(&self, name: &str) -> Option<Flown> {
         let group = self.groups.group_of(name)?;
-        let estimates =
-            self.estimates.iter().filter(|e| e.derivative == name && e.value.is_some() && group.has(&e.class));
-        let ids: std::collections::BTreeSet<&str> = estimates.map(|e| e.maneuver_id.as_str()).collect();
-        let maneuvers = || self.maneuvers.iter().filter(|m| ids.contains(m.maneuver_id.as_str()));
+        let estimates = self
+            .estimates
+            .iter()
+            .filter(|e| e.derivative == name && e.value.is_some() && group.has(&e.class));
+        let ids: std::collections::BTreeSet<&str> =
+            estimates.map(|e| e.maneuver_id.as_str()).collect();
+        let maneuvers = || {
+            self.maneuvers
+                .iter()
+                .filter(|m| ids.contains(m.maneuver_id.as_str()))
+        };
         let third = range(maneuvers().filter_map(|m| m.condition(self.tunnel).third));
-        Some(Flown { mach: range(maneuvers().map(|m| m.mach))?, third })
+        Some(Flown {
+            mach: range(maneuvers().map(|m| m.mach))?,
+            third,
+        })
     }
 }
 
@@ -179,13 +231,25 @@ impl Flown {
 
 fn of_flight(t: &TrendRow) -> Cell {
     let uncertainty = Some(t.standard_error).filter(|e| e.is_finite());
-    Cell { value: t.value, uncertainty, is_flight: true, source: format!("flight, trend of {}", t.group) }
+    Cell {
+        value: t.value,
+        uncertainty,
+        is_flight: true,
+        source: format!("flight, trend of {}", t.group),
+    }
 }
 
 fn of_tunnel(tunnel: &WindTunnel, name: &str, condition: &Condition) -> Option<Cell> {
     let read = tunnel.at(name, condition)?;
-    let source = tunnel.source_of(name).map_or_else(|| "wind tunnel".to_owned(), |s| format!("wind tunnel: {s}"));
-    Some(Cell { value: read.value, uncertainty: read.uncertainty, is_flight: false, source })
+    let source = tunnel
+        .source_of(name)
+        .map_or_else(|| "wind tunnel".to_owned(), |s| format!("wind tunnel: {s}"));
+    Some(Cell {
+        value: read.value,
+        uncertainty: read.uncertainty,
+        is_flight: false,
+        source,
+    })
 }
 
 fn same(a: f64, b: f64) -> bool {
@@ -206,7 +270,11 @@ fn union(own: Vec<f64>, others: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// Each value, or once none.
 fn each(values: &[f64]) -> Vec<Option<f64>> {
-    if values.is_empty() { vec![None] } else { values.iter().copied().map(Some).collect() }
+    if values.is_empty() {
+        vec![None]
+    } else {
+        values.iter().copied().map(Some).collect()
+    }
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
@@ -220,7 +288,11 @@ impl Table {
     pub fn points(&self) -> impl Iterator<Item = (Condition, &Cell)> {
         let places = each(&self.thirds).into_iter().flat_map(move |third| {
             let machs = each(&self.machs).into_iter();
-            machs.flat_map(move |mach| self.alphas_deg.iter().map(move |&alpha_deg| (third, mach, alpha_deg)))
+            machs.flat_map(move |mach| {
+                self.alphas_deg
+                    .iter()
+                    .map(move |&alpha_deg| (third, mach, alpha_deg))
+            })
         });
         let condition = |(third, mach, alpha_deg): (Option<f64>, Option<f64>, f64)| Condition {
             alpha_deg,
@@ -246,20 +318,31 @@ impl Table {
     pub fn sources(&self) -> String {
         let n = self.alphas_deg.len();
         let flights = |row: &&[Cell]| row.iter().filter(|c| c.is_flight).count();
-        let Some(row) = self.cells.chunks(n.max(1)).max_by_key(flights) else { return String::new() };
+        let Some(row) = self.cells.chunks(n.max(1)).max_by_key(flights) else {
+            return String::new();
+        };
         let mut words: Vec<(String, Vec<String>)> = Vec::new();
         let mut done = 0;
         for run in row.chunk_by(|a, b| a.source == b.source) {
             let (from, to) = (self.alphas_deg[done], self.alphas_deg[done + run.len() - 1]);
             done += run.len();
-            let span = if run.len() == 1 { format!("{from}°") } else { format!("{from}° to {to}°") };
-            match words.iter_mut().find(|(source, _)| *source == run[0].source) {
+            let span = if run.len() == 1 {
+                format!("{from}°")
+            } else {
+                format!("{from}° to {to}°")
+            };
+            match words
+                .iter_mut()
+                .find(|(source, _)| *source == run[0].source)
+            {
                 Some((_, spans)) => spans.push(span),
                 None => words.push((run[0].source.clone(), vec![span])),
             }
         }
-        let words: Vec<String> =
-            words.into_iter().map(|(source, spans)| format!("{source}: {}", spans.join(", "))).collect();
+        let words: Vec<String> = words
+            .into_iter()
+            .map(|(source, spans)| format!("{source}: {}", spans.join(", ")))
+            .collect();
         words.join("; ")
     }
 }
@@ -278,13 +361,19 @@ pub fn rows(tables: &[Table]) -> Vec<ExportRow> {
         source: cell.source.clone(),
         is_flight: usize::from(cell.is_flight),
     };
-    tables.iter().flat_map(|table| table.points().map(move |(at, cell)| row(table, at, cell))).collect()
+    tables
+        .iter()
+        .flat_map(|table| table.points().map(move |(at, cell)| row(table, at, cell)))
+        .collect()
 }
 
 /// The tables as a database, read linearly and clamped, as simulators read them.
 #[must_use]
 pub fn database(tables: &[Table], settings: &wind_tunnel::Settings) -> WindTunnel {
-    let mut database = WindTunnel::new(wind_tunnel::Settings { third: settings.third.clone(), ..Default::default() });
+    let mut database = WindTunnel::new(wind_tunnel::Settings {
+        third: settings.third.clone(),
+        ..Default::default()
+    });
     for table in tables {
         for (at, cell) in table.points() {
             let point = TunnelPoint {
@@ -309,10 +398,18 @@ fn terms<'a>(
 ) -> impl Iterator<Item = &'a Derivative> {
     contents.buildup.derivatives.iter().filter(move |d| {
         let is_vane = matches!(d.regressor, Regressor::Vane(_));
-        d.coefficient == coefficient && is_vane == vanes && tables.iter().any(|t| t.derivative == d.name)
+        d.coefficient == coefficient
+            && is_vane == vanes
+            && tables.iter().any(|t| t.derivative == d.name)
     })
 }
 
 /// All coefficients, forces first.
-const COEFFICIENTS: [Coefficient; 6] =
-    [Coefficient::CN, Coefficient::CA, Coefficient::CY, Coefficient::Cl, Coefficient::Cm, Coefficient::Cn];
+const COEFFICIENTS: [Coefficient; 6] = [
+    Coefficient::CN,
+    Coefficient::CA,
+    Coefficient::CY,
+    Coefficient::Cl,
+    Coefficient::Cm,
+    Coefficient::Cn,
+];

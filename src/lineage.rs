@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// The stages in order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
     #[default]
@@ -20,8 +22,14 @@ pub enum Stage {
 }
 
 impl Stage {
-    pub const ALL: [Stage; 6] =
-        [Stage::Ingest, Stage::Segment, Stage::Estimate, Stage::Trend, Stage::Compare, Stage::Report];
+    pub const ALL: [Stage; 6] = [
+        Stage::Ingest,
+        Stage::Segment,
+        Stage::Estimate,
+        Stage::Trend,
+        Stage::Compare,
+        Stage::Report,
+    ];
 
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -88,7 +96,9 @@ impl Lineage {
         let mut part = self.clone();
         part.configuration.retain(|s, _| *s <= stage);
         part.tables.retain(|s, _| *s <= stage);
-        part.code.methods.retain(|method, _| method_stage(method) <= stage);
+        part.code
+            .methods
+            .retain(|method, _| method_stage(method) <= stage);
         part
     }
 
@@ -99,9 +109,17 @@ impl Lineage {
         let empty = BTreeMap::new();
         for stage in Stage::ALL {
             let [a, b] = [before, self].map(|l| l.tables.get(&stage).unwrap_or(&empty));
-            for name in union(a, b).into_iter().filter(|name| a.get(*name) != b.get(*name)) {
+            for name in union(a, b)
+                .into_iter()
+                .filter(|name| a.get(*name) != b.get(*name))
+            {
                 let words = format!("the {name} changed");
-                causes.push(Cause { stage, origin: Origin::Configuration, subject: name.clone(), words });
+                causes.push(Cause {
+                    stage,
+                    origin: Origin::Configuration,
+                    subject: name.clone(),
+                    words,
+                });
             }
         }
         let empty = BTreeMap::new();
@@ -113,9 +131,17 @@ impl Lineage {
                 let more = paths.len().saturating_sub(SPELLED_OUT);
                 paths.truncate(SPELLED_OUT);
                 if more > 0 {
-                    paths.push((name.clone(), format!("{more} more settings of `{name}` changed")));
+                    paths.push((
+                        name.clone(),
+                        format!("{more} more settings of `{name}` changed"),
+                    ));
                 }
-                let cause = |(subject, words)| Cause { stage, origin: Origin::Configuration, subject, words };
+                let cause = |(subject, words)| Cause {
+                    stage,
+                    origin: Origin::Configuration,
+                    subject,
+                    words,
+                };
                 causes.extend(paths.into_iter().map(cause));
             }
         }
@@ -127,7 +153,10 @@ impl Lineage {
 
 /// The stage of a method: joint estimates and predictions belong to `estimate`.
 fn method_stage(method: &str) -> Stage {
-    Stage::ALL.into_iter().find(|s| s.name() == method).unwrap_or(Stage::Estimate)
+    Stage::ALL
+        .into_iter()
+        .find(|s| s.name() == method)
+        .unwrap_or(Stage::Estimate)
 }
 
 fn union<'a, V>(a: &'a BTreeMap<String, V>, b: &'a BTreeMap<String, V>) -> Vec<&'a String> {
@@ -144,9 +173,18 @@ fn flights(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) ->
             (_, None) => format!("flight {flight} is gone from the archive"),
             _ => format!("the file of flight {flight} changed"),
         };
-        Cause { stage: Stage::Ingest, origin: Origin::Flight, subject: flight.clone(), words }
+        Cause {
+            stage: Stage::Ingest,
+            origin: Origin::Flight,
+            subject: flight.clone(),
+            words,
+        }
     };
-    union(before, now).into_iter().filter(|f| before.get(*f) != now.get(*f)).map(cause).collect()
+    union(before, now)
+        .into_iter()
+        .filter(|f| before.get(*f) != now.get(*f))
+        .map(cause)
+        .collect()
 }
 
 fn code(before: &Code, now: &Code) -> Vec<Cause> {
@@ -154,21 +192,39 @@ fn code(before: &Code, now: &Code) -> Vec<Cause> {
     for method in union(&before.methods, &now.methods) {
         let [a, b] = [before, now].map(|c| c.methods.get(method).copied().unwrap_or_default());
         if a != b {
-            let (stage, words) = (method_stage(method), format!("method `{method}`: version {a} became {b}"));
-            causes.push(Cause { stage, origin: Origin::Code, subject: method.clone(), words });
+            let (stage, words) = (
+                method_stage(method),
+                format!("method `{method}`: version {a} became {b}"),
+            );
+            causes.push(Cause {
+                stage,
+                origin: Origin::Code,
+                subject: method.clone(),
+                words,
+            });
         }
     }
     if (&before.version, &before.source) != (&now.version, &now.source) {
         let name = |c: &Code| format!("{} ({})", c.version, c.source);
         let words = format!("the program changed from {} to {}", name(before), name(now));
         // Stages with artefacts state their methods' versions; what is made anew each time may differ by any change.
-        causes.push(Cause { stage: Stage::Trend, origin: Origin::Code, subject: "harvest".to_owned(), words });
+        causes.push(Cause {
+            stage: Stage::Trend,
+            origin: Origin::Code,
+            subject: "harvest".to_owned(),
+            words,
+        });
     }
     causes
 }
 
 /// Collects the paths at which two values differ, with what they were and are.
-fn compare(path: &str, before: Option<&Value>, now: Option<&Value>, found: &mut Vec<(String, String)>) {
+fn compare(
+    path: &str,
+    before: Option<&Value>,
+    now: Option<&Value>,
+    found: &mut Vec<(String, String)>,
+) {
     match (before, now) {
         (a, b) if a == b => {}
         (Some(Value::Object(a)), Some(Value::Object(b))) => {
@@ -181,7 +237,10 @@ fn compare(path: &str, before: Option<&Value>, now: Option<&Value>, found: &mut 
         }
         (a, b) => {
             let (a, b) = (short(a), short(b));
-            found.push((path.to_owned(), format!("configuration {path}: {a} became {b}")));
+            found.push((
+                path.to_owned(),
+                format!("configuration {path}: {a} became {b}"),
+            ));
         }
     }
 }
@@ -207,17 +266,33 @@ mod tests {
 
     fn lineage() -> Lineage {
         let settings = serde_json::json!({"weights": "table", "steps": {"de_deg": 2.5}});
-        let methods = [("ingest".to_owned(), 1), ("estimate".to_owned(), 5), ("joint".to_owned(), 2)].into();
+        let methods = [
+            ("ingest".to_owned(), 1),
+            ("estimate".to_owned(), 5),
+            ("joint".to_owned(), 2),
+        ]
+        .into();
         Lineage {
-            code: Code { version: "0.1.0".into(), source: "aa".into(), methods },
+            code: Code {
+                version: "0.1.0".into(),
+                source: "aa".into(),
+                methods,
+            },
             configuration: [(Stage::Segment, [("segment".to_owned(), settings)].into())].into(),
             flights: [("f1".to_owned(), "01".to_owned())].into(),
-            tables: [(Stage::Estimate, [("wind-tunnel table".to_owned(), "03".to_owned())].into())].into(),
+            tables: [(
+                Stage::Estimate,
+                [("wind-tunnel table".to_owned(), "03".to_owned())].into(),
+            )]
+            .into(),
         }
     }
 
     fn words(now: &Lineage) -> Vec<String> {
-        now.differences(&lineage()).into_iter().map(|c| c.words).collect()
+        now.differences(&lineage())
+            .into_iter()
+            .map(|c| c.words)
+            .collect()
     }
 
     #[test]
@@ -229,7 +304,10 @@ mod tests {
     fn a_flight_is_new_gone_or_changed() {
         let mut now = lineage();
         now.flights = [("f2".to_owned(), "02".to_owned())].into();
-        assert_eq!(words(&now), ["flight f1 is gone from the archive", "new flight f2"]);
+        assert_eq!(
+            words(&now),
+            ["flight f1 is gone from the archive", "new flight f2"]
+        );
         now.flights = [("f1".to_owned(), "02".to_owned())].into();
         assert_eq!(words(&now), ["the file of flight f1 changed"]);
     }
@@ -240,8 +318,14 @@ mod tests {
         let settings = serde_json::json!({"weights": "table", "steps": {"de_deg": 3.0}});
         now.configuration = [(Stage::Segment, [("segment".to_owned(), settings)].into())].into();
         let causes = now.differences(&lineage());
-        assert_eq!(causes[0].words, "configuration segment.steps.de_deg: 2.5 became 3.0");
-        assert_eq!((causes.len(), causes[0].stage, causes[0].origin), (1, Stage::Segment, Origin::Configuration));
+        assert_eq!(
+            causes[0].words,
+            "configuration segment.steps.de_deg: 2.5 became 3.0"
+        );
+        assert_eq!(
+            (causes.len(), causes[0].stage, causes[0].origin),
+            (1, Stage::Segment, Origin::Configuration)
+        );
     }
 
     #[test]
@@ -253,7 +337,10 @@ mod tests {
         let causes = now.differences(&lineage());
         assert_eq!(causes[0].words, "the wind-tunnel table changed");
         assert_eq!(causes[1].words, "method `joint`: version 2 became 3");
-        assert_eq!((causes[1].stage, causes[2].stage), (Stage::Estimate, Stage::Trend));
+        assert_eq!(
+            (causes[1].stage, causes[2].stage),
+            (Stage::Estimate, Stage::Trend)
+        );
     }
 
     #[test]

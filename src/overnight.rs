@@ -109,7 +109,10 @@ pub fn between(since: &str, before: &Tables, now: &Tables) -> Changes {
     let reasons = reasons.with_maneuvers(&maneuvers, &estimates, now);
     let trends = trends(before, now, &reasons);
     let names = |t: &Tables| -> BTreeSet<String> {
-        t.trends.iter().map(|t| format!("{}, {}", t.derivative, t.group)).collect()
+        t.trends
+            .iter()
+            .map(|t| format!("{}, {}", t.derivative, t.group))
+            .collect()
     };
     let (a, b) = (names(before), names(now));
     let mut changes = Changes {
@@ -142,15 +145,25 @@ struct Reasons {
 
 impl Reasons {
     fn new(before: &Tables, now: &Tables) -> Reasons {
-        let classes = before.maneuvers.iter().chain(now.maneuvers).map(|m| m.class.clone()).collect();
-        Reasons { causes: now.lineage.differences(before.lineage), behind: BTreeMap::new(), classes }
+        let classes = before
+            .maneuvers
+            .iter()
+            .chain(now.maneuvers)
+            .map(|m| m.class.clone())
+            .collect();
+        Reasons {
+            causes: now.lineage.differences(before.lineage),
+            behind: BTreeMap::new(),
+            classes,
+        }
     }
 
     /// Why something of a maneuver differs: its flight, or what its stages read. Other classes' settings do not count.
     fn of_maneuver(&self, flight_id: &str, class: &str) -> String {
         let other_class = |c: &Cause| {
             let mut path = c.subject.split('.');
-            matches!(path.next(), Some("classes" | "recognition")) && path.next().is_some_and(|name| name != class)
+            matches!(path.next(), Some("classes" | "recognition"))
+                && path.next().is_some_and(|name| name != class)
         };
         let of_flight = self
             .causes
@@ -159,30 +172,59 @@ impl Reasons {
             .collect::<Vec<_>>();
         let of_settings = || {
             let reaches = |c: &&Cause| c.origin != Origin::Flight && c.stage <= Stage::Estimate;
-            let (others, own): (Vec<&Cause>, Vec<&Cause>) =
-                self.causes.iter().filter(reaches).partition(|c| other_class(c) && c.stage > Stage::Segment);
+            let (others, own): (Vec<&Cause>, Vec<&Cause>) = self
+                .causes
+                .iter()
+                .filter(reaches)
+                .partition(|c| other_class(c) && c.stage > Stage::Segment);
             if own.is_empty() { others } else { own }
         };
-        let causes = if of_flight.is_empty() { of_settings() } else { of_flight };
+        let causes = if of_flight.is_empty() {
+            of_settings()
+        } else {
+            of_flight
+        };
         words(causes.iter().map(|c| c.words.as_str()))
     }
 
     /// Adds what the maneuvers that changed have to say about the derivatives that they estimate.
-    fn with_maneuvers(mut self, changed: &[ManeuverChange], moved: &[Moved], now: &Tables) -> Reasons {
-        let why: BTreeMap<&str, &str> = changed.iter().map(|m| (m.maneuver_id.as_str(), m.because.as_str())).collect();
+    fn with_maneuvers(
+        mut self,
+        changed: &[ManeuverChange],
+        moved: &[Moved],
+        now: &Tables,
+    ) -> Reasons {
+        let why: BTreeMap<&str, &str> = changed
+            .iter()
+            .map(|m| (m.maneuver_id.as_str(), m.because.as_str()))
+            .collect();
         let mut add = |derivative: &str, class: &str, because: &str| {
             let of_derivative = self.behind.entry(derivative.to_owned()).or_default();
-            of_derivative.entry(class.to_owned()).or_default().insert(because.to_owned());
+            of_derivative
+                .entry(class.to_owned())
+                .or_default()
+                .insert(because.to_owned());
         };
-        for row in now.estimates.iter().filter(|e| e.status == Status::Estimated.name()) {
+        for row in now
+            .estimates
+            .iter()
+            .filter(|e| e.status == Status::Estimated.name())
+        {
             if let Some(because) = why.get(row.maneuver_id.as_str()) {
                 add(&row.derivative, &row.class, because);
             }
         }
-        let class: BTreeMap<&str, &str> =
-            now.maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m.class.as_str())).collect();
+        let class: BTreeMap<&str, &str> = now
+            .maneuvers
+            .iter()
+            .map(|m| (m.maneuver_id.as_str(), m.class.as_str()))
+            .collect();
         for row in moved {
-            add(&row.derivative, class.get(row.of.as_str()).copied().unwrap_or_default(), &row.because);
+            add(
+                &row.derivative,
+                class.get(row.of.as_str()).copied().unwrap_or_default(),
+                &row.because,
+            );
         }
         self
     }
@@ -190,12 +232,32 @@ impl Reasons {
     /// Why a trend differs: the maneuvers behind it, and what only trends and comparisons read. `group` may be a class.
     fn of_trend(&self, derivative: &str, group: &str, until: Stage) -> String {
         let counts = |class: &str| class == group || !self.classes.contains(group);
-        let behind = self.behind.get(derivative).into_iter().flatten().filter(|(class, _)| counts(class));
-        let own: BTreeSet<&str> = behind.flat_map(|(_, because)| because).map(String::as_str).collect();
-        let later = self.causes.iter().filter(|c| (Stage::Trend..=until).contains(&c.stage));
-        let gone = self.causes.iter().filter(|c| c.origin == Origin::Flight && c.words.contains("gone"));
-        let settings = self.causes.iter().filter(|c| c.origin != Origin::Flight && c.stage == Stage::Estimate);
-        words(own.into_iter().chain(gone.chain(settings).chain(later).map(|c| c.words.as_str())))
+        let behind = self
+            .behind
+            .get(derivative)
+            .into_iter()
+            .flatten()
+            .filter(|(class, _)| counts(class));
+        let own: BTreeSet<&str> = behind
+            .flat_map(|(_, because)| because)
+            .map(String::as_str)
+            .collect();
+        let later = self
+            .causes
+            .iter()
+            .filter(|c| (Stage::Trend..=until).contains(&c.stage));
+        let gone = self
+            .causes
+            .iter()
+            .filter(|c| c.origin == Origin::Flight && c.words.contains("gone"));
+        let settings = self
+            .causes
+            .iter()
+            .filter(|c| c.origin != Origin::Flight && c.stage == Stage::Estimate);
+        words(
+            own.into_iter()
+                .chain(gone.chain(settings).chain(later).map(|c| c.words.as_str())),
+        )
     }
 }
 
@@ -213,19 +275,27 @@ fn words<'a>(causes: impl Iterator<Item = &'a str>) -> String {
     if more > 0 {
         text = format!("{text}; and {more} more");
     }
-    if text.is_empty() { "the other maneuvers and flights".to_owned() } else { text }
+    if text.is_empty() {
+        "the other maneuvers and flights".to_owned()
+    } else {
+        text
+    }
 }
 
 fn maneuvers(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<ManeuverChange> {
     fn by_id<'a>(t: &Tables<'a>) -> BTreeMap<&'a str, &'a Window> {
-        t.maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m)).collect()
+        t.maneuvers
+            .iter()
+            .map(|m| (m.maneuver_id.as_str(), m))
+            .collect()
     }
     fn fits<'a>(t: &Tables<'a>) -> BTreeMap<&'a str, &'a FitRow> {
         t.fits.iter().map(|f| (f.maneuver_id.as_str(), f)).collect()
     }
     let (old, new, old_fits, new_fits) = (by_id(before), by_id(now), fits(before), fits(now));
     let outcome = |fits: &BTreeMap<&str, &FitRow>, id: &str| {
-        fits.get(id).map_or_else(|| "no fit".to_owned(), |f| f.outcome.clone())
+        fits.get(id)
+            .map_or_else(|| "no fit".to_owned(), |f| f.outcome.clone())
     };
     let ids: BTreeSet<&str> = old.keys().chain(new.keys()).copied().collect();
     let mut changes = Vec::new();
@@ -244,7 +314,13 @@ fn maneuvers(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<ManeuverCh
         };
         let because = reasons.of_maneuver(&window.flight_id, &window.class);
         let (maneuver_id, class) = (id.to_owned(), window.class.clone());
-        changes.push(ManeuverChange { maneuver_id, class, what: what.to_owned(), words, because });
+        changes.push(ManeuverChange {
+            maneuver_id,
+            class,
+            what: what.to_owned(),
+            words,
+            because,
+        });
     }
     changes
 }
@@ -268,14 +344,24 @@ fn difference(a: &Window, b: &Window, outcome_a: &str, outcome_b: &str) -> Strin
 /// Estimates of maneuvers that converged on both nights.
 fn estimates(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
     let converged = |t: &Tables| -> BTreeSet<String> {
-        t.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).map(|f| f.maneuver_id.clone()).collect()
+        t.fits
+            .iter()
+            .filter(|f| f.outcome == Outcome::Converged.name())
+            .map(|f| f.maneuver_id.clone())
+            .collect()
     };
     let (a, b) = (converged(before), converged(now));
     let counts = |e: &&EstimateRow| {
-        e.status == Status::Estimated.name() && a.contains(&e.maneuver_id) && b.contains(&e.maneuver_id)
+        e.status == Status::Estimated.name()
+            && a.contains(&e.maneuver_id)
+            && b.contains(&e.maneuver_id)
     };
-    let old: BTreeMap<(&str, &str), &EstimateRow> =
-        before.estimates.iter().filter(counts).map(|e| ((e.maneuver_id.as_str(), e.derivative.as_str()), e)).collect();
+    let old: BTreeMap<(&str, &str), &EstimateRow> = before
+        .estimates
+        .iter()
+        .filter(counts)
+        .map(|e| ((e.maneuver_id.as_str(), e.derivative.as_str()), e))
+        .collect();
     let moved = |e: &EstimateRow| {
         let was = old.get(&(e.maneuver_id.as_str(), e.derivative.as_str()))?;
         let (before, now) = (was.value?, e.value?);
@@ -290,7 +376,11 @@ fn estimates(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
             because: reasons.of_maneuver(&e.flight_id, &e.class),
         })
     };
-    now.estimates.iter().filter(counts).filter_map(moved).collect()
+    now.estimates
+        .iter()
+        .filter(counts)
+        .filter_map(moved)
+        .collect()
 }
 
 fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
@@ -309,8 +399,11 @@ fn place<'a>(derivative: &'a str, group: &'a str, alpha_deg: f64) -> Place<'a> {
 }
 
 fn trends(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
-    let old: BTreeMap<Place, &PublishedTrend> =
-        before.trends.iter().map(|t| (place(&t.derivative, &t.group, t.alpha_deg), t)).collect();
+    let old: BTreeMap<Place, &PublishedTrend> = before
+        .trends
+        .iter()
+        .map(|t| (place(&t.derivative, &t.group, t.alpha_deg), t))
+        .collect();
     let moved = |t: &PublishedTrend| {
         let was = old.get(&place(&t.derivative, &t.group, t.alpha_deg))?;
         let uncertainty = was.standard_error.max(t.standard_error);
@@ -328,8 +421,11 @@ fn trends(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
 }
 
 fn verdicts(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<VerdictChange> {
-    let old: BTreeMap<Place, &PublishedVerdict> =
-        before.verdicts.iter().map(|c| (place(&c.derivative, "", c.alpha_deg), c)).collect();
+    let old: BTreeMap<Place, &PublishedVerdict> = before
+        .verdicts
+        .iter()
+        .map(|c| (place(&c.derivative, "", c.alpha_deg), c))
+        .collect();
     let changed = |c: &PublishedVerdict| {
         let was = old.get(&place(&c.derivative, "", c.alpha_deg))?;
         (was.verdict != c.verdict).then(|| VerdictChange {

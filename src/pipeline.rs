@@ -43,8 +43,8 @@ use crate::store::archive::FlightFiles;
 use crate::store::table::Shelf;
 use crate::store::{Contents, Digest, Fingerprint, Nights, Store, archive, table};
 use crate::tables::{
-    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow, EventRow, FitRow,
-    History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
+    EventRow, FitRow, History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
 use crate::{estimate, report, trend};
 use conditioning::Shares;
@@ -159,12 +159,19 @@ impl Campaign {
 
     /// The outputs of every predicted maneuver.
     fn predictions(&self) -> Vec<PredictionRow> {
-        self.predicted.iter().flat_map(|p| &p.outputs).cloned().collect()
+        self.predicted
+            .iter()
+            .flat_map(|p| &p.outputs)
+            .cloned()
+            .collect()
     }
 
     #[must_use]
     pub fn converged(&self) -> usize {
-        self.fits.iter().filter(|f| f.outcome == Outcome::Converged.name()).count()
+        self.fits
+            .iter()
+            .filter(|f| f.outcome == Outcome::Converged.name())
+            .count()
     }
 }
 
@@ -174,7 +181,12 @@ impl Campaign {
 /// # Errors
 /// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
 /// the problems of the night's summary.
-pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progress) -> Result<night::Done> {
+pub fn run(
+    config: &Config,
+    until: Stage,
+    wait: Duration,
+    progress: &dyn Progress,
+) -> Result<night::Done> {
     let (mut run, files) = begin(config, wait, progress)?;
     let nights = Nights::open(&config.reports, wait)?;
     if let Some(done) = run.is_published(&nights, until) {
@@ -193,7 +205,11 @@ pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progres
 }
 
 /// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
-fn begin<'a>(config: &'a Config, wait: Duration, progress: &'a dyn Progress) -> Result<(Run<'a>, Vec<FlightFiles>)> {
+fn begin<'a>(
+    config: &'a Config,
+    wait: Duration,
+    progress: &'a dyn Progress,
+) -> Result<(Run<'a>, Vec<FlightFiles>)> {
     let files = archive::find(&config.archive)?;
     let store = Store::open(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
     let run = Run::of_store(config, store, &files, progress)?;
@@ -275,7 +291,11 @@ impl Run<'_> {
         for (files, done) in files.iter().zip(done) {
             match done.artefact {
                 Some(artefact) => self.store.need([&artefact]),
-                None => _ = campaign.unread.insert(files.flight_id.clone(), done.reasons()),
+                None => {
+                    _ = campaign
+                        .unread
+                        .insert(files.flight_id.clone(), done.reasons())
+                }
             }
             campaign.problems.extend(done.problems);
             campaign.flights.extend(done.stretches);
@@ -284,10 +304,16 @@ impl Run<'_> {
         self.store.need(recorded.map(|f| &f.record));
         stretches::same_rows(campaign);
         for flight in &campaign.flights {
-            campaign.channels.extend_from_slice(&flight.ingested.channels);
+            campaign
+                .channels
+                .extend_from_slice(&flight.ingested.channels);
             campaign.checks.extend_from_slice(&flight.ingested.checks);
-            campaign.instruments.extend_from_slice(&flight.ingested.instruments);
-            campaign.problems.extend_from_slice(&flight.ingested.problems);
+            campaign
+                .instruments
+                .extend_from_slice(&flight.ingested.instruments);
+            campaign
+                .problems
+                .extend_from_slice(&flight.ingested.problems);
         }
         let shelf = self.shelf(Stage::Ingest);
         table::publish(&shelf, &campaign.channels)?;
@@ -296,8 +322,17 @@ impl Run<'_> {
     }
 
     fn segment(&self, campaign: &mut Campaign) -> Result<()> {
-        let accepted: Vec<&Flight> = campaign.flights.iter().filter(|f| f.ingested.accepted).collect();
-        let found = self.each("segment", &accepted, |f| &f.flight_id, |f| self.segment_flight(f))?;
+        let accepted: Vec<&Flight> = campaign
+            .flights
+            .iter()
+            .filter(|f| f.ingested.accepted)
+            .collect();
+        let found = self.each(
+            "segment",
+            &accepted,
+            |f| &f.flight_id,
+            |f| self.segment_flight(f),
+        )?;
         let (paths, found): (Vec<PathBuf>, Vec<Found>) = found.into_iter().unzip();
         self.store.need(&paths);
         for flight in found {
@@ -311,7 +346,9 @@ impl Run<'_> {
         for event in self.config.events.iter().filter(|e| unflown(&e.flight_id)) {
             let place = format!("event {} at {:.1} s", event.class, event.start_s);
             let reason = "the archive has no such flight; the analyst's list names it";
-            campaign.problems.push(problem("segment", &event.flight_id, &place, reason));
+            campaign
+                .problems
+                .push(problem("segment", &event.flight_id, &place, reason));
         }
         let shelf = self.shelf(Stage::Segment);
         table::publish(&shelf, &campaign.maneuvers)?;
@@ -321,14 +358,19 @@ impl Run<'_> {
 
     fn segment_path(&self, flight: &Flight, events: &[Event]) -> PathBuf {
         let config = self.config;
-        let rules: Vec<_> = config.classes.iter().map(|c| (&c.name, c.axis, &c.recognition)).collect();
+        let rules: Vec<_> = config
+            .classes
+            .iter()
+            .map(|c| (&c.name, c.axis, &c.recognition))
+            .collect();
         let fingerprint = Fingerprint::of("segment", SEGMENT_VERSION)
             .with(&flight.fingerprint)
             .with(&rules)
             .with(&config.segment)
             .with(&events)
             .finish();
-        self.store.path("segment", &flight.flight_id, &fingerprint, "json")
+        self.store
+            .path("segment", &flight.flight_id, &fingerprint, "json")
     }
 
     /// The analyst's events in a flight, and where what is found in it lies. Only for events its record is looked at.
@@ -358,13 +400,27 @@ impl Run<'_> {
     }
 
     fn estimate(&self, campaign: &mut Campaign) -> Result<()> {
-        let of_flight = |f: &Flight| campaign.maneuvers.iter().filter(|m| m.flight_id == f.flight_id).collect();
-        let flights: Vec<(&Flight, Vec<&Maneuver>)> = campaign.flights.iter().map(|f| (f, of_flight(f))).collect();
+        let of_flight = |f: &Flight| {
+            campaign
+                .maneuvers
+                .iter()
+                .filter(|m| m.flight_id == f.flight_id)
+                .collect()
+        };
+        let flights: Vec<(&Flight, Vec<&Maneuver>)> =
+            campaign.flights.iter().map(|f| (f, of_flight(f))).collect();
         self.progress.begin("estimate", campaign.maneuvers.len());
-        let done: Result<Vec<Vec<_>>> = flights.par_iter().map(|(f, m)| self.estimate_flight(f, m)).collect();
+        let done: Result<Vec<Vec<_>>> = flights
+            .par_iter()
+            .map(|(f, m)| self.estimate_flight(f, m))
+            .collect();
         self.progress.end();
-        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) = done?.into_iter().flatten().unzip();
-        campaign.histories = paths.iter().map(|p| self.store.beside(p, "history")).collect();
+        let (paths, estimated): (Vec<PathBuf>, Vec<Estimated>) =
+            done?.into_iter().flatten().unzip();
+        campaign.histories = paths
+            .iter()
+            .map(|p| self.store.beside(p, "history"))
+            .collect();
         self.store.need(&paths);
         self.store.need(&campaign.histories);
         self.join(campaign, &paths)?;
@@ -373,7 +429,12 @@ impl Run<'_> {
             let fit = estimated.fit;
             if fit.outcome != Outcome::Converged.name() {
                 let reason = format!("{}: {}", fit.outcome, fit.reason);
-                campaign.problems.push(problem("estimate", &maneuver.flight_id, &maneuver.maneuver_id, &reason));
+                campaign.problems.push(problem(
+                    "estimate",
+                    &maneuver.flight_id,
+                    &maneuver.maneuver_id,
+                    &reason,
+                ));
             }
             campaign.fits.push(fit);
             campaign.estimates.extend(estimated.estimates);
@@ -385,12 +446,26 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(&self, flight: &Flight, maneuvers: &[&Maneuver]) -> Result<Vec<(PathBuf, Estimated)>> {
-        let paths: Vec<PathBuf> = maneuvers.iter().map(|m| self.estimate_path(flight, m)).collect();
-        let load =
-            |path: &PathBuf| self.store.load(path).filter(|_| self.store.holds(&self.store.beside(path, "history")));
+    fn estimate_flight(
+        &self,
+        flight: &Flight,
+        maneuvers: &[&Maneuver],
+    ) -> Result<Vec<(PathBuf, Estimated)>> {
+        let paths: Vec<PathBuf> = maneuvers
+            .iter()
+            .map(|m| self.estimate_path(flight, m))
+            .collect();
+        let load = |path: &PathBuf| {
+            self.store
+                .load(path)
+                .filter(|_| self.store.holds(&self.store.beside(path, "history")))
+        };
         let present: Vec<Option<Estimated>> = paths.iter().map(load).collect();
-        let record = if present.iter().all(Option::is_some) { None } else { Some(flight.open(&self.store)?) };
+        let record = if present.iter().all(Option::is_some) {
+            None
+        } else {
+            Some(flight.open(&self.store)?)
+        };
         let items: Vec<_> = maneuvers.iter().zip(paths).zip(present).collect();
         items
             .into_par_iter()
@@ -401,11 +476,14 @@ impl Run<'_> {
                         let record = record.part(None, maneuver.start_s, maneuver.end_s)?;
                         let mut estimated = self.estimate_maneuver(&record, maneuver);
                         let history = estimated.history.take().map(|h| report::thinned(&h));
-                        self.store.save(&self.store.beside(&path, "history"), &history)?;
+                        self.store
+                            .save(&self.store.beside(&path, "history"), &history)?;
                         self.store.save(&path, &estimated)?;
                         estimated
                     }
-                    (None, None) => return Err(Error::store(&path, &"its flight's record was not read")),
+                    (None, None) => {
+                        return Err(Error::store(&path, &"its flight's record was not read"));
+                    }
                 };
                 self.progress.advance(&maneuver.maneuver_id);
                 Ok((path, done))
@@ -424,7 +502,8 @@ impl Run<'_> {
             .with(&config.tunnel)
             .with(&config.estimate)
             .finish();
-        self.store.path("estimate", &maneuver.maneuver_id, &fingerprint, "json")
+        self.store
+            .path("estimate", &maneuver.maneuver_id, &fingerprint, "json")
     }
 
     fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
@@ -436,12 +515,19 @@ impl Run<'_> {
 
     fn basis(&self) -> Basis<'_> {
         let config = self.config;
-        Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate)
+        Basis::new(
+            &config.aircraft,
+            &config.buildup,
+            &config.tunnel,
+            &config.estimate,
+        )
     }
 
     fn trend(&self, campaign: &mut Campaign) -> Result<()> {
         let estimates = comparison::converged(self.config, campaign);
-        let found = trend::trends(&estimates, &self.config.trend, |name| self.config.tunnel.alphas_deg(name));
+        let found = trend::trends(&estimates, &self.config.trend, |name| {
+            self.config.tunnel.alphas_deg(name)
+        });
         campaign.trends = found.rows;
         campaign.problems.extend(found.problems);
         campaign.outliers = found.outliers;
@@ -452,12 +538,24 @@ impl Run<'_> {
     fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
         let at = config.report.histories_at_alpha_deg;
-        let (maneuvers, fits, most) = (&campaign.maneuvers, &campaign.fits, config.report.maneuver_pages);
+        let (maneuvers, fits, most) = (
+            &campaign.maneuvers,
+            &campaign.fits,
+            config.report.maneuver_pages,
+        );
         let pages = report::pages::chosen(maneuvers, fits, &campaign.overnight, at, most);
-        let with_page = maneuvers.iter().zip(&campaign.histories).filter(|(m, _)| pages.contains(&m.maneuver_id));
-        let histories: Vec<History> =
-            with_page.filter_map(|(_, path)| self.store.load::<Option<History>>(path)?).collect();
-        let classes: Vec<_> = config.classes.iter().map(|c| (c.name.clone(), c.title.clone(), c.axis)).collect();
+        let with_page = maneuvers
+            .iter()
+            .zip(&campaign.histories)
+            .filter(|(m, _)| pages.contains(&m.maneuver_id));
+        let histories: Vec<History> = with_page
+            .filter_map(|(_, path)| self.store.load::<Option<History>>(path)?)
+            .collect();
+        let classes: Vec<_> = config
+            .classes
+            .iter()
+            .map(|c| (c.name.clone(), c.title.clone(), c.axis))
+            .collect();
         let estimates: Vec<EstimateRow> = campaign.estimated().cloned().collect();
         let contents = report::Contents {
             title: &config.title,
@@ -492,7 +590,9 @@ impl Run<'_> {
             Ok(bytes) => self.place_tonight(PRINTED, &bytes)?,
             Err(why) => {
                 let reason = format!("not made: the template's page is no well-formed XML: {why}");
-                campaign.problems.push(problem("report", "", PRINTED, &reason));
+                campaign
+                    .problems
+                    .push(problem("report", "", PRINTED, &reason));
             }
         }
         Ok(())

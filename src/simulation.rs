@@ -72,7 +72,11 @@ struct InstrumentRow<'a> {
 ///
 /// # Errors
 /// A disk that says no. A card that cannot be flown is among the flights' problems.
-pub fn run(simulation: &Simulation, out: &Path, progress: &dyn Progress) -> Result<Vec<FlownFlight>> {
+pub fn run(
+    simulation: &Simulation,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Vec<FlownFlight>> {
     let cards = &simulation.cards.flights;
     progress.begin("simulate", cards.len());
     let fly = |(flight_id, card): (&String, &FlightCard)| {
@@ -86,7 +90,10 @@ pub fn run(simulation: &Simulation, out: &Path, progress: &dyn Progress) -> Resu
         progress.advance(flight_id);
         Ok(flown)
     };
-    let flights = cards.par_iter().map(fly).collect::<Result<Vec<FlownFlight>>>()?;
+    let flights = cards
+        .par_iter()
+        .map(fly)
+        .collect::<Result<Vec<FlownFlight>>>()?;
     progress.end();
     files::place_rows(&out.join("wind_tunnel.csv"), &wind_tunnel(simulation))?;
     truth(simulation, out, &flights)?;
@@ -97,13 +104,22 @@ pub fn run(simulation: &Simulation, out: &Path, progress: &dyn Progress) -> Resu
 fn flight(simulation: &Simulation, flight_id: &str, card: &FlightCard) -> FlownFlight {
     let seed = seed_of(simulation.cards.seed, flight_id);
     let instruments = simulation.cards.instruments.drawn(seed);
-    let mut flight = FlownFlight { flight_id: flight_id.to_owned(), instruments, ..FlownFlight::default() };
+    let mut flight = FlownFlight {
+        flight_id: flight_id.to_owned(),
+        instruments,
+        ..FlownFlight::default()
+    };
     let mut start_s = FIRST_S;
-    for (k, card) in cards(simulation, flight_id, card, seed).into_iter().enumerate() {
+    for (k, card) in cards(simulation, flight_id, card, seed)
+        .into_iter()
+        .enumerate()
+    {
         let card = Card { start_s, ..card };
         match simulation.simulator.fly(&card) {
             Ok(flown) => {
-                flight.records.push(flown.recorded(&flight.instruments, seed_of(seed, &format!("card {k}"))));
+                flight
+                    .records
+                    .push(flown.recorded(&flight.instruments, seed_of(seed, &format!("card {k}"))));
                 flight.flown.push(flown);
             }
             Err(problem) => flight.problems.push(problem),
@@ -115,7 +131,10 @@ fn flight(simulation: &Simulation, flight_id: &str, card: &FlightCard) -> FlownF
 
 /// The cards of a flight: its test points in order, each a little lighter than the one before.
 fn cards(simulation: &Simulation, flight_id: &str, flight: &FlightCard, seed: u64) -> Vec<Card> {
-    let points = flight.points.iter().flat_map(|p| p.alpha_deg.iter().map(move |alpha| (p, *alpha)));
+    let points = flight
+        .points
+        .iter()
+        .flat_map(|p| p.alpha_deg.iter().map(move |alpha| (p, *alpha)));
     let card = |(k, (point, alpha_deg)): (usize, (&TestPoint, f64))| {
         let axis = simulation.config.class(&point.class)?.axis;
         Some(Card {
@@ -130,16 +149,25 @@ fn cards(simulation: &Simulation, flight_id: &str, flight: &FlightCard, seed: u6
             tables: simulation.cards.tables,
             turbulence: flight.turbulence,
             seed: seed_of(seed, &format!("air {k}")),
-            program: simulation.cards.programs.get(&point.class)?.scaled(point.scale),
+            program: simulation
+                .cards
+                .programs
+                .get(&point.class)?
+                .scaled(point.scale),
         })
     };
     points.enumerate().filter_map(card).collect()
 }
 
 /// The columns that the recorder writes of some records, one after another: the channel map backwards.
-fn recording(channels: &BTreeMap<String, Channel>, records: &[Record]) -> BTreeMap<String, RawColumn> {
+fn recording(
+    channels: &BTreeMap<String, Channel>,
+    records: &[Record],
+) -> BTreeMap<String, RawColumn> {
     let column = |(name, channel): (&String, &Channel)| {
-        let factor = Unit::parse(&channel.unit).ok().and_then(|u| u.factor_to(Unit::of_signal(&channel.signal)));
+        let factor = Unit::parse(&channel.unit)
+            .ok()
+            .and_then(|u| u.factor_to(Unit::of_signal(&channel.signal)));
         let per_unit = 1.0 / (factor.unwrap_or(1.0) * channel.sign * channel.scale);
         let recorded = |value: f64| match channel.wraps_at {
             Some(period) => (value * per_unit).rem_euclid(period),
@@ -151,8 +179,16 @@ fn recording(channels: &BTreeMap<String, Channel>, records: &[Record]) -> BTreeM
             // A flag that this card's program does not name.
             None => 0.0,
         };
-        let values = records.iter().flat_map(|record| (0..record.samples).map(move |k| recorded(of(record, k))));
-        (name.clone(), RawColumn { unit: Some(channel.unit.clone()), values: values.collect() })
+        let values = records
+            .iter()
+            .flat_map(|record| (0..record.samples).map(move |k| recorded(of(record, k))));
+        (
+            name.clone(),
+            RawColumn {
+                unit: Some(channel.unit.clone()),
+                values: values.collect(),
+            },
+        )
     };
     channels.iter().map(column).collect()
 }
@@ -164,7 +200,8 @@ fn wind_tunnel(simulation: &Simulation) -> Vec<TunnelRow> {
     let source = Some("simulated tunnel: the truth with stated errors".to_owned());
     let mut rows = Vec::new();
     for derivative in &simulation.config.buildup.derivatives {
-        let same = |row: &&TunnelRow| row.derivative.replace('_', "") == derivative.name.replace('_', "");
+        let same =
+            |row: &&TunnelRow| row.derivative.replace('_', "") == derivative.name.replace('_', "");
         let size = simulation.config.tunnel.root_mean_square(&derivative.name) / 100.0;
         let mut noise = Noise::new(seed, &format!("tunnel {}", derivative.name));
         let whole = settings.error_pct * noise.normal();
@@ -179,14 +216,29 @@ fn wind_tunnel(simulation: &Simulation) -> Vec<TunnelRow> {
         }
     }
     for combined in &simulation.config.buildup.combined {
-        let of = |name: &str| rows.iter().filter(|r| r.derivative == name).cloned().collect::<Vec<TunnelRow>>();
+        let of = |name: &str| {
+            rows.iter()
+                .filter(|r| r.derivative == name)
+                .cloned()
+                .collect::<Vec<TunnelRow>>()
+        };
         let slopes = of(&combined.slope);
         for row in of(&combined.constant) {
-            let there = |s: &&TunnelRow| s.alpha_deg.total_cmp(&row.alpha_deg).is_eq() && s.mach == row.mach;
+            let there = |s: &&TunnelRow| {
+                s.alpha_deg.total_cmp(&row.alpha_deg).is_eq() && s.mach == row.mach
+            };
             if let Some(slope) = slopes.iter().find(there) {
-                let uncertainty = row.uncertainty.zip(slope.uncertainty).map(|(a, b)| a.hypot(b * row.alpha_deg));
+                let uncertainty = row
+                    .uncertainty
+                    .zip(slope.uncertainty)
+                    .map(|(a, b)| a.hypot(b * row.alpha_deg));
                 let value = row.value + slope.value * row.alpha_deg;
-                rows.push(TunnelRow { derivative: combined.name.clone(), value, uncertainty, ..row });
+                rows.push(TunnelRow {
+                    derivative: combined.name.clone(),
+                    value,
+                    uncertainty,
+                    ..row
+                });
             }
         }
     }
@@ -226,8 +278,18 @@ fn true_rows<'a>(simulation: &'a Simulation, flown: &'a Flown) -> Vec<TruthRow<'
         unit,
         value,
     };
-    let value = |name: &str| flown.truth.iter().find(|t| t.derivative == name).map(|t| t.value);
-    let mut rows: Vec<TruthRow> = flown.truth.iter().map(|t| row(&t.derivative, t.unit, t.value)).collect();
+    let value = |name: &str| {
+        flown
+            .truth
+            .iter()
+            .find(|t| t.derivative == name)
+            .map(|t| t.value)
+    };
+    let mut rows: Vec<TruthRow> = flown
+        .truth
+        .iter()
+        .map(|t| row(&t.derivative, t.unit, t.value))
+        .collect();
     for combined in &simulation.config.buildup.combined {
         if let Some((constant, slope)) = value(&combined.constant).zip(value(&combined.slope)) {
             rows.push(row(&combined.name, "-", constant + slope * m.alpha_deg));
@@ -237,17 +299,21 @@ fn true_rows<'a>(simulation: &'a Simulation, flown: &'a Flown) -> Vec<TruthRow<'
 }
 
 fn instrument_rows(flight: &FlownFlight) -> impl Iterator<Item = InstrumentRow<'_>> {
-    flight.instruments.0.iter().map(|(signal, i)| InstrumentRow {
-        flight_id: &flight.flight_id,
-        signal,
-        noise: i.noise,
-        coloured: i.coloured,
-        coloured_time_s: i.coloured_time_s,
-        bias: i.bias,
-        scale: i.scale,
-        lag_s: i.lag_s,
-        quantum: i.quantum,
-        dropouts_per_s: i.dropouts_per_s,
-        spikes_per_s: i.spikes_per_s,
-    })
+    flight
+        .instruments
+        .0
+        .iter()
+        .map(|(signal, i)| InstrumentRow {
+            flight_id: &flight.flight_id,
+            signal,
+            noise: i.noise,
+            coloured: i.coloured,
+            coloured_time_s: i.coloured_time_s,
+            bias: i.bias,
+            scale: i.scale,
+            lag_s: i.lag_s,
+            quantum: i.quantum,
+            dropouts_per_s: i.dropouts_per_s,
+            spikes_per_s: i.spikes_per_s,
+        })
 }

@@ -420,7 +420,11 @@ pub struct PublishedVerdict {
 impl From<&ComparisonRow> for PublishedVerdict {
     fn from(row: &ComparisonRow) -> PublishedVerdict {
         let (derivative, verdict) = (row.derivative.clone(), row.verdict.clone());
-        PublishedVerdict { derivative, alpha_deg: row.alpha_deg, verdict }
+        PublishedVerdict {
+            derivative,
+            alpha_deg: row.alpha_deg,
+            verdict,
+        }
     }
 }
 

@@ -4,7 +4,10 @@
 //! Within ±π/4 the minimax polynomials of FreeBSD's msun (W. J. Cody and W. Waite's reduction of the argument otherwise):
 //! the error is below one unit in the last place for the angles that an integration reaches (some 50 rad, beyond which it
 //! is stopped). With fused multiplication throughout, every processor gets the same bits.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4};
 
@@ -81,7 +84,12 @@ fn times(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
 
 #[inline(always)]
 fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
-    [a[0].mul_add(b[0], c[0]), a[1].mul_add(b[1], c[1]), a[2].mul_add(b[2], c[2]), a[3].mul_add(b[3], c[3])]
+    [
+        a[0].mul_add(b[0], c[0]),
+        a[1].mul_add(b[1], c[1]),
+        a[2].mul_add(b[2], c[2]),
+        a[3].mul_add(b[3], c[3]),
+    ]
 }
 
 /// The numbers of sine and cosine at one power.

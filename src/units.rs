@@ -40,8 +40,18 @@ pub struct Unit {
     factor: f64,
 }
 
-const fn unit(name: &'static str, suffix: Option<&'static str>, quantity: Quantity, factor: f64) -> Unit {
-    Unit { name, suffix, quantity, factor }
+const fn unit(
+    name: &'static str,
+    suffix: Option<&'static str>,
+    quantity: Quantity,
+    factor: f64,
+) -> Unit {
+    Unit {
+        name,
+        suffix,
+        quantity,
+        factor,
+    }
 }
 
 const FT: f64 = 1.0 / 0.3048;
@@ -88,11 +98,19 @@ impl Unit {
     /// # Errors
     /// The names of all units, when none is spelled so.
     pub fn parse(text: &str) -> Result<Unit, String> {
-        let plain = |s: &str| s.chars().filter(|c| !matches!(c, ' ' | '^' | '·' | '*')).collect::<String>();
-        UNITS.iter().find(|u| plain(u.name) == plain(text)).copied().ok_or_else(|| {
-            let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
-            format!("unknown unit `{text}`; the units are {}", names.join(", "))
-        })
+        let plain = |s: &str| {
+            s.chars()
+                .filter(|c| !matches!(c, ' ' | '^' | '·' | '*'))
+                .collect::<String>()
+        };
+        UNITS
+            .iter()
+            .find(|u| plain(u.name) == plain(text))
+            .copied()
+            .ok_or_else(|| {
+                let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
+                format!("unknown unit `{text}`; the units are {}", names.join(", "))
+            })
     }
 
     /// The unit in which the signal of this name is kept: the longest suffix that fits, a pure number without one.
@@ -110,7 +128,10 @@ impl Unit {
 
     /// Every unit that measures the same, this one among them.
     pub fn alike(self) -> impl Iterator<Item = Unit> {
-        UNITS.iter().copied().filter(move |u| u.quantity == self.quantity)
+        UNITS
+            .iter()
+            .copied()
+            .filter(move |u| u.quantity == self.quantity)
     }
 
     /// The factor from values in this unit to values in `target`, where the two measure the same.
@@ -126,7 +147,9 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn factor(from: &str, signal: &str) -> Option<f64> {
-        Unit::parse(from).expect("a known unit").factor_to(Unit::of_signal(signal))
+        Unit::parse(from)
+            .expect("a known unit")
+            .factor_to(Unit::of_signal(signal))
     }
 
     #[test]
@@ -145,7 +168,11 @@ mod tests {
             ("in", "stick_pitch_in", 1.0),
             ("deg", "alpha_vane_deg", 1.0),
         ] {
-            assert_relative_eq!(factor(from, signal).expect(from), expected, max_relative = 1e-7);
+            assert_relative_eq!(
+                factor(from, signal).expect(from),
+                expected,
+                max_relative = 1e-7
+            );
         }
     }
 

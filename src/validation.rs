@@ -53,7 +53,9 @@ pub fn run(
     let mut flown: Vec<(&Class, Flown)> = Vec::new();
     for class in &simulation.config.classes {
         for alpha_deg in angles(simulation, &class.name) {
-            let Some(card) = simulation.card(&class.name, alpha_deg) else { continue };
+            let Some(card) = simulation.card(&class.name, alpha_deg) else {
+                continue;
+            };
             match simulation.simulator.fly(&card) {
                 Ok(maneuver) => flown.push((class, maneuver)),
                 Err(problem) => found.problems.push(problem),
@@ -70,26 +72,50 @@ pub fn run(
     progress.begin("validate", flown.len() * (SETTINGS.len() + 1));
     for (residuals, weights) in SETTINGS {
         for (class, maneuver) in &flown {
-            let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
+            let (truth, seed) = (
+                validate::tunnel_of_truth(maneuver),
+                seed_of(simulation.cards.seed, &name(maneuver)),
+            );
             let subject = subject(simulation, class, maneuver, &truth, &settings);
-            let setting = Setting { residuals, coloured_time_s: study.coloured_time_s, weights };
-            found.coverage.extend(validate::coverage(&subject, setting, study.realisations, seed));
+            let setting = Setting {
+                residuals,
+                coloured_time_s: study.coloured_time_s,
+                weights,
+            };
+            found.coverage.extend(validate::coverage(
+                &subject,
+                setting,
+                study.realisations,
+                seed,
+            ));
             progress.advance(&name(maneuver));
         }
     }
     for (class, maneuver) in &flown {
-        let (truth, seed) = (validate::tunnel_of_truth(maneuver), seed_of(simulation.cards.seed, &name(maneuver)));
+        let (truth, seed) = (
+            validate::tunnel_of_truth(maneuver),
+            seed_of(simulation.cards.seed, &name(maneuver)),
+        );
         let subject = subject(simulation, class, maneuver, &truth, &settings);
-        let setting = Setting { residuals: Residuals::White, coloured_time_s: 0.0, weights: Weights::Table };
+        let setting = Setting {
+            residuals: Residuals::White,
+            coloured_time_s: 0.0,
+            weights: Weights::Table,
+        };
         let records = study.realisations.div_ceil(RECORDS_PER_START);
-        found.starts.extend(validate::starts(&subject, setting, records, seed));
+        found
+            .starts
+            .extend(validate::starts(&subject, setting, records, seed));
         progress.advance(&name(maneuver));
     }
     progress.end();
     let shelf = table::Shelf::of(out);
     table::publish(&shelf, &found.coverage)?;
     table::publish(&shelf, &found.starts)?;
-    atomic::place(page, validate::page(command, &found.coverage, &found.starts).as_bytes())?;
+    atomic::place(
+        page,
+        validate::page(command, &found.coverage, &found.starts).as_bytes(),
+    )?;
     Ok(found)
 }
 
@@ -106,7 +132,12 @@ fn subject<'a>(
 ) -> Subject<'a> {
     let config = &simulation.config;
     let basis = Basis::new(&config.aircraft, &config.buildup, truth, settings);
-    Subject { class, flown, instruments: &simulation.cards.instruments, basis }
+    Subject {
+        class,
+        flown,
+        instruments: &simulation.cards.instruments,
+        basis,
+    }
 }
 
 /// Angles of attack for a class's study, spread over those that its cards have.
@@ -118,5 +149,7 @@ fn angles(simulation: &Simulation, class: &str) -> Vec<f64> {
     angles.dedup();
     let wanted = simulation.cards.study.points.clamp(1, angles.len().max(1));
     let place = |k: usize| k * angles.len().saturating_sub(1) / (wanted - 1).max(1);
-    (0..wanted.min(angles.len())).map(|k| angles[place(k)]).collect()
+    (0..wanted.min(angles.len()))
+        .map(|k| angles[place(k)])
+        .collect()
 }

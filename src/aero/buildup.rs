@@ -49,7 +49,9 @@ impl Buildup {
 
     /// The derivatives of one axis, in the order of the model file.
     pub fn derivatives_of(&self, axis: Axis) -> impl Iterator<Item = &Derivative> {
-        self.derivatives.iter().filter(move |d| d.coefficient.axis() == axis)
+        self.derivatives
+            .iter()
+            .filter(move |d| d.coefficient.axis() == axis)
     }
 
     /// The biases of one axis's outputs, in the order of the model file.
@@ -60,8 +62,16 @@ impl Buildup {
     /// The unit of a derivative, bias or combined sum.
     #[must_use]
     pub fn unit_of(&self, name: &str) -> Option<DerivativeUnit> {
-        let combined = || self.combined.iter().find(|c| c.name == name).map(|_| DerivativeUnit::Number);
+        let combined = || {
+            self.combined
+                .iter()
+                .find(|c| c.name == name)
+                .map(|_| DerivativeUnit::Number)
+        };
         let bias = || self.biases.iter().find(|b| b.name == name).map(Bias::unit);
-        self.derivative(name).map(Derivative::unit).or_else(bias).or_else(combined)
+        self.derivative(name)
+            .map(Derivative::unit)
+            .or_else(bias)
+            .or_else(combined)
     }
 }

@@ -27,7 +27,13 @@ impl Axis {
     #[must_use]
     pub fn outputs(self) -> [Output; 5] {
         match self {
-            Axis::Longitudinal => [Output::Alpha, Output::Q, Output::Theta, Output::An, Output::Ax],
+            Axis::Longitudinal => [
+                Output::Alpha,
+                Output::Q,
+                Output::Theta,
+                Output::An,
+                Output::Ax,
+            ],
             Axis::Lateral => [Output::Beta, Output::P, Output::R, Output::Phi, Output::Ay],
         }
     }
@@ -64,7 +70,11 @@ impl Coefficient {
     /// Its place among its axis's three.
     #[must_use]
     pub fn index(self) -> usize {
-        self.axis().coefficients().iter().position(|c| *c == self).unwrap_or(0)
+        self.axis()
+            .coefficients()
+            .iter()
+            .position(|c| *c == self)
+            .unwrap_or(0)
     }
 
     #[must_use]
@@ -126,7 +136,11 @@ impl Output {
 
     #[must_use]
     pub fn axis(self) -> Axis {
-        if Axis::Longitudinal.outputs().contains(&self) { Axis::Longitudinal } else { Axis::Lateral }
+        if Axis::Longitudinal.outputs().contains(&self) {
+            Axis::Longitudinal
+        } else {
+            Axis::Lateral
+        }
     }
 }
 
@@ -222,12 +236,26 @@ fn per_degree(angle: &str) -> f64 {
 
 /// A derivative's unit taken apart: what it measures, the factor to that quantity's own unit, and the angle it is per.
 fn spelled(written: &str) -> Option<(&'static str, f64, Option<&'static str>)> {
-    let plain: String = written.trim().chars().filter(|c| !matches!(c, ' ' | '*' | '·' | '^')).collect();
+    let plain: String = written
+        .trim()
+        .chars()
+        .filter(|c| !matches!(c, ' ' | '*' | '·' | '^'))
+        .collect();
     let (of, per) = match plain.split_once("per_").or_else(|| plain.split_once('/')) {
         Some((of, per)) => (of.trim_matches('_'), Some(per)),
-        None => (plain.strip_suffix("deg-1").or(plain.strip_suffix("rad-1")).unwrap_or(&plain), None),
+        None => (
+            plain
+                .strip_suffix("deg-1")
+                .or(plain.strip_suffix("rad-1"))
+                .unwrap_or(&plain),
+            None,
+        ),
     };
-    let per = per.or_else(|| plain.strip_suffix("-1").map(|p| &p[p.len().saturating_sub(3)..]));
+    let per = per.or_else(|| {
+        plain
+            .strip_suffix("-1")
+            .map(|p| &p[p.len().saturating_sub(3)..])
+    });
     let angle = match per {
         None => None,
         Some("deg") => Some("deg"),
@@ -259,7 +287,9 @@ impl Derivative {
         match self.regressor {
             Regressor::Constant => DerivativeUnit::Number,
             Regressor::Alpha | Regressor::Beta | Regressor::Surface(_) => DerivativeUnit::PerDeg,
-            Regressor::RollRate | Regressor::PitchRate | Regressor::YawRate => DerivativeUnit::PerRad,
+            Regressor::RollRate | Regressor::PitchRate | Regressor::YawRate => {
+                DerivativeUnit::PerRad
+            }
             Regressor::Vane(_) if self.coefficient.is_moment() => DerivativeUnit::FtLbfPerDeg,
             Regressor::Vane(_) => DerivativeUnit::LbfPerDeg,
         }
@@ -285,14 +315,22 @@ mod tests {
             (FtLbfPerDeg, "N_m/deg", 1.0 / 4.448_221_615_260_5 / 0.3048),
             (Number, "nd", 1.0),
         ] {
-            assert_relative_eq!(unit.factor_from(written).expect(written), factor, max_relative = 1e-12);
+            assert_relative_eq!(
+                unit.factor_from(written).expect(written),
+                factor,
+                max_relative = 1e-12
+            );
         }
         for unit in [Number, PerDeg, PerRad, LbfPerDeg, FtLbfPerDeg] {
             assert_eq!(unit.factor_from(unit.name()), Some(1.0));
         }
-        for (unit, written) in
-            [(PerDeg, "-"), (Number, "per_deg"), (PerDeg, "lbf_per_deg"), (PerDeg, "per_ft"), (PerDeg, "x")]
-        {
+        for (unit, written) in [
+            (PerDeg, "-"),
+            (Number, "per_deg"),
+            (PerDeg, "lbf_per_deg"),
+            (PerDeg, "per_ft"),
+            (PerDeg, "x"),
+        ] {
             assert_eq!(unit.factor_from(written), None, "{written}");
         }
     }

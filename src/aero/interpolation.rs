@@ -23,15 +23,30 @@ pub(super) fn place(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f6
     let (mut low, mut high) = (0, last);
     while high > low + 1 {
         let middle = low.midpoint(high);
-        if x_of(middle) <= x { low = middle } else { high = middle }
+        if x_of(middle) <= x {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     let (a, b) = (x_of(low), x_of(high));
-    (low, if b > a { ((x - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 })
+    (
+        low,
+        if b > a {
+            ((x - a) / (b - a)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        },
+    )
 }
 
 /// The value at a fraction of an interval: exactly the table's at its ends.
 pub(super) fn linear(y0: f64, y1: f64, fraction: f64) -> f64 {
-    if fraction >= 1.0 { y1 } else { y0 + fraction * (y1 - y0) }
+    if fraction >= 1.0 {
+        y1
+    } else {
+        y0 + fraction * (y1 - y0)
+    }
 }
 
 /// The monotone cubic at a fraction of the interval that begins at point `low` of `n`.
@@ -61,7 +76,10 @@ pub(super) fn monotone(
     let (h, t) = (length(low), fraction);
     let (d0, d1) = (slope(low), slope(high));
     let (t2, t3) = (t * t, t * t * t);
-    (2.0 * t3 - 3.0 * t2 + 1.0) * y0 + (t3 - 2.0 * t2 + t) * h * d0 + (3.0 * t2 - 2.0 * t3) * y1 + (t3 - t2) * h * d1
+    (2.0 * t3 - 3.0 * t2 + 1.0) * y0
+        + (t3 - 2.0 * t2 + t) * h * d0
+        + (3.0 * t2 - 2.0 * t3) * y1
+        + (t3 - t2) * h * d1
 }
 
 fn inner_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {
@@ -104,13 +122,26 @@ mod tests {
 
     fn read(points: &[(f64, f64)], x: f64) -> f64 {
         let (low, fraction) = place(points.len(), |i| points[i].0, x);
-        monotone(points.len(), low, fraction, |i| points[i].0, |i| points[i].1)
+        monotone(
+            points.len(),
+            low,
+            fraction,
+            |i| points[i].0,
+            |i| points[i].1,
+        )
     }
 
     #[test]
     fn the_monotone_cubic_is_that_of_an_independent_implementation() {
         // scipy.interpolate.PchipInterpolator on the same points.
-        let points = [(0.0, 0.0), (1.0, 1.0), (3.0, 1.5), (4.0, 4.0), (6.0, 3.0), (7.0, 3.0)];
+        let points = [
+            (0.0, 0.0),
+            (1.0, 1.0),
+            (3.0, 1.5),
+            (4.0, 4.0),
+            (6.0, 3.0),
+            (7.0, 3.0),
+        ];
         for (x, expected) in PCHIP {
             assert_relative_eq!(read(&points, x), expected, max_relative = 1e-13);
         }
@@ -133,7 +164,10 @@ mod tests {
         for (x, y) in points {
             assert_eq!(read(&points, x).to_bits(), y.to_bits());
             let (low, fraction) = place(points.len(), |i| points[i].0, x);
-            assert_eq!(linear(points[low].1, points[(low + 1).min(3)].1, fraction).to_bits(), y.to_bits());
+            assert_eq!(
+                linear(points[low].1, points[(low + 1).min(3)].1, fraction).to_bits(),
+                y.to_bits()
+            );
         }
     }
 

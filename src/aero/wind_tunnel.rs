@@ -111,7 +111,10 @@ impl WindTunnel {
     /// Without tables yet, to be read as the settings say.
     #[must_use]
     pub fn new(settings: Settings) -> WindTunnel {
-        WindTunnel { tables: BTreeMap::new(), settings }
+        WindTunnel {
+            tables: BTreeMap::new(),
+            settings,
+        }
     }
 
     #[must_use]
@@ -122,8 +125,14 @@ impl WindTunnel {
     /// The same tables, constant beyond their ends.
     #[must_use]
     pub fn clamped(&self) -> WindTunnel {
-        let settings = Settings { extrapolation: Extrapolation::Clamp, ..self.settings.clone() };
-        WindTunnel { tables: self.tables.clone(), settings }
+        let settings = Settings {
+            extrapolation: Extrapolation::Clamp,
+            ..self.settings.clone()
+        };
+        WindTunnel {
+            tables: self.tables.clone(),
+            settings,
+        }
     }
 
     /// Adds one point; points may come in any order.
@@ -140,7 +149,9 @@ impl WindTunnel {
     }
 
     fn table(&self, derivative: &str) -> &[Entry] {
-        self.tables.get(&key(derivative)).map_or(&[][..], Vec::as_slice)
+        self.tables
+            .get(&key(derivative))
+            .map_or(&[][..], Vec::as_slice)
     }
 
     #[must_use]
@@ -151,7 +162,12 @@ impl WindTunnel {
     /// Where the values come from, as far as the database says: every source once, sorted.
     #[must_use]
     pub fn sources(&self) -> Vec<&str> {
-        let mut sources: Vec<&str> = self.tables.values().flatten().filter_map(|e| e.point.source.as_deref()).collect();
+        let mut sources: Vec<&str> = self
+            .tables
+            .values()
+            .flatten()
+            .filter_map(|e| e.point.source.as_deref())
+            .collect();
         sources.sort_unstable();
         sources.dedup();
         sources
@@ -160,7 +176,9 @@ impl WindTunnel {
     /// The source of a derivative's first value that states one.
     #[must_use]
     pub fn source_of(&self, derivative: &str) -> Option<&str> {
-        self.table(derivative).iter().find_map(|e| e.point.source.as_deref())
+        self.table(derivative)
+            .iter()
+            .find_map(|e| e.point.source.as_deref())
     }
 
     /// The α at which a derivative is tabulated (at any Mach), ascending.
@@ -193,7 +211,14 @@ impl WindTunnel {
     /// The value at an angle of attack and Mach number, at the settings' third variable.
     #[must_use]
     pub fn value(&self, derivative: &str, alpha_deg: f64, mach: f64) -> Option<TunnelValue> {
-        self.at(derivative, &Condition { alpha_deg, mach, third: None })
+        self.at(
+            derivative,
+            &Condition {
+                alpha_deg,
+                mach,
+                third: None,
+            },
+        )
     }
 
     /// The value at a flight condition; none without a table, or where extrapolation would be needed and is refused.
@@ -213,15 +238,30 @@ impl WindTunnel {
             let along_alpha = |j: usize| {
                 let row = rows[j];
                 let alpha = |k: usize| row[k].point.alpha_deg;
-                along(row.len(), alpha, |k| row[k].value(), condition.alpha_deg, scheme)
+                along(
+                    row.len(),
+                    alpha,
+                    |k| row[k].value(),
+                    condition.alpha_deg,
+                    scheme,
+                )
             };
             along(rows.len(), mach, along_alpha, condition.mach, scheme)
         };
-        Some(along(blocks.len(), third, across_mach, self.third_at(condition), scheme))
+        Some(along(
+            blocks.len(),
+            third,
+            across_mach,
+            self.third_at(condition),
+            scheme,
+        ))
     }
 
     fn third_at(&self, condition: &Condition) -> f64 {
-        condition.third.or(self.settings.third.as_ref().map(|t| t.at)).unwrap_or(0.0)
+        condition
+            .third
+            .or(self.settings.third.as_ref().map(|t| t.at))
+            .unwrap_or(0.0)
     }
 
     /// In which variables a reading lies beyond a derivative's table: beyond the rows on either side of it, which may be
@@ -234,11 +274,19 @@ impl WindTunnel {
         let mut note = |variable: &str, read_at: f64, (from, to): (f64, f64)| {
             let known = beyond.iter().any(|b: &Beyond| b.variable == variable);
             if !known && !(from..=to).contains(&read_at) {
-                beyond.push(Beyond { variable: variable.to_owned(), read_at, from, to });
+                beyond.push(Beyond {
+                    variable: variable.to_owned(),
+                    read_at,
+                    from,
+                    to,
+                });
             }
         };
         let thirds = breakpoints(table, |e| e.third);
-        if let (Some(range), Some(name)) = (ends(&thirds), self.settings.third.as_ref().map(|t| t.name.as_str())) {
+        if let (Some(range), Some(name)) = (
+            ends(&thirds),
+            self.settings.third.as_ref().map(|t| t.name.as_str()),
+        ) {
             note(name, third, range);
         }
         let blocks: Vec<&[Entry]> = table.chunk_by(|a, b| a.third == b.third).collect();
@@ -259,16 +307,25 @@ impl WindTunnel {
 
 impl Entry {
     fn place(&self) -> (f64, f64, f64) {
-        (self.third.unwrap_or(0.0), self.point.mach.unwrap_or(0.0), self.point.alpha_deg)
+        (
+            self.third.unwrap_or(0.0),
+            self.point.mach.unwrap_or(0.0),
+            self.point.alpha_deg,
+        )
     }
 
     fn value(&self) -> TunnelValue {
-        TunnelValue { value: self.point.value, uncertainty: self.point.uncertainty }
+        TunnelValue {
+            value: self.point.value,
+            uncertainty: self.point.uncertainty,
+        }
     }
 }
 
 fn rows_of_mach(block: &[Entry]) -> Vec<&[Entry]> {
-    block.chunk_by(|a, b| a.point.mach == b.point.mach).collect()
+    block
+        .chunk_by(|a, b| a.point.mach == b.point.mach)
+        .collect()
 }
 
 /// The distinct values of a variable, ascending.
@@ -314,7 +371,13 @@ fn along(
         Interpolation::Linear => linear(a.value, b.value, fraction),
         Interpolation::MonotoneCubic => monotone(n, low, fraction, &x_of, |i| value_of(i).value),
     };
-    TunnelValue { value, uncertainty: a.uncertainty.zip(b.uncertainty).map(|(u, v)| linear(u, v, fraction)) }
+    TunnelValue {
+        value,
+        uncertainty: a
+            .uncertainty
+            .zip(b.uncertainty)
+            .map(|(u, v)| linear(u, v, fraction)),
+    }
 }
 
 #[cfg(test)]
@@ -325,29 +388,51 @@ mod tests {
     fn tunnel(points: &[(f64, Option<f64>, f64)]) -> WindTunnel {
         let mut tunnel = WindTunnel::default();
         for &(alpha_deg, mach, value) in points {
-            tunnel.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });
+            tunnel.insert(
+                "CN_alpha",
+                TunnelPoint {
+                    alpha_deg,
+                    mach,
+                    value,
+                    uncertainty: None,
+                    source: None,
+                },
+            );
         }
         tunnel
     }
 
     fn value(tunnel: &WindTunnel, alpha_deg: f64, mach: f64) -> f64 {
-        tunnel.value("CNalpha", alpha_deg, mach).expect("tabulated").value
+        tunnel
+            .value("CNalpha", alpha_deg, mach)
+            .expect("tabulated")
+            .value
     }
 
     #[test]
     fn a_table_is_linear_between_its_points_and_constant_beyond() {
         let t = tunnel(&[(20.0, None, 3.0), (10.0, None, 1.0), (30.0, None, 2.0)]);
-        for (alpha, expected) in
-            [(10.0, 1.0), (12.5, 1.5), (20.0, 3.0), (25.0, 2.5), (30.0, 2.0), (5.0, 1.0), (60.0, 2.0)]
-        {
+        for (alpha, expected) in [
+            (10.0, 1.0),
+            (12.5, 1.5),
+            (20.0, 3.0),
+            (25.0, 2.5),
+            (30.0, 2.0),
+            (5.0, 1.0),
+            (60.0, 2.0),
+        ] {
             assert_relative_eq!(value(&t, alpha, 0.3), expected);
         }
     }
 
     #[test]
     fn mach_is_interpolated_where_the_tables_have_it() {
-        let t =
-            tunnel(&[(10.0, Some(0.2), 1.0), (20.0, Some(0.2), 2.0), (10.0, Some(0.6), 3.0), (20.0, Some(0.6), 6.0)]);
+        let t = tunnel(&[
+            (10.0, Some(0.2), 1.0),
+            (20.0, Some(0.2), 2.0),
+            (10.0, Some(0.6), 3.0),
+            (20.0, Some(0.6), 6.0),
+        ]);
         assert_relative_eq!(value(&t, 15.0, 0.2), 1.5);
         assert_relative_eq!(value(&t, 15.0, 0.4), 3.0);
         assert_relative_eq!(value(&t, 20.0, 0.5), 5.0);
@@ -362,21 +447,46 @@ mod tests {
 
     fn points() -> Vec<(f64, Option<f64>, f64)> {
         let mach = [0.2, 0.6];
-        mach.iter().flat_map(|&m| (0..4).map(move |k| (10.0 * f64::from(k), Some(m), f64::from(k * k) + m))).collect()
+        mach.iter()
+            .flat_map(|&m| {
+                (0..4).map(move |k| (10.0 * f64::from(k), Some(m), f64::from(k * k) + m))
+            })
+            .collect()
     }
 
     #[test]
     fn a_third_variable_is_interpolated_and_read_at_its_setting_where_it_is_not_known() {
-        let third = Some(Third { name: "altitude_ft".into(), at: 20e3 });
-        let mut t = WindTunnel::new(Settings { third, ..Settings::default() });
+        let third = Some(Third {
+            name: "altitude_ft".into(),
+            at: 20e3,
+        });
+        let mut t = WindTunnel::new(Settings {
+            third,
+            ..Settings::default()
+        });
         for (altitude, factor) in [(10e3, 1.0), (30e3, 3.0)] {
             for (alpha_deg, mach, value) in points() {
-                let point = TunnelPoint { alpha_deg, mach, value: factor * value, uncertainty: None, source: None };
+                let point = TunnelPoint {
+                    alpha_deg,
+                    mach,
+                    value: factor * value,
+                    uncertainty: None,
+                    source: None,
+                };
                 t.insert_at("CN_alpha", Some(altitude), point);
             }
         }
         let at = |third: Option<f64>| {
-            t.at("CN_alpha", &Condition { alpha_deg: 15.0, mach: 0.4, third }).expect("tabulated").value
+            t.at(
+                "CN_alpha",
+                &Condition {
+                    alpha_deg: 15.0,
+                    mach: 0.4,
+                    third,
+                },
+            )
+            .expect("tabulated")
+            .value
         };
         // (1 + 4)/2 + 0.4 at the first altitude.
         assert_relative_eq!(at(Some(10e3)), 2.9, max_relative = 1e-14);
@@ -388,14 +498,29 @@ mod tests {
 
     #[test]
     fn a_monotone_cubic_runs_through_the_points_and_differs_between_them() {
-        let mut cubic =
-            WindTunnel::new(Settings { interpolation: Interpolation::MonotoneCubic, ..Settings::default() });
+        let mut cubic = WindTunnel::new(Settings {
+            interpolation: Interpolation::MonotoneCubic,
+            ..Settings::default()
+        });
         let straight = tunnel(&points());
         for (alpha_deg, mach, value) in points() {
-            cubic.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });
+            cubic.insert(
+                "CN_alpha",
+                TunnelPoint {
+                    alpha_deg,
+                    mach,
+                    value,
+                    uncertainty: None,
+                    source: None,
+                },
+            );
         }
         for (alpha, mach, v) in points() {
-            assert_relative_eq!(value(&cubic, alpha, mach.expect("mach")), v, max_relative = 1e-14);
+            assert_relative_eq!(
+                value(&cubic, alpha, mach.expect("mach")),
+                v,
+                max_relative = 1e-14
+            );
         }
         // Closed form for k² at unit spacing between 1 and 2: chords 1, 3, 5 have the slopes 1.5 and 3.75.
         let expected = 0.5 * (1.0 + 4.0) + (1.5 - 3.75) / 8.0 + 0.2;
@@ -406,26 +531,79 @@ mod tests {
     #[test]
     fn beyond_the_ends_it_is_clamped_or_refused_and_says_so() {
         let clamped = tunnel(&points());
-        let mut refusing = WindTunnel::new(Settings { extrapolation: Extrapolation::Refuse, ..Settings::default() });
+        let mut refusing = WindTunnel::new(Settings {
+            extrapolation: Extrapolation::Refuse,
+            ..Settings::default()
+        });
         for (alpha_deg, mach, value) in points() {
-            refusing.insert("CN_alpha", TunnelPoint { alpha_deg, mach, value, uncertainty: None, source: None });
+            refusing.insert(
+                "CN_alpha",
+                TunnelPoint {
+                    alpha_deg,
+                    mach,
+                    value,
+                    uncertainty: None,
+                    source: None,
+                },
+            );
         }
-        let beyond = Condition { alpha_deg: 31.0, mach: 0.7, third: None };
+        let beyond = Condition {
+            alpha_deg: 31.0,
+            mach: 0.7,
+            third: None,
+        };
         assert_relative_eq!(clamped.at("CN_alpha", &beyond).expect("clamped").value, 9.6);
         assert_eq!(refusing.at("CN_alpha", &beyond), None);
-        let named = |variable: &str, read_at, from, to| Beyond { variable: variable.into(), read_at, from, to };
-        let both = [named("mach", 0.7, 0.2, 0.6), named("alpha_deg", 31.0, 0.0, 30.0)];
+        let named = |variable: &str, read_at, from, to| Beyond {
+            variable: variable.into(),
+            read_at,
+            from,
+            to,
+        };
+        let both = [
+            named("mach", 0.7, 0.2, 0.6),
+            named("alpha_deg", 31.0, 0.0, 30.0),
+        ];
         assert_eq!(refusing.beyond("CN_alpha", &beyond), both);
-        let inside = Condition { alpha_deg: 30.0, mach: 0.2, third: None };
+        let inside = Condition {
+            alpha_deg: 30.0,
+            mach: 0.2,
+            third: None,
+        };
         assert_eq!(refusing.beyond("CN_alpha", &inside), []);
-        assert_eq!(refusing.at("CN_alpha", &inside), clamped.at("CN_alpha", &inside));
+        assert_eq!(
+            refusing.at("CN_alpha", &inside),
+            clamped.at("CN_alpha", &inside)
+        );
     }
 
     #[test]
     fn a_shorter_row_at_one_mach_ends_where_it_ends() {
-        let t = tunnel(&[(0.0, Some(0.2), 0.0), (30.0, Some(0.2), 3.0), (0.0, Some(0.6), 0.0), (10.0, Some(0.6), 1.0)]);
-        let at = |alpha_deg, mach| t.beyond("CN_alpha", &Condition { alpha_deg, mach, third: None });
+        let t = tunnel(&[
+            (0.0, Some(0.2), 0.0),
+            (30.0, Some(0.2), 3.0),
+            (0.0, Some(0.6), 0.0),
+            (10.0, Some(0.6), 1.0),
+        ]);
+        let at = |alpha_deg, mach| {
+            t.beyond(
+                "CN_alpha",
+                &Condition {
+                    alpha_deg,
+                    mach,
+                    third: None,
+                },
+            )
+        };
         assert_eq!(at(20.0, 0.2), []);
-        assert_eq!(at(20.0, 0.3), [Beyond { variable: "alpha_deg".into(), read_at: 20.0, from: 0.0, to: 10.0 }]);
+        assert_eq!(
+            at(20.0, 0.3),
+            [Beyond {
+                variable: "alpha_deg".into(),
+                read_at: 20.0,
+                from: 0.0,
+                to: 10.0
+            }]
+        );
     }
 }

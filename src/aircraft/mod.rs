@@ -72,7 +72,11 @@ pub struct Vane {
 impl Vane {
     #[must_use]
     pub fn position(self) -> Position {
-        Position { x_ft: self.x_ft, y_ft: self.y_ft, z_ft: self.z_ft }
+        Position {
+            x_ft: self.x_ft,
+            y_ft: self.y_ft,
+            z_ft: self.z_ft,
+        }
     }
 }
 
@@ -91,6 +95,10 @@ impl Position {
     /// The arm from the c.g. to this point in body axes, ft forward, right and down.
     #[must_use]
     pub fn arm(self, cg: Position) -> [f64; 3] {
-        [cg.x_ft - self.x_ft, self.y_ft - cg.y_ft, cg.z_ft - self.z_ft]
+        [
+            cg.x_ft - self.x_ft,
+            self.y_ft - cg.y_ft,
+            cg.z_ft - self.z_ft,
+        ]
     }
 }

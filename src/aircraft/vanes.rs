@@ -4,7 +4,10 @@
 //! read `k` times the local angle. Exact: the angle of the local velocity. Small-angle, as printed in the paper:
 //! α + (x q + y p)/V and β + (z p − x r)/V, with arms aft, right and above. At tip booms the two differ by up to 0.45°
 //! at α 30° to 50°.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 use super::{Position, Sensors, Vane, VaneModel};
 use crate::trig::sin_cos;
@@ -41,7 +44,11 @@ impl Flow {
         let ([(sa, ca), (sb, cb)], v) = (sin_cos([self.alpha, self.beta]), self.velocity);
         let ([p, q, r], [x, y, z]) = (self.rates, arm);
         Local {
-            velocity: [v * ca * cb + q * z - r * y, v * sb + r * x - p * z, v * sa * cb + p * y - q * x],
+            velocity: [
+                v * ca * cb + q * z - r * y,
+                v * sb + r * x - p * z,
+                v * sa * cb + p * y - q * x,
+            ],
             by_alpha: [-v * sa * cb, 0.0, v * ca * cb],
             by_beta: [-v * ca * sb, v * cb, -v * sa * sb],
             by_rates: [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]],
@@ -67,7 +74,11 @@ impl Vane {
                 reading(w.atan2(u), slope, &local)
             }
             VaneModel::SmallAngle => {
-                return self.alpha_small(flow.alpha, self.alpha_by_rates(flow.velocity, cg), flow.rates);
+                return self.alpha_small(
+                    flow.alpha,
+                    self.alpha_by_rates(flow.velocity, cg),
+                    flow.rates,
+                );
             }
         };
         scaled(exact, self)
@@ -93,14 +104,30 @@ impl Vane {
     #[inline(always)]
     #[must_use]
     pub fn alpha_small(self, alpha: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
-        scaled(Reading { angle: alpha + dot(by_rates, rates), by_alpha: 1.0, by_beta: 0.0, by_rates }, self)
+        scaled(
+            Reading {
+                angle: alpha + dot(by_rates, rates),
+                by_alpha: 1.0,
+                by_beta: 0.0,
+                by_rates,
+            },
+            self,
+        )
     }
 
     /// The small-angle reading of a β vane.
     #[inline(always)]
     #[must_use]
     pub fn beta_small(self, beta: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
-        scaled(Reading { angle: beta + dot(by_rates, rates), by_alpha: 0.0, by_beta: 1.0, by_rates }, self)
+        scaled(
+            Reading {
+                angle: beta + dot(by_rates, rates),
+                by_alpha: 0.0,
+                by_beta: 1.0,
+                by_rates,
+            },
+            self,
+        )
     }
 
     /// What a β vane reads, rad, with the c.g. at `cg`.
@@ -114,11 +141,16 @@ impl Vane {
                 let [u, v, w] = local.velocity;
                 let across = u.hypot(w);
                 let speed2 = across * across + v * v;
-                let slope = |d: [f64; 3]| (across * d[1] - v * (u * d[0] + w * d[2]) / across) / speed2;
+                let slope =
+                    |d: [f64; 3]| (across * d[1] - v * (u * d[0] + w * d[2]) / across) / speed2;
                 reading(v.atan2(across), slope, &local)
             }
             VaneModel::SmallAngle => {
-                return self.beta_small(flow.beta, self.beta_by_rates(flow.velocity, cg), flow.rates);
+                return self.beta_small(
+                    flow.beta,
+                    self.beta_by_rates(flow.velocity, cg),
+                    flow.rates,
+                );
             }
         };
         scaled(exact, self)
@@ -151,7 +183,10 @@ impl Sensors {
             ..*read
         };
         if self.vane_model == VaneModel::SmallAngle {
-            flow.alpha -= dot(self.alpha_vane.alpha_by_rates(read.velocity, cg), read.rates);
+            flow.alpha -= dot(
+                self.alpha_vane.alpha_by_rates(read.velocity, cg),
+                read.rates,
+            );
             flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);
             return flow;
         }
@@ -200,22 +235,45 @@ mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
 
-    const CG: Position = Position { x_ft: 38.2, y_ft: 0.0, z_ft: 8.7 };
+    const CG: Position = Position {
+        x_ft: 38.2,
+        y_ft: 0.0,
+        z_ft: 8.7,
+    };
 
     fn sensors(vane_model: VaneModel) -> Sensors {
-        let p = Position { x_ft: 31.4, y_ft: -0.1, z_ft: 6.95 };
+        let p = Position {
+            x_ft: 31.4,
+            y_ft: -0.1,
+            z_ft: 6.95,
+        };
         Sensors {
             an: p,
             ax: p,
             ay: p,
-            alpha_vane: Vane { x_ft: 35.4, y_ft: 19.2, z_ft: 7.9, factor: 1.02 },
-            beta_vane: Vane { x_ft: 35.4, y_ft: -19.2, z_ft: 7.9, factor: 0.98 },
+            alpha_vane: Vane {
+                x_ft: 35.4,
+                y_ft: 19.2,
+                z_ft: 7.9,
+                factor: 1.02,
+            },
+            beta_vane: Vane {
+                x_ft: 35.4,
+                y_ft: -19.2,
+                z_ft: 7.9,
+                factor: 0.98,
+            },
             vane_model,
             thrust_in_ax: true,
         }
     }
 
-    const FLOW: Flow = Flow { alpha: 0.6, beta: 0.1, velocity: 280.0, rates: [0.3, -0.1, 0.15] };
+    const FLOW: Flow = Flow {
+        alpha: 0.6,
+        beta: 0.1,
+        velocity: 280.0,
+        rates: [0.3, -0.1, 0.15],
+    };
 
     fn slopes_match(read: impl Fn(&Flow) -> Reading) {
         let (h, at) = (1e-6, read(&FLOW));
@@ -228,7 +286,11 @@ mod tests {
         assert_abs_diff_eq!(at.by_alpha, numeric(&|f, d| f.alpha += d), epsilon = 1e-8);
         assert_abs_diff_eq!(at.by_beta, numeric(&|f, d| f.beta += d), epsilon = 1e-8);
         for i in 0..3 {
-            assert_abs_diff_eq!(at.by_rates[i], numeric(&|f, d| f.rates[i] += d), epsilon = 1e-8);
+            assert_abs_diff_eq!(
+                at.by_rates[i],
+                numeric(&|f, d| f.rates[i] += d),
+                epsilon = 1e-8
+            );
         }
     }
 
@@ -245,8 +307,15 @@ mod tests {
     fn a_vane_ahead_of_the_cg_reads_less_alpha_when_the_nose_goes_up() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow { rates: [0.0; 3], beta: 0.0, ..FLOW };
-            let nose_up = Flow { rates: [0.0, 0.2, 0.0], ..still };
+            let still = Flow {
+                rates: [0.0; 3],
+                beta: 0.0,
+                ..FLOW
+            };
+            let nose_up = Flow {
+                rates: [0.0, 0.2, 0.0],
+                ..still
+            };
             assert!(s.alpha_reading(&nose_up, CG).angle < s.alpha_reading(&still, CG).angle);
         }
     }
@@ -255,8 +324,16 @@ mod tests {
     fn a_vane_on_the_right_tip_reads_more_alpha_when_the_right_wing_goes_down() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow { rates: [0.0; 3], alpha: 0.1, beta: 0.0, ..FLOW };
-            let rolling = Flow { rates: [0.2, 0.0, 0.0], ..still };
+            let still = Flow {
+                rates: [0.0; 3],
+                alpha: 0.1,
+                beta: 0.0,
+                ..FLOW
+            };
+            let rolling = Flow {
+                rates: [0.2, 0.0, 0.0],
+                ..still
+            };
             assert!(s.alpha_reading(&rolling, CG).angle > s.alpha_reading(&still, CG).angle);
         }
     }
@@ -266,17 +343,31 @@ mod tests {
         // The nose moving right meets the air from the right.
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow { rates: [0.0; 3], alpha: 0.1, beta: 0.0, ..FLOW };
-            let yawing = Flow { rates: [0.0, 0.0, 0.2], ..still };
+            let still = Flow {
+                rates: [0.0; 3],
+                alpha: 0.1,
+                beta: 0.0,
+                ..FLOW
+            };
+            let yawing = Flow {
+                rates: [0.0, 0.0, 0.2],
+                ..still
+            };
             assert!(s.beta_reading(&yawing, CG).angle > s.beta_reading(&still, CG).angle);
         }
     }
 
     #[test]
     fn exact_and_printed_forms_agree_for_small_angles_at_the_cg_s_height() {
-        let small = Flow { alpha: 0.02, beta: 0.0, velocity: 500.0, rates: [0.01, 0.02, 0.0] };
+        let small = Flow {
+            alpha: 0.02,
+            beta: 0.0,
+            velocity: 500.0,
+            rates: [0.01, 0.02, 0.0],
+        };
         let (exact, printed) = (sensors(VaneModel::Exact), sensors(VaneModel::SmallAngle));
-        let difference = exact.alpha_reading(&small, CG).angle - printed.alpha_reading(&small, CG).angle;
+        let difference =
+            exact.alpha_reading(&small, CG).angle - printed.alpha_reading(&small, CG).angle;
         assert_abs_diff_eq!(difference, 0.0, epsilon = 2e-6);
     }
 
@@ -284,7 +375,11 @@ mod tests {
     fn the_way_back_returns_the_angles_at_the_cg() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let read = Flow { alpha: s.alpha_reading(&FLOW, CG).angle, beta: s.beta_reading(&FLOW, CG).angle, ..FLOW };
+            let read = Flow {
+                alpha: s.alpha_reading(&FLOW, CG).angle,
+                beta: s.beta_reading(&FLOW, CG).angle,
+                ..FLOW
+            };
             let back = s.flow_at_cg(&read, CG);
             assert_abs_diff_eq!(back.alpha, FLOW.alpha, epsilon = 1e-15);
             assert_abs_diff_eq!(back.beta, FLOW.beta, epsilon = 1e-15);

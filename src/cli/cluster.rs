@@ -84,7 +84,11 @@ enum Scheduler {
 
 fn plan_file(config: &Config, of: Of) -> PathBuf {
     // Where all machines see it.
-    config.shared_store.as_ref().unwrap_or(&config.store).join(format!("{}.plan.json", of.name()))
+    config
+        .shared_store
+        .as_ref()
+        .unwrap_or(&config.store)
+        .join(format!("{}.plan.json", of.name()))
 }
 
 /// Deals a campaign's work.
@@ -95,10 +99,19 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
         Dealt::Flights => Of::Flights,
         Dealt::Maneuvers => Of::Maneuvers,
     };
-    let file = options.out.clone().unwrap_or_else(|| plan_file(&config, of));
+    let file = options
+        .out
+        .clone()
+        .unwrap_or_else(|| plan_file(&config, of));
     let shards = options.shards.unwrap_or(config.cluster.shards);
     anyhow::ensure!(shards > 0, "--shards must be at least 1");
-    let plan = shard::plan(&config, of, shards, &file, &Bars::new(options.options.quiet, None))?;
+    let plan = shard::plan(
+        &config,
+        of,
+        shards,
+        &file,
+        &Bars::new(options.options.quiet, None),
+    )?;
     if !options.options.quiet {
         say(&plan, &file);
     }
@@ -122,10 +135,17 @@ fn say(plan: &Plan, file: &Path) {
 
 impl ShareOptions {
     /// Computes the shard that is asked for; none where none is.
-    pub fn work(&self, until: Stage, options: &Options, patience: &Patience) -> Option<anyhow::Result<ExitCode>> {
+    pub fn work(
+        &self,
+        until: Stage,
+        options: &Options,
+        patience: &Patience,
+    ) -> Option<anyhow::Result<ExitCode>> {
         let (plan, shard) = (self.plan.as_deref()?, self.shard?);
         Some(match work(plan, shard, until, options, patience) {
-            Err(error) if error.downcast_ref::<Error>().is_some_and(Error::is_passing) => Ok(again(&error)),
+            Err(error) if error.downcast_ref::<Error>().is_some_and(Error::is_passing) => {
+                Ok(again(&error))
+            }
             done => done,
         })
     }
@@ -138,7 +158,13 @@ fn again(error: &anyhow::Error) -> ExitCode {
 }
 
 #[expect(clippy::print_stdout, reason = "what a shard says")]
-fn work(file: &Path, shard: Shard, until: Stage, options: &Options, patience: &Patience) -> anyhow::Result<ExitCode> {
+fn work(
+    file: &Path,
+    shard: Shard,
+    until: Stage,
+    options: &Options,
+    patience: &Patience,
+) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let config = options.load()?;
     let plan = shard::read(file)?;
@@ -149,22 +175,43 @@ fn work(file: &Path, shard: Shard, until: Stage, options: &Options, patience: &P
         plan.of.name(),
         plan.of.stage().name()
     );
-    let made = shard::work(&config, &plan, shard, until, patience.wait(), &Bars::new(options.quiet, None))?;
+    let made = shard::work(
+        &config,
+        &plan,
+        shard,
+        until,
+        patience.wait(),
+        &Bars::new(options.quiet, None),
+    )?;
     if !options.quiet {
         let share = plan.share(shard.number).count();
-        println!("shard {}/{}: {share} {}, {made} artefacts made", shard.number, shard.of, plan.of.name());
+        println!(
+            "shard {}/{}: {share} {}, {made} artefacts made",
+            shard.number,
+            shard.of,
+            plan.of.name()
+        );
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Prints the shards of which something is missing, as a scheduler writes an array.
-#[expect(clippy::print_stdout, clippy::print_stderr, reason = "the array is for a script, the rest for a reader")]
+#[expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "the array is for a script, the rest for a reader"
+)]
 pub fn missing(options: &Options, file: &Path) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let (config, plan) = (options.load()?, shard::read(file)?);
     let missing = shard::missing(&config, &plan, &Bars::new(options.quiet, None))?;
     if !options.quiet {
-        eprintln!("{} of {} {} are missing", missing.len(), plan.items.len(), plan.of.name());
+        eprintln!(
+            "{} of {} {} are missing",
+            missing.len(),
+            plan.items.len(),
+            plan.of.name()
+        );
     }
     if missing.is_empty() {
         return Ok(ExitCode::SUCCESS);
@@ -197,10 +244,15 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let folder = std::env::current_dir().context("there is no current folder")?;
-    let out = options.out.clone().unwrap_or_else(|| config.store.join("cluster"));
+    let out = options
+        .out
+        .clone()
+        .unwrap_or_else(|| config.store.join("cluster"));
     let shown = |path: &Path| path.display().to_string();
     let campaign = Campaign {
-        program: shown(&std::env::current_exe().context("the program does not know where it lies")?),
+        program: shown(
+            &std::env::current_exe().context("the program does not know where it lies")?,
+        ),
         arguments: options.options.typed(),
         folder: shown(&folder),
         flights: shown(&plan_file(&config, Of::Flights)),
@@ -215,19 +267,36 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;
     }
     let bars = Bars::new(options.options.quiet, None);
-    let plan = shard::plan(&config, Of::Flights, config.cluster.shards, &plan_file(&config, Of::Flights), &bars)?;
+    let plan = shard::plan(
+        &config,
+        Of::Flights,
+        config.cluster.shards,
+        &plan_file(&config, Of::Flights),
+        &bars,
+    )?;
     let submit = out.join("submit.sh");
     if !options.options.quiet {
         say(&plan, &plan_file(&config, Of::Flights));
         if config.cluster.shards > LARGEST_ARRAY {
-            println!("arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler");
+            println!(
+                "arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler"
+            );
         }
-        println!("scripts in {}; bash {} hands them over", out.display(), submit.display());
+        println!(
+            "scripts in {}; bash {} hands them over",
+            out.display(),
+            submit.display()
+        );
     }
     if options.go {
-        let status =
-            Command::new("bash").arg(&submit).status().with_context(|| format!("cannot run {}", submit.display()))?;
-        anyhow::ensure!(status.success(), "the scheduler did not take the jobs: {status}");
+        let status = Command::new("bash")
+            .arg(&submit)
+            .status()
+            .with_context(|| format!("cannot run {}", submit.display()))?;
+        anyhow::ensure!(
+            status.success(),
+            "the scheduler did not take the jobs: {status}"
+        );
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -83,13 +83,21 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     let status = status::status(&options.load()?, &bars(options)?)?;
     if !options.quiet {
         match &status.night {
-            Some(night) => println!("night {night} is published in {}", options.load()?.reports.display()),
+            Some(night) => println!(
+                "night {night} is published in {}",
+                options.load()?.reports.display()
+            ),
             None => println!("no night is published yet"),
         }
         println!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
         for stage in &status.stages {
             let stale: usize = stage.stale.values().map(Vec::len).sum();
-            println!("{:<9} {:>6} {stale:>6} {:>6}", stage.stage.name(), stage.fresh, stage.failed.len());
+            println!(
+                "{:<9} {:>6} {stale:>6} {:>6}",
+                stage.stage.name(),
+                stage.fresh,
+                stage.failed.len()
+            );
         }
         for stage in &status.stages {
             for (why, items) in &stage.stale {
@@ -99,7 +107,11 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
                 println!("  {}: failed: {item}: {why}", stage.stage.name());
             }
             if stage.failed.len() > MOST {
-                println!("  {}: and {} more failed", stage.stage.name(), stage.failed.len() - MOST);
+                println!(
+                    "  {}: and {} more failed",
+                    stage.stage.name(),
+                    stage.failed.len() - MOST
+                );
             }
         }
     }
@@ -118,7 +130,11 @@ fn some(items: &[String]) -> String {
     let (first, more) = items.split_at(items.len().min(3));
     let mut unique = first.to_vec();
     unique.dedup();
-    let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
+    let more = if more.is_empty() {
+        String::new()
+    } else {
+        format!(" and {} more", more.len())
+    };
     format!("{}{more}", unique.join(", "))
 }
 
@@ -126,7 +142,10 @@ fn some(items: &[String]) -> String {
 #[expect(clippy::print_stdout, reason = "what is asked for")]
 pub fn explain(options: &ExplainOptions) -> anyhow::Result<ExitCode> {
     let bars = bars(&options.options)?;
-    print!("{}", explain::explain(&options.options.load()?, &options.id, &bars)?);
+    print!(
+        "{}",
+        explain::explain(&options.options.load()?, &options.id, &bars)?
+    );
     Ok(ExitCode::SUCCESS)
 }
 
@@ -147,7 +166,11 @@ pub fn diff(options: &DiffOptions) -> anyhow::Result<ExitCode> {
     } else if !options.options.quiet || found.changes.alert {
         say(&found.night, &found.changes);
     }
-    Ok(if found.changes.alert { ExitCode::from(LOOK) } else { ExitCode::SUCCESS })
+    Ok(if found.changes.alert {
+        ExitCode::from(LOOK)
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 #[expect(clippy::print_stdout, reason = "what a comparison says")]
@@ -159,8 +182,15 @@ fn say(night: &str, changes: &Changes) {
     println!("night {night} since night {since}");
     list("because", &changes.causes, |c| c.words.clone());
     list("maneuvers", &changes.maneuvers, |m| {
-        let words = if m.words.is_empty() { String::new() } else { format!(": {}", m.words) };
-        format!("{} {} ({}){words} [{}]", m.what, m.maneuver_id, m.class, m.because)
+        let words = if m.words.is_empty() {
+            String::new()
+        } else {
+            format!(": {}", m.words)
+        };
+        format!(
+            "{} {} ({}){words} [{}]",
+            m.what, m.maneuver_id, m.class, m.because
+        )
     });
     let moved = |m: &Moved| {
         let (of, alpha, because) = (&m.of, m.alpha_deg, &m.because);
@@ -169,12 +199,23 @@ fn say(night: &str, changes: &Changes) {
             m.derivative, m.before, m.now, m.uncertainty
         )
     };
-    list("estimates that moved by more than their uncertainty", &changes.estimates, moved);
-    list("trends that moved by more than their uncertainty", &changes.trends, moved);
+    list(
+        "estimates that moved by more than their uncertainty",
+        &changes.estimates,
+        moved,
+    );
+    list(
+        "trends that moved by more than their uncertainty",
+        &changes.trends,
+        moved,
+    );
     list("new trends", &changes.new_trends, Clone::clone);
     list("trends gone", &changes.gone_trends, Clone::clone);
     list("verdicts", &changes.verdicts, |v| {
-        format!("{} at {} deg: {} became {} [{}]", v.derivative, v.alpha_deg, v.before, v.now, v.because)
+        format!(
+            "{} at {} deg: {} became {} [{}]",
+            v.derivative, v.alpha_deg, v.before, v.now, v.because
+        )
     });
     if changes.is_empty() {
         println!("nothing that was published moved by more than its uncertainty");
@@ -203,7 +244,15 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
     if !options.options.quiet {
         println!("night {}", found.night);
         for file in &found.files {
-            println!("  {:<22} {}", file.file, if file.reasons.is_empty() { "holds" } else { "does not hold" });
+            println!(
+                "  {:<22} {}",
+                file.file,
+                if file.reasons.is_empty() {
+                    "holds"
+                } else {
+                    "does not hold"
+                }
+            );
             for reason in &file.reasons {
                 println!("    {reason}");
             }
@@ -214,9 +263,20 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
         if found.artefacts.len() > MOST {
             println!("  and {} more artefacts", found.artefacts.len() - MOST);
         }
-        println!("{}", if found.holds() { "All of it holds." } else { "It does not hold." });
+        println!(
+            "{}",
+            if found.holds() {
+                "All of it holds."
+            } else {
+                "It does not hold."
+            }
+        );
     }
-    Ok(if found.holds() { ExitCode::SUCCESS } else { ExitCode::from(2) })
+    Ok(if found.holds() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(2)
+    })
 }
 
 /// Shows what no published night needs, and removes it where that is asked for.
@@ -225,12 +285,21 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let litter = gc::gc(&config, options.yes, options.patience.wait())?;
     if !options.options.quiet {
-        for name in litter.nights.iter().map(|n| format!("night {n}")).chain(litter.artefacts.keys().cloned()) {
+        for name in litter
+            .nights
+            .iter()
+            .map(|n| format!("night {n}"))
+            .chain(litter.artefacts.keys().cloned())
+        {
             println!("  {name}");
         }
         let bytes: u64 = litter.artefacts.values().sum();
         let (count, kept) = (litter.artefacts.len(), litter.kept);
-        let verb = if options.yes { "removed" } else { "would be removed" };
+        let verb = if options.yes {
+            "removed"
+        } else {
+            "would be removed"
+        };
         println!(
             "{count} artefacts ({} MB) and {} nights {verb}, {kept} artefacts stay",
             bytes / 1_000_000,

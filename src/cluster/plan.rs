@@ -71,7 +71,12 @@ impl Plan {
     /// A shard has neighbours: the maneuvers of a flight share its record. A shard's cost differs from the mean by no more
     /// than that of the dearest item.
     #[must_use]
-    pub fn deal(of: Of, shards: usize, items: Vec<(String, String, f64)>, lineage: &Lineage) -> Plan {
+    pub fn deal(
+        of: Of,
+        shards: usize,
+        items: Vec<(String, String, f64)>,
+        lineage: &Lineage,
+    ) -> Plan {
         let shards = shards.max(1);
         let total: f64 = items.iter().map(|(_, _, cost)| cost).sum();
         let mut before = 0.0;
@@ -84,7 +89,12 @@ impl Plan {
                 reason = "a share of the shards, from zero"
             )]
             let shard = (middle * shards as f64) as usize;
-            Item { id, flight_id, cost, shard: shard.min(shards - 1) + 1 }
+            Item {
+                id,
+                flight_id,
+                cost,
+                shard: shard.min(shards - 1) + 1,
+            }
         };
         Plan {
             form: FORM,
@@ -100,16 +110,31 @@ impl Plan {
     /// # Errors
     /// Why the text is none, or none that can be worked by: a plan of another program, an item twice or in no shard.
     pub fn read(text: &str) -> Result<Plan, String> {
-        let plan: Plan = serde_json::from_str(text).map_err(|e| format!("is no plan of this program: {e}"))?;
+        let plan: Plan =
+            serde_json::from_str(text).map_err(|e| format!("is no plan of this program: {e}"))?;
         if plan.form != FORM {
-            return Err(format!("is a plan of form {}, not {FORM}: plan again", plan.form));
+            return Err(format!(
+                "is a plan of form {}, not {FORM}: plan again",
+                plan.form
+            ));
         }
         let mut seen = BTreeSet::new();
         if let Some(twice) = plan.items.iter().find(|item| !seen.insert(&item.id)) {
-            return Err(format!("{} `{}` is dealt twice: plan again", plan.of.name(), twice.id));
+            return Err(format!(
+                "{} `{}` is dealt twice: plan again",
+                plan.of.name(),
+                twice.id
+            ));
         }
-        if let Some(lost) = plan.items.iter().find(|item| !(1..=plan.shards).contains(&item.shard)) {
-            return Err(format!("`{}` is dealt to shard {} of {}: plan again", lost.id, lost.shard, plan.shards));
+        if let Some(lost) = plan
+            .items
+            .iter()
+            .find(|item| !(1..=plan.shards).contains(&item.shard))
+        {
+            return Err(format!(
+                "`{}` is dealt to shard {} of {}: plan again",
+                lost.id, lost.shard, plan.shards
+            ));
         }
         Ok(plan)
     }
@@ -129,7 +154,11 @@ impl Plan {
     /// The shards that have one of these items.
     #[must_use]
     pub fn shards_of(&self, ids: &BTreeSet<String>) -> BTreeSet<usize> {
-        self.items.iter().filter(|item| ids.contains(&item.id)).map(|item| item.shard).collect()
+        self.items
+            .iter()
+            .filter(|item| ids.contains(&item.id))
+            .map(|item| item.shard)
+            .collect()
     }
 
     /// The cost of each shard.
@@ -166,7 +195,9 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Shard, String> {
-        let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        let parts = text
+            .split_once('/')
+            .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) => Ok(Shard { number, of }),
             _ => Err("give the shard as i/N, i from 1 to N: 3/24".to_owned()),
@@ -179,7 +210,11 @@ mod tests {
     use super::*;
 
     fn items(costs: &[f64]) -> Vec<(String, String, f64)> {
-        costs.iter().enumerate().map(|(i, cost)| (format!("m{i:03}"), "f".to_owned(), *cost)).collect()
+        costs
+            .iter()
+            .enumerate()
+            .map(|(i, cost)| (format!("m{i:03}"), "f".to_owned(), *cost))
+            .collect()
     }
 
     #[test]
@@ -189,7 +224,13 @@ mod tests {
             let plan = Plan::deal(Of::Maneuvers, n, items(&costs), &Lineage::default());
             assert_eq!((1..=n).flat_map(|shard| plan.share(shard)).count(), 106);
             let (mean, dearest) = (costs.iter().sum::<f64>() / n as f64, 17.0);
-            assert!(plan.costs().values().all(|cost| *cost <= mean + dearest + 1e-9), "{n}: {:?}", plan.costs());
+            assert!(
+                plan.costs()
+                    .values()
+                    .all(|cost| *cost <= mean + dearest + 1e-9),
+                "{n}: {:?}",
+                plan.costs()
+            );
             assert!(plan.items.windows(2).all(|w| w[0].shard <= w[1].shard));
         }
     }

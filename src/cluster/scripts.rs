@@ -56,9 +56,15 @@ fn quoted(word: &str) -> String {
 #[must_use]
 pub fn scripts(engine: Engine, settings: &Settings, campaign: &Campaign) -> Vec<Script> {
     let names = ["flights.sh", "plan.sh", "maneuvers.sh", "merge.sh"];
-    let job = |(name, job): (&'static str, &&str)| Script { name, text: script(engine, settings, campaign, job) };
+    let job = |(name, job): (&'static str, &&str)| Script {
+        name,
+        text: script(engine, settings, campaign, job),
+    };
     let mut scripts: Vec<Script> = names.into_iter().zip(&JOBS).map(job).collect();
-    scripts.push(Script { name: "submit.sh", text: submit(engine, campaign) });
+    scripts.push(Script {
+        name: "submit.sh",
+        text: submit(engine, campaign),
+    });
     scripts
 }
 
@@ -82,10 +88,16 @@ fn script(engine: Engine, settings: &Settings, campaign: &Campaign, job: &str) -
     let mut lines = vec!["#!/bin/bash".to_owned()];
     lines.extend(directives(engine, settings, campaign, job, is_array));
     lines.push(format!("cd {} || exit 1", quoted(&campaign.folder)));
-    lines.push(format!("harvest=${{HARVEST:-{}}}", quoted(&campaign.program)));
+    lines.push(format!(
+        "harvest=${{HARVEST:-{}}}",
+        quoted(&campaign.program)
+    ));
     lines.push(retried(engine, settings, is_array, &command));
     if job == "merge" {
-        lines.push("# Something was rejected, and the rest is published: the table problems says what.".to_owned());
+        lines.push(
+            "# Something was rejected, and the rest is published: the table problems says what."
+                .to_owned(),
+        );
         lines.push("[ $code -eq 2 ] && code=0".to_owned());
     }
     lines.push("exit $code\n".to_owned());
@@ -93,11 +105,21 @@ fn script(engine: Engine, settings: &Settings, campaign: &Campaign, job: &str) -
 }
 
 /// What the scheduler is told.
-fn directives(engine: Engine, s: &Settings, campaign: &Campaign, job: &str, is_array: bool) -> Vec<String> {
+fn directives(
+    engine: Engine,
+    s: &Settings,
+    campaign: &Campaign,
+    job: &str,
+    is_array: bool,
+) -> Vec<String> {
     let (name, log) = (format!("harvest-{job}"), format!("{}/{job}", campaign.out));
     let mut lines = match engine {
         Engine::Slurm => {
-            let output = if is_array { format!("{log}-%a.log") } else { format!("{log}.log") };
+            let output = if is_array {
+                format!("{log}-%a.log")
+            } else {
+                format!("{log}.log")
+            };
             let mut lines = vec![
                 format!("--job-name={name}"),
                 format!("--output={output}"),
@@ -130,8 +152,15 @@ fn directives(engine: Engine, s: &Settings, campaign: &Campaign, job: &str, is_a
         }
     };
     lines.extend(s.options.iter().cloned());
-    let mark = if engine == Engine::Slurm { "#SBATCH" } else { "#PBS" };
-    lines.into_iter().map(|line| format!("{mark} {line}")).collect()
+    let mark = if engine == Engine::Slurm {
+        "#SBATCH"
+    } else {
+        "#PBS"
+    };
+    lines
+        .into_iter()
+        .map(|line| format!("{mark} {line}"))
+        .collect()
 }
 
 /// The command, tried again where it asks for it with 75.
@@ -139,7 +168,11 @@ fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -
     let retries = settings.retries;
     match engine {
         Engine::Slurm => {
-            let task = if is_array { "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}" } else { "$SLURM_JOB_ID" };
+            let task = if is_array {
+                "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}"
+            } else {
+                "$SLURM_JOB_ID"
+            };
             format!(
                 "\"$harvest\" {command} --quiet\ncode=$?\n\
                  # RequeueExit would end the jobs that wait for this one: a task that wants another try requeues itself.\n\
@@ -158,7 +191,10 @@ fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -
 fn submit(engine: Engine, campaign: &Campaign) -> String {
     let out = quoted(&campaign.out);
     let (first, next) = match engine {
-        Engine::Slurm => ("sbatch --parsable", "sbatch --parsable --dependency=afterok:$job --kill-on-invalid-dep=yes"),
+        Engine::Slurm => (
+            "sbatch --parsable",
+            "sbatch --parsable --dependency=afterok:$job --kill-on-invalid-dep=yes",
+        ),
         Engine::Pbs => ("qsub", "qsub -W depend=afterok:$job"),
     };
     let line = |(i, job): (usize, &&str)| {
@@ -176,7 +212,11 @@ mod tests {
     fn campaign() -> Campaign {
         Campaign {
             program: "/opt/harvest".into(),
-            arguments: vec!["harv".into(), "--archive".into(), "flights of '97/*.parquet".into()],
+            arguments: vec![
+                "harv".into(),
+                "--archive".into(),
+                "flights of '97/*.parquet".into(),
+            ],
             folder: "/data".into(),
             flights: "store/flights.plan.json".into(),
             maneuvers: "store/maneuvers.plan.json".into(),
@@ -185,15 +225,24 @@ mod tests {
     }
 
     fn text(engine: Engine, name: &str) -> String {
-        let settings = Settings { shards: 7, partition: Some("flight".into()), ..Settings::default() };
-        let script = scripts(engine, &settings, &campaign()).into_iter().find(|s| s.name == name);
+        let settings = Settings {
+            shards: 7,
+            partition: Some("flight".into()),
+            ..Settings::default()
+        };
+        let script = scripts(engine, &settings, &campaign())
+            .into_iter()
+            .find(|s| s.name == name);
         script.expect("a script of this name").text
     }
 
     #[test]
     fn a_slurm_task_knows_its_shard_and_requeues_itself_when_it_wants_another_try() {
         let flights = text(Engine::Slurm, "flights.sh");
-        assert!(flights.starts_with("#!/bin/bash\n#SBATCH --job-name=harvest-flights\n"), "{flights}");
+        assert!(
+            flights.starts_with("#!/bin/bash\n#SBATCH --job-name=harvest-flights\n"),
+            "{flights}"
+        );
         for line in [
             "#SBATCH --array=1-7",
             "#SBATCH --partition=flight",
@@ -205,21 +254,37 @@ mod tests {
         }
         assert!(!flights.contains("RequeueExit="));
         let merge = text(Engine::Slurm, "merge.sh");
-        assert!(!merge.contains("--array") && merge.contains("[ $code -eq 2 ] && code=0"), "{merge}");
+        assert!(
+            !merge.contains("--array") && merge.contains("[ $code -eq 2 ] && code=0"),
+            "{merge}"
+        );
     }
 
     #[test]
     fn each_job_waits_for_the_one_before() {
         let submit = text(Engine::Slurm, "submit.sh");
         assert_eq!(submit.matches("--dependency=afterok:$job").count(), 3);
-        let places: Vec<usize> = JOBS.iter().map(|job| submit.find(&format!("/{job}.sh")).expect("the job")).collect();
+        let places: Vec<usize> = JOBS
+            .iter()
+            .map(|job| submit.find(&format!("/{job}.sh")).expect("the job"))
+            .collect();
         assert!(places.is_sorted());
-        assert_eq!(text(Engine::Pbs, "submit.sh").matches("depend=afterok:$job").count(), 3);
+        assert_eq!(
+            text(Engine::Pbs, "submit.sh")
+                .matches("depend=afterok:$job")
+                .count(),
+            3
+        );
     }
 
     #[test]
     fn words_with_spaces_and_quotes_stay_one_word() {
-        for (word, expected) in [("a-b_1/c.d", "a-b_1/c.d"), ("a b", "'a b'"), ("it's", "'it'\\''s'"), ("", "''")] {
+        for (word, expected) in [
+            ("a-b_1/c.d", "a-b_1/c.d"),
+            ("a b", "'a b'"),
+            ("it's", "'it'\\''s'"),
+            ("", "''"),
+        ] {
             assert_eq!(quoted(word), expected);
         }
     }

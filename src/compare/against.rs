@@ -21,22 +21,35 @@ pub struct Earlier {
 impl Earlier {
     #[must_use]
     pub fn new(folder: &Path, trends: Vec<PublishedTrend>) -> Earlier {
-        Earlier { name: folder.display().to_string(), trends }
+        Earlier {
+            name: folder.display().to_string(),
+            trends,
+        }
     }
 
     /// Value and standard error of a trend, linear between its published α; none outside of them or in another unit.
     fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
         let same = |e: &&PublishedTrend| {
-            e.derivative == now.derivative && e.group == now.group && e.unit == now.unit && e.alpha_deg.is_finite()
+            e.derivative == now.derivative
+                && e.group == now.group
+                && e.unit == now.unit
+                && e.alpha_deg.is_finite()
         };
         let mut rows: Vec<&PublishedTrend> = self.trends.iter().filter(same).collect();
         rows.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg));
         let high = rows.iter().find(|r| r.alpha_deg >= now.alpha_deg)?;
         let low = rows.iter().rev().find(|r| r.alpha_deg <= now.alpha_deg)?;
         let span = high.alpha_deg - low.alpha_deg;
-        let share = if span > 0.0 { (now.alpha_deg - low.alpha_deg) / span } else { 0.0 };
+        let share = if span > 0.0 {
+            (now.alpha_deg - low.alpha_deg) / span
+        } else {
+            0.0
+        };
         let mix = |a: f64, b: f64| a + share * (b - a);
-        Some((mix(low.value, high.value), mix(low.standard_error, high.standard_error)))
+        Some((
+            mix(low.value, high.value),
+            mix(low.standard_error, high.standard_error),
+        ))
     }
 }
 
@@ -48,10 +61,19 @@ pub fn changes(
     groups: &trend::Settings,
     settings: &Settings,
 ) -> Vec<ChangeRow> {
-    let speaks = |t: &&TrendRow| groups.group_of(&t.derivative).is_some_and(|g| g.name == t.group);
+    let speaks = |t: &&TrendRow| {
+        groups
+            .group_of(&t.derivative)
+            .is_some_and(|g| g.name == t.group)
+    };
     let row = |t: &TrendRow| {
         let before = earlier.at(t);
-        let judged = judge(t.value, t.standard_error, before.map(|(value, error)| (value, Some(error))), settings);
+        let judged = judge(
+            t.value,
+            t.standard_error,
+            before.map(|(value, error)| (value, Some(error))),
+            settings,
+        );
         let verdict = match judged.verdict {
             Verdict::NothingThere => "not there before",
             Verdict::Higher => "higher than before",
@@ -113,15 +135,40 @@ mod tests {
             value,
             standard_error: 0.4,
         };
-        let earlier = Earlier::new(Path::new("reports/last"), vec![before(20.0, 4.0), before(10.0, 2.0)]);
-        let trends = [now(10.0, 2.5), now(15.0, 5.0), now(20.0, 1.0), now(25.0, 1.0)];
-        let rows = changes(&trends, &earlier, &trend::Settings::default(), &Settings::default());
+        let earlier = Earlier::new(
+            Path::new("reports/last"),
+            vec![before(20.0, 4.0), before(10.0, 2.0)],
+        );
+        let trends = [
+            now(10.0, 2.5),
+            now(15.0, 5.0),
+            now(20.0, 1.0),
+            now(25.0, 1.0),
+        ];
+        let rows = changes(
+            &trends,
+            &earlier,
+            &trend::Settings::default(),
+            &Settings::default(),
+        );
         let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.as_str()).collect();
-        assert_eq!(verdicts, ["agrees", "higher than before", "lower than before", "not there before"]);
+        assert_eq!(
+            verdicts,
+            [
+                "agrees",
+                "higher than before",
+                "lower than before",
+                "not there before"
+            ]
+        );
         assert_relative_eq!(rows[1].before.expect("before"), 3.0);
         assert_relative_eq!(rows[1].z.expect("z"), 4.0, max_relative = 1e-14);
-        let (verdicts, worst) = super::super::ranges::of_changes(&rows, "reports/last", &Settings::default());
-        assert_eq!(verdicts[1].words, "flight higher than reports/last at 15°, by 67%");
+        let (verdicts, worst) =
+            super::super::ranges::of_changes(&rows, "reports/last", &Settings::default());
+        assert_eq!(
+            verdicts[1].words,
+            "flight higher than reports/last at 15°, by 67%"
+        );
         assert_eq!((worst.len(), worst[0].alpha_deg), (2, 20.0));
     }
 }

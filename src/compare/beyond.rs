@@ -17,14 +17,32 @@ pub fn beyond(
 ) -> Vec<BeyondRow> {
     let mut rows = Vec::new();
     for maneuver in maneuvers {
-        let of_it = estimates.iter().filter(|e| e.maneuver_id == maneuver.maneuver_id);
+        let of_it = estimates
+            .iter()
+            .filter(|e| e.maneuver_id == maneuver.maneuver_id);
         let names = of_it.map(|e| e.derivative.as_str());
-        rows.extend(at(&maneuver.maneuver_id, &maneuver.condition(tunnel), names, tunnel));
+        rows.extend(at(
+            &maneuver.maneuver_id,
+            &maneuver.condition(tunnel),
+            names,
+            tunnel,
+        ));
     }
-    let places = comparison.iter().filter_map(|c| Some((c, c.wind_tunnel.and(c.mach)?)));
+    let places = comparison
+        .iter()
+        .filter_map(|c| Some((c, c.wind_tunnel.and(c.mach)?)));
     for (c, mach) in places {
-        let condition = Condition { alpha_deg: c.alpha_deg, mach, third: None };
-        rows.extend(at("", &condition, std::iter::once(c.derivative.as_str()), tunnel));
+        let condition = Condition {
+            alpha_deg: c.alpha_deg,
+            mach,
+            third: None,
+        };
+        rows.extend(at(
+            "",
+            &condition,
+            std::iter::once(c.derivative.as_str()),
+            tunnel,
+        ));
     }
     rows
 }
@@ -39,8 +57,16 @@ fn at<'a>(
     let mut found: BTreeMap<(String, u64, u64), (Beyond, Vec<&str>)> = BTreeMap::new();
     for name in derivatives {
         for beyond in tunnel.beyond(name, condition) {
-            let key = (beyond.variable.clone(), beyond.from.to_bits(), beyond.to.to_bits());
-            found.entry(key).or_insert_with(|| (beyond, Vec::new())).1.push(name);
+            let key = (
+                beyond.variable.clone(),
+                beyond.from.to_bits(),
+                beyond.to.to_bits(),
+            );
+            found
+                .entry(key)
+                .or_insert_with(|| (beyond, Vec::new()))
+                .1
+                .push(name);
         }
     }
     let treatment = match tunnel.settings().extrapolation {

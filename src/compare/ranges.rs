@@ -57,15 +57,29 @@ pub fn of_tunnel(
     settings: &Settings,
 ) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
     let places: Vec<Place> = rows.iter().map(Place::of_tunnel).collect();
-    ranges(&places, "wind tunnel", "tunnel", settings, |name| tunnel.root_mean_square(name))
+    ranges(&places, "wind tunnel", "tunnel", settings, |name| {
+        tunnel.root_mean_square(name)
+    })
 }
 
 /// The ranges of the comparison with one earlier campaign, and the worst of them.
 #[must_use]
-pub fn of_changes(rows: &[ChangeRow], against: &str, settings: &Settings) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
-    let places: Vec<Place> = rows.iter().filter(|r| r.against == against).map(Place::of_change).collect();
+pub fn of_changes(
+    rows: &[ChangeRow],
+    against: &str,
+    settings: &Settings,
+) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
+    let places: Vec<Place> = rows
+        .iter()
+        .filter(|r| r.against == against)
+        .map(Place::of_change)
+        .collect();
     let size = |name: &str| {
-        let values: Vec<f64> = places.iter().filter(|p| p.derivative == name).filter_map(|p| p.other).collect();
+        let values: Vec<f64> = places
+            .iter()
+            .filter(|p| p.derivative == name)
+            .filter_map(|p| p.other)
+            .collect();
         (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
     };
     ranges(&places, against, against, settings, size)
@@ -113,9 +127,15 @@ fn ranges(
 /// The worst angle of attack of a range that disagrees.
 fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Option<DisagreementRow> {
     let apart = |p: &Place| p.other.map(|other| p.flight - other);
-    let disagrees = !matches!(run[0].verdict, "agrees" | "no tunnel value" | "not there before");
+    let disagrees = !matches!(
+        run[0].verdict,
+        "agrees" | "no tunnel value" | "not there before"
+    );
     let far = |p: &Place| apart(p).map_or(0.0, f64::abs);
-    let p = run.iter().filter(|_| disagrees).max_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let p = run
+        .iter()
+        .filter(|_| disagrees)
+        .max_by(|a, b| far(a).total_cmp(&far(b)))?;
     let difference = apart(p)?;
     Some(DisagreementRow {
         rank: 0,
@@ -133,7 +153,13 @@ fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Optio
 }
 
 /// One range in words.
-fn words(run: &[Place], before_deg: Option<f64>, to_the_end: bool, called: &str, settings: &Settings) -> String {
+fn words(
+    run: &[Place],
+    before_deg: Option<f64>,
+    to_the_end: bool,
+    called: &str,
+    settings: &Settings,
+) -> String {
     let (first, last) = (run[0], run[run.len() - 1]);
     let range = if run.len() == 1 {
         format!("at {}°", first.alpha_deg)
@@ -141,12 +167,23 @@ fn words(run: &[Place], before_deg: Option<f64>, to_the_end: bool, called: &str,
         format!("from {}° to {}°", first.alpha_deg, last.alpha_deg)
     };
     match first.verdict {
-        "agrees" if run.iter().all(|p| p.z.is_some_and(|z| z.abs() <= settings.agreement_z)) => {
+        "agrees"
+            if run
+                .iter()
+                .all(|p| p.z.is_some_and(|z| z.abs() <= settings.agreement_z)) =>
+        {
             format!("agrees within its uncertainty {range}")
         }
-        "agrees" => format!("agrees within its uncertainty or {}% {range}", settings.agreement_pct),
-        "flight higher" | "higher than before" => format!("flight higher than {called} {range}{}", by(run)),
-        "flight lower" | "lower than before" => format!("flight lower than {called} {range}{}", by(run)),
+        "agrees" => format!(
+            "agrees within its uncertainty or {}% {range}",
+            settings.agreement_pct
+        ),
+        "flight higher" | "higher than before" => {
+            format!("flight higher than {called} {range}{}", by(run))
+        }
+        "flight lower" | "lower than before" => {
+            format!("flight lower than {called} {range}{}", by(run))
+        }
         "sign differs" => match before_deg.filter(|_| to_the_end) {
             Some(before) => format!("sign differs above {before}°"),
             None => format!("sign differs {range}"),
@@ -158,17 +195,40 @@ fn words(run: &[Place], before_deg: Option<f64>, to_the_end: bool, called: &str,
 /// By how much: the median in percent of the other's magnitude, with its extremes where they are far from it; in the
 /// derivative's unit where the other is zero.
 fn by(run: &[Place]) -> String {
-    let mut shares: Vec<f64> = run.iter().filter_map(|p| p.difference_pct).map(f64::abs).collect();
+    let mut shares: Vec<f64> = run
+        .iter()
+        .filter_map(|p| p.difference_pct)
+        .map(f64::abs)
+        .collect();
     shares.sort_by(f64::total_cmp);
-    let whole = |share: f64| if share < 9.95 { format!("{share:.1}%") } else { format!("{share:.0}%") };
-    match (median(shares.iter().copied()), shares.first(), shares.last()) {
+    let whole = |share: f64| {
+        if share < 9.95 {
+            format!("{share:.1}%")
+        } else {
+            format!("{share:.0}%")
+        }
+    };
+    match (
+        median(shares.iter().copied()),
+        shares.first(),
+        shares.last(),
+    ) {
         (Some(middle), Some(least), Some(most)) if most - least > 0.5 * middle => {
-            format!(", by {} ({} to {})", whole(middle), whole(*least), whole(*most))
+            format!(
+                ", by {} ({} to {})",
+                whole(middle),
+                whole(*least),
+                whole(*most)
+            )
         }
         (Some(middle), ..) => format!(", by {}", whole(middle)),
         _ => {
-            let apart = run.iter().filter_map(|p| p.other.map(|other| (p.flight - other).abs()));
-            median(apart).map_or_else(String::new, |apart| format!(", by {apart:.3e} {}", run[0].unit))
+            let apart = run
+                .iter()
+                .filter_map(|p| p.other.map(|other| (p.flight - other).abs()));
+            median(apart).map_or_else(String::new, |apart| {
+                format!(", by {apart:.3e} {}", run[0].unit)
+            })
         }
     }
 }
@@ -176,7 +236,10 @@ fn by(run: &[Place]) -> String {
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    let (low, high) = (values.get(values.len().checked_sub(1)? / 2)?, values.get(values.len() / 2)?);
+    let (low, high) = (
+        values.get(values.len().checked_sub(1)? / 2)?,
+        values.get(values.len() / 2)?,
+    );
     Some(low.midpoint(*high))
 }
 
@@ -198,7 +261,9 @@ mod tests {
             wind_tunnel: tunnel,
             difference: tunnel.map(|t| flight - t),
             uncertainty: tunnel.map(|_| 0.1),
-            difference_pct: tunnel.filter(|t| *t != 0.0).map(|t| 100.0 * (flight - t) / t.abs()),
+            difference_pct: tunnel
+                .filter(|t| *t != 0.0)
+                .map(|t| 100.0 * (flight - t) / t.abs()),
             z: tunnel.map(|t| (flight - t) / 0.1),
             verdict: verdict.into(),
         }
@@ -206,12 +271,25 @@ mod tests {
 
     fn tunnel() -> WindTunnel {
         let mut tunnel = WindTunnel::default();
-        tunnel.insert("d", TunnelPoint { alpha_deg: 0.0, mach: None, value: 2.0, uncertainty: None, source: None });
+        tunnel.insert(
+            "d",
+            TunnelPoint {
+                alpha_deg: 0.0,
+                mach: None,
+                value: 2.0,
+                uncertainty: None,
+                source: None,
+            },
+        );
         tunnel
     }
 
     fn said(rows: &[ComparisonRow]) -> Vec<String> {
-        of_tunnel(rows, &tunnel(), &Settings::default()).0.into_iter().map(|v| v.words).collect()
+        of_tunnel(rows, &tunnel(), &Settings::default())
+            .0
+            .into_iter()
+            .map(|v| v.words)
+            .collect()
     }
 
     #[test]
@@ -225,7 +303,10 @@ mod tests {
         ];
         assert_eq!(
             said(&rows),
-            ["agrees within its uncertainty from 5° to 10°", "flight lower than tunnel from 35° to 60°, by 30%"]
+            [
+                "agrees within its uncertainty from 5° to 10°",
+                "flight lower than tunnel from 35° to 60°, by 30%"
+            ]
         );
     }
 
@@ -254,12 +335,18 @@ mod tests {
             row(10.0, 2.6, Some(2.0), "flight higher"),
             row(15.0, 3.0, Some(2.0), "flight higher"),
         ];
-        assert_eq!(said(&rows), ["flight higher than tunnel from 5° to 15°, by 30% (10% to 50%)"]);
+        assert_eq!(
+            said(&rows),
+            ["flight higher than tunnel from 5° to 15°, by 30% (10% to 50%)"]
+        );
     }
 
     #[test]
     fn agreement_by_percent_alone_says_so() {
-        assert_eq!(said(&[row(5.0, 2.3, Some(2.0), "agrees")]), ["agrees within its uncertainty or 5% at 5°"]);
+        assert_eq!(
+            said(&[row(5.0, 2.3, Some(2.0), "agrees")]),
+            ["agrees within its uncertainty or 5% at 5°"]
+        );
     }
 
     #[test]
@@ -271,10 +358,19 @@ mod tests {
             row(20.0, 1.2, Some(2.0), "flight lower"),
         ];
         let (_, worst) = of_tunnel(&rows, &tunnel(), &Settings::default());
-        assert_eq!(worst.iter().map(|w| (w.rank, w.alpha_deg)).collect::<Vec<_>>(), [(1, 20.0), (2, 5.0)]);
+        assert_eq!(
+            worst
+                .iter()
+                .map(|w| (w.rank, w.alpha_deg))
+                .collect::<Vec<_>>(),
+            [(1, 20.0), (2, 5.0)]
+        );
         assert_relative_eq!(worst[0].size_pct.expect("size"), 40.0, max_relative = 1e-12);
         assert_relative_eq!(worst[1].size_pct.expect("size"), 2.0, max_relative = 1e-12);
-        let one = Settings { worst: 1, ..Settings::default() };
+        let one = Settings {
+            worst: 1,
+            ..Settings::default()
+        };
         assert_eq!(of_tunnel(&rows, &tunnel(), &one).1.len(), 1);
     }
 }

@@ -35,14 +35,27 @@ impl Simulation {
         } else {
             PathBuf::from("pipelines").join(&cards.pipeline)
         };
-        let overrides = Overrides { wind_tunnel: Some(cards.truth.clone()), ..Overrides::default() };
+        let overrides = Overrides {
+            wind_tunnel: Some(cards.truth.clone()),
+            ..Overrides::default()
+        };
         let config = Config::load(&folder, overrides)?;
-        let truth = super::check::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
+        let truth =
+            super::check::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
         let truth = truth.into_iter().map(|(_, row)| row).collect();
-        let simulator =
-            Simulator::new(&config.aircraft, &config.buildup, config.tunnel.clone(), cards.aircraft.clone())
-                .map_err(|what| source.error("aircraft", what))?;
-        let simulation = Simulation { cards, config, truth, simulator };
+        let simulator = Simulator::new(
+            &config.aircraft,
+            &config.buildup,
+            config.tunnel.clone(),
+            cards.aircraft.clone(),
+        )
+        .map_err(|what| source.error("aircraft", what))?;
+        let simulation = Simulation {
+            cards,
+            config,
+            truth,
+            simulator,
+        };
         simulation.classes(&source)?;
         simulation.signals(&source)?;
         Ok(simulation)
@@ -75,22 +88,33 @@ impl Simulation {
         let settings = self.simulator.settings();
         let flags = self.cards.programs.values().flat_map(|p| p.flags.keys());
         let sticks = settings.laws.values().flat_map(|law| law.gearing.keys());
-        let names = flags.chain(sticks).chain(settings.surfaces.keys()).map(String::as_str);
-        names.chain(signal::REQUIRED.iter().copied()).chain([signal::PSI, "time_s"]).collect()
+        let names = flags
+            .chain(sticks)
+            .chain(settings.surfaces.keys())
+            .map(String::as_str);
+        names
+            .chain(signal::REQUIRED.iter().copied())
+            .chain([signal::PSI, "time_s"])
+            .collect()
     }
 
     fn classes(&self, source: &Source) -> Result<()> {
         for (class, program) in &self.cards.programs {
             if self.config.class(class).is_none() {
                 let near = did_you_mean(class, self.config.classes.iter().map(|c| c.name.as_str()));
-                return Err(source.error_under("programs", class, format!("unknown class `{class}`{near}")));
+                return Err(source.error_under(
+                    "programs",
+                    class,
+                    format!("unknown class `{class}`{near}"),
+                ));
             }
             self.program(class, program, source)?;
         }
         for (flight, card) in &self.cards.flights {
             for point in &card.points {
                 if !self.cards.programs.contains_key(&point.class) {
-                    let near = did_you_mean(&point.class, self.cards.programs.keys().map(String::as_str));
+                    let near =
+                        did_you_mean(&point.class, self.cards.programs.keys().map(String::as_str));
                     let what = format!("flight {flight}: no program `{}`{near}", point.class);
                     return Err(source.error_under("flights", &point.class, what));
                 }
@@ -100,7 +124,9 @@ impl Simulation {
     }
 
     fn program(&self, class: &str, program: &Program, source: &Source) -> Result<()> {
-        let error = |name: &str, what: String| Err(source.error_under("programs", name, format!("{class}: {what}")));
+        let error = |name: &str, what: String| {
+            Err(source.error_under("programs", name, format!("{class}: {what}")))
+        };
         let settings = self.simulator.settings();
         let Some(law) = settings.laws.get(&program.law) else {
             let near = did_you_mean(&program.law, settings.laws.keys().map(String::as_str));
@@ -108,14 +134,24 @@ impl Simulation {
         };
         let (from_s, to_s) = program.maneuver_s;
         if !(0.0 <= from_s && from_s < to_s && to_s <= program.duration_s) {
-            return error(class, "`maneuver_s` must lie within 0 and `duration_s`, its start first".into());
+            return error(
+                class,
+                "`maneuver_s` must lie within 0 and `duration_s`, its start first".into(),
+            );
         }
         for input in &program.inputs {
-            let known = law.gearing.keys().chain(settings.surfaces.keys()).map(String::as_str);
+            let known = law
+                .gearing
+                .keys()
+                .chain(settings.surfaces.keys())
+                .map(String::as_str);
             let mut known = known.chain([signal::THRUST]);
             if !known.clone().any(|name| name == input.signal) {
                 let near = did_you_mean(&input.signal, known.by_ref());
-                return error(&input.signal, format!("law `{}` moves no `{}`{near}", program.law, input.signal));
+                return error(
+                    &input.signal,
+                    format!("law `{}` moves no `{}`{near}", program.law, input.signal),
+                );
             }
         }
         Ok(())
@@ -125,7 +161,10 @@ impl Simulation {
         let given = self.given();
         for (column, channel) in &self.config.channels {
             if !given.contains(channel.signal.as_str()) {
-                let what = format!("channel `{column}`: the simulator has no signal `{}`", channel.signal);
+                let what = format!(
+                    "channel `{column}`: the simulator has no signal `{}`",
+                    channel.signal
+                );
                 return Err(source.error("pipeline", what));
             }
         }

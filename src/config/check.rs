@@ -15,29 +15,52 @@ use crate::store::files::{self, TunnelRow};
 use crate::units::Unit;
 
 /// Reads the tunnel's tables, in the units of the model's derivatives.
-pub(super) fn tunnel(path: &Path, buildup: &Buildup, settings: &wind_tunnel::Settings) -> Result<WindTunnel> {
+pub(super) fn tunnel(
+    path: &Path,
+    buildup: &Buildup,
+    settings: &wind_tunnel::Settings,
+) -> Result<WindTunnel> {
     let mut tunnel = WindTunnel::new(settings.clone());
     let mut seen = Seen::default();
     for (line, mut row) in tunnel_rows(path, buildup, settings)? {
         let error = |what: String| Err(Error::config(path, Some(line), what));
-        let numbers = [Some(row.alpha_deg), Some(row.value), row.mach, row.uncertainty, row.third];
+        let numbers = [
+            Some(row.alpha_deg),
+            Some(row.value),
+            row.mach,
+            row.uncertainty,
+            row.third,
+        ];
         if numbers.iter().flatten().any(|v| !v.is_finite()) {
-            return error(format!("`{}` has a value that is no number", row.derivative));
+            return error(format!(
+                "`{}` has a value that is no number",
+                row.derivative
+            ));
         }
-        if let Some(derivative) = buildup.derivatives.iter().find(|d| plain(&d.name) == plain(&row.derivative)) {
+        if let Some(derivative) = buildup
+            .derivatives
+            .iter()
+            .find(|d| plain(&d.name) == plain(&row.derivative))
+        {
             let unit = derivative.unit();
             let Some(factor) = unit.factor_from(&row.unit) else {
                 let (name, written, unit) = (&row.derivative, &row.unit, unit.name());
-                return error(format!("`{name}` is in `{written}`, which cannot become the model's `{unit}`"));
+                return error(format!(
+                    "`{name}` is in `{written}`, which cannot become the model's `{unit}`"
+                ));
             };
             row.value *= factor;
             row.uncertainty = row.uncertainty.map(|u| u * factor);
         }
-        seen.add(&row).map_err(|what| Error::config(path, Some(line), what))?;
+        seen.add(&row)
+            .map_err(|what| Error::config(path, Some(line), what))?;
         tunnel.insert_at(&row.derivative, row.third, row.point());
     }
     if let Some(third) = settings.third.as_ref().filter(|_| !seen.third) {
-        let what = format!("no table depends on `{}`, which pipeline.yaml names (tunnel: third:)", third.name);
+        let what = format!(
+            "no table depends on `{}`, which pipeline.yaml names (tunnel: third:)",
+            third.name
+        );
         return Err(Error::config(path, None, what));
     }
     Ok(tunnel)
@@ -50,7 +73,10 @@ pub(super) fn tunnel_rows(
     settings: &wind_tunnel::Settings,
 ) -> Result<Vec<(usize, TunnelRow)>> {
     let derivatives = buildup.derivatives.iter().map(|d| &d.name);
-    let names: Vec<String> = derivatives.chain(buildup.combined.iter().map(|c| &c.name)).map(|n| plain(n)).collect();
+    let names: Vec<String> = derivatives
+        .chain(buildup.combined.iter().map(|c| &c.name))
+        .map(|n| plain(n))
+        .collect();
     let third = settings.third.as_ref().map(|third| third.name.as_str());
     store::tunnel::rows(path, third, |variable| names.contains(&plain(variable)))
 }
@@ -79,7 +105,11 @@ impl Seen {
         }
         // Adding zero makes one of the two zeros.
         let bits = |v: f64| (v + 0.0).to_bits();
-        let point = [Some(bits(row.alpha_deg)), row.mach.map(bits), row.third.map(bits)];
+        let point = [
+            Some(bits(row.alpha_deg)),
+            row.mach.map(bits),
+            row.third.map(bits),
+        ];
         if self.points.insert((name, point)) {
             return Ok(());
         }
@@ -94,17 +124,27 @@ impl Seen {
 
 /// Reads the analyst's events, where there are any.
 pub(super) fn events(path: Option<&Path>, classes: &[Class]) -> Result<Vec<Event>> {
-    let Some(path) = path else { return Ok(Vec::new()) };
+    let Some(path) = path else {
+        return Ok(Vec::new());
+    };
     let mut events = Vec::new();
     for (line, event) in files::events(path)? {
         let known = classes.iter().map(|c| c.name.as_str());
         if !known.clone().any(|name| name == event.class) {
-            let what = format!("unknown class `{}`{}", event.class, did_you_mean(&event.class, known));
+            let what = format!(
+                "unknown class `{}`{}",
+                event.class,
+                did_you_mean(&event.class, known)
+            );
             return Err(Error::config(path, Some(line), what));
         }
         // Also refuses times that are no numbers.
         if event.end_s.partial_cmp(&event.start_s) != Some(std::cmp::Ordering::Greater) {
-            return Err(Error::config(path, Some(line), "the event ends before it starts"));
+            return Err(Error::config(
+                path,
+                Some(line),
+                "the event ends before it starts",
+            ));
         }
         events.push(event);
     }
@@ -135,7 +175,11 @@ fn aircraft(config: &Config, source: &Source) -> Result<()> {
     ];
     for (key, name, value) in positive {
         if !(value.is_finite() && value > 0.0) {
-            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
+            return Err(source.error_under(
+                key,
+                name,
+                format!("`{name}` must be greater than zero, not {value}"),
+            ));
         }
     }
     if !(-90.0..=90.0).contains(&a.latitude_deg) {
@@ -155,13 +199,20 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
         let target = Unit::of_signal(&channel.signal);
         if unit.factor_to(target).is_none() {
             let (unit, target, signal) = (unit.name, target.name, &channel.signal);
-            return error(format!("channel `{column}`: `{unit}` cannot become {target} of `{signal}`"));
+            return error(format!(
+                "channel `{column}`: `{unit}` cannot become {target} of `{signal}`"
+            ));
         }
         if ![1.0, -1.0].contains(&channel.sign) {
-            return error(format!("channel `{column}`: sign is 1 or -1, not {}", channel.sign));
+            return error(format!(
+                "channel `{column}`: sign is 1 or -1, not {}",
+                channel.sign
+            ));
         }
         if !(channel.scale.is_finite() && channel.scale > 0.0) {
-            return error(format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"));
+            return error(format!(
+                "channel `{column}`: scale must be greater than zero; a sign is `sign`"
+            ));
         }
         if signals.contains(&channel.signal.as_str()) {
             return error(format!("signal `{}` has two sources", channel.signal));
@@ -171,7 +222,10 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
     for required in std::iter::once(&"time_s").chain(signal::REQUIRED) {
         if !signals.contains(required) {
             let near = did_you_mean(required, signals.iter().copied());
-            return Err(source.error("channels", format!("no channel or constant gives the signal `{required}`{near}")));
+            return Err(source.error(
+                "channels",
+                format!("no channel or constant gives the signal `{required}`{near}"),
+            ));
         }
     }
     Ok(())
@@ -179,7 +233,11 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
 
 /// The names of all signals of the channel map and the constants.
 fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
-    config.channels.values().map(|c| c.signal.as_str()).chain(config.constants.keys().map(String::as_str))
+    config
+        .channels
+        .values()
+        .map(|c| c.signal.as_str())
+        .chain(config.constants.keys().map(String::as_str))
 }
 
 fn known_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
@@ -187,13 +245,18 @@ fn known_signal(config: &Config, source: &Source, name: &str, user: &str) -> Res
         return Ok(());
     }
     let near = did_you_mean(name, signals(config));
-    Err(source.error(name, format!("{user}: no channel gives the signal `{name}`{near}")))
+    Err(source.error(
+        name,
+        format!("{user}: no channel gives the signal `{name}`{near}"),
+    ))
 }
 
 fn model(config: &Config, source: &Source) -> Result<()> {
     let buildup = &config.buildup;
     let derivatives = buildup.derivatives.iter().map(|d| &d.name);
-    let mut names: Vec<&String> = derivatives.chain(buildup.biases.iter().map(|b| &b.name)).collect();
+    let mut names: Vec<&String> = derivatives
+        .chain(buildup.biases.iter().map(|b| &b.name))
+        .collect();
     names.extend(buildup.combined.iter().map(|c| &c.name));
     names.sort();
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -208,7 +271,10 @@ fn model(config: &Config, source: &Source) -> Result<()> {
         for part in [&combined.constant, &combined.slope] {
             if buildup.derivative(part).is_none() {
                 let near = did_you_mean(part, buildup.derivatives.iter().map(|d| d.name.as_str()));
-                return Err(source.error(part, format!("{}: unknown derivative `{part}`{near}", combined.name)));
+                return Err(source.error(
+                    part,
+                    format!("{}: unknown derivative `{part}`{near}", combined.name),
+                ));
             }
         }
     }
@@ -216,31 +282,60 @@ fn model(config: &Config, source: &Source) -> Result<()> {
 }
 
 fn statuses(config: &Config, class: &Class, source: &Source) -> Result<()> {
-    let derivatives = config.buildup.derivatives_of(class.axis).map(|d| d.name.as_str());
-    let biases: Vec<&str> = config.buildup.biases_of(class.axis).map(|b| b.name.as_str()).collect();
+    let derivatives = config
+        .buildup
+        .derivatives_of(class.axis)
+        .map(|d| d.name.as_str());
+    let biases: Vec<&str> = config
+        .buildup
+        .biases_of(class.axis)
+        .map(|b| b.name.as_str())
+        .collect();
     let known: Vec<&str> = derivatives.chain(biases.iter().copied()).collect();
-    let given = class.statuses.keys().chain(class.overrides.iter().flat_map(|o| o.statuses.keys()));
+    let given = class
+        .statuses
+        .keys()
+        .chain(class.overrides.iter().flat_map(|o| o.statuses.keys()));
     for name in given {
         if !known.contains(&name.as_str()) {
             let near = did_you_mean(name, known.iter().copied());
-            let what = format!("class {}: no {} derivative `{name}` in the model{near}", class.name, class.axis.name());
+            let what = format!(
+                "class {}: no {} derivative `{name}` in the model{near}",
+                class.name,
+                class.axis.name()
+            );
             return Err(source.error(name, what));
         }
     }
     for name in &known {
         if !class.statuses.contains_key(*name) {
-            let what = format!("class {}: `{name}` is neither estimated, held nor inactive", class.name);
+            let what = format!(
+                "class {}: `{name}` is neither estimated, held nor inactive",
+                class.name
+            );
             return Err(source.error("class", what));
         }
     }
-    let all = class.statuses.iter().chain(class.overrides.iter().flat_map(|o| &o.statuses));
+    let all = class
+        .statuses
+        .iter()
+        .chain(class.overrides.iter().flat_map(|o| &o.statuses));
     for (name, _) in all.filter(|(_, status)| **status == Status::Held) {
         if biases.contains(&name.as_str()) {
-            return Err(source.error(name, format!("class {}: a bias is estimated or inactive, not held", class.name)));
+            return Err(source.error(
+                name,
+                format!(
+                    "class {}: a bias is estimated or inactive, not held",
+                    class.name
+                ),
+            ));
         }
         if !config.tunnel.has(name) {
             let table = config.wind_tunnel.display();
-            let what = format!("class {}: `{name}` is held, and {table} has no value to hold it at", class.name);
+            let what = format!(
+                "class {}: `{name}` is held, and {table} has no value to hold it at",
+                class.name
+            );
             return Err(source.error(name, what));
         }
     }
@@ -255,7 +350,10 @@ fn weights(class: &Class, source: &Source) -> Result<()> {
             return Err(source.error("weights", what));
         }
     }
-    let all = class.weights.iter().chain(class.overrides.iter().flat_map(|o| &o.weights));
+    let all = class
+        .weights
+        .iter()
+        .chain(class.overrides.iter().flat_map(|o| &o.weights));
     for (output, weight) in all {
         if !outputs.contains(output) {
             let outputs = outputs.map(word).join(", ");
@@ -268,7 +366,11 @@ fn weights(class: &Class, source: &Source) -> Result<()> {
             return Err(source.error_under("weights", output.name(), what));
         }
         if !(weight.is_finite() && *weight > 0.0) {
-            let what = format!("class {}: the weight of {} must be greater than zero", class.name, word(*output));
+            let what = format!(
+                "class {}: the weight of {} must be greater than zero",
+                class.name,
+                word(*output)
+            );
             return Err(source.error_under("weights", output.name(), what));
         }
     }
@@ -287,13 +389,21 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     }
     for (name, count) in &rule.steps {
         if count.at_least > count.at_most {
-            return error(name, format!("class {}: `{name}` steps at least more than at most", class.name));
+            return error(
+                name,
+                format!(
+                    "class {}: `{name}` steps at least more than at most",
+                    class.name
+                ),
+            );
         }
     }
     for name in rule.counted() {
         if !config.segment.steps.contains_key(name) {
-            let what =
-                format!("class {}: `segment: steps:` of pipeline.yaml says no size for steps of `{name}`", class.name);
+            let what = format!(
+                "class {}: `segment: steps:` of pipeline.yaml says no size for steps of `{name}`",
+                class.name
+            );
             return error(name, what);
         }
     }
@@ -307,7 +417,13 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     patterns(class, source)?;
     for (name, time_s) in [("lead_in_s", rule.lead_in_s), ("decay_s", rule.decay_s)] {
         if !(time_s.is_finite() && time_s >= 0.0) {
-            return error(name, format!("class {}: `{name}` must not be negative, not {time_s}", class.name));
+            return error(
+                name,
+                format!(
+                    "class {}: `{name}` must not be negative, not {time_s}",
+                    class.name
+                ),
+            );
         }
     }
     Ok(())
@@ -315,14 +431,21 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
 
 /// Lengths of pulses and rising frequencies that can be.
 fn patterns(class: &Class, source: &Source) -> Result<()> {
-    let error =
-        |name: &str, what: &str| Err(source.error_under("recognise", name, format!("class {}: {what}", class.name)));
+    let error = |name: &str, what: &str| {
+        Err(source.error_under("recognise", name, format!("class {}: {what}", class.name)))
+    };
     for pulses in class.recognition.pulses.values() {
         if pulses.widths.len() < 2 || !pulses.widths.iter().all(|w| w.is_finite() && *w > 0.0) {
-            return error("widths", "`widths` are the lengths of two pulses or more, all greater than zero");
+            return error(
+                "widths",
+                "`widths` are the lengths of two pulses or more, all greater than zero",
+            );
         }
         if !(pulses.unit_s.0 >= 0.0 && pulses.unit_s.1 > pulses.unit_s.0) {
-            return error("unit_s", "`unit_s` is the shortest unit and the longest, in s: [0.2, 2]");
+            return error(
+                "unit_s",
+                "`unit_s` is the shortest unit and the longest, in s: [0.2, 2]",
+            );
         }
         if !(pulses.tolerance > 0.0 && pulses.tolerance.is_finite()) {
             return error("tolerance", "`tolerance` must be greater than zero");
@@ -333,7 +456,10 @@ fn patterns(class: &Class, source: &Source) -> Result<()> {
             return error("at_least", "a sweep has at least 4 swings");
         }
         if !(sweep.ratio > 1.0 && sweep.ratio.is_finite()) {
-            return error("ratio", "the frequency of a sweep rises: `ratio` must be greater than 1");
+            return error(
+                "ratio",
+                "the frequency of a sweep rises: `ratio` must be greater than 1",
+            );
         }
     }
     Ok(())
@@ -342,17 +468,27 @@ fn patterns(class: &Class, source: &Source) -> Result<()> {
 /// What segment is told of signals, and its limits.
 fn segment(config: &Config, source: &Source) -> Result<()> {
     let settings = &config.segment;
-    let named = settings.steps.keys().chain(&settings.pilot_controls).chain(settings.quality.actuators.keys());
+    let named = settings
+        .steps
+        .keys()
+        .chain(&settings.pilot_controls)
+        .chain(settings.quality.actuators.keys());
     for name in std::iter::once(&settings.excitation_flag).chain(named) {
         known_signal(config, source, name, "segment")?;
     }
-    if let Some(name) = settings.pilot_controls.iter().find(|name| !settings.steps.contains_key(*name)) {
+    if let Some(name) = settings
+        .pilot_controls
+        .iter()
+        .find(|name| !settings.steps.contains_key(*name))
+    {
         let what = format!("segment: `steps` says no size for steps of the pilot control `{name}`");
         return Err(source.error_under("pilot_controls", name, what));
     }
     for (name, actuator) in &settings.quality.actuators {
         if !(actuator.lower_deg < actuator.upper_deg && actuator.rate_deg_s > 0.0) {
-            let what = format!("the actuator of `{name}` needs lower_deg < upper_deg and a rate greater than zero");
+            let what = format!(
+                "the actuator of `{name}` needs lower_deg < upper_deg and a rate greater than zero"
+            );
             return Err(source.error_under("actuators", name, what));
         }
     }
@@ -368,7 +504,11 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
     ];
     for (name, limit) in limits {
         if limit.is_nan() || limit < 0.0 {
-            return Err(source.error_under("quality", name, format!("`{name}` must not be negative, not {limit}")));
+            return Err(source.error_under(
+                "quality",
+                name,
+                format!("`{name}` must not be negative, not {limit}"),
+            ));
         }
     }
     Ok(())
@@ -378,8 +518,12 @@ fn calibration(config: &Config, source: &Source) -> Result<()> {
     for (name, left) in &config.estimate.calibration {
         known_signal(config, source, name, "calibration")?;
         let sizes = [("bias", left.bias), ("scale_pct", left.scale_pct)];
-        if let Some((what, size)) = sizes.into_iter().find(|(_, size)| !(size.is_finite() && *size >= 0.0)) {
-            let what = format!("calibration of `{name}`: `{what}` is a standard deviation, not {size}");
+        if let Some((what, size)) = sizes
+            .into_iter()
+            .find(|(_, size)| !(size.is_finite() && *size >= 0.0))
+        {
+            let what =
+                format!("calibration of `{name}`: `{what}` is a standard deviation, not {size}");
             return Err(source.error_under("calibration", name, what));
         }
     }
@@ -394,11 +538,22 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
     }
     calibration(config, source)?;
     segment(config, source)?;
-    let angles = config.estimate.joint.iter().map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
-    let distances = config.estimate.prediction.iter().map(|p| ("alpha_distance_deg", p.alpha_distance_deg));
+    let angles = config
+        .estimate
+        .joint
+        .iter()
+        .map(|j| ("alpha_bin_deg", j.alpha_bin_deg));
+    let distances = config
+        .estimate
+        .prediction
+        .iter()
+        .map(|p| ("alpha_distance_deg", p.alpha_distance_deg));
     for (name, angle_deg) in angles.chain(distances) {
         if !(angle_deg.is_finite() && angle_deg > 0.0) {
-            return Err(source.error(name, format!("`{name}` must be greater than zero, not {angle_deg}")));
+            return Err(source.error(
+                name,
+                format!("`{name}` must be greater than zero, not {angle_deg}"),
+            ));
         }
     }
     trends_and_tunnel(config, source)?;
@@ -423,7 +578,12 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
 /// Numbers of trends and tunnel that would make no sense.
 fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
     let (trend, compare) = (&config.trend, &config.compare);
-    let knots = trend.knots_deg.iter().chain(trend.groups.iter().flat_map(|g| g.knots_deg.iter().flatten()));
+    let knots = trend.knots_deg.iter().chain(
+        trend
+            .groups
+            .iter()
+            .flat_map(|g| g.knots_deg.iter().flatten()),
+    );
     if let Some(knot) = knots.copied().find(|k| !k.is_finite()) {
         return Err(source.error_under(
             "trend",
@@ -438,17 +598,40 @@ fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
     ];
     for (key, name, value) in positive {
         if !(value.is_finite() && value > 0.0) {
-            return Err(source.error_under(key, name, format!("`{name}` must be greater than zero, not {value}")));
+            return Err(source.error_under(
+                key,
+                name,
+                format!("`{name}` must be greater than zero, not {value}"),
+            ));
         }
     }
-    if let Some(third) = config.tunnel.settings().third.as_ref().filter(|third| !third.at.is_finite()) {
-        return Err(source.error_under("tunnel", "at", format!("`at` must be a number, not {}", third.at)));
+    if let Some(third) = config
+        .tunnel
+        .settings()
+        .third
+        .as_ref()
+        .filter(|third| !third.at.is_finite())
+    {
+        return Err(source.error_under(
+            "tunnel",
+            "at",
+            format!("`at` must be a number, not {}", third.at),
+        ));
     }
     let mut given = config.export.jsbsim_properties.keys();
-    let used = || config.buildup.derivatives.iter().filter_map(|d| d.regressor.surface());
+    let used = || {
+        config
+            .buildup
+            .derivatives
+            .iter()
+            .filter_map(|d| d.regressor.surface())
+    };
     if let Some(signal) = given.find(|signal| !used().any(|s| s == signal.as_str())) {
         let near = did_you_mean(signal, used());
-        return Err(source.error(signal, format!("export: no derivative is of the signal `{signal}`{near}")));
+        return Err(source.error(
+            signal,
+            format!("export: no derivative is of the signal `{signal}`{near}"),
+        ));
     }
     Ok(())
 }

@@ -85,14 +85,25 @@ impl Config {
         let buildup = files.model()?;
         let classes = files.classes()?;
         let wind_tunnel = overrides.wind_tunnel.unwrap_or(pipeline.wind_tunnel);
-        let name = folder.file_name().map_or_else(|| "pipeline".to_owned(), |n| n.to_string_lossy().into_owned());
+        let name = folder.file_name().map_or_else(
+            || "pipeline".to_owned(),
+            |n| n.to_string_lossy().into_owned(),
+        );
         let events = overrides.events.or(pipeline.events);
-        let template = pipeline.report.template.as_deref().map(crate::store::files::text).transpose()?;
+        let template = pipeline
+            .report
+            .template
+            .as_deref()
+            .map(crate::store::files::text)
+            .transpose()?;
         let default = Path::new("data/store").join(&name);
         let store = overrides.store.or(pipeline.store);
         let cache = overrides.store_cache.or(pipeline.store_cache);
         let (store, shared_store) = places::store(store, cache, default, &files.pipeline)?;
-        let reports = overrides.reports.or(pipeline.reports).unwrap_or_else(|| Path::new("reports").join(&name));
+        let reports = overrides
+            .reports
+            .or(pipeline.reports)
+            .unwrap_or_else(|| Path::new("reports").join(&name));
         let archive = overrides.archive.unwrap_or(pipeline.archive);
         places::reachable(Path::new(&archive))?;
         let config = Config {
@@ -137,13 +148,23 @@ impl Config {
     #[must_use]
     pub fn derivative_names(&self) -> Vec<String> {
         let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
-        derivatives.chain(self.buildup.combined.iter().map(|c| &c.name)).cloned().collect()
+        derivatives
+            .chain(self.buildup.combined.iter().map(|c| &c.name))
+            .cloned()
+            .collect()
     }
 }
 
 /// The comparison's settings with the earlier campaigns that the command line names, where it names some.
 fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
-    if named.is_empty() { settings } else { compare::Settings { against: named, ..settings } }
+    if named.is_empty() {
+        settings
+    } else {
+        compare::Settings {
+            against: named,
+            ..settings
+        }
+    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,10 @@ pub(super) fn store(
 ) -> Result<(PathBuf, Option<PathBuf>)> {
     if let Some(shared) = store.as_ref().filter(|store| object::is_object(store)) {
         reachable(shared)?;
-        let folder = in_folder(cache.unwrap_or(default), "the cache of a store is a folder of this machine's")?;
+        let folder = in_folder(
+            cache.unwrap_or(default),
+            "the cache of a store is a folder of this machine's",
+        )?;
         return Ok((folder, Some(shared.clone())));
     }
     if cache.is_some() {
@@ -28,13 +31,21 @@ pub(super) fn store(
 
 /// Checks that a place in an object store is one, and that this program knows such; nobody is asked.
 pub(super) fn reachable(place: &Path) -> Result<()> {
-    if object::is_object(place) { object::check(place).map_err(|e| e.at(place)) } else { Ok(()) }
+    if object::is_object(place) {
+        object::check(place).map_err(|e| e.at(place))
+    } else {
+        Ok(())
+    }
 }
 
 /// A place that must be a folder.
 pub(super) fn in_folder(place: PathBuf, why: &str) -> Result<PathBuf> {
     if object::is_object(&place) {
-        return Err(Error::config(&place, None, format!("{why}: it cannot lie in an object store")));
+        return Err(Error::config(
+            &place,
+            None,
+            format!("{why}: it cannot lie in an object store"),
+        ));
     }
     Ok(place)
 }

@@ -34,7 +34,11 @@ impl Source {
 
     /// Its name within a pipeline's folder, and its text.
     pub fn named(&self, folder: &Path) -> (String, String) {
-        let name = self.path.strip_prefix(folder).unwrap_or(&self.path).display();
+        let name = self
+            .path
+            .strip_prefix(folder)
+            .unwrap_or(&self.path)
+            .display();
         (name.to_string(), self.text.clone())
     }
 
@@ -52,9 +56,15 @@ impl Source {
 
     /// An error about a name in the section under a key: a word may stand elsewhere in another meaning.
     pub fn error_under(&self, key: &str, name: &str, what: impl Into<String>) -> Error {
-        let begins = |line: &str| line.trim_start().strip_prefix(key).is_some_and(|rest| rest.starts_with(':'));
+        let begins = |line: &str| {
+            line.trim_start()
+                .strip_prefix(key)
+                .is_some_and(|rest| rest.starts_with(':'))
+        };
         let section = self.text.lines().position(begins);
-        let line = self.line_of(name, section.unwrap_or(0)).or(section.map(|i| i + 1));
+        let line = self
+            .line_of(name, section.unwrap_or(0))
+            .or(section.map(|i| i + 1));
         Error::config(&self.path, line, what)
     }
 
@@ -62,48 +72,73 @@ impl Source {
     fn line_of(&self, name: &str, first: usize) -> Option<usize> {
         let word = |c: char| c.is_alphanumeric() || c == '_';
         let holds = |line: &str| without_comment(line).split(|c| !word(c)).any(|w| w == name);
-        self.text.lines().enumerate().skip(first).find(|(_, line)| holds(line)).map(|(i, _)| i + 1)
+        self.text
+            .lines()
+            .enumerate()
+            .skip(first)
+            .find(|(_, line)| holds(line))
+            .map(|(i, _)| i + 1)
     }
 }
 
 /// A line without what follows a `#` that begins a comment.
 fn without_comment(line: &str) -> &str {
-    if line.trim_start().starts_with('#') { "" } else { line.split(" #").next().unwrap_or_default() }
+    if line.trim_start().starts_with('#') {
+        ""
+    } else {
+        line.split(" #").next().unwrap_or_default()
+    }
 }
 
 /// What the parser says, without the place (the error begins with it) and, for an unknown key or word, with the one that
 /// was probably meant.
 fn said(parser: &str) -> String {
-    let what = parser.rsplit_once(" at line ").map_or(parser, |(what, _)| what);
-    let Some((head, expected)) = what.split_once(", expected ").filter(|(head, _)| head.contains("unknown ")) else {
+    let what = parser
+        .rsplit_once(" at line ")
+        .map_or(parser, |(what, _)| what);
+    let Some((head, expected)) = what
+        .split_once(", expected ")
+        .filter(|(head, _)| head.contains("unknown "))
+    else {
         return what.to_owned();
     };
     let given = head.split('`').rev().nth(1).unwrap_or_default();
-    format!("{what}{}", did_you_mean(given, expected.split('`').skip(1).step_by(2)))
+    format!(
+        "{what}{}",
+        did_you_mean(given, expected.split('`').skip(1).step_by(2))
+    )
 }
 
 impl Files {
     /// All of them, in the order in which they are explained.
     pub fn all(&self) -> impl Iterator<Item = &Source> {
-        [&self.pipeline, &self.aircraft, &self.model].into_iter().chain(&self.classes)
+        [&self.pipeline, &self.aircraft, &self.model]
+            .into_iter()
+            .chain(&self.classes)
     }
 
     pub fn read(folder: &Path) -> Result<Files> {
         if !folder.join("pipeline.yaml").is_file() {
-            let what =
-                "no pipeline here: a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/";
+            let what = "no pipeline here: a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/";
             return Err(Error::config(folder, None, what));
         }
         let maneuvers = folder.join("maneuvers");
         let classes = files::with_extension(&maneuvers, "yaml")?;
         if classes.is_empty() {
-            return Err(Error::config(&maneuvers, None, "no maneuver class: each is a file `<class>.yaml` here"));
+            return Err(Error::config(
+                &maneuvers,
+                None,
+                "no maneuver class: each is a file `<class>.yaml` here",
+            ));
         }
         Ok(Files {
             pipeline: Source::read(folder.join("pipeline.yaml"))?,
             aircraft: Source::read(folder.join("aircraft.yaml"))?,
             model: Source::read(folder.join("model.yaml"))?,
-            classes: classes.into_iter().map(Source::read).collect::<Result<_>>()?,
+            classes: classes
+                .into_iter()
+                .map(Source::read)
+                .collect::<Result<_>>()?,
         })
     }
 
@@ -124,18 +159,27 @@ impl Files {
         for source in &self.classes {
             let file: ClassFile = source.parse()?;
             let own = [&file.estimated, &file.held, &file.inactive];
-            let overrides = file.overrides.iter().map(|o| [&o.estimated, &o.held, &o.inactive]);
+            let overrides = file
+                .overrides
+                .iter()
+                .map(|o| [&o.estimated, &o.held, &o.inactive]);
             for lists in std::iter::once(own).chain(overrides) {
                 let mut names: Vec<&String> = lists.into_iter().flatten().collect();
                 names.sort();
                 if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
                     let name = twice[0];
-                    return Err(source.error(name, format!("`{name}` stands twice among estimated, held and inactive")));
+                    return Err(source.error(
+                        name,
+                        format!("`{name}` stands twice among estimated, held and inactive"),
+                    ));
                 }
             }
             let class = Class::from(file);
             if classes.iter().any(|c| c.name == class.name) {
-                return Err(source.error(&class.name, format!("class `{}` is defined twice", class.name)));
+                return Err(source.error(
+                    &class.name,
+                    format!("class `{}` is defined twice", class.name),
+                ));
             }
             classes.push(class);
         }

@@ -19,7 +19,11 @@ impl Copy {
             for entry in fs::read_dir(shipped.join(sub)).unwrap() {
                 let path = entry.unwrap().path();
                 if path.is_file() {
-                    fs::copy(&path, folder.path().join(sub).join(path.file_name().unwrap())).unwrap();
+                    fs::copy(
+                        &path,
+                        folder.path().join(sub).join(path.file_name().unwrap()),
+                    )
+                    .unwrap();
                 }
             }
         }
@@ -53,13 +57,27 @@ impl Copy {
     }
 
     fn error_with_tunnel(&self, rows: &str) -> String {
-        let path = self.write("tunnel.csv", &format!("derivative,alpha_deg,value,unit\n{rows}"));
-        self.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap_err()
+        let path = self.write(
+            "tunnel.csv",
+            &format!("derivative,alpha_deg,value,unit\n{rows}"),
+        );
+        self.load(Overrides {
+            wind_tunnel: Some(path),
+            ..Overrides::default()
+        })
+        .unwrap_err()
     }
 
     fn error_with_events(&self, rows: &str) -> String {
-        let path = self.write("events.csv", &format!("flight_id,class,start_s,end_s\n{rows}"));
-        self.load(Overrides { events: Some(path), ..Overrides::default() }).unwrap_err()
+        let path = self.write(
+            "events.csv",
+            &format!("flight_id,class,start_s,end_s\n{rows}"),
+        );
+        self.load(Overrides {
+            events: Some(path),
+            ..Overrides::default()
+        })
+        .unwrap_err()
     }
 }
 
@@ -75,7 +93,12 @@ fn an_unknown_key_is_named_with_the_one_that_was_probably_meant() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "wind_tunnel: data", "wind_tunel: data");
     let e = copy.error();
-    assert!(e.starts_with(&format!("pipeline.yaml:{line}: unknown field `wind_tunel`, expected one of ")), "{e}");
+    assert!(
+        e.starts_with(&format!(
+            "pipeline.yaml:{line}: unknown field `wind_tunel`, expected one of "
+        )),
+        "{e}"
+    );
     assert!(e.ends_with("did you mean `wind_tunnel`?"), "{e}");
 }
 
@@ -84,23 +107,41 @@ fn an_unknown_key_deep_in_a_file_is_named_with_its_path() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "max_marked_share: 0.2", "max_marked: 0.2");
     let e = copy.error();
-    assert!(e.starts_with(&format!("pipeline.yaml:{line}: estimate: unknown field `max_marked`")), "{e}");
+    assert!(
+        e.starts_with(&format!(
+            "pipeline.yaml:{line}: estimate: unknown field `max_marked`"
+        )),
+        "{e}"
+    );
     assert!(e.ends_with("did you mean `max_marked_share`?"), "{e}");
 }
 
 #[test]
 fn an_unknown_word_is_named_with_the_one_that_was_probably_meant() {
     let copy = Copy::new();
-    let line = copy.spoil("maneuvers/ppss.yaml", "axis: longitudinal", "axis: longitudnal");
+    let line = copy.spoil(
+        "maneuvers/ppss.yaml",
+        "axis: longitudinal",
+        "axis: longitudnal",
+    );
     let e = copy.error();
-    assert!(e.starts_with(&format!("maneuvers/ppss.yaml:{line}: axis: unknown variant `longitudnal`")), "{e}");
+    assert!(
+        e.starts_with(&format!(
+            "maneuvers/ppss.yaml:{line}: axis: unknown variant `longitudnal`"
+        )),
+        "{e}"
+    );
     assert!(e.ends_with("did you mean `longitudinal`?"), "{e}");
 }
 
 #[test]
 fn yaml_that_cannot_be_read_is_named_by_line() {
     let copy = Copy::new();
-    let line = copy.spoil("model.yaml", "  - { name: CN_alpha,", "  - { name CN_alpha: [,");
+    let line = copy.spoil(
+        "model.yaml",
+        "  - { name: CN_alpha,",
+        "  - { name CN_alpha: [,",
+    );
     let e = copy.error();
     assert!(e.starts_with(&format!("model.yaml:{line}: ")), "{e}");
 }
@@ -130,9 +171,15 @@ fn a_typo_in_a_derivative_is_answered_with_its_name() {
 #[test]
 fn a_derivative_of_the_other_axis_is_none_of_this_class() {
     let copy = Copy::new();
-    let line = copy.spoil("maneuvers/ppss.yaml", "inactive: [\n", "inactive: [ Cl_beta,\n");
+    let line = copy.spoil(
+        "maneuvers/ppss.yaml",
+        "inactive: [\n",
+        "inactive: [ Cl_beta,\n",
+    );
     let e = copy.error();
-    let expected = format!("maneuvers/ppss.yaml:{line}: class PPSS: no longitudinal derivative `Cl_beta` in the model");
+    let expected = format!(
+        "maneuvers/ppss.yaml:{line}: class PPSS: no longitudinal derivative `Cl_beta` in the model"
+    );
     assert!(e.starts_with(&expected), "{e}");
 }
 
@@ -140,34 +187,58 @@ fn a_derivative_of_the_other_axis_is_none_of_this_class() {
 fn a_derivative_in_no_list_is_named() {
     let copy = Copy::new();
     copy.spoil("maneuvers/ppss.yaml", "CN_0, CN_alpha,", "CN_0,");
-    assert_eq!(copy.error(), "maneuvers/ppss.yaml:1: class PPSS: `CN_alpha` is neither estimated, held nor inactive");
+    assert_eq!(
+        copy.error(),
+        "maneuvers/ppss.yaml:1: class PPSS: `CN_alpha` is neither estimated, held nor inactive"
+    );
 }
 
 #[test]
 fn a_derivative_in_two_lists_is_named() {
     let copy = Copy::new();
-    copy.spoil("maneuvers/ppss.yaml", "CN_dlef, CN_dtef,", "CN_dlef, CN_dtef, CN_de,");
+    copy.spoil(
+        "maneuvers/ppss.yaml",
+        "CN_dlef, CN_dtef,",
+        "CN_dlef, CN_dtef, CN_de,",
+    );
     let e = copy.error();
     assert!(e.starts_with("maneuvers/ppss.yaml:"), "{e}");
-    assert!(e.ends_with(": `CN_de` stands twice among estimated, held and inactive"), "{e}");
+    assert!(
+        e.ends_with(": `CN_de` stands twice among estimated, held and inactive"),
+        "{e}"
+    );
 }
 
 #[test]
 fn a_derivative_twice_in_an_override_is_named() {
     let copy = Copy::new();
-    copy.spoil("maneuvers/pyrs.yaml", "estimated: [CY_da, Cl_dr]", "estimated: [CY_da, Cl_dr]\n    held: [CY_da]");
+    copy.spoil(
+        "maneuvers/pyrs.yaml",
+        "estimated: [CY_da, Cl_dr]",
+        "estimated: [CY_da, Cl_dr]\n    held: [CY_da]",
+    );
     let e = copy.error();
-    assert!(e.ends_with(": `CY_da` stands twice among estimated, held and inactive"), "{e}");
+    assert!(
+        e.ends_with(": `CY_da` stands twice among estimated, held and inactive"),
+        "{e}"
+    );
 }
 
 #[test]
 fn a_held_derivative_without_a_tunnel_table_is_named() {
     let copy = Copy::new();
     let line = copy.spoil("maneuvers/olat.yaml", "CY_ddht, CY_dyv,", "CY_dyv,");
-    copy.spoil("maneuvers/olat.yaml", "inactive: [\n", "held: [CY_ddht]\ninactive: [\n");
+    copy.spoil(
+        "maneuvers/olat.yaml",
+        "inactive: [\n",
+        "held: [CY_ddht]\ninactive: [\n",
+    );
     let table: String = fs::read_to_string("data/demo/wt_tables.csv").unwrap();
-    let without: Vec<&str> =
-        table.lines().skip(1).filter(|l| !l.starts_with("CY_ddht") && !l.starts_with("CYddht")).collect();
+    let without: Vec<&str> = table
+        .lines()
+        .skip(1)
+        .filter(|l| !l.starts_with("CY_ddht") && !l.starts_with("CYddht"))
+        .collect();
     let e = copy.error_with_tunnel(&without.join("\n"));
     assert_eq!(
         e,
@@ -181,43 +252,71 @@ fn a_held_derivative_without_a_tunnel_table_is_named() {
 #[test]
 fn a_bias_is_never_held() {
     let copy = Copy::new();
-    copy.spoil("maneuvers/ppss.yaml", "an_bias, ax_bias, q_bias,", "ax_bias, q_bias,");
+    copy.spoil(
+        "maneuvers/ppss.yaml",
+        "an_bias, ax_bias, q_bias,",
+        "ax_bias, q_bias,",
+    );
     let line = copy.spoil("maneuvers/ppss.yaml", "held: [\n", "held: [ an_bias,\n");
     assert_eq!(
         copy.error(),
-        format!("maneuvers/ppss.yaml:{line}: class PPSS: a bias is estimated or inactive, not held")
+        format!(
+            "maneuvers/ppss.yaml:{line}: class PPSS: a bias is estimated or inactive, not held"
+        )
     );
 }
 
 #[test]
 fn an_unknown_unit_is_answered_with_the_known_ones() {
     let copy = Copy::new();
-    let line = copy.spoil("aircraft.yaml", "alpha_vane_deg, unit: deg }", "alpha_vane_deg, unit: degrees }");
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "alpha_vane_deg, unit: deg }",
+        "alpha_vane_deg, unit: degrees }",
+    );
     let e = copy.error();
-    let expected =
-        format!("aircraft.yaml:{line}: channel `alpha_vane`: unknown unit `degrees`; the units are deg, rad, ");
+    let expected = format!(
+        "aircraft.yaml:{line}: channel `alpha_vane`: unknown unit `degrees`; the units are deg, rad, "
+    );
     assert!(e.starts_with(&expected), "{e}");
 }
 
 #[test]
 fn a_unit_that_cannot_become_the_signal_s_is_named() {
     let copy = Copy::new();
-    let line = copy.spoil("aircraft.yaml", "q: { signal: q_deg_s, unit: deg/s }", "q: { signal: q_deg_s, unit: deg }");
-    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: channel `q`: `deg` cannot become deg/s of `q_deg_s`"));
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "q: { signal: q_deg_s, unit: deg/s }",
+        "q: { signal: q_deg_s, unit: deg }",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("aircraft.yaml:{line}: channel `q`: `deg` cannot become deg/s of `q_deg_s`")
+    );
 }
 
 #[test]
 fn a_sign_is_one_or_minus_one() {
     let copy = Copy::new();
-    let line = copy.spoil("aircraft.yaml", "q_deg_s, unit: deg/s }", "q_deg_s, unit: deg/s, sign: -2 }");
-    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: channel `q`: sign is 1 or -1, not -2"));
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "q_deg_s, unit: deg/s }",
+        "q_deg_s, unit: deg/s, sign: -2 }",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("aircraft.yaml:{line}: channel `q`: sign is 1 or -1, not -2")
+    );
 }
 
 #[test]
 fn a_vane_factor_is_greater_than_zero() {
     let copy = Copy::new();
     let line = copy.spoil("aircraft.yaml", "factor: 0.98", "factor: 0");
-    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: `factor` must be greater than zero, not 0"));
+    assert_eq!(
+        copy.error(),
+        format!("aircraft.yaml:{line}: `factor` must be greater than zero, not 0")
+    );
 }
 
 #[test]
@@ -233,14 +332,25 @@ fn a_decay_is_not_negative() {
 #[test]
 fn two_sources_of_a_signal_are_one_too_many() {
     let copy = Copy::new();
-    let line = copy.spoil("aircraft.yaml", "r: { signal: r_deg_s,", "r: { signal: q_deg_s,");
-    assert_eq!(copy.error(), format!("aircraft.yaml:{line}: signal `q_deg_s` has two sources"));
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "r: { signal: r_deg_s,",
+        "r: { signal: q_deg_s,",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("aircraft.yaml:{line}: signal `q_deg_s` has two sources")
+    );
 }
 
 #[test]
 fn a_constant_is_a_source_too() {
     let copy = Copy::new();
-    copy.spoil("aircraft.yaml", "constants: {}", "constants: { mass_slug: 1050 }");
+    copy.spoil(
+        "aircraft.yaml",
+        "constants: {}",
+        "constants: { mass_slug: 1050 }",
+    );
     let e = copy.error();
     assert!(e.starts_with("aircraft.yaml:"), "{e}");
     assert!(e.ends_with(": signal `mass_slug` has two sources"), "{e}");
@@ -249,25 +359,41 @@ fn a_constant_is_a_source_too() {
 #[test]
 fn a_required_signal_without_a_source_is_named() {
     let copy = Copy::new();
-    copy.spoil("aircraft.yaml", "  q: { signal: q_deg_s, unit: deg/s }\n", "");
+    copy.spoil(
+        "aircraft.yaml",
+        "  q: { signal: q_deg_s, unit: deg/s }\n",
+        "",
+    );
     let text = fs::read_to_string(copy.path("aircraft.yaml")).unwrap();
     let line = text.lines().position(|l| l == "channels:").unwrap() + 1;
     let e = copy.error();
-    let expected = format!("aircraft.yaml:{line}: no channel or constant gives the signal `q_deg_s`");
+    let expected =
+        format!("aircraft.yaml:{line}: no channel or constant gives the signal `q_deg_s`");
     assert!(e.starts_with(&expected), "{e}");
 }
 
 #[test]
 fn a_weight_that_is_missing_is_named() {
     let copy = Copy::new();
-    let line = copy.spoil("maneuvers/ppss.yaml", "weights: { alpha: 5, q: 8,", "weights: { alpha: 5,");
-    assert_eq!(copy.error(), format!("maneuvers/ppss.yaml:{line}: class PPSS: `weights` lacks `q`"));
+    let line = copy.spoil(
+        "maneuvers/ppss.yaml",
+        "weights: { alpha: 5, q: 8,",
+        "weights: { alpha: 5,",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("maneuvers/ppss.yaml:{line}: class PPSS: `weights` lacks `q`")
+    );
 }
 
 #[test]
 fn a_weight_of_the_other_axis_is_named() {
     let copy = Copy::new();
-    let line = copy.spoil("maneuvers/ppss.yaml", "weights: { alpha: 5,", "weights: { alpha: 5, beta: 12,");
+    let line = copy.spoil(
+        "maneuvers/ppss.yaml",
+        "weights: { alpha: 5,",
+        "weights: { alpha: 5, beta: 12,",
+    );
     assert_eq!(
         copy.error(),
         format!(
@@ -284,7 +410,9 @@ fn a_weight_is_greater_than_zero() {
         let line = copy.spoil("maneuvers/ppss.yaml", "q: 8,", &format!("q: {wrong},"));
         assert_eq!(
             copy.error(),
-            format!("maneuvers/ppss.yaml:{line}: class PPSS: the weight of `q` must be greater than zero")
+            format!(
+                "maneuvers/ppss.yaml:{line}: class PPSS: the weight of `q` must be greater than zero"
+            )
         );
     }
 }
@@ -292,7 +420,11 @@ fn a_weight_is_greater_than_zero() {
 #[test]
 fn recognition_by_an_unknown_signal_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
-    let line = copy.spoil("maneuvers/ppss.yaml", "stick_pitch_in: {", "stick_pich_in: {");
+    let line = copy.spoil(
+        "maneuvers/ppss.yaml",
+        "stick_pitch_in: {",
+        "stick_pich_in: {",
+    );
     assert_eq!(
         copy.error(),
         format!(
@@ -320,40 +452,72 @@ fn an_unknown_word_of_recognition_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
     copy.spoil("maneuvers/3211.yaml", "{widths: [", "{width: [");
     let e = copy.error();
-    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `widths`?"), "{e}");
+    assert!(
+        e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `widths`?"),
+        "{e}"
+    );
     let copy = Copy::new();
     copy.spoil("maneuvers/3211.yaml", "  pulses:", "  pulse:");
     let e = copy.error();
-    assert!(e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `pulses`?"), "{e}");
+    assert!(
+        e.starts_with("maneuvers/3211.yaml:") && e.ends_with("did you mean `pulses`?"),
+        "{e}"
+    );
 }
 
 #[test]
 fn patterns_that_cannot_be_are_named_with_their_line() {
     for (from, to, said) in [
-        ("widths: [3, 2, 1, 1]", "widths: [3]", "`widths` are the lengths of two pulses or more"),
-        ("unit_s: [0.2, 2]", "unit_s: [2, 0.2]", "`unit_s` is the shortest unit and the longest"),
-        ("tolerance: 0.35", "tolerance: 0", "`tolerance` must be greater than zero"),
+        (
+            "widths: [3, 2, 1, 1]",
+            "widths: [3]",
+            "`widths` are the lengths of two pulses or more",
+        ),
+        (
+            "unit_s: [0.2, 2]",
+            "unit_s: [2, 0.2]",
+            "`unit_s` is the shortest unit and the longest",
+        ),
+        (
+            "tolerance: 0.35",
+            "tolerance: 0",
+            "`tolerance` must be greater than zero",
+        ),
     ] {
         let copy = Copy::new();
         let line = copy.spoil("maneuvers/3211.yaml", from, to);
         let e = copy.error();
-        assert!(e.starts_with(&format!("maneuvers/3211.yaml:{line}: class 3211: {said}")), "{e}");
+        assert!(
+            e.starts_with(&format!("maneuvers/3211.yaml:{line}: class 3211: {said}")),
+            "{e}"
+        );
     }
-    for (sweep, said) in
-        [("{at_least: 3}", "at least 4 swings"), ("{at_least: 9, ratio: 0.5}", "`ratio` must be greater")]
-    {
+    for (sweep, said) in [
+        ("{at_least: 3}", "at least 4 swings"),
+        ("{at_least: 9, ratio: 0.5}", "`ratio` must be greater"),
+    ] {
         let copy = Copy::new();
-        let line =
-            copy.spoil("maneuvers/olon.yaml", "  lead_in_s:", &format!("  sweep: {{de_deg: {sweep}}}\n  lead_in_s:"));
+        let line = copy.spoil(
+            "maneuvers/olon.yaml",
+            "  lead_in_s:",
+            &format!("  sweep: {{de_deg: {sweep}}}\n  lead_in_s:"),
+        );
         let e = copy.error();
-        assert!(e.contains(said) && e.starts_with("maneuvers/olon.yaml:"), "{line}: {e}");
+        assert!(
+            e.contains(said) && e.starts_with("maneuvers/olon.yaml:"),
+            "{line}: {e}"
+        );
     }
 }
 
 #[test]
 fn a_class_that_nothing_makes_is_named() {
     let copy = Copy::new();
-    copy.spoil("maneuvers/ppss.yaml", "{at_least: 7, at_most: 12}", "{at_most: 12}");
+    copy.spoil(
+        "maneuvers/ppss.yaml",
+        "{at_least: 7, at_most: 12}",
+        "{at_most: 12}",
+    );
     let e = copy.error();
     assert!(e.contains("class PPSS: nothing makes this maneuver"), "{e}");
 }
@@ -361,47 +525,87 @@ fn a_class_that_nothing_makes_is_named() {
 #[test]
 fn pilot_controls_and_actuators_of_no_signal_are_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "[stick_pitch_in, stick_lat_in, pedal_in]", "[stick_pitch_in, pedal_inn]");
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "[stick_pitch_in, stick_lat_in, pedal_in]",
+        "[stick_pitch_in, pedal_inn]",
+    );
     assert_eq!(
         copy.error(),
-        format!("pipeline.yaml:{line}: segment: no channel gives the signal `pedal_inn`; did you mean `pedal_in`?")
+        format!(
+            "pipeline.yaml:{line}: segment: no channel gives the signal `pedal_inn`; did you mean `pedal_in`?"
+        )
     );
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "lower_deg: -24, upper_deg: 10.5", "lower_deg: 24, upper_deg: 10.5");
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "lower_deg: -24, upper_deg: 10.5",
+        "lower_deg: 24, upper_deg: 10.5",
+    );
     let e = copy.error();
-    assert!(e.starts_with(&format!("pipeline.yaml:{line}: the actuator of `de_deg` needs")), "{e}");
+    assert!(
+        e.starts_with(&format!(
+            "pipeline.yaml:{line}: the actuator of `de_deg` needs"
+        )),
+        "{e}"
+    );
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "other_axis: 1 ", "other_axis: -1 ");
-    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: `other_axis` must not be negative, not -1"));
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: `other_axis` must not be negative, not -1")
+    );
 }
 
 #[test]
 fn a_trend_group_of_an_unknown_derivative_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "derivatives: [CN_q, Cm_q]", "derivatives: [CN_q, Cm_qq]");
-    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: unknown derivative `Cm_qq`; did you mean `Cm_q`?"));
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "derivatives: [CN_q, Cm_q]",
+        "derivatives: [CN_q, Cm_qq]",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: unknown derivative `Cm_qq`; did you mean `Cm_q`?")
+    );
 }
 
 #[test]
 fn a_trend_group_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
     let copy = Copy::new();
     let line = copy.spoil("pipeline.yaml", "classes: [PPSSTV]", "classes: [PPSTV]");
-    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: unknown class `PPSTV`; did you mean `PPSSTV`?"));
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: unknown class `PPSTV`; did you mean `PPSSTV`?")
+    );
 }
 
 #[test]
 fn calibration_of_an_unknown_signal_or_with_a_negative_size_is_refused() {
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "    qbar_psf: { scale_pct: 0.5 }", "    qbar_psi: { scale_pct: 0.5 }");
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "    qbar_psf: { scale_pct: 0.5 }",
+        "    qbar_psi: { scale_pct: 0.5 }",
+    );
     assert_eq!(
         copy.error(),
-        format!("pipeline.yaml:{line}: calibration: no channel gives the signal `qbar_psi`; did you mean `qbar_psf`?")
+        format!(
+            "pipeline.yaml:{line}: calibration: no channel gives the signal `qbar_psi`; did you mean `qbar_psf`?"
+        )
     );
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "    qbar_psf: { scale_pct: 0.5 }", "    qbar_psf: { scale_pct: -0.5 }");
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "    qbar_psf: { scale_pct: 0.5 }",
+        "    qbar_psf: { scale_pct: -0.5 }",
+    );
     assert_eq!(
         copy.error(),
-        format!("pipeline.yaml:{line}: calibration of `qbar_psf`: `scale_pct` is a standard deviation, not -0.5")
+        format!(
+            "pipeline.yaml:{line}: calibration of `qbar_psf`: `scale_pct` is a standard deviation, not -0.5"
+        )
     );
 }
 
@@ -415,7 +619,9 @@ fn a_regressor_that_no_channel_gives_is_named() {
     );
     assert_eq!(
         copy.error(),
-        format!("model.yaml:{line}: CN_dlef: no channel gives the signal `dlaf_deg`; did you mean `dlef_deg`?")
+        format!(
+            "model.yaml:{line}: CN_dlef: no channel gives the signal `dlaf_deg`; did you mean `dlef_deg`?"
+        )
     );
 }
 
@@ -423,7 +629,10 @@ fn a_regressor_that_no_channel_gives_is_named() {
 fn two_classes_of_one_name_are_one_too_many() {
     let copy = Copy::new();
     copy.spoil("maneuvers/ppss.yaml", "class: PPSS\n", "class: PPSSTV\n");
-    assert_eq!(copy.error(), "maneuvers/ppsstv.yaml:1: class `PPSSTV` is defined twice");
+    assert_eq!(
+        copy.error(),
+        "maneuvers/ppsstv.yaml:1: class `PPSSTV` is defined twice"
+    );
 }
 
 #[test]
@@ -476,16 +685,20 @@ fn a_tunnel_value_that_is_no_number_is_named_by_line_and_column() {
 fn a_folder_without_a_pipeline_says_what_one_is() {
     let copy = Copy::new();
     fs::remove_file(copy.path("pipeline.yaml")).unwrap();
-    assert!(
-        copy.error().contains("a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/")
-    );
+    assert!(copy.error().contains(
+        "a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/"
+    ));
 }
 
 #[test]
 fn a_missing_file_of_a_pipeline_is_named() {
     let copy = Copy::new();
     fs::remove_file(copy.path("model.yaml")).unwrap();
-    assert!(copy.error().starts_with("model.yaml: cannot read it"), "{}", copy.error());
+    assert!(
+        copy.error().starts_with("model.yaml: cannot read it"),
+        "{}",
+        copy.error()
+    );
 }
 
 #[test]
@@ -494,15 +707,26 @@ fn a_pipeline_without_classes_says_so() {
     for file in fs::read_dir(copy.path("maneuvers")).unwrap() {
         fs::remove_file(file.unwrap().path()).unwrap();
     }
-    assert_eq!(copy.error(), "maneuvers: no maneuver class: each is a file `<class>.yaml` here");
+    assert_eq!(
+        copy.error(),
+        "maneuvers: no maneuver class: each is a file `<class>.yaml` here"
+    );
 }
 
 #[test]
 fn a_tunnel_per_radian_becomes_one_per_degree() {
     let copy = Copy::new();
     let table = fs::read_to_string("data/demo/wt_tables.csv").unwrap();
-    let path = copy.write("tunnel.csv", &table.replace("CNalpha,5,0.0968867536,per_deg", "CNalpha,5,5.0,1/rad"));
-    let config = copy.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap();
+    let path = copy.write(
+        "tunnel.csv",
+        &table.replace("CNalpha,5,0.0968867536,per_deg", "CNalpha,5,5.0,1/rad"),
+    );
+    let config = copy
+        .load(Overrides {
+            wind_tunnel: Some(path),
+            ..Overrides::default()
+        })
+        .unwrap();
     let value = config.tunnel.value("CN_alpha", 5.0, 0.3).unwrap().value;
     approx::assert_relative_eq!(value, 5.0_f64.to_radians(), max_relative = 1e-14);
 }
@@ -510,12 +734,24 @@ fn a_tunnel_per_radian_becomes_one_per_degree() {
 #[test]
 fn a_second_value_at_one_place_and_a_mach_number_in_some_rows_only_are_named() {
     let e = Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCNalpha,10,0.09,per_deg\n");
-    assert!(e.starts_with("tunnel.csv:3: `CNalpha` has a second value at alpha 10 deg"), "{e}");
+    assert!(
+        e.starts_with("tunnel.csv:3: `CNalpha` has a second value at alpha 10 deg"),
+        "{e}"
+    );
     let copy = Copy::new();
-    let rows = "derivative,alpha_deg,mach,value,unit\nCN_q,10,0.3,4.0,per_rad\nCN_q,15,,4.0,per_rad\n";
+    let rows =
+        "derivative,alpha_deg,mach,value,unit\nCN_q,10,0.3,4.0,per_rad\nCN_q,15,,4.0,per_rad\n";
     let path = copy.write("mach.csv", rows);
-    let e = copy.load(Overrides { wind_tunnel: Some(path), ..Overrides::default() }).unwrap_err();
-    assert!(e.starts_with("mach.csv:3: `CN_q` has Mach number or third variable in some rows"), "{e}");
+    let e = copy
+        .load(Overrides {
+            wind_tunnel: Some(path),
+            ..Overrides::default()
+        })
+        .unwrap_err();
+    assert!(
+        e.starts_with("mach.csv:3: `CN_q` has Mach number or third variable in some rows"),
+        "{e}"
+    );
 }
 
 #[test]
@@ -532,17 +768,33 @@ fn a_third_variable_without_a_column_is_named() {
 #[test]
 fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "interpolation: linear", "interpolation: cubic");
-    let e = copy.error();
-    assert!(e.starts_with(&format!("pipeline.yaml:{line}: ")) && e.contains("monotone_cubic"), "{e}");
-    let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "outlier_z: 3", "outlier_z: 0");
-    assert_eq!(copy.error(), format!("pipeline.yaml:{line}: `outlier_z` must be greater than zero, not 0"));
-    let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "# export:\n", "export: { jsbsim_properties: { de_dg: fcs/de } }\n");
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "interpolation: linear",
+        "interpolation: cubic",
+    );
     let e = copy.error();
     assert!(
-        e.starts_with(&format!("pipeline.yaml:{line}: export: no derivative is of the signal `de_dg`; did you mean")),
+        e.starts_with(&format!("pipeline.yaml:{line}: ")) && e.contains("monotone_cubic"),
+        "{e}"
+    );
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", "outlier_z: 3", "outlier_z: 0");
+    assert_eq!(
+        copy.error(),
+        format!("pipeline.yaml:{line}: `outlier_z` must be greater than zero, not 0")
+    );
+    let copy = Copy::new();
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "# export:\n",
+        "export: { jsbsim_properties: { de_dg: fcs/de } }\n",
+    );
+    let e = copy.error();
+    assert!(
+        e.starts_with(&format!(
+            "pipeline.yaml:{line}: export: no derivative is of the signal `de_dg`; did you mean"
+        )),
         "{e}"
     );
 }
@@ -550,24 +802,63 @@ fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
 #[test]
 fn a_place_in_an_object_store_is_an_archive_or_a_store_with_a_cache_and_nothing_else() {
     let copy = Copy::new();
-    let own = |store: &str| Overrides { store: Some(store.into()), ..Overrides::default() };
+    let own = |store: &str| Overrides {
+        store: Some(store.into()),
+        ..Overrides::default()
+    };
     if cfg!(feature = "s3") {
-        copy.spoil("pipeline.yaml", "\narchive: data/demo/flights", "\narchive: s3://fleet/flights");
+        copy.spoil(
+            "pipeline.yaml",
+            "\narchive: data/demo/flights",
+            "\narchive: s3://fleet/flights",
+        );
         let config = copy.load(own("s3://fleet/store")).unwrap();
         assert_eq!(config.archive, "s3://fleet/flights");
         assert_eq!(config.shared_store, Some("s3://fleet/store".into()));
         assert!(config.store.starts_with("data/store"));
-        let cached = Overrides { store_cache: Some("cache".into()), ..own("s3://fleet/store") };
+        let cached = Overrides {
+            store_cache: Some("cache".into()),
+            ..own("s3://fleet/store")
+        };
         assert_eq!(copy.load(cached).unwrap().store, PathBuf::from("cache"));
-        assert!(copy.load(own("s3:///store")).unwrap_err().contains("expected s3://bucket/prefix"));
+        assert!(
+            copy.load(own("s3:///store"))
+                .unwrap_err()
+                .contains("expected s3://bucket/prefix")
+        );
     } else {
-        assert!(copy.load(own("s3://fleet/store")).unwrap_err().contains("--features s3"));
-        let archive = Overrides { archive: Some("s3://fleet/flights".into()), ..Overrides::default() };
-        assert!(copy.load(archive).unwrap_err().starts_with("s3://fleet/flights: "));
+        assert!(
+            copy.load(own("s3://fleet/store"))
+                .unwrap_err()
+                .contains("--features s3")
+        );
+        let archive = Overrides {
+            archive: Some("s3://fleet/flights".into()),
+            ..Overrides::default()
+        };
+        assert!(
+            copy.load(archive)
+                .unwrap_err()
+                .starts_with("s3://fleet/flights: ")
+        );
     }
-    let reports = Overrides { reports: Some("s3://fleet/reports".into()), ..Overrides::default() };
-    assert!(copy.load(reports).unwrap_err().contains("it cannot lie in an object store"));
-    let line = copy.spoil("pipeline.yaml", "\n# store_cache: data/store/harv", "\nstore_cache: data/store/harv") + 1;
+    let reports = Overrides {
+        reports: Some("s3://fleet/reports".into()),
+        ..Overrides::default()
+    };
+    assert!(
+        copy.load(reports)
+            .unwrap_err()
+            .contains("it cannot lie in an object store")
+    );
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "\n# store_cache: data/store/harv",
+        "\nstore_cache: data/store/harv",
+    ) + 1;
     let error = copy.error();
-    assert!(error.starts_with(&format!("pipeline.yaml:{line}: `store_cache`")), "{error}");
+    assert!(
+        error.starts_with(&format!("pipeline.yaml:{line}: `store_cache`")),
+        "{error}"
+    );
 }

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::aero::{Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel};
+use crate::aero::{
+    Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
+};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
@@ -66,7 +68,12 @@ pub struct ReportSettings {
 impl Default for ReportSettings {
     fn default() -> Self {
         // The paper's Figures 4 and 12 are at 30 deg.
-        ReportSettings { histories_at_alpha_deg: 30.0, maneuver_pages: 600, template: None, keep_nights: 7 }
+        ReportSettings {
+            histories_at_alpha_deg: 30.0,
+            maneuver_pages: 600,
+            template: None,
+            keep_nights: 7,
+        }
     }
 }
 
@@ -129,12 +136,27 @@ impl From<ModelFile> for Buildup {
                 ("r", _) => Regressor::YawRate,
                 _ => Regressor::Surface(line.regressor),
             };
-            Derivative { name: line.name, coefficient: line.coefficient, regressor }
+            Derivative {
+                name: line.name,
+                coefficient: line.coefficient,
+                regressor,
+            }
         };
-        let combined = |line: CombinedLine| Combined { name: line.name, constant: line.constant, slope: line.slope };
+        let combined = |line: CombinedLine| Combined {
+            name: line.name,
+            constant: line.constant,
+            slope: line.slope,
+        };
         Buildup {
             derivatives: file.derivatives.into_iter().map(derivative).collect(),
-            biases: file.biases.into_iter().map(|b| Bias { name: b.name, output: b.output }).collect(),
+            biases: file
+                .biases
+                .into_iter()
+                .map(|b| Bias {
+                    name: b.name,
+                    output: b.output,
+                })
+                .collect(),
             combined: file.combined.into_iter().map(combined).collect(),
         }
     }
@@ -174,12 +196,25 @@ pub struct OverrideLine {
     pub inactive: Vec<String>,
 }
 
-fn statuses(estimated: &[String], held: &[String], inactive: &[String]) -> BTreeMap<String, Status> {
-    let with = |names: &[String], status| names.iter().map(move |n| (n.clone(), status)).collect::<Vec<_>>();
-    [with(estimated, Status::Estimated), with(held, Status::Held), with(inactive, Status::Inactive)]
-        .concat()
-        .into_iter()
-        .collect()
+fn statuses(
+    estimated: &[String],
+    held: &[String],
+    inactive: &[String],
+) -> BTreeMap<String, Status> {
+    let with = |names: &[String], status| {
+        names
+            .iter()
+            .map(move |n| (n.clone(), status))
+            .collect::<Vec<_>>()
+    };
+    [
+        with(estimated, Status::Estimated),
+        with(held, Status::Held),
+        with(inactive, Status::Inactive),
+    ]
+    .concat()
+    .into_iter()
+    .collect()
 }
 
 impl From<ClassFile> for Class {

@@ -4,7 +4,10 @@
 //! The longitudinal specific forces f_x, f_z are taken as measured, brought to the c.g.; in 3.1 they stand as C_D sin β
 //! and T cos α sin β (minus: thrust pulls the nose back into the wind's direction). Moments: Euler's equations about x and
 //! z for a symmetric airframe with the engines' momentum H along +x, whose yawing moment is +q H.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 use nalgebra::{SMatrix, SVector};
 
@@ -71,8 +74,16 @@ impl Known {
     fn angular(&self, p: f64, r: f64, c: &[f64; COEFFICIENTS]) -> [f64; 2] {
         let ([p_dot, r_dot], [cl, cn]) = (self.coupling, [c[CL], c[CN]]);
         [
-            p_dot[0] * p + p_dot[1] * r + self.gyroscopic[0] + self.moment[0][0] * cl + self.moment[0][1] * cn,
-            r_dot[0] * p + r_dot[1] * r + self.gyroscopic[1] + self.moment[1][0] * cl + self.moment[1][1] * cn,
+            p_dot[0] * p
+                + p_dot[1] * r
+                + self.gyroscopic[0]
+                + self.moment[0][0] * cl
+                + self.moment[0][1] * cn,
+            r_dot[0] * p
+                + r_dot[1] * r
+                + self.gyroscopic[1]
+                + self.moment[1][0] * cl
+                + self.moment[1][1] * cn,
         ]
     }
 }
@@ -100,21 +111,38 @@ impl Equations<4> for Lateral {
         (PHI, R),
         (PHI, PHI),
     ];
-    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(BETA, CY), (P, CL), (P, CN), (R, CL), (R, CN)];
-    const OUTPUTS_BY_STATE: &'static [(usize, usize)] =
-        &[(0, BETA), (0, P), (0, R), (1, P), (2, R), (3, PHI), (4, BETA), (4, P), (4, R)];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] =
+        &[(BETA, CY), (P, CL), (P, CN), (R, CL), (R, CN)];
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
+        (0, BETA),
+        (0, P),
+        (0, R),
+        (1, P),
+        (2, R),
+        (3, PHI),
+        (4, BETA),
+        (4, P),
+        (4, R),
+    ];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(4, CY), (4, CL), (4, CN)];
 
     #[inline(always)]
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let determinant = m.ix * m.iz - m.ixz * m.ixz;
         // Rows of the inverse inertia matrix: what a rolling and a yawing moment give of ṗ and ṙ.
-        let inverse = [[m.iz / determinant, m.ixz / determinant], [m.ixz / determinant, m.ix / determinant]];
+        let inverse = [
+            [m.iz / determinant, m.ixz / determinant],
+            [m.ixz / determinant, m.ix / determinant],
+        ];
         let q = m.rates[1];
         // Moments of the rotation itself: L = q r (I_y − I_z) + p q I_xz, N = p q (I_x − I_y) − q r I_xz.
-        let turning = [[q * m.ixz, q * (m.iy - m.iz)], [q * (m.ix - m.iy), -q * m.ixz]];
+        let turning = [
+            [q * m.ixz, q * (m.iy - m.iz)],
+            [q * (m.ix - m.iy), -q * m.ixz],
+        ];
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
-        let times = |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
+        let times =
+            |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
         let [(sin_alpha, cos_alpha), (sin_theta, cos_theta)] = sin_cos([m.alpha, m.theta]);
         Known {
             per_speed: 1.0 / m.velocity,
@@ -162,7 +190,11 @@ impl Equations<4> for Lateral {
         }
     }
 
-    fn state_regressor(aircraft: &Aircraft, velocity: f64, regressor: &Regressor) -> Option<(usize, f64)> {
+    fn state_regressor(
+        aircraft: &Aircraft,
+        velocity: f64,
+        regressor: &Regressor,
+    ) -> Option<(usize, f64)> {
         let rate = aircraft.span_ft / (2.0 * velocity);
         match regressor {
             Regressor::Beta => Some((BETA, DEG)),
@@ -178,7 +210,10 @@ impl Equations<4> for Lateral {
         let [p_dot, _, r_dot] = m.accelerations;
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
         let roll = m.ix * p_dot - m.ixz * r_dot - (q * r * (m.iy - m.iz) + p * q * m.ixz);
-        let yaw = m.iz * r_dot - m.ixz * p_dot - (p * q * (m.ix - m.iy) - q * r * m.ixz) - q * m.engine_momentum;
+        let yaw = m.iz * r_dot
+            - m.ixz * p_dot
+            - (p * q * (m.ix - m.iy) - q * r * m.ixz)
+            - q * m.engine_momentum;
         [m.force_y / k.force, roll / pressure, yaw / pressure]
     }
 
@@ -190,18 +225,27 @@ impl Equations<4> for Lateral {
         // 3.1 sorted by what cos β and sin β multiply.
         let by_cos = per_speed * (k.force * c[CY] + k.gravity * k.cos_theta * sp);
         let by_sin = -per_speed * (k.along + k.gravity * weight);
-        let beta_dot = sb.mul_add(by_sin, cb.mul_add(by_cos, x[P] * k.sin_alpha - x[R] * k.cos_alpha));
+        let beta_dot = sb.mul_add(
+            by_sin,
+            cb.mul_add(by_cos, x[P] * k.sin_alpha - x[R] * k.cos_alpha),
+        );
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
         let tan_theta = k.tan_theta;
         let mut out = Rates {
-            rates: SVector::from([beta_dot, p_dot, r_dot, x[P] + tan_theta * (x[R] * cp + k.q * sp)]),
+            rates: SVector::from([
+                beta_dot,
+                p_dot,
+                r_dot,
+                x[P] + tan_theta * (x[R] * cp + k.q * sp),
+            ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::zeros(),
         };
         out.by_state[(BETA, BETA)] = cb * by_sin - sb * by_cos;
         out.by_state[(BETA, P)] = k.sin_alpha;
         out.by_state[(BETA, R)] = -k.cos_alpha;
-        out.by_state[(BETA, PHI)] = per_speed * k.gravity * k.cos_theta * (cb * cp + sb * sp * k.sin_alpha);
+        out.by_state[(BETA, PHI)] =
+            per_speed * k.gravity * k.cos_theta * (cb * cp + sb * sp * k.sin_alpha);
         for (row, i) in [(P, 0), (R, 1)] {
             out.by_state[(row, P)] = k.coupling[i][0];
             out.by_state[(row, R)] = k.coupling[i][1];
@@ -216,13 +260,23 @@ impl Equations<4> for Lateral {
     }
 
     #[inline(always)]
-    fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Outputs<4> {
+    fn outputs(
+        k: &Known,
+        sensed: &Sensed,
+        x: &SVector<f64, 4>,
+        c: &[f64; COEFFICIENTS],
+    ) -> Outputs<4> {
         let rates = [x[P], k.q, x[R]];
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
         let vane = match sensed.model {
             VaneModel::SmallAngle => sensed.vane.beta_small(x[BETA], sensed.vane_by_rates, rates),
             VaneModel::Exact => {
-                let flow = Flow { alpha: sensed.alpha, beta: x[BETA], velocity: sensed.velocity, rates };
+                let flow = Flow {
+                    alpha: sensed.alpha,
+                    beta: x[BETA],
+                    velocity: sensed.velocity,
+                    rates,
+                };
                 sensed.vane.beta_reading(sensed.model, &flow, sensed.cg)
             }
         };
@@ -247,11 +301,13 @@ impl Equations<4> for Lateral {
         out.by_state[(3, PHI)] = DEG;
         let [by_p_dot, _, by_r_dot] = right.by_accelerations;
         for (state, j, by_rate) in [(P, 0, right.by_rates[0]), (R, 1, right.by_rates[2])] {
-            out.by_state[(4, state)] = g * (by_rate + by_p_dot * k.coupling[0][j] + by_r_dot * k.coupling[1][j]);
+            out.by_state[(4, state)] =
+                g * (by_rate + by_p_dot * k.coupling[0][j] + by_r_dot * k.coupling[1][j]);
         }
         out.by_coefficient[(4, CY)] = g * k.force;
         for (column, j) in [(CL, 0), (CN, 1)] {
-            out.by_coefficient[(4, column)] = g * (by_p_dot * k.moment[0][j] + by_r_dot * k.moment[1][j]);
+            out.by_coefficient[(4, column)] =
+                g * (by_p_dot * k.moment[0][j] + by_r_dot * k.moment[1][j]);
         }
         out
     }

@@ -2,7 +2,10 @@
 //!
 //! Eqs. 2.7, 2.8 and 3.7 are this with the products of two different rates dropped; those reach 0.005 g at high roll rate,
 //! so they are kept.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 /// One body-axis component of the lever acceleration, ft/s², with its slopes along ω and ω̇.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,13 +24,18 @@ pub(crate) fn lever(i: usize, arm: [f64; 3], rates: [f64; 3], accelerations: [f6
     let mut by_accelerations = [0.0; 3];
     by_accelerations[j] = arm[k];
     by_accelerations[k] = -arm[j];
-    let value = accelerations[j] * arm[k] - accelerations[k] * arm[j] + rates[i] * (along - rates[i] * arm[i])
+    let value = accelerations[j] * arm[k] - accelerations[k] * arm[j]
+        + rates[i] * (along - rates[i] * arm[i])
         - arm[i] * across2;
     let mut by_rates = [0.0; 3];
     by_rates[i] = along - rates[i] * arm[i];
     by_rates[j] = rates[i] * arm[j] - 2.0 * arm[i] * rates[j];
     by_rates[k] = rates[i] * arm[k] - 2.0 * arm[i] * rates[k];
-    Lever { value, by_rates, by_accelerations }
+    Lever {
+        value,
+        by_rates,
+        by_accelerations,
+    }
 }
 
 #[cfg(test)]
@@ -40,7 +48,11 @@ mod tests {
     const ACCELERATIONS: [f64; 3] = [1.1, -0.7, 0.3];
 
     fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
     }
 
     #[test]
@@ -68,11 +80,23 @@ mod tests {
         for (i, w) in [(0, 0.4), (1, -0.2), (2, 0.15)] {
             let [p, q, r] = only(i, w);
             let up = -lever(2, ARM, only(i, w), ACCELERATIONS).value;
-            assert_abs_diff_eq!(up, -(x * qd + y * pd) - z * (q * q + p * p), epsilon = 1e-14);
+            assert_abs_diff_eq!(
+                up,
+                -(x * qd + y * pd) - z * (q * q + p * p),
+                epsilon = 1e-14
+            );
             let forward = lever(0, ARM, only(i, w), ACCELERATIONS).value;
-            assert_abs_diff_eq!(forward, -(z * qd + y * rd) + x * (q * q + r * r), epsilon = 1e-14);
+            assert_abs_diff_eq!(
+                forward,
+                -(z * qd + y * rd) + x * (q * q + r * r),
+                epsilon = 1e-14
+            );
             let right = lever(1, ARM, only(i, w), ACCELERATIONS).value;
-            assert_abs_diff_eq!(right, -x * rd + z * pd - y * (p * p + r * r), epsilon = 1e-14);
+            assert_abs_diff_eq!(
+                right,
+                -x * rd + z * pd - y * (p * p + r * r),
+                epsilon = 1e-14
+            );
         }
     }
 

@@ -4,7 +4,10 @@
 //! V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S CA)/m. The paper's 2.1 with
 //! C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y for a symmetric airframe (I_xy = I_yz = 0) with
 //! the engines' momentum H along +x, whose moment is −r H.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 use nalgebra::{SMatrix, SVector};
 
@@ -75,11 +78,25 @@ impl Equations<3> for Longitudinal {
     const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
 
     const FOLLOWED: &'static [usize] = &[ALPHA, Q];
-    const RATES_BY_STATE: &'static [(usize, usize)] =
-        &[(ALPHA, ALPHA), (ALPHA, Q), (ALPHA, THETA), (Q, ALPHA), (Q, Q), (THETA, Q)];
+    const RATES_BY_STATE: &'static [(usize, usize)] = &[
+        (ALPHA, ALPHA),
+        (ALPHA, Q),
+        (ALPHA, THETA),
+        (Q, ALPHA),
+        (Q, Q),
+        (THETA, Q),
+    ];
     const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(ALPHA, CN), (ALPHA, CA), (Q, CM)];
-    const OUTPUTS_BY_STATE: &'static [(usize, usize)] =
-        &[(0, ALPHA), (0, Q), (1, Q), (2, THETA), (3, ALPHA), (3, Q), (4, ALPHA), (4, Q)];
+    const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
+        (0, ALPHA),
+        (0, Q),
+        (1, Q),
+        (2, THETA),
+        (3, ALPHA),
+        (3, Q),
+        (4, ALPHA),
+        (4, Q),
+    ];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(3, CN), (3, CM), (4, CM), (4, CA)];
 
     #[inline(always)]
@@ -87,7 +104,8 @@ impl Equations<3> for Longitudinal {
         let [p, _, r] = m.rates;
         let [(sin_beta, cos_beta), (sin_phi, cos_phi)] = sin_cos([m.beta, m.phi]);
         // Divisions are most of what laying out a maneuver costs: one for each denominator, here and below.
-        let (per_speed, per_mass, per_iy) = (1.0 / (m.velocity * cos_beta), 1.0 / m.mass, 1.0 / m.iy);
+        let (per_speed, per_mass, per_iy) =
+            (1.0 / (m.velocity * cos_beta), 1.0 / m.mass, 1.0 / m.iy);
         let tan_beta = sin_beta * m.velocity * per_speed;
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
@@ -117,7 +135,11 @@ impl Equations<3> for Longitudinal {
             an: sensors.an.arm(m.cg),
             ax: sensors.ax.arm(m.cg),
             force: m.qbar * aircraft.wing_area_ft2 * per_mass,
-            thrust: if sensors.thrust_in_ax { m.thrust * per_mass } else { 0.0 },
+            thrust: if sensors.thrust_in_ax {
+                m.thrust * per_mass
+            } else {
+                0.0
+            },
             cg: m.cg,
             vane: sensors.alpha_vane,
             model: sensors.vane_model,
@@ -138,7 +160,11 @@ impl Equations<3> for Longitudinal {
         }
     }
 
-    fn state_regressor(aircraft: &Aircraft, velocity: f64, regressor: &Regressor) -> Option<(usize, f64)> {
+    fn state_regressor(
+        aircraft: &Aircraft,
+        velocity: f64,
+        regressor: &Regressor,
+    ) -> Option<(usize, f64)> {
         match regressor {
             Regressor::Alpha => Some((ALPHA, DEG)),
             Regressor::PitchRate => Some((Q, aircraft.chord_ft / (2.0 * velocity))),
@@ -148,8 +174,15 @@ impl Equations<3> for Longitudinal {
 
     #[inline(always)]
     fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
-        let (per_force, thrust) = (m.mass / (m.qbar * aircraft.wing_area_ft2), m.thrust * (1.0 / m.mass));
-        [-m.force_z * per_force, (m.accelerations[1] - k.pitch) / k.moment, (thrust - m.force_x) * per_force]
+        let (per_force, thrust) = (
+            m.mass / (m.qbar * aircraft.wing_area_ft2),
+            m.thrust * (1.0 / m.mass),
+        );
+        [
+            -m.force_z * per_force,
+            (m.accelerations[1] - k.pitch) / k.moment,
+            (thrust - m.force_x) * per_force,
+        ]
     }
 
     #[inline(always)]
@@ -165,7 +198,9 @@ impl Equations<3> for Longitudinal {
         let theta_dot = k.cos_phi.mul_add(x[Q], -k.turn);
         Rates {
             rates: SVector::from([alpha_dot, q_dot, theta_dot]),
-            by_state: SMatrix::from_row_slice(&[by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0]),
+            by_state: SMatrix::from_row_slice(&[
+                by_alpha, 1.0, by_theta, 0.0, 0.0, 0.0, 0.0, k.cos_phi, 0.0,
+            ]),
             by_coefficient: SMatrix::from_row_slice(&[
                 -k.force * ca,
                 0.0,
@@ -181,13 +216,25 @@ impl Equations<3> for Longitudinal {
     }
 
     #[inline(always)]
-    fn outputs(k: &Known, sensed: &Sensed, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Outputs<3> {
+    fn outputs(
+        k: &Known,
+        sensed: &Sensed,
+        x: &SVector<f64, 3>,
+        c: &[f64; COEFFICIENTS],
+    ) -> Outputs<3> {
         let rates = [sensed.p, x[Q], sensed.r];
         let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
         let vane = match sensed.model {
-            VaneModel::SmallAngle => sensed.vane.alpha_small(x[ALPHA], sensed.vane_by_rates, rates),
+            VaneModel::SmallAngle => sensed
+                .vane
+                .alpha_small(x[ALPHA], sensed.vane_by_rates, rates),
             VaneModel::Exact => {
-                let flow = Flow { alpha: x[ALPHA], beta: sensed.beta, velocity: sensed.velocity, rates };
+                let flow = Flow {
+                    alpha: x[ALPHA],
+                    beta: sensed.beta,
+                    velocity: sensed.velocity,
+                    rates,
+                };
                 sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg)
             }
         };

@@ -77,10 +77,18 @@ pub trait Equations<const NX: usize> {
     fn state_of(regressor: &Regressor) -> Option<usize>;
 
     /// That state and the factor of proportion at a velocity, ft/s.
-    fn state_regressor(aircraft: &Aircraft, velocity: f64, regressor: &Regressor) -> Option<(usize, f64)>;
+    fn state_regressor(
+        aircraft: &Aircraft,
+        velocity: f64,
+        regressor: &Regressor,
+    ) -> Option<(usize, f64)>;
 
     /// The coefficients that the measured motion implies: its accelerations put into the equations.
-    fn coefficients(aircraft: &Aircraft, motion: &Motion, known: &Self::Known) -> [f64; COEFFICIENTS];
+    fn coefficients(
+        aircraft: &Aircraft,
+        motion: &Motion,
+        known: &Self::Known,
+    ) -> [f64; COEFFICIENTS];
 
     fn rates(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Rates<NX>;
 

@@ -2,7 +2,10 @@
 //!
 //! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs them at its two ends
 //! and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
-#![expect(clippy::inline_always, reason = "laid out by vectors for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "laid out by vectors for the processor at hand"
+)]
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -53,8 +56,16 @@ pub enum MassProperties {
     Mean,
 }
 
-const MASS_PROPERTIES: &[&str] =
-    &[signal::MASS, signal::X_CG, signal::Y_CG, signal::Z_CG, signal::IX, signal::IY, signal::IZ, signal::IXZ];
+const MASS_PROPERTIES: &[&str] = &[
+    signal::MASS,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+    signal::IX,
+    signal::IY,
+    signal::IZ,
+    signal::IXZ,
+];
 
 /// The signals of a window of a record at samples and half-samples.
 #[derive(Clone, Debug)]
@@ -79,20 +90,38 @@ impl Window {
         let mut points = BTreeMap::new();
         for name in signal::REQUIRED.iter().copied().chain(surfaces) {
             let values = record.values(name).and_then(|v| v.get(range.clone()));
-            let values = values.ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
+            let values = values
+                .ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
             if some_missing(values) {
                 let gap = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
                 let time_s = record.time_s(range.start + gap);
-                return Err(format!("signal `{name}` is missing at {time_s:.3} s, inside the maneuver"));
+                return Err(format!(
+                    "signal `{name}` is missing at {time_s:.3} s, inside the maneuver"
+                ));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
-            points.insert(name.to_owned(), Arc::new(if mean { constant(values) } else { halved(values) }));
+            points.insert(
+                name.to_owned(),
+                Arc::new(if mean {
+                    constant(values)
+                } else {
+                    halved(values)
+                }),
+            );
         }
         for name in [signal::P, signal::Q, signal::R] {
-            let slope = slope(record.values(name).unwrap_or_default(), &range, record.step_s);
+            let slope = slope(
+                record.values(name).unwrap_or_default(),
+                &range,
+                record.step_s,
+            );
             points.insert(slope_name(name), Arc::new(halved(&slope)));
         }
-        Ok(Window { points, step_s: record.step_s, samples: range.len() })
+        Ok(Window {
+            points,
+            step_s: record.step_s,
+            samples: range.len(),
+        })
     }
 
     /// Number of points: samples and the halves between them.
@@ -109,7 +138,9 @@ impl Window {
     /// A signal's values at the points; all zero for a signal that was not cut out.
     #[must_use]
     pub fn signal(&self, name: &str) -> &[f64] {
-        self.points.get(name).map_or(&[], |points| points.as_slice())
+        self.points
+            .get(name)
+            .map_or(&[], |points| points.as_slice())
     }
 
     /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
@@ -118,7 +149,12 @@ impl Window {
         let mut window = self.clone();
         let mut change = |name: &str, bias: f64| {
             if let Some(points) = window.points.get_mut(name) {
-                *points = Arc::new(points.iter().map(|value| value + (scale * value + bias)).collect());
+                *points = Arc::new(
+                    points
+                        .iter()
+                        .map(|value| value + (scale * value + bias))
+                        .collect(),
+                );
             }
         };
         change(name, bias);
@@ -130,28 +166,38 @@ impl Window {
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {
         let mut window = self.clone();
-        window.points.insert(name.to_owned(), Arc::new(vec![value; self.len()]));
+        window
+            .points
+            .insert(name.to_owned(), Arc::new(vec![value; self.len()]));
         window
     }
 
     /// The motion at every point.
     #[must_use]
     pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> Along<'a, impl Fn(f64) -> f64 + use<>> {
-        Along { aircraft, signals: self.signals(), gravity: gravity_at(aircraft.latitude_deg), points: self.len() }
+        Along {
+            aircraft,
+            signals: self.signals(),
+            gravity: gravity_at(aircraft.latitude_deg),
+            points: self.len(),
+        }
     }
 
     fn signals(&self) -> Signals<'_> {
         Signals {
-            flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY].map(|name| self.signal(name)),
+            flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY]
+                .map(|name| self.signal(name)),
             rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
             slopes: [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name))),
             attitude: [signal::THETA, signal::PHI].map(|name| self.signal(name)),
             forces: [signal::AX, signal::AY, signal::AN].map(|name| self.signal(name)),
             air: [signal::ALTITUDE, signal::QBAR].map(|name| self.signal(name)),
-            engines: [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT].map(|name| self.signal(name)),
+            engines: [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT]
+                .map(|name| self.signal(name)),
             mass: self.signal(signal::MASS),
             cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
-            inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ].map(|name| self.signal(name)),
+            inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ]
+                .map(|name| self.signal(name)),
         }
     }
 }
@@ -205,16 +251,26 @@ impl Signals<'_> {
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
         let cg = Position { x_ft, y_ft, z_ft };
         let [alpha, beta, velocity] = self.flow.map(|s| s[i]);
-        let read = Flow { alpha: alpha * RAD, beta: beta * RAD, velocity, rates };
+        let read = Flow {
+            alpha: alpha * RAD,
+            beta: beta * RAD,
+            velocity,
+            rates,
+        };
         let flow = aircraft.sensors.flow_at_cg(&read, cg);
-        let felt = |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
+        let felt =
+            |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
         let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
         let [altitude, qbar] = self.air.map(|s| s[i]);
         let [ix, iy, iz, ixz] = self.inertia.map(|s| s[i]);
         let [ax, ay, an] = self.forces.map(|s| s[i]);
         let mass = self.mass[i];
         // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
-        let unfelt = if aircraft.sensors.thrust_in_ax { 0.0 } else { thrust * (1.0 / mass) };
+        let unfelt = if aircraft.sensors.thrust_in_ax {
+            0.0
+        } else {
+            thrust * (1.0 / mass)
+        };
         Motion {
             alpha: flow.alpha,
             beta: flow.beta,
@@ -248,7 +304,11 @@ fn slope_name(name: &str) -> String {
 
 /// Asked of all at once: that is faster than looking for the first.
 fn some_missing(values: &[f64]) -> bool {
-    Arch::new().dispatch(|| values.iter().fold(false, |missing, v| missing | !v.is_finite()))
+    Arch::new().dispatch(|| {
+        values
+            .iter()
+            .fold(false, |missing, v| missing | !v.is_finite())
+    })
 }
 
 /// Samples and the means of neighbours between them.
@@ -269,7 +329,9 @@ fn halved(values: &[f64]) -> Vec<f64> {
 fn constant(values: &[f64]) -> Vec<f64> {
     // Several sums side by side, of which none waits for the others.
     let (whole, rest) = values.as_chunks::<8>();
-    let sums = whole.iter().fold([0.0; 8], |sums, v| std::array::from_fn(|i| sums[i] + v[i]));
+    let sums = whole
+        .iter()
+        .fold([0.0; 8], |sums, v| std::array::from_fn(|i| sums[i] + v[i]));
     let mean = sums.iter().chain(rest).sum::<f64>() / values.len().max(1) as f64;
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }
@@ -292,7 +354,11 @@ fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
             up += weight * (near[SLOPE_REACH + d] - near[SLOPE_REACH - d]);
             norm += 2.0 * weight * weight;
         }
-        if up.is_finite() { up / (norm * step_s) } else { slope_near_gap(values, k, step_s) }
+        if up.is_finite() {
+            up / (norm * step_s)
+        } else {
+            slope_near_gap(values, k, step_s)
+        }
     };
     range.clone().map(at).collect()
 }
@@ -308,7 +374,11 @@ fn slope_near_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
             norm += 2.0 * weight * weight;
         }
     }
-    if norm > 0.0 { up / (norm * step_s) } else { 0.0 }
+    if norm > 0.0 {
+        up / (norm * step_s)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,10 @@
 //!
 //! The sensitivities are those of the discrete integration, not of the continuous equation: each stage's slope is
 //! differentiated where the state's own was taken, so a Gauss-Newton step sees the exact gradient of what was integrated.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 /// Slopes that a step takes.
 pub const STAGES: usize = 4;
@@ -11,14 +14,23 @@ pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
 /// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and `along(x, h, slope)` is
 /// x + h slope.
 #[inline(always)]
-pub fn step<X: Copy>(x: X, step_s: f64, mut slope: impl FnMut(usize, X) -> X, along: impl Fn(X, f64, X) -> X) -> X {
+pub fn step<X: Copy>(
+    x: X,
+    step_s: f64,
+    mut slope: impl FnMut(usize, X) -> X,
+    along: impl Fn(X, f64, X) -> X,
+) -> X {
     let half = 0.5 * step_s;
     let k1 = slope(0, x);
     let k2 = slope(1, along(x, half, k1));
     let k3 = slope(2, along(x, half, k2));
     let k4 = slope(3, along(x, step_s, k3));
     let (sixth, third) = (step_s / 6.0, step_s / 3.0);
-    along(along(along(along(x, sixth, k1), third, k2), third, k3), sixth, k4)
+    along(
+        along(along(along(x, sixth, k1), third, k2), third, k3),
+        sixth,
+        k4,
+    )
 }
 
 #[cfg(test)]
@@ -44,7 +56,12 @@ mod tests {
                 },
                 along,
             );
-            s = step(s, h, |stage, s| 2.0 * a * at[stage] * s + at[stage] * at[stage], along);
+            s = step(
+                s,
+                h,
+                |stage, s| 2.0 * a * at[stage] * s + at[stage] * at[stage],
+                along,
+            );
             x = next;
         }
         (x, s)
@@ -55,7 +72,10 @@ mod tests {
         let exact = 1.0 / (1.0 - 0.4);
         let error = |steps| (integrate(0.4, steps).0 - exact).abs();
         let ratio = error(8) / error(16);
-        assert!((14.0..18.0).contains(&ratio), "halving the step divides the error by {ratio}");
+        assert!(
+            (14.0..18.0).contains(&ratio),
+            "halving the step divides the error by {ratio}"
+        );
     }
 
     #[test]

@@ -18,11 +18,33 @@ pub(crate) fn aircraft() -> Aircraft {
         engine_inertia_slug_ft2: 3.0,
         latitude_deg: 34.9,
         sensors: Sensors {
-            an: Position { x_ft: 31.3, y_ft: -0.25, z_ft: 6.9 },
-            ax: Position { x_ft: 31.4, y_ft: -0.1, z_ft: 6.95 },
-            ay: Position { x_ft: 31.45, y_ft: 0.1, z_ft: 6.85 },
-            alpha_vane: Vane { x_ft: 35.4, y_ft: 19.2, z_ft: 7.9, factor: 1.02 },
-            beta_vane: Vane { x_ft: 35.4, y_ft: -19.2, z_ft: 7.9, factor: 0.98 },
+            an: Position {
+                x_ft: 31.3,
+                y_ft: -0.25,
+                z_ft: 6.9,
+            },
+            ax: Position {
+                x_ft: 31.4,
+                y_ft: -0.1,
+                z_ft: 6.95,
+            },
+            ay: Position {
+                x_ft: 31.45,
+                y_ft: 0.1,
+                z_ft: 6.85,
+            },
+            alpha_vane: Vane {
+                x_ft: 35.4,
+                y_ft: 19.2,
+                z_ft: 7.9,
+                factor: 1.02,
+            },
+            beta_vane: Vane {
+                x_ft: 35.4,
+                y_ft: -19.2,
+                z_ft: 7.9,
+                factor: 0.98,
+            },
             vane_model: VaneModel::Exact,
             thrust_in_ax: true,
         },
@@ -51,41 +73,73 @@ pub(crate) fn steady() -> Motion {
         iz: 187_300.0,
         ixz: -2080.0,
         engine_momentum: 7540.0,
-        cg: Position { x_ft: 38.2, y_ft: 0.05, z_ft: 8.7 },
+        cg: Position {
+            x_ft: 38.2,
+            y_ft: 0.05,
+            z_ft: 8.7,
+        },
     }
 }
 
 /// A motion in which every term of the equations is alive.
 fn lively() -> Motion {
-    Motion { beta: 0.08, rates: [0.3, 0.1, -0.12], accelerations: [0.5, -0.3, 0.2], phi: 0.3, ..steady() }
+    Motion {
+        beta: 0.08,
+        rates: [0.3, 0.1, -0.12],
+        accelerations: [0.5, -0.3, 0.2],
+        phi: 0.3,
+        ..steady()
+    }
 }
 
 const C: [f64; COEFFICIENTS] = [1.4, -0.05, 0.1];
 
 fn slopes_match<const NX: usize, E: Equations<NX>>() {
-    let (known, sensed) = (E::known(&aircraft(), &lively()), E::sensed(&aircraft(), &lively()));
+    let (known, sensed) = (
+        E::known(&aircraft(), &lively()),
+        E::sensed(&aircraft(), &lively()),
+    );
     let x = E::measured_state(&lively());
-    let (rates, outputs) = (E::rates(&known, &x, &C), E::outputs(&known, &sensed, &x, &C));
+    let (rates, outputs) = (
+        E::rates(&known, &x, &C),
+        E::outputs(&known, &sensed, &x, &C),
+    );
     let h = 1e-6;
     for j in 0..NX {
         let (mut up, mut down) = (x, x);
         up[j] += h;
         down[j] -= h;
-        let rate = (E::rates(&known, &up, &C).rates - E::rates(&known, &down, &C).rates) / (2.0 * h);
-        let output =
-            (E::outputs(&known, &sensed, &up, &C).outputs - E::outputs(&known, &sensed, &down, &C).outputs) / (2.0 * h);
+        let rate =
+            (E::rates(&known, &up, &C).rates - E::rates(&known, &down, &C).rates) / (2.0 * h);
+        let output = (E::outputs(&known, &sensed, &up, &C).outputs
+            - E::outputs(&known, &sensed, &down, &C).outputs)
+            / (2.0 * h);
         assert_abs_diff_eq!(rates.by_state.column(j).into_owned(), rate, epsilon = 1e-7);
-        assert_abs_diff_eq!(outputs.by_state.column(j).into_owned(), output, epsilon = 1e-6);
+        assert_abs_diff_eq!(
+            outputs.by_state.column(j).into_owned(),
+            output,
+            epsilon = 1e-6
+        );
     }
     for j in 0..COEFFICIENTS {
         let (mut up, mut down) = (C, C);
         up[j] += h;
         down[j] -= h;
-        let rate = (E::rates(&known, &x, &up).rates - E::rates(&known, &x, &down).rates) / (2.0 * h);
-        let output =
-            (E::outputs(&known, &sensed, &x, &up).outputs - E::outputs(&known, &sensed, &x, &down).outputs) / (2.0 * h);
-        assert_abs_diff_eq!(rates.by_coefficient.column(j).into_owned(), rate, epsilon = 1e-7);
-        assert_abs_diff_eq!(outputs.by_coefficient.column(j).into_owned(), output, epsilon = 1e-6);
+        let rate =
+            (E::rates(&known, &x, &up).rates - E::rates(&known, &x, &down).rates) / (2.0 * h);
+        let output = (E::outputs(&known, &sensed, &x, &up).outputs
+            - E::outputs(&known, &sensed, &x, &down).outputs)
+            / (2.0 * h);
+        assert_abs_diff_eq!(
+            rates.by_coefficient.column(j).into_owned(),
+            rate,
+            epsilon = 1e-7
+        );
+        assert_abs_diff_eq!(
+            outputs.by_coefficient.column(j).into_owned(),
+            output,
+            epsilon = 1e-6
+        );
     }
 }
 
@@ -102,11 +156,25 @@ fn lateral_slopes_are_those_of_finite_differences() {
 /// Slopes that are not zero stand where the axis says they can, those through coefficients that follow every regressor
 /// among them.
 fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
-    let (known, sensed) = (E::known(&aircraft(), &lively()), E::sensed(&aircraft(), &lively()));
+    let (known, sensed) = (
+        E::known(&aircraft(), &lively()),
+        E::sensed(&aircraft(), &lively()),
+    );
     let x = E::measured_state(&lively());
-    let (rates, outputs) = (E::rates(&known, &x, &C), E::outputs(&known, &sensed, &x, &C));
-    let regressors = [Regressor::Alpha, Regressor::Beta, Regressor::RollRate, Regressor::PitchRate, Regressor::YawRate];
-    let along = regressors.iter().filter_map(|r| E::state_regressor(&aircraft(), lively().velocity, r));
+    let (rates, outputs) = (
+        E::rates(&known, &x, &C),
+        E::outputs(&known, &sensed, &x, &C),
+    );
+    let regressors = [
+        Regressor::Alpha,
+        Regressor::Beta,
+        Regressor::RollRate,
+        Regressor::PitchRate,
+        Regressor::YawRate,
+    ];
+    let along = regressors
+        .iter()
+        .filter_map(|r| E::state_regressor(&aircraft(), lively().velocity, r));
     let mut c_by_state = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::zeros();
     for (state, factor) in along {
         assert!(E::FOLLOWED.contains(&state));
@@ -114,15 +182,27 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
     }
     let nonzero = |rows: usize, columns: usize, at: &dyn Fn(usize, usize) -> f64| {
         let all = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-        all.filter(|&(i, j)| at(i, j) != 0.0).collect::<std::collections::BTreeSet<_>>()
+        all.filter(|&(i, j)| at(i, j) != 0.0)
+            .collect::<std::collections::BTreeSet<_>>()
     };
-    let said = |list: &[(usize, usize)]| list.iter().copied().collect::<std::collections::BTreeSet<_>>();
-    let (a, c) =
-        (rates.by_state + rates.by_coefficient * c_by_state, outputs.by_state + outputs.by_coefficient * c_by_state);
+    let said = |list: &[(usize, usize)]| {
+        list.iter()
+            .copied()
+            .collect::<std::collections::BTreeSet<_>>()
+    };
+    let (a, c) = (
+        rates.by_state + rates.by_coefficient * c_by_state,
+        outputs.by_state + outputs.by_coefficient * c_by_state,
+    );
     assert!(nonzero(NX, NX, &|i, j| a[(i, j)]).is_subset(&said(E::RATES_BY_STATE)));
-    assert!(nonzero(NX, COEFFICIENTS, &|i, j| rates.by_coefficient[(i, j)]).is_subset(&said(E::RATES_BY_COEFFICIENT)));
+    assert!(
+        nonzero(NX, COEFFICIENTS, &|i, j| rates.by_coefficient[(i, j)])
+            .is_subset(&said(E::RATES_BY_COEFFICIENT))
+    );
     assert!(nonzero(OUTPUTS, NX, &|i, j| c[(i, j)]).is_subset(&said(E::OUTPUTS_BY_STATE)));
-    let by_coefficient = nonzero(OUTPUTS, COEFFICIENTS, &|i, j| outputs.by_coefficient[(i, j)]);
+    let by_coefficient = nonzero(OUTPUTS, COEFFICIENTS, &|i, j| {
+        outputs.by_coefficient[(i, j)]
+    });
     assert!(by_coefficient.is_subset(&said(E::OUTPUTS_BY_COEFFICIENT)));
 }
 
@@ -133,15 +213,27 @@ fn slopes_that_are_not_zero_stand_where_each_axis_says() {
 }
 
 fn longitudinal(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 3>, SVector<f64, 5>) {
-    let (known, sensed) = (Longitudinal::known(&aircraft(), motion), Longitudinal::sensed(&aircraft(), motion));
+    let (known, sensed) = (
+        Longitudinal::known(&aircraft(), motion),
+        Longitudinal::sensed(&aircraft(), motion),
+    );
     let x = Longitudinal::measured_state(motion);
-    (Longitudinal::rates(&known, &x, &c).rates, Longitudinal::outputs(&known, &sensed, &x, &c).outputs)
+    (
+        Longitudinal::rates(&known, &x, &c).rates,
+        Longitudinal::outputs(&known, &sensed, &x, &c).outputs,
+    )
 }
 
 fn lateral(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 4>, SVector<f64, 5>) {
-    let (known, sensed) = (Lateral::known(&aircraft(), motion), Lateral::sensed(&aircraft(), motion));
+    let (known, sensed) = (
+        Lateral::known(&aircraft(), motion),
+        Lateral::sensed(&aircraft(), motion),
+    );
     let x = Lateral::measured_state(motion);
-    (Lateral::rates(&known, &x, &c).rates, Lateral::outputs(&known, &sensed, &x, &c).outputs)
+    (
+        Lateral::rates(&known, &x, &c).rates,
+        Lateral::outputs(&known, &sensed, &x, &c).outputs,
+    )
 }
 
 /// The change of one number when a coefficient or a part of the motion changes.
@@ -162,7 +254,11 @@ fn lift_curves_the_path_up_and_so_alpha_falls() {
 #[test]
 fn a_nose_up_moment_raises_the_nose() {
     let expected = 52.0 * 400.0 * 11.52 / 173_300.0;
-    assert_abs_diff_eq!(change!(longitudinal.0[1], [0.0, 1.0, 0.0]), expected, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        change!(longitudinal.0[1], [0.0, 1.0, 0.0]),
+        expected,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
@@ -183,26 +279,51 @@ fn gravity_pulls_the_path_down_and_raises_alpha() {
 
 #[test]
 fn pitching_raises_alpha_and_theta_at_its_own_rate() {
-    let nose_up = Motion { rates: [0.0, 0.1, 0.0], ..steady() };
-    assert_abs_diff_eq!(change!(longitudinal.0[0], steady() => nose_up), 0.1, epsilon = 1e-12);
-    assert_abs_diff_eq!(change!(longitudinal.0[2], steady() => nose_up), 0.1, epsilon = 1e-12);
+    let nose_up = Motion {
+        rates: [0.0, 0.1, 0.0],
+        ..steady()
+    };
+    assert_abs_diff_eq!(
+        change!(longitudinal.0[0], steady() => nose_up),
+        0.1,
+        epsilon = 1e-12
+    );
+    assert_abs_diff_eq!(
+        change!(longitudinal.0[2], steady() => nose_up),
+        0.1,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
 fn rolling_right_with_the_wind_from_the_right_trades_alpha_for_beta() {
-    let slipping = Motion { beta: 0.1, ..steady() };
-    assert!(change!(longitudinal.0[0], slipping => Motion { rates: [0.3, 0.0, 0.0], ..slipping }) < 0.0);
+    let slipping = Motion {
+        beta: 0.1,
+        ..steady()
+    };
+    assert!(
+        change!(longitudinal.0[0], slipping => Motion { rates: [0.3, 0.0, 0.0], ..slipping }) < 0.0
+    );
 }
 
 #[test]
 fn in_a_right_bank_a_right_yaw_lowers_the_nose() {
-    let banked = Motion { phi: 0.5, ..steady() };
-    assert!(change!(longitudinal.0[2], banked => Motion { rates: [0.0, 0.0, 0.1], ..banked }) < 0.0);
+    let banked = Motion {
+        phi: 0.5,
+        ..steady()
+    };
+    assert!(
+        change!(longitudinal.0[2], banked => Motion { rates: [0.0, 0.0, 0.1], ..banked }) < 0.0
+    );
 }
 
 #[test]
 fn the_engines_turning_clockwise_pitch_the_nose_down_in_a_right_yaw() {
-    let yawing = Motion { rates: [0.0, 0.0, 0.2], ixz: 0.0, ..steady() };
+    let yawing = Motion {
+        rates: [0.0, 0.0, 0.2],
+        ixz: 0.0,
+        ..steady()
+    };
     let q_dot = change!(longitudinal.0[1], steady() => yawing);
     assert_abs_diff_eq!(q_dot, -0.2 * 7540.0 / 173_300.0, epsilon = 1e-12);
 }
@@ -210,17 +331,39 @@ fn the_engines_turning_clockwise_pitch_the_nose_down_in_a_right_yaw() {
 #[test]
 fn rolling_and_yawing_together_pitch_the_nose_up_when_the_mass_lies_fore_and_aft() {
     // Centrifugal forces pull nose and tail away from the axis of rotation: p r (I_z − I_x) > 0.
-    let coning = Motion { rates: [0.3, 0.0, 0.2], engine_momentum: 0.0, ixz: 0.0, ..steady() };
-    let q_dot = change!(longitudinal.0[1], Motion { engine_momentum: 0.0, ixz: 0.0, ..steady() } => coning);
-    assert_abs_diff_eq!(q_dot, 0.3 * 0.2 * (187_300.0 - 22_360.0) / 173_300.0, epsilon = 1e-12);
+    let coning = Motion {
+        rates: [0.3, 0.0, 0.2],
+        engine_momentum: 0.0,
+        ixz: 0.0,
+        ..steady()
+    };
+    let q_dot =
+        change!(longitudinal.0[1], Motion { engine_momentum: 0.0, ixz: 0.0, ..steady() } => coning);
+    assert_abs_diff_eq!(
+        q_dot,
+        0.3 * 0.2 * (187_300.0 - 22_360.0) / 173_300.0,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
 fn accelerometers_read_force_up_forward_and_right_in_g() {
     let force = 52.0 * 400.0 / 1040.0 / G0_FT_S2;
-    assert_abs_diff_eq!(change!(longitudinal.1[3], [1.0, 0.0, 0.0]), force, epsilon = 1e-12);
-    assert_abs_diff_eq!(change!(longitudinal.1[4], [0.0, 0.0, 1.0]), -force, epsilon = 1e-12);
-    assert_abs_diff_eq!(change!(lateral.1[4], [1.0, 0.0, 0.0]), force, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        change!(longitudinal.1[3], [1.0, 0.0, 0.0]),
+        force,
+        epsilon = 1e-12
+    );
+    assert_abs_diff_eq!(
+        change!(longitudinal.1[4], [0.0, 0.0, 1.0]),
+        -force,
+        epsilon = 1e-12
+    );
+    assert_abs_diff_eq!(
+        change!(lateral.1[4], [1.0, 0.0, 0.0]),
+        force,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
@@ -233,7 +376,11 @@ fn the_axial_accelerometer_feels_thrust() {
 fn a_normal_accelerometer_ahead_of_the_cg_is_thrown_up_when_the_nose_comes_up() {
     // Its arm ahead is 38.2 − 31.3 = 6.9 ft; Cm of 1 gives 1.3827 rad/s².
     let q_dot = 52.0 * 400.0 * 11.52 / 173_300.0;
-    assert_abs_diff_eq!(change!(longitudinal.1[3], [0.0, 1.0, 0.0]), 6.9 * q_dot / G0_FT_S2, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        change!(longitudinal.1[3], [0.0, 1.0, 0.0]),
+        6.9 * q_dot / G0_FT_S2,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
@@ -250,19 +397,37 @@ fn outputs_are_in_degrees() {
 
 #[test]
 fn side_force_to_the_right_carries_the_aircraft_right_so_beta_rises() {
-    assert_abs_diff_eq!(change!(lateral.0[0], [1.0, 0.0, 0.0]), 52.0 * 400.0 / (1040.0 * 320.0), epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        change!(lateral.0[0], [1.0, 0.0, 0.0]),
+        52.0 * 400.0 / (1040.0 * 320.0),
+        epsilon = 1e-12
+    );
 }
 
 #[test]
 fn rolling_about_the_body_axis_turns_alpha_into_beta() {
-    let rolling = Motion { rates: [0.1, 0.0, 0.0], ..steady() };
-    assert_abs_diff_eq!(change!(lateral.0[0], steady() => rolling), 0.1 * 0.35_f64.sin(), epsilon = 1e-12);
+    let rolling = Motion {
+        rates: [0.1, 0.0, 0.0],
+        ..steady()
+    };
+    assert_abs_diff_eq!(
+        change!(lateral.0[0], steady() => rolling),
+        0.1 * 0.35_f64.sin(),
+        epsilon = 1e-12
+    );
 }
 
 #[test]
 fn yawing_right_takes_beta_away() {
-    let yawing = Motion { rates: [0.0, 0.0, 0.1], ..steady() };
-    assert_abs_diff_eq!(change!(lateral.0[0], steady() => yawing), -0.1 * 0.35_f64.cos(), epsilon = 1e-12);
+    let yawing = Motion {
+        rates: [0.0, 0.0, 0.1],
+        ..steady()
+    };
+    assert_abs_diff_eq!(
+        change!(lateral.0[0], steady() => yawing),
+        -0.1 * 0.35_f64.cos(),
+        epsilon = 1e-12
+    );
 }
 
 #[test]
@@ -272,10 +437,20 @@ fn a_right_bank_lets_gravity_pull_the_aircraft_into_the_wind_from_the_right() {
 
 #[test]
 fn thrust_speeds_the_aircraft_along_its_nose_and_takes_beta_away() {
-    let slipping = Motion { beta: 0.2, ..steady() };
-    let faster = Motion { force_x: 15.0, ..slipping };
+    let slipping = Motion {
+        beta: 0.2,
+        ..steady()
+    };
+    let faster = Motion {
+        force_x: 15.0,
+        ..slipping
+    };
     let expected = -5.0 * 0.35_f64.cos() * 0.2_f64.sin() / 320.0;
-    assert_abs_diff_eq!(change!(lateral.0[0], slipping => faster), expected, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        change!(lateral.0[0], slipping => faster),
+        expected,
+        epsilon = 1e-12
+    );
 }
 
 #[test]
@@ -295,7 +470,11 @@ fn moments_meet_the_inertias_that_the_paper_writes() {
 
 #[test]
 fn the_engines_turning_clockwise_yaw_the_nose_right_when_it_comes_up() {
-    let pitching = Motion { rates: [0.0, 0.2, 0.0], ixz: 0.0, ..steady() };
+    let pitching = Motion {
+        rates: [0.0, 0.2, 0.0],
+        ixz: 0.0,
+        ..steady()
+    };
     let r_dot = lateral(&pitching, [0.0; 3]).0[2];
     assert_abs_diff_eq!(r_dot, 0.2 * 7540.0 / 187_300.0, epsilon = 1e-12);
 }
@@ -303,30 +482,66 @@ fn the_engines_turning_clockwise_yaw_the_nose_right_when_it_comes_up() {
 #[test]
 fn a_spinning_body_keeps_energy_and_momentum() {
     // Without moments and without engines: I ω·ω̇ = 0 and (I ω)·(I ω̇) = 0 for the three axes together.
-    let m = Motion { rates: [0.5, 0.3, -0.4], engine_momentum: 0.0, ..steady() };
+    let m = Motion {
+        rates: [0.5, 0.3, -0.4],
+        engine_momentum: 0.0,
+        ..steady()
+    };
     let q_dot = longitudinal(&m, [0.0; 3]).0[1];
     let lat = lateral(&m, [0.0; 3]).0;
-    let times = |w: [f64; 3]| [m.ix * w[0] - m.ixz * w[2], m.iy * w[1], m.iz * w[2] - m.ixz * w[0]];
+    let times = |w: [f64; 3]| {
+        [
+            m.ix * w[0] - m.ixz * w[2],
+            m.iy * w[1],
+            m.iz * w[2] - m.ixz * w[0],
+        ]
+    };
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let momentum_rate = times([lat[1], q_dot, lat[2]]);
     assert_abs_diff_eq!(dot(m.rates, momentum_rate), 0.0, epsilon = 1e-9);
-    assert_abs_diff_eq!(dot(times(m.rates), momentum_rate) / m.iz, 0.0, epsilon = 1e-9);
+    assert_abs_diff_eq!(
+        dot(times(m.rates), momentum_rate) / m.iz,
+        0.0,
+        epsilon = 1e-9
+    );
 }
 
 #[test]
 fn a_nose_up_attitude_turns_a_yaw_rate_into_a_roll_rate_of_the_horizon() {
-    let yawing = Motion { rates: [0.0, 0.0, 0.1], ..steady() };
-    assert_abs_diff_eq!(lateral(&yawing, [0.0; 3]).0[3], 0.1 * 0.4_f64.tan(), epsilon = 1e-12);
+    let yawing = Motion {
+        rates: [0.0, 0.0, 0.1],
+        ..steady()
+    };
+    assert_abs_diff_eq!(
+        lateral(&yawing, [0.0; 3]).0[3],
+        0.1 * 0.4_f64.tan(),
+        epsilon = 1e-12
+    );
 }
 
 #[test]
 fn rate_regressors_are_in_radians_over_the_reference_length() {
     let (a, m) = (aircraft(), steady());
-    assert_eq!(Longitudinal::state_regressor(&a, m.velocity, &Regressor::PitchRate), Some((1, 11.52 / 640.0)));
-    assert_eq!(Lateral::state_regressor(&a, m.velocity, &Regressor::RollRate), Some((1, 37.42 / 640.0)));
-    assert_eq!(Lateral::state_regressor(&a, m.velocity, &Regressor::YawRate), Some((2, 37.42 / 640.0)));
-    assert_eq!(Longitudinal::state_regressor(&a, m.velocity, &Regressor::Alpha), Some((0, DEG)));
-    assert_eq!(Lateral::state_regressor(&a, m.velocity, &Regressor::Alpha), None);
+    assert_eq!(
+        Longitudinal::state_regressor(&a, m.velocity, &Regressor::PitchRate),
+        Some((1, 11.52 / 640.0))
+    );
+    assert_eq!(
+        Lateral::state_regressor(&a, m.velocity, &Regressor::RollRate),
+        Some((1, 37.42 / 640.0))
+    );
+    assert_eq!(
+        Lateral::state_regressor(&a, m.velocity, &Regressor::YawRate),
+        Some((2, 37.42 / 640.0))
+    );
+    assert_eq!(
+        Longitudinal::state_regressor(&a, m.velocity, &Regressor::Alpha),
+        Some((0, DEG))
+    );
+    assert_eq!(
+        Lateral::state_regressor(&a, m.velocity, &Regressor::Alpha),
+        None
+    );
 }
 
 /// The motion that the equations themselves produce with coefficients `C`, with matching accelerations and forces.
@@ -337,7 +552,13 @@ fn produced<const NX: usize, E: Equations<NX>>(
     let m = lively();
     let rates = E::rates(&E::known(&aircraft(), &m), &E::measured_state(&m), &C).rates;
     let [force_x, force_y, force_z] = forces;
-    Motion { accelerations: accelerations(&rates), force_x, force_y, force_z, ..m }
+    Motion {
+        accelerations: accelerations(&rates),
+        force_x,
+        force_y,
+        force_z,
+        ..m
+    }
 }
 
 fn implied<const NX: usize, E: Equations<NX>>(m: &Motion) -> [f64; COEFFICIENTS] {
@@ -349,8 +570,11 @@ fn coefficients_come_back_from_the_motion_that_they_produce() {
     let (m, force) = (lively(), 52.0 * 400.0 / 1040.0);
     let [_, q_dot, _] = m.accelerations;
     let forces = [m.thrust / m.mass - force * C[2], 0.0, -force * C[0]];
-    let longitudinal = produced::<3, Longitudinal>(forces, |x| [m.accelerations[0], x[1], m.accelerations[2]]);
-    let lateral = produced::<4, Lateral>([m.force_x, force * C[0], m.force_z], |x| [x[1], q_dot, x[2]]);
+    let longitudinal =
+        produced::<3, Longitudinal>(forces, |x| [m.accelerations[0], x[1], m.accelerations[2]]);
+    let lateral = produced::<4, Lateral>([m.force_x, force * C[0], m.force_z], |x| {
+        [x[1], q_dot, x[2]]
+    });
     for (back, c) in implied::<3, Longitudinal>(&longitudinal).iter().zip(C) {
         assert_abs_diff_eq!(*back, c, epsilon = 1e-12);
     }

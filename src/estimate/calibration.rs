@@ -13,7 +13,11 @@ pub(super) const NOT_COUNTED: &str =
 
 impl<'a> Run<'a> {
     /// Adds what errors of calibration do to the estimates to the corrected covariance of a fit.
-    pub(super) fn miscalibrate<const NX: usize, E: Equations<NX>>(&self, ready: &Ready<'a, NX, E>, fit: &mut Fit) {
+    pub(super) fn miscalibrate<const NX: usize, E: Equations<NX>>(
+        &self,
+        ready: &Ready<'a, NX, E>,
+        fit: &mut Fit,
+    ) {
         if fit.covariance_corrected.is_none() || self.basis.settings.calibration.is_empty() {
             return;
         }
@@ -36,7 +40,20 @@ impl<'a> Run<'a> {
         let used = calibration.filter(|(signal, _)| !ready.window.signal(signal).is_empty());
         let errors: Vec<Misreading> = used.flat_map(|(signal, c)| c.misreadings(signal)).collect();
         let aircraft = self.basis.aircraft;
-        let Ready { window, model, case, .. } = ready;
-        Fitted { aircraft, window, model, case, values, weights }.gradient_shifts(&errors)
+        let Ready {
+            window,
+            model,
+            case,
+            ..
+        } = ready;
+        Fitted {
+            aircraft,
+            window,
+            model,
+            case,
+            values,
+            weights,
+        }
+        .gradient_shifts(&errors)
     }
 }

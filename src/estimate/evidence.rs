@@ -37,8 +37,15 @@ impl Choice {
             Status::Held if !held(name) => *status = Status::Estimated,
             _ => {}
         };
-        class.statuses.iter_mut().for_each(|(name, status)| own(name, status));
-        class.overrides.iter_mut().flat_map(|o| &mut o.statuses).for_each(|(name, status)| own(name, status));
+        class
+            .statuses
+            .iter_mut()
+            .for_each(|(name, status)| own(name, status));
+        class
+            .overrides
+            .iter_mut()
+            .flat_map(|o| &mut o.statuses)
+            .for_each(|(name, status)| own(name, status));
         class
     }
 }
@@ -57,30 +64,71 @@ struct Choosing<'r, 'a, const NX: usize, E: Equations<NX>> {
 impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
     fn new(run: &'r Run<'a>) -> Result<Self, String> {
         let (range, all) = (run.range(), run.model_without_held()?);
-        let surfaces = all.free.iter().chain(all.held.iter().map(|(d, _)| d)).filter_map(|d| d.regressor.surface());
-        let window = Window::cut(run.record, range.clone(), surfaces, run.basis.settings.mass_properties)?;
+        let surfaces = all
+            .free
+            .iter()
+            .chain(all.held.iter().map(|(d, _)| d))
+            .filter_map(|d| d.regressor.surface());
+        let window = Window::cut(
+            run.record,
+            range.clone(),
+            surfaces,
+            run.basis.settings.mass_properties,
+        )?;
         let wide = Case::new(run.basis.aircraft, &window, run.measurements(&range)?, &all);
         let uncertainty = wide.names.iter().map(|name| run.known_to(name)).collect();
-        Ok(Choosing { run, window, all, wide, uncertainty })
+        Ok(Choosing {
+            run,
+            window,
+            all,
+            wide,
+            uncertainty,
+        })
     }
 
     /// The maneuver with these parameters of `wide` held.
     fn narrow(&self, held: &[bool]) -> Case<NX, E> {
-        let is_held = |d: &Derivative| self.wide.names.iter().zip(held).any(|(name, held)| *held && *name == d.name);
+        let is_held = |d: &Derivative| {
+            self.wide
+                .names
+                .iter()
+                .zip(held)
+                .any(|(name, held)| *held && *name == d.name)
+        };
         let tunnel = |d: &&'a Derivative| Some((*d, self.run.tunnel(&d.name)?));
         let mut model = self.all.clone();
-        model.held.extend(model.free.iter().filter(|d| is_held(d)).filter_map(tunnel));
+        model
+            .held
+            .extend(model.free.iter().filter(|d| is_held(d)).filter_map(tunnel));
         model.free.retain(|d| !is_held(d));
-        Case::new(self.run.basis.aircraft, &self.window, self.wide.measurements.clone(), &model)
+        Case::new(
+            self.run.basis.aircraft,
+            &self.window,
+            self.wide.measurements.clone(),
+            &model,
+        )
     }
 
     /// What the data say of all parameters at the values of a fit with some held.
     fn gather(&self, narrow: &Case<NX, E>, fit: &Fit, noise: &Noise) -> Option<Candidates> {
-        let value = |name: &String| narrow.names.iter().position(|n| n == name).map(|j| fit.values[j]);
+        let value = |name: &String| {
+            narrow
+                .names
+                .iter()
+                .position(|n| n == name)
+                .map(|j| fit.values[j])
+        };
         let at = |name: &String| value(name).or_else(|| self.run.tunnel(name)).unwrap_or(0.0);
         let values: Vec<f64> = self.wide.names.iter().map(at).collect();
         let max = self.max_condition_number();
-        Candidates::gather(&self.wide, &values, noise, &fit.weights, self.uncertainty.clone(), max)
+        Candidates::gather(
+            &self.wide,
+            &values,
+            noise,
+            &fit.weights,
+            self.uncertainty.clone(),
+            max,
+        )
     }
 
     fn max_condition_number(&self) -> f64 {
@@ -104,12 +152,19 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
                     break;
                 }
                 // With everything free the maneuver cannot be fitted: begin with what the table holds.
-                held = self.wide.names.iter().map(|n| self.run.status(n) == Some(Status::Held)).collect();
+                held = self
+                    .wide
+                    .names
+                    .iter()
+                    .map(|n| self.run.status(n) == Some(Status::Held))
+                    .collect();
                 continue;
             }
             fitted = Some(held.clone());
             noise = noise.or_else(|| cramer_rao::noise(&narrow, &fit, self.max_condition_number()));
-            let Some(candidates) = self.gather(&narrow, &fit, noise.as_ref().unwrap_or(&Noise::default())) else {
+            let Some(candidates) =
+                self.gather(&narrow, &fit, noise.as_ref().unwrap_or(&Noise::default()))
+            else {
                 break;
             };
             // A fit that the data do not determine says nothing of the noise: fit again before judging bounds.
@@ -127,7 +182,9 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
         let why = |j: usize| because.as_ref().and_then(|c| c.because(&held, j));
         let names = &self.wide.names;
         let reason = |j: usize| (names[j].clone(), self.run.in_words(names, j, why(j)));
-        Ok(Choice { held_because: (0..held.len()).filter(|&j| held[j]).map(reason).collect() })
+        Ok(Choice {
+            held_because: (0..held.len()).filter(|&j| held[j]).map(reason).collect(),
+        })
     }
 }
 
@@ -145,19 +202,33 @@ impl Run<'_> {
     fn known_to(&self, name: &str) -> Option<f64> {
         let derivative = self.basis.buildup.derivative(name)?;
         let known = derivative.regressor != Regressor::Constant && self.tunnel(name).is_some();
-        known.then(|| self.held_uncertainty(derivative)).filter(|u| *u > 0.0)
+        known
+            .then(|| self.held_uncertainty(derivative))
+            .filter(|u| *u > 0.0)
     }
 
     /// Why evidence could not mend a fit that the data do not determine: what has nothing to be held at.
-    pub(super) fn without_tunnel<const NX: usize, E: Equations<NX>>(&self, case: &Case<NX, E>, fit: &Fit) -> String {
+    pub(super) fn without_tunnel<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        fit: &Fit,
+    ) -> String {
         let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
-        let is_derivative = |name: &&String| self.basis.buildup.derivative(name).is_some() && !self.is_constant(name);
-        let lacking: Vec<&str> =
-            names.filter(is_derivative).filter(|n| self.known_to(n).is_none()).map(String::as_str).collect();
+        let is_derivative = |name: &&String| {
+            self.basis.buildup.derivative(name).is_some() && !self.is_constant(name)
+        };
+        let lacking: Vec<&str> = names
+            .filter(is_derivative)
+            .filter(|n| self.known_to(n).is_none())
+            .map(String::as_str)
+            .collect();
         match lacking.as_slice() {
             [] => String::new(),
             [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
-            many => format!("; none of {} has a wind-tunnel value with an uncertainty to be held at", many.join(", ")),
+            many => format!(
+                "; none of {} has a wind-tunnel value with an uncertainty to be held at",
+                many.join(", ")
+            ),
         }
     }
 
@@ -165,7 +236,10 @@ impl Run<'_> {
         match because {
             None => "it was held beside others that are free now".to_owned(),
             Some(Because::NotFelt) => match self.basis.buildup.derivative(&names[parameter]) {
-                Some(Derivative { regressor: Regressor::Surface(s) | Regressor::Vane(s), .. }) => {
+                Some(Derivative {
+                    regressor: Regressor::Surface(s) | Regressor::Vane(s),
+                    ..
+                }) => {
                     format!("{s} did not move")
                 }
                 _ => "its regressor did not move".to_owned(),
@@ -174,13 +248,20 @@ impl Run<'_> {
                 let others: Vec<&str> = others.iter().map(|&j| names[j].as_str()).collect();
                 format!("the data do not tell it apart from {}", others.join(", "))
             }
-            Some(Because::Bound { bound, uncertainty, partner }) => {
-                let with = partner.filter(|(_, c)| c.abs() > self.basis.settings.identifiability.correlation);
+            Some(Because::Bound {
+                bound,
+                uncertainty,
+                partner,
+            }) => {
+                let with = partner
+                    .filter(|(_, c)| c.abs() > self.basis.settings.identifiability.correlation);
                 let with = with.map_or_else(String::new, |(j, correlation)| {
                     format!("; it would correlate {correlation:.2} with {}", names[j])
                 });
                 let (bound, uncertainty) = (short(bound), short(uncertainty));
-                format!("estimated, its bound would be {bound}; the tunnel's uncertainty is {uncertainty}{with}")
+                format!(
+                    "estimated, its bound would be {bound}; the tunnel's uncertainty is {uncertainty}{with}"
+                )
             }
         }
     }
@@ -189,5 +270,7 @@ impl Run<'_> {
 /// A number with three significant digits.
 fn short(value: f64) -> String {
     let digits = format!("{value:.2e}");
-    digits.parse().map_or(digits, |rounded: f64| rounded.to_string())
+    digits
+        .parse()
+        .map_or(digits, |rounded: f64| rounded.to_string())
 }

@@ -38,7 +38,11 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { alpha_bin_deg: 2.5, centres_deg: vec![], share_constants: false }
+        Settings {
+            alpha_bin_deg: 2.5,
+            centres_deg: vec![],
+            share_constants: false,
+        }
     }
 }
 
@@ -60,7 +64,9 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
     classes.dedup();
     let mut bins = Vec::new();
     for class in classes {
-        let mut of_class: Vec<usize> = (0..maneuvers.len()).filter(|&i| maneuvers[i].class == class).collect();
+        let mut of_class: Vec<usize> = (0..maneuvers.len())
+            .filter(|&i| maneuvers[i].class == class)
+            .collect();
         of_class.sort_by(|&a, &b| maneuvers[a].alpha_deg.total_cmp(&maneuvers[b].alpha_deg));
         let alpha = |&i: &usize| maneuvers[i].alpha_deg;
         let groups = if settings.centres_deg.is_empty() {
@@ -71,7 +77,11 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
         for mut members in groups.into_iter().filter(|g| g.len() > 1) {
             let mean = members.iter().map(alpha).sum::<f64>() / members.len() as f64;
             members.sort_unstable();
-            bins.push(Bin { joint_id: format!("joint/{class}/{mean:.2}"), class: class.to_owned(), members });
+            bins.push(Bin {
+                joint_id: format!("joint/{class}/{mean:.2}"),
+                class: class.to_owned(),
+                members,
+            });
         }
     }
     bins
@@ -79,14 +89,22 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
 
 /// Parts maneuvers, sorted by angle of attack, at the widest gap until none of the groups is wider than `widest_deg`.
 fn parted(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, widest_deg: f64) -> Vec<Vec<usize>> {
-    let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else { return vec![] };
+    let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
+        return vec![];
+    };
     if alpha(last) - alpha(first) <= widest_deg {
         return vec![sorted.to_vec()];
     }
     let gap = |i: &usize| alpha(&sorted[*i]) - alpha(&sorted[*i - 1]);
-    let Some(at) = (1..sorted.len()).max_by(|a, b| gap(a).total_cmp(&gap(b)).then(b.cmp(a))) else { return vec![] };
+    let Some(at) = (1..sorted.len()).max_by(|a, b| gap(a).total_cmp(&gap(b)).then(b.cmp(a))) else {
+        return vec![];
+    };
     let (low, high) = sorted.split_at(at);
-    [parted(low, alpha, widest_deg), parted(high, alpha, widest_deg)].concat()
+    [
+        parted(low, alpha, widest_deg),
+        parted(high, alpha, widest_deg),
+    ]
+    .concat()
 }
 
 /// Each maneuver with the nearest centre, if it is near enough.
@@ -97,7 +115,13 @@ fn around(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, settings: &Settings) 
         let centre = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         (distance(&centre) <= settings.alpha_bin_deg / 2.0).then_some(centre)
     };
-    let of = |c: usize| sorted.iter().copied().filter(|i| nearest(i) == Some(c)).collect();
+    let of = |c: usize| {
+        sorted
+            .iter()
+            .copied()
+            .filter(|i| nearest(i) == Some(c))
+            .collect()
+    };
     (0..centres.len()).map(of).collect()
 }
 
@@ -111,7 +135,12 @@ pub struct Joined {
 /// Estimates maneuvers together; `class` is theirs. Whatever goes wrong is in the outcome; a maneuver that fails alone is
 /// left out and named in the reason.
 #[must_use]
-pub fn estimate(joint_id: &str, members: &[(&Record, &Maneuver)], class: &Class, basis: &Basis) -> Joined {
+pub fn estimate(
+    joint_id: &str,
+    members: &[(&Record, &Maneuver)],
+    class: &Class,
+    basis: &Basis,
+) -> Joined {
     let all: Vec<&Maneuver> = members.iter().map(|(_, m)| *m).collect();
     let class = class.at(mean_of(&all, |m| m.alpha_deg));
     match class.axis {
@@ -135,7 +164,12 @@ fn together<const NX: usize, E: Equations<NX>>(
 ) -> Joined {
     let (mut parts, mut left_out) = (Vec::new(), Vec::new());
     for &(record, maneuver) in members {
-        match part::<NX, E>(Run { record, maneuver, class, basis }) {
+        match part::<NX, E>(Run {
+            record,
+            maneuver,
+            class,
+            basis,
+        }) {
             Ok(part) => parts.push(part),
             Err(reason) => left_out.push((maneuver, reason)),
         }
@@ -143,12 +177,26 @@ fn together<const NX: usize, E: Equations<NX>>(
     let taking: Vec<&Maneuver> = parts.iter().map(|p| p.run.maneuver).collect();
     let all: Vec<&Maneuver> = members.iter().map(|(_, m)| *m).collect();
     let whole = condition(joint_id, if taking.is_empty() { &all } else { &taking });
-    let Some((record, _)) = members.first() else { return nothing(&whole) };
-    let run = Run { record, maneuver: &whole, class, basis };
-    let fitted = if parts.len() > 1 { fit(&run, &parts) } else { Err("fewer than two maneuvers to join".to_owned()) };
+    let Some((record, _)) = members.first() else {
+        return nothing(&whole);
+    };
+    let run = Run {
+        record,
+        maneuver: &whole,
+        class,
+        basis,
+    };
+    let fitted = if parts.len() > 1 {
+        fit(&run, &parts)
+    } else {
+        Err("fewer than two maneuvers to join".to_owned())
+    };
     let (mut estimated, costs) = fitted.unwrap_or_else(|reason| (run.rejected(reason), vec![]));
     for (maneuver, reason) in &left_out {
-        estimated.fit.reason = format!("{}; left out: {} ({reason})", estimated.fit.reason, maneuver.maneuver_id);
+        estimated.fit.reason = format!(
+            "{}; left out: {} ({reason})",
+            estimated.fit.reason, maneuver.maneuver_id
+        );
     }
     let row = |maneuver: &Maneuver, part: &str| row(&whole, parts.len(), maneuver, part);
     let joined = parts.iter().enumerate().map(|(i, p)| JointRow {
@@ -156,8 +204,13 @@ fn together<const NX: usize, E: Equations<NX>>(
         cost_joint: costs.get(i).copied(),
         ..row(p.run.maneuver, "joined")
     });
-    let rows = joined.chain(left_out.iter().map(|(m, reason)| row(m, reason))).collect();
-    Joined { estimated, members: rows }
+    let rows = joined
+        .chain(left_out.iter().map(|(m, reason)| row(m, reason)))
+        .collect();
+    Joined {
+        estimated,
+        members: rows,
+    }
 }
 
 /// Makes a maneuver ready and estimates it alone.
@@ -175,7 +228,9 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     run: &Run<'a>,
     parts: &[Part<'a, NX, E>],
 ) -> Result<(Estimated, Vec<f64>), String> {
-    let cases = parts.iter().map(|p| (p.run.maneuver.maneuver_id.as_str(), &p.ready.case));
+    let cases = parts
+        .iter()
+        .map(|p| (p.run.maneuver.maneuver_id.as_str(), &p.ready.case));
     let settings = run.basis.settings;
     let share_constants = settings.joint.as_ref().is_some_and(|s| s.share_constants);
     let joint = Joint::new(cases, |name| !share_constants && run.is_constant(name))?;
@@ -183,23 +238,46 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
     let from = |shared: &[f64]| {
         let start = joint.assemble(shared, &own);
-        newton_raphson::estimate(&joint, start, weights, settings.weights, resolution, &settings.iteration)
+        newton_raphson::estimate(
+            &joint,
+            start,
+            weights,
+            settings.weights,
+            resolution,
+            &settings.iteration,
+        )
     };
     let mut fit = from(&start(parts, joint.shared()));
     if fit.outcome != Outcome::Converged {
         // From the derivatives of the maneuver that fits best alone.
         let cost = |p: &&Part<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
         let best = parts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        let other = best.map(|p| from(&joint.shared().iter().map(|&j| p.alone.values[j]).collect::<Vec<_>>()));
-        fit = other.filter(|f| f.outcome == Outcome::Converged).unwrap_or(fit);
+        let other = best.map(|p| {
+            from(
+                &joint
+                    .shared()
+                    .iter()
+                    .map(|&j| p.alone.values[j])
+                    .collect::<Vec<_>>(),
+            )
+        });
+        fit = other
+            .filter(|f| f.outcome == Outcome::Converged)
+            .unwrap_or(fit);
     }
-    let costs = if fit.final_cost.is_some() { joint.costs(&fit.response, &fit.weights) } else { vec![] };
+    let costs = if fit.final_cost.is_some() {
+        joint.costs(&fit.response, &fit.weights)
+    } else {
+        vec![]
+    };
     consider(run, parts, &joint, &mut fit);
     miscalibrate(parts, &joint, &mut fit);
     let names = joint.names().to_vec();
     let (fit, _) = fit.with_response(Response::default());
     // What each maneuver keeps to itself is no row of what they share.
-    let is_shared = |row: &EstimateRow| row.status != Status::Estimated.name() || names.contains(&row.derivative);
+    let is_shared = |row: &EstimateRow| {
+        row.status != Status::Estimated.name() || names.contains(&row.derivative)
+    };
     let shared = run.rows(Some((&names, &fit))).into_iter().filter(is_shared);
     let left_out = parts.iter().map(|p| p.ready.left_out).sum::<f64>() / parts.len().max(1) as f64;
     let estimated = Estimated {
@@ -216,7 +294,8 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
 /// The mean of the maneuvers' own derivatives, weighted by their covariances; plain where these do not exist.
 fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>], shared: &[usize]) -> Vec<f64> {
     let n = shared.len();
-    let values = |p: &Part<NX, E>| DVector::from_iterator(n, shared.iter().map(|&j| p.alone.values[j]));
+    let values =
+        |p: &Part<NX, E>| DVector::from_iterator(n, shared.iter().map(|&j| p.alone.values[j]));
     let estimate = |p: &Part<NX, E>| {
         let covariance: &DMatrix<f64> = p.alone.covariance.as_ref()?;
         Some(mean::Estimate {
@@ -240,7 +319,14 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
 ) {
     let Some(first) = parts.first() else { return };
     let wide: Vec<Case<NX, E>> = parts.iter().map(|p| p.run.wide(&p.ready)).collect();
-    let own = |i: usize| joint.places(i).iter().filter_map(|&p| fit.values.get(p)).copied().collect::<Vec<f64>>();
+    let own = |i: usize| {
+        joint
+            .places(i)
+            .iter()
+            .filter_map(|&p| fit.values.get(p))
+            .copied()
+            .collect::<Vec<f64>>()
+    };
     let considered: Vec<Considered<NX, E>> = parts
         .iter()
         .zip(&wide)
@@ -252,7 +338,11 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
             places: joint.places(i).to_vec(),
         })
         .collect();
-    cramer_rao::consider_together(&considered, &run.held_uncertainties(&first.ready.model), fit);
+    cramer_rao::consider_together(
+        &considered,
+        &run.held_uncertainties(&first.ready.model),
+        fit,
+    );
 }
 
 /// Adds what errors of calibration do to the shared derivatives. An error of a signal is common to all its maneuvers: so
@@ -293,7 +383,9 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
     Maneuver {
         maneuver_id: joint_id.to_owned(),
         flight_id: "joint".to_owned(),
-        class: maneuvers.first().map_or_else(String::new, |m| m.class.clone()),
+        class: maneuvers
+            .first()
+            .map_or_else(String::new, |m| m.class.clone()),
         axis: maneuvers.first().map_or(Axis::Longitudinal, |m| m.axis),
         start_s: 0.0,
         end_s: 0.0,
@@ -313,7 +405,10 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
 
 fn nothing(whole: &Maneuver) -> Joined {
     let fit = super::rejected(whole, "no maneuver to join".to_owned());
-    Joined { estimated: Estimated::without_fit(fit, vec![]), members: vec![] }
+    Joined {
+        estimated: Estimated::without_fit(fit, vec![]),
+        members: vec![],
+    }
 }
 
 fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: &str) -> JointRow {

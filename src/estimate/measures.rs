@@ -36,7 +36,11 @@ impl Run<'_> {
         estimated.correlations = self.regressors(&flown, window);
         self.add_excitation(&flown, &mut estimated.estimates);
         for (name, value) in case.names.iter().zip(equation_error::regression(case)) {
-            if let Some(row) = estimated.estimates.iter_mut().find(|row| row.derivative == *name) {
+            if let Some(row) = estimated
+                .estimates
+                .iter_mut()
+                .find(|row| row.derivative == *name)
+            {
                 row.equation_error = value;
             }
         }
@@ -46,18 +50,31 @@ impl Run<'_> {
         let information = cost::sums(&fit.response, &fit.weights).information;
         let settings = self.basis.settings;
         let limits = &settings.identifiability;
-        let Some(measured) = collinearity(&information, settings.iteration.max_condition_number, limits) else {
+        let Some(measured) = collinearity(
+            &information,
+            settings.iteration.max_condition_number,
+            limits,
+        ) else {
             return;
         };
         for (name, inflation) in case.names.iter().zip(&measured.inflation) {
-            if let Some(row) = estimated.estimates.iter_mut().find(|row| row.derivative == *name) {
+            if let Some(row) = estimated
+                .estimates
+                .iter_mut()
+                .find(|row| row.derivative == *name)
+            {
                 row.variance_inflation = *inflation;
             }
         }
-        estimated.fit.largest_condition_index = Some(measured.largest_index).filter(|index| index.is_finite());
+        estimated.fit.largest_condition_index =
+            Some(measured.largest_index).filter(|index| index.is_finite());
         estimated.fit.confounded = in_words(&measured, &case.names);
         if let Some(matrix) = &measured.correlation {
-            estimated.correlations.extend(self.estimates(&case.names, matrix, limits.published_correlation));
+            estimated.correlations.extend(self.estimates(
+                &case.names,
+                matrix,
+                limits.published_correlation,
+            ));
         }
     }
 
@@ -68,11 +85,25 @@ impl Run<'_> {
         window: &Window,
         model: &Model<'m>,
     ) -> Vec<Flown<'m>> {
-        let mut acting: Vec<&'m Derivative> =
-            model.free.iter().copied().chain(model.held.iter().map(|(d, _)| *d)).collect();
+        let mut acting: Vec<&'m Derivative> = model
+            .free
+            .iter()
+            .copied()
+            .chain(model.held.iter().map(|(d, _)| *d))
+            .collect();
         // In the order of the model, whatever is held: a pair has one name in all maneuvers.
-        acting.sort_by_key(|d| self.basis.buildup.derivatives.iter().position(|other| other.name == d.name));
-        let all = Model { free: acting.clone(), held: vec![], ..model.clone() };
+        acting.sort_by_key(|d| {
+            self.basis
+                .buildup
+                .derivatives
+                .iter()
+                .position(|other| other.name == d.name)
+        });
+        let all = Model {
+            free: acting.clone(),
+            held: vec![],
+            ..model.clone()
+        };
         let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
@@ -83,7 +114,11 @@ impl Run<'_> {
                 Regressor::Vane(name) => Some(excitation(&samples(window, name))),
                 _ => Some(excitation(&history)),
             };
-            Some(Flown { derivative, excitation: moved, history })
+            Some(Flown {
+                derivative,
+                excitation: moved,
+                history,
+            })
         });
         flown.collect()
     }
@@ -92,19 +127,32 @@ impl Run<'_> {
     fn add_excitation(&self, flown: &[Flown], rows: &mut [EstimateRow]) {
         let value = |name: &str, rows: &[EstimateRow]| {
             let row = rows.iter().find(|r| r.derivative == name);
-            row.and_then(|r| r.value).or_else(|| self.tunnel(name)).unwrap_or(0.0)
+            row.and_then(|r| r.value)
+                .or_else(|| self.tunnel(name))
+                .unwrap_or(0.0)
         };
         for one in flown {
             let name = one.derivative.name.as_str();
             let mut total = vec![0.0; one.history.len()];
-            for other in flown.iter().filter(|o| o.derivative.coefficient == one.derivative.coefficient) {
+            for other in flown
+                .iter()
+                .filter(|o| o.derivative.coefficient == one.derivative.coefficient)
+            {
                 let derivative = value(&other.derivative.name, rows);
-                total.iter_mut().zip(&other.history).for_each(|(sum, r)| *sum += derivative * r);
+                total
+                    .iter_mut()
+                    .zip(&other.history)
+                    .for_each(|(sum, r)| *sum += derivative * r);
             }
-            let (part, whole) = (value(name, rows).abs() * excitation(&one.history), excitation(&total));
+            let (part, whole) = (
+                value(name, rows).abs() * excitation(&one.history),
+                excitation(&total),
+            );
             if let Some(row) = rows.iter_mut().find(|r| r.derivative == name) {
                 row.excitation = one.excitation;
-                row.contribution_pct = one.excitation.and((whole > 0.0).then(|| 100.0 * part / whole));
+                row.contribution_pct = one
+                    .excitation
+                    .and((whole > 0.0).then(|| 100.0 * part / whole));
             }
         }
     }
@@ -113,7 +161,10 @@ impl Run<'_> {
     fn regressors(&self, flown: &[Flown], window: &Window) -> Vec<CorrelationRow> {
         let mut seen: Vec<(String, Vec<f64>)> = Vec::new();
         for one in flown {
-            let active = matches!(self.status(&one.derivative.name), Some(Status::Estimated | Status::Held));
+            let active = matches!(
+                self.status(&one.derivative.name),
+                Some(Status::Estimated | Status::Held)
+            );
             let (name, history) = match &one.derivative.regressor {
                 Regressor::Constant => continue,
                 Regressor::Alpha => ("alpha".to_owned(), one.history.clone()),
@@ -121,7 +172,9 @@ impl Run<'_> {
                 Regressor::RollRate => (signal::P.to_owned(), samples(window, signal::P)),
                 Regressor::PitchRate => (signal::Q.to_owned(), samples(window, signal::Q)),
                 Regressor::YawRate => (signal::R.to_owned(), samples(window, signal::R)),
-                Regressor::Surface(name) | Regressor::Vane(name) => (name.clone(), samples(window, name)),
+                Regressor::Surface(name) | Regressor::Vane(name) => {
+                    (name.clone(), samples(window, name))
+                }
             };
             if active && !seen.iter().any(|(other, _)| *other == name) {
                 seen.push((name, history));
@@ -135,7 +188,12 @@ impl Run<'_> {
         pairs.filter_map(row).collect()
     }
 
-    fn estimates(&self, names: &[String], matrix: &DMatrix<f64>, least: f64) -> Vec<CorrelationRow> {
+    fn estimates(
+        &self,
+        names: &[String],
+        matrix: &DMatrix<f64>,
+        least: f64,
+    ) -> Vec<CorrelationRow> {
         let pairs = (0..names.len()).flat_map(|i| (i + 1..names.len()).map(move |j| (i, j)));
         pairs
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
@@ -143,7 +201,13 @@ impl Run<'_> {
             .collect()
     }
 
-    fn correlation(&self, kind: &str, first: &str, second: &str, correlation: f64) -> CorrelationRow {
+    fn correlation(
+        &self,
+        kind: &str,
+        first: &str,
+        second: &str,
+        correlation: f64,
+    ) -> CorrelationRow {
         CorrelationRow {
             maneuver_id: self.maneuver.maneuver_id.clone(),
             class: self.class.name.clone(),
@@ -164,7 +228,12 @@ fn samples(window: &Window, name: &str) -> Vec<f64> {
 fn in_words(measured: &Collinearity, names: &[String]) -> Option<String> {
     let mut groups: Vec<String> = Vec::new();
     for group in &measured.groups {
-        let members: Vec<&str> = group.parameters.iter().filter_map(|&j| names.get(j)).map(String::as_str).collect();
+        let members: Vec<&str> = group
+            .parameters
+            .iter()
+            .filter_map(|&j| names.get(j))
+            .map(String::as_str)
+            .collect();
         let group = members.join(", ");
         if !groups.contains(&group) {
             groups.push(group);

@@ -35,7 +35,10 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { alpha_distance_deg: 2.5, share_constants: false }
+        Settings {
+            alpha_distance_deg: 2.5,
+            share_constants: false,
+        }
     }
 }
 
@@ -51,20 +54,45 @@ impl Predicted {
     #[must_use]
     pub fn none(reason: impl Into<String>, others: usize) -> Predicted {
         let predicted_from = (others > 0).then_some(others);
-        let summary = PredictedRow { prediction: Some(reason.into()), predicted_from, ..PredictedRow::default() };
-        Predicted { summary, outputs: vec![] }
+        let summary = PredictedRow {
+            prediction: Some(reason.into()),
+            predicted_from,
+            ..PredictedRow::default()
+        };
+        Predicted {
+            summary,
+            outputs: vec![],
+        }
     }
 }
 
 /// For each maneuver the others of its class and angle of attack whose fits converged; `None` for one that did not.
 #[must_use]
-pub fn others(maneuvers: &[Maneuver], fits: &[FitRow], settings: &Settings) -> Vec<Option<Vec<usize>>> {
-    let converged: Vec<bool> = fits.iter().map(|f| f.outcome == Outcome::Converged.name()).collect();
+pub fn others(
+    maneuvers: &[Maneuver],
+    fits: &[FitRow],
+    settings: &Settings,
+) -> Vec<Option<Vec<usize>>> {
+    let converged: Vec<bool> = fits
+        .iter()
+        .map(|f| f.outcome == Outcome::Converged.name())
+        .collect();
     let is_sound = |i: usize| converged.get(i).copied().unwrap_or(false);
-    let near = |a: &Maneuver, b: &Maneuver| (a.alpha_deg - b.alpha_deg).abs() <= settings.alpha_distance_deg;
+    let near = |a: &Maneuver, b: &Maneuver| {
+        (a.alpha_deg - b.alpha_deg).abs() <= settings.alpha_distance_deg
+    };
     let of = |(i, m): (usize, &Maneuver)| {
-        let is_other = |&(j, o): &(usize, &Maneuver)| j != i && o.class == m.class && near(m, o) && is_sound(j);
-        is_sound(i).then(|| maneuvers.iter().enumerate().filter(is_other).map(|(j, _)| j).collect())
+        let is_other = |&(j, o): &(usize, &Maneuver)| {
+            j != i && o.class == m.class && near(m, o) && is_sound(j)
+        };
+        is_sound(i).then(|| {
+            maneuvers
+                .iter()
+                .enumerate()
+                .filter(is_other)
+                .map(|(j, _)| j)
+                .collect()
+        })
     };
     maneuvers.iter().enumerate().map(of).collect()
 }
@@ -78,7 +106,12 @@ pub fn maneuver(
     basis: &Basis,
     others: &[&Estimated],
 ) -> Predicted {
-    let run = Run { record, maneuver, class, basis };
+    let run = Run {
+        record,
+        maneuver,
+        class,
+        basis,
+    };
     let predicted = match class.axis {
         Axis::Longitudinal => predict::<3, Longitudinal>(&run, others),
         Axis::Lateral => predict::<4, Lateral>(&run, others),
@@ -86,21 +119,41 @@ pub fn maneuver(
     predicted.unwrap_or_else(|reason| Predicted::none(reason, others.len()))
 }
 
-fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) -> Result<Predicted, String> {
+fn predict<const NX: usize, E: Equations<NX>>(
+    run: &Run,
+    others: &[&Estimated],
+) -> Result<Predicted, String> {
     let settings = run.basis.settings;
     // By evidence the others may estimate what a table would hold: all that they know is taken.
     let model = match settings.hold {
         Hold::Table => run.model()?,
         Hold::Evidence => run.model_without_held()?,
     };
-    let share_constants = settings.prediction.as_ref().is_some_and(|s| s.share_constants);
-    let values: BTreeMap<&str, f64> =
-        model.free.iter().map(|d| d.name.as_str()).zip(shared(run, &model.free, others)?).collect();
-    let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) =
-        model.free.iter().partition(|d| !share_constants && run.is_constant(&d.name));
+    let share_constants = settings
+        .prediction
+        .as_ref()
+        .is_some_and(|s| s.share_constants);
+    let values: BTreeMap<&str, f64> = model
+        .free
+        .iter()
+        .map(|d| d.name.as_str())
+        .zip(shared(run, &model.free, others)?)
+        .collect();
+    let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) = model
+        .free
+        .iter()
+        .partition(|d| !share_constants && run.is_constant(&d.name));
     let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
-    let held = model.held.iter().copied().chain(fixed.into_iter().map(|d| (d, value(&d.name))));
-    let fixed = Model { free: own, held: held.collect(), ..model.clone() };
+    let held = model
+        .held
+        .iter()
+        .copied()
+        .chain(fixed.into_iter().map(|d| (d, value(&d.name))));
+    let fixed = Model {
+        free: own,
+        held: held.collect(),
+        ..model.clone()
+    };
     let ready = run.ready::<NX, E>(fixed)?;
     let (case, weights) = (&ready.case, run.weights()?);
     if case.parameters() == 0 {
@@ -110,17 +163,35 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
         return if diverged {
             Err("the integration diverges".into())
         } else {
-            Ok(rows(run, case, &response.outputs, &weights, cost, others.len()))
+            Ok(rows(
+                run,
+                case,
+                &response.outputs,
+                &weights,
+                cost,
+                others.len(),
+            ))
         };
     }
     let start = case.starting_values(value);
-    let fit: Fit =
-        newton_raphson::estimate(case, start, weights, settings.weights, run.resolution(), &settings.iteration);
+    let fit: Fit = newton_raphson::estimate(
+        case,
+        start,
+        weights,
+        settings.weights,
+        run.resolution(),
+        &settings.iteration,
+    );
     match (fit.outcome, fit.final_cost) {
         // Biases that cannot be told apart leave the response as it is.
-        (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => {
-            Ok(rows(run, case, &fit.response.outputs, &fit.weights, cost, others.len()))
-        }
+        (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => Ok(rows(
+            run,
+            case,
+            &fit.response.outputs,
+            &fit.weights,
+            cost,
+            others.len(),
+        )),
         _ => Err(fit.reason),
     }
 }
@@ -129,19 +200,32 @@ fn predict<const NX: usize, E: Equations<NX>>(run: &Run, others: &[&Estimated]) 
 /// others estimates one.
 fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<f64>, String> {
     let covered = |d: &&&Derivative| others.iter().any(|o| value(o, &d.name).is_some());
-    let wanted: Vec<&str> = free.iter().filter(covered).map(|d| d.name.as_str()).collect();
-    let estimates: Vec<mean::Estimate> = others.iter().filter_map(|o| estimate(o, &wanted)).collect();
+    let wanted: Vec<&str> = free
+        .iter()
+        .filter(covered)
+        .map(|d| d.name.as_str())
+        .collect();
+    let estimates: Vec<mean::Estimate> =
+        others.iter().filter_map(|o| estimate(o, &wanted)).collect();
     if estimates.is_empty() {
         return Err("no other maneuver of its class and angle of attack".into());
     }
-    let mean = mean::weighted(&estimates, wanted.len()).ok_or("the others' covariances have no inverse")?;
+    let mean = mean::weighted(&estimates, wanted.len())
+        .ok_or("the others' covariances have no inverse")?;
     let mean: BTreeMap<&str, f64> = wanted.into_iter().zip(mean.iter().copied()).collect();
-    let value = |d: &&Derivative| mean.get(d.name.as_str()).copied().or_else(|| run.tunnel(&d.name));
-    free.iter().map(|d| value(d).ok_or_else(|| format!("none of the others estimates {}", d.name))).collect()
+    let value = |d: &&Derivative| {
+        mean.get(d.name.as_str())
+            .copied()
+            .or_else(|| run.tunnel(&d.name))
+    };
+    free.iter()
+        .map(|d| value(d).ok_or_else(|| format!("none of the others estimates {}", d.name)))
+        .collect()
 }
 
 fn value(estimated: &Estimated, name: &str) -> Option<f64> {
-    let of_it = |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated.name();
+    let of_it =
+        |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated.name();
     estimated.estimates.iter().find(of_it)?.value
 }
 
@@ -150,7 +234,11 @@ fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
     let covariance = estimated.covariance.as_ref()?;
     let (mut places, mut at, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for (place, name) in wanted.iter().enumerate() {
-        let found = covariance.names.iter().position(|n| n == name).zip(value(estimated, name));
+        let found = covariance
+            .names
+            .iter()
+            .position(|n| n == name)
+            .zip(value(estimated, name));
         if let Some((i, value)) = found {
             places.push(place);
             at.push(i);
@@ -158,9 +246,19 @@ fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
         }
     }
     let n = covariance.names.len();
-    let element = |i: usize, j: usize| covariance.corrected.get(at[i] * n + at[j]).copied().unwrap_or(0.0);
+    let element = |i: usize, j: usize| {
+        covariance
+            .corrected
+            .get(at[i] * n + at[j])
+            .copied()
+            .unwrap_or(0.0)
+    };
     let covariance = DMatrix::from_fn(at.len(), at.len(), element);
-    (!places.is_empty()).then(|| mean::Estimate { places, values: DVector::from_vec(values), covariance })
+    (!places.is_empty()).then(|| mean::Estimate {
+        places,
+        values: DVector::from_vec(values),
+        covariance,
+    })
 }
 
 fn rows<const NX: usize, E: Equations<NX>>(
@@ -174,10 +272,19 @@ fn rows<const NX: usize, E: Equations<NX>>(
     let measured = &case.measurements;
     let agreement = |o: usize| {
         let samples = measured.values.iter().zip(&measured.used).zip(computed);
-        Agreement::of(&samples.filter(|((_, used), _)| used[o]).map(|((z, _), y)| (z[o], y[o])).collect::<Vec<_>>())
+        Agreement::of(
+            &samples
+                .filter(|((_, used), _)| used[o])
+                .map(|((z, _), y)| (z[o], y[o]))
+                .collect::<Vec<_>>(),
+        )
     };
     let agreements: [Agreement; OUTPUTS] = std::array::from_fn(agreement);
-    let weighted: Vec<(Agreement, f64)> = agreements.iter().copied().zip(weights.iter().copied()).collect();
+    let weighted: Vec<(Agreement, f64)> = agreements
+        .iter()
+        .copied()
+        .zip(weights.iter().copied())
+        .collect();
     let named = || run.class.axis.outputs().into_iter().zip(&agreements);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
@@ -188,10 +295,17 @@ fn rows<const NX: usize, E: Equations<NX>>(
         theil_bias: whole.map(|t| t.bias),
         theil_variance: whole.map(|t| t.variance),
         theil_covariance: whole.map(|t| t.covariance),
-        theil_of: named().filter_map(|(o, a)| Some((o, a.theil()?.coefficient))).collect(),
-        r_squared_of: named().filter_map(|(o, a)| Some((o, a.r_squared()?))).collect(),
+        theil_of: named()
+            .filter_map(|(o, a)| Some((o, a.theil()?.coefficient)))
+            .collect(),
+        r_squared_of: named()
+            .filter_map(|(o, a)| Some((o, a.r_squared()?)))
+            .collect(),
     };
-    Predicted { summary, outputs: named().map(|(o, a)| row(run, o, a)).collect() }
+    Predicted {
+        summary,
+        outputs: named().map(|(o, a)| row(run, o, a)).collect(),
+    }
 }
 
 fn row(run: &Run, output: Output, agreement: &Agreement) -> PredictionRow {

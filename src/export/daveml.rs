@@ -11,9 +11,21 @@ const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\
 
 /// Rates over twice the speed: identifier, words.
 const RATES: [(Regressor, &str, &str); 3] = [
-    (Regressor::RollRate, "pb_2V", "roll rate p b/2V, positive right wing down"),
-    (Regressor::PitchRate, "qc_2V", "pitch rate q c/2V, positive nose up"),
-    (Regressor::YawRate, "rb_2V", "yaw rate r b/2V, positive nose right"),
+    (
+        Regressor::RollRate,
+        "pb_2V",
+        "roll rate p b/2V, positive right wing down",
+    ),
+    (
+        Regressor::PitchRate,
+        "qc_2V",
+        "pitch rate q c/2V, positive nose up",
+    ),
+    (
+        Regressor::YawRate,
+        "rb_2V",
+        "yaw rate r b/2V, positive nose right",
+    ),
 ];
 
 /// The model, whole.
@@ -25,7 +37,14 @@ pub fn document(contents: &Contents, tables: &[Table]) -> String {
     inputs(contents, tables, &mut xml);
     for table in tables {
         let name = table.derivative.as_str();
-        variable(&mut xml, name, name, &unit(&table.unit), &table.sources(), Mark::Output);
+        variable(
+            &mut xml,
+            name,
+            name,
+            &unit(&table.unit),
+            &table.sources(),
+            Mark::Output,
+        );
         let words = format!("1 where {name} is flight's, 0 where it is the tunnel's");
         variable(&mut xml, name, &flag(name), "nd", &words, Mark::Output);
     }
@@ -41,7 +60,13 @@ pub fn document(contents: &Contents, tables: &[Table]) -> String {
         gridded(table, &mut xml);
     }
     for table in tables {
-        function(contents, table, &table.derivative, &format!("{}_table", table.derivative), &mut xml);
+        function(
+            contents,
+            table,
+            &table.derivative,
+            &format!("{}_table", table.derivative),
+            &mut xml,
+        );
         let flag = flag(&table.derivative);
         function(contents, table, &flag, &format!("{flag}_table"), &mut xml);
     }
@@ -52,7 +77,10 @@ pub fn document(contents: &Contents, tables: &[Table]) -> String {
 fn header(contents: &Contents, xml: &mut Xml) {
     let (settings, a) = (contents.settings, contents.aircraft);
     xml.open("fileHeader", &[("name", contents.title)]);
-    xml.empty("author", &[("name", &settings.author), ("org", &settings.organisation)]);
+    xml.empty(
+        "author",
+        &[("name", &settings.author), ("org", &settings.organisation)],
+    );
     xml.empty("creationDate", &[("date", &settings.date)]);
     let text = format!(
         "{}: flight-updated derivatives: trends of flight tests where there is data, wind tunnel elsewhere; each table \
@@ -73,48 +101,110 @@ enum Mark {
 }
 
 fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, mark: Mark) {
-    xml.open("variableDef", &[("name", name), ("varID", id), ("units", units)]);
+    xml.open(
+        "variableDef",
+        &[("name", name), ("varID", id), ("units", units)],
+    );
     xml.text("description", &[], words);
-    xml.empty(if mark == Mark::Input { "isInput" } else { "isOutput" }, &[]);
+    xml.empty(
+        if mark == Mark::Input {
+            "isInput"
+        } else {
+            "isOutput"
+        },
+        &[],
+    );
     xml.close();
 }
 
 fn inputs(contents: &Contents, tables: &[Table], xml: &mut Xml) {
-    variable(xml, "angleOfAttack", "alpha", "deg", "angle of attack, positive nose up", Mark::Input);
-    variable(xml, "angleOfSideslip", "beta", "deg", "sideslip, positive wind from the right", Mark::Input);
+    variable(
+        xml,
+        "angleOfAttack",
+        "alpha",
+        "deg",
+        "angle of attack, positive nose up",
+        Mark::Input,
+    );
+    variable(
+        xml,
+        "angleOfSideslip",
+        "beta",
+        "deg",
+        "sideslip, positive wind from the right",
+        Mark::Input,
+    );
     if tables.iter().any(|t| !t.machs.is_empty()) {
         variable(xml, "machNumber", "mach", "nd", "Mach number", Mark::Input);
     }
     if let Some(third) = third(contents, tables) {
-        variable(xml, third, third, "nd", "the tables' third variable, in the unit of its name", Mark::Input);
+        variable(
+            xml,
+            third,
+            third,
+            "nd",
+            "the tables' third variable, in the unit of its name",
+            Mark::Input,
+        );
     }
     for (_, id, words) in RATES {
         variable(xml, id, id, "rad", words, Mark::Input);
     }
-    let mut surfaces: Vec<&str> = contents.buildup.derivatives.iter().filter_map(|d| d.regressor.surface()).collect();
+    let mut surfaces: Vec<&str> = contents
+        .buildup
+        .derivatives
+        .iter()
+        .filter_map(|d| d.regressor.surface())
+        .collect();
     surfaces.sort_unstable();
     surfaces.dedup();
     // A surface that is a table's third variable is an input already.
-    for signal in surfaces.into_iter().filter(|s| Some(*s) != third(contents, tables)) {
-        variable(xml, signal, signal, "deg", "surface or vane, in the unit of its name", Mark::Input);
+    for signal in surfaces
+        .into_iter()
+        .filter(|s| Some(*s) != third(contents, tables))
+    {
+        variable(
+            xml,
+            signal,
+            signal,
+            "deg",
+            "surface or vane, in the unit of its name",
+            Mark::Input,
+        );
     }
 }
 
 fn third<'a>(contents: &'a Contents, tables: &[Table]) -> Option<&'a str> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
-    contents.tunnel.settings().third.as_ref().filter(|_| depends).map(|third| third.name.as_str())
+    contents
+        .tunnel
+        .settings()
+        .third
+        .as_ref()
+        .filter(|_| depends)
+        .map(|third| third.name.as_str())
 }
 
 /// A coefficient without vanes as the sum of its terms, and the load of its vanes where it has some.
 fn coefficients(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
     let name = format!("{coefficient:?}");
-    let load = if coefficient.is_moment() { "ft*lbf" } else { "lbf" };
-    for (vanes, id, units) in [(false, name.clone(), "nd"), (true, format!("{name}_vanes"), load)] {
+    let load = if coefficient.is_moment() {
+        "ft*lbf"
+    } else {
+        "lbf"
+    };
+    for (vanes, id, units) in [
+        (false, name.clone(), "nd"),
+        (true, format!("{name}_vanes"), load),
+    ] {
         let terms: Vec<&Derivative> = terms(contents, tables, coefficient, vanes).collect();
         if terms.is_empty() {
             continue;
         }
-        xml.open("variableDef", &[("name", &id), ("varID", &id), ("units", units)]);
+        xml.open(
+            "variableDef",
+            &[("name", &id), ("varID", &id), ("units", units)],
+        );
         xml.open("calculation", &[]);
         xml.open("math", &[("xmlns", "http://www.w3.org/1998/Math/MathML")]);
         xml.open("apply", &[]);
@@ -136,7 +226,10 @@ fn term(derivative: &Derivative, xml: &mut Xml) {
         Regressor::Alpha => "alpha",
         Regressor::Beta => "beta",
         Regressor::Surface(signal) | Regressor::Vane(signal) => signal,
-        rate => RATES.iter().find(|(r, ..)| r == rate).map_or("", |(_, id, _)| id),
+        rate => RATES
+            .iter()
+            .find(|(r, ..)| r == rate)
+            .map_or("", |(_, id, _)| id),
     };
     xml.open("apply", &[]);
     xml.empty("times", &[]);
@@ -146,11 +239,17 @@ fn term(derivative: &Derivative, xml: &mut Xml) {
 }
 
 /// The breakpoints of every table: those of one table's variable that has a grid.
-fn breakpoints<'a>(contents: &Contents, tables: &'a [Table]) -> Vec<(String, &'a [f64], &'static str)> {
+fn breakpoints<'a>(
+    contents: &Contents,
+    tables: &'a [Table],
+) -> Vec<(String, &'a [f64], &'static str)> {
     let third = third(contents, tables).is_some();
     let of = |table: &'a Table| {
         let id = |variable: &str| format!("{}_{variable}", table.derivative);
-        let mut all = vec![(id("alpha"), table.alphas_deg.as_slice(), "deg"), (id("mach"), &table.machs, "nd")];
+        let mut all = vec![
+            (id("alpha"), table.alphas_deg.as_slice(), "deg"),
+            (id("mach"), &table.machs, "nd"),
+        ];
         if third {
             all.push((id("third"), &table.thirds, "nd"));
         }
@@ -178,24 +277,41 @@ fn gridded(table: &Table, xml: &mut Xml) {
         let values: Vec<f64> = table.cells.iter().map(of).collect();
         let rows: Vec<String> = values.chunks(n).map(numbers).collect();
         let last = rows.len().saturating_sub(1);
-        rows.into_iter().enumerate().map(|(i, row)| if i < last { format!("{row},") } else { row }).collect()
+        rows.into_iter()
+            .enumerate()
+            .map(|(i, row)| if i < last { format!("{row},") } else { row })
+            .collect()
     };
     let references = |xml: &mut Xml| {
         xml.open("breakpointRefs", &[]);
         for (variable, _) in variables(table, None) {
-            xml.empty("bpRef", &[("bpID", &format!("{}_{variable}", table.derivative))]);
+            xml.empty(
+                "bpRef",
+                &[("bpID", &format!("{}_{variable}", table.derivative))],
+            );
         }
         xml.close();
     };
     let id = format!("{}_table", table.derivative);
-    xml.open("griddedTableDef", &[("name", &table.derivative), ("gtID", &id), ("units", &unit(&table.unit))]);
+    xml.open(
+        "griddedTableDef",
+        &[
+            ("name", &table.derivative),
+            ("gtID", &id),
+            ("units", &unit(&table.unit)),
+        ],
+    );
     xml.text("description", &[], &table.sources());
     references(xml);
     if table.cells.iter().all(|c| c.uncertainty.is_some()) {
         xml.open("uncertainty", &[("effect", "additive")]);
         xml.open("normalPDF", &[("numSigmas", "1")]);
         xml.open("bounds", &[]);
-        xml.block("dataTable", &[], &lines(&|c| c.uncertainty.unwrap_or_default()));
+        xml.block(
+            "dataTable",
+            &[],
+            &lines(&|c| c.uncertainty.unwrap_or_default()),
+        );
         for _ in 0..3 {
             xml.close();
         }
@@ -203,16 +319,34 @@ fn gridded(table: &Table, xml: &mut Xml) {
     xml.block("dataTable", &[], &lines(&|c| c.value));
     xml.close();
     let flag = flag(&table.derivative);
-    xml.open("griddedTableDef", &[("name", &flag), ("gtID", &format!("{flag}_table")), ("units", "nd")]);
+    xml.open(
+        "griddedTableDef",
+        &[
+            ("name", &flag),
+            ("gtID", &format!("{flag}_table")),
+            ("units", "nd"),
+        ],
+    );
     references(xml);
-    xml.block("dataTable", &[], &lines(&|c| f64::from(u8::from(c.is_flight))));
+    xml.block(
+        "dataTable",
+        &[],
+        &lines(&|c| f64::from(u8::from(c.is_flight))),
+    );
     xml.close();
 }
 
 fn function(contents: &Contents, table: &Table, variable: &str, gridded: &str, xml: &mut Xml) {
     xml.open("function", &[("name", variable)]);
     for (_, id) in variables(table, third(contents, std::slice::from_ref(table))) {
-        xml.empty("independentVarRef", &[("varID", id), ("extrapolate", "neither"), ("interpolate", "linear")]);
+        xml.empty(
+            "independentVarRef",
+            &[
+                ("varID", id),
+                ("extrapolate", "neither"),
+                ("interpolate", "linear"),
+            ],
+        );
     }
     xml.empty("dependentVarRef", &[("varID", variable)]);
     xml.open("functionDefn", &[]);
@@ -226,7 +360,11 @@ fn flag(derivative: &str) -> String {
 }
 
 fn numbers(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+    values
+        .iter()
+        .map(f64::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A unit as the standard spells it.

@@ -32,11 +32,15 @@ pub fn section(contents: &Contents, tables: &[Table]) -> String {
         }
     }
     for coefficient in COEFFICIENTS {
-        xml.open("function", &[("name", &format!("aero/harvest/{}", word(coefficient)))]);
+        xml.open(
+            "function",
+            &[("name", &format!("aero/harvest/{}", word(coefficient)))],
+        );
         let text = format!("{} without thrust-vectoring vanes", word(coefficient));
         xml.text("description", &[], &text);
-        let products: Vec<Vec<String>> =
-            terms(contents, tables, coefficient, false).map(|d| factors(contents, d)).collect();
+        let products: Vec<Vec<String>> = terms(contents, tables, coefficient, false)
+            .map(|d| factors(contents, d))
+            .collect();
         sum(&mut xml, &products);
         xml.close();
     }
@@ -78,17 +82,29 @@ fn property(contents: &Contents, signal: &str) -> String {
 /// The third variable's property, where a table depends on one.
 fn third(contents: &Contents, tables: &[Table]) -> Option<String> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
-    let third = contents.tunnel.settings().third.as_ref().filter(|_| depends)?;
+    let third = contents
+        .tunnel
+        .settings()
+        .third
+        .as_ref()
+        .filter(|_| depends)?;
     Some(property(contents, &third.name))
 }
 
 /// The properties that JSBSim does not have by itself, each once.
 fn own_properties(contents: &Contents, tables: &[Table]) -> Vec<String> {
-    let all = COEFFICIENTS.into_iter().flat_map(|c| [false, true].map(|vanes| (c, vanes)));
-    let derivatives = all.flat_map(|(c, vanes)| terms(contents, tables, c, vanes).collect::<Vec<_>>());
-    let surfaces = derivatives.filter_map(|d| d.regressor.surface()).map(|signal| property(contents, signal));
-    let mut properties: Vec<String> =
-        surfaces.chain(third(contents, tables)).filter(|p| p.starts_with("harvest/")).collect();
+    let all = COEFFICIENTS
+        .into_iter()
+        .flat_map(|c| [false, true].map(|vanes| (c, vanes)));
+    let derivatives =
+        all.flat_map(|(c, vanes)| terms(contents, tables, c, vanes).collect::<Vec<_>>());
+    let surfaces = derivatives
+        .filter_map(|d| d.regressor.surface())
+        .map(|signal| property(contents, signal));
+    let mut properties: Vec<String> = surfaces
+        .chain(third(contents, tables))
+        .filter(|p| p.starts_with("harvest/"))
+        .collect();
     properties.sort();
     properties.dedup();
     properties
@@ -101,9 +117,18 @@ fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
         Regressor::Constant => vec![],
         Regressor::Alpha => vec!["aero/alpha-deg".to_owned()],
         Regressor::Beta => vec!["aero/beta-deg".to_owned()],
-        Regressor::RollRate => vec!["velocities/p-aero-rad_sec".to_owned(), "aero/bi2vel".to_owned()],
-        Regressor::PitchRate => vec!["velocities/q-aero-rad_sec".to_owned(), "aero/ci2vel".to_owned()],
-        Regressor::YawRate => vec!["velocities/r-aero-rad_sec".to_owned(), "aero/bi2vel".to_owned()],
+        Regressor::RollRate => vec![
+            "velocities/p-aero-rad_sec".to_owned(),
+            "aero/bi2vel".to_owned(),
+        ],
+        Regressor::PitchRate => vec![
+            "velocities/q-aero-rad_sec".to_owned(),
+            "aero/ci2vel".to_owned(),
+        ],
+        Regressor::YawRate => vec![
+            "velocities/r-aero-rad_sec".to_owned(),
+            "aero/bi2vel".to_owned(),
+        ],
         Regressor::Surface(signal) | Regressor::Vane(signal) => vec![property(contents, signal)],
     });
     factors
@@ -112,8 +137,18 @@ fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
 fn axis(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
     let (name, length) = axis_of(coefficient);
     xml.open("axis", &[("name", name)]);
-    let kind = if coefficient.is_moment() { "moment" } else { "force" };
-    xml.open("function", &[("name", &format!("aero/{kind}/harvest/{}", word(coefficient)))]);
+    let kind = if coefficient.is_moment() {
+        "moment"
+    } else {
+        "force"
+    };
+    xml.open(
+        "function",
+        &[(
+            "name",
+            &format!("aero/{kind}/harvest/{}", word(coefficient)),
+        )],
+    );
     let mut whole = vec!["aero/qbar-psf".to_owned(), "metrics/Sw-sqft".to_owned()];
     whole.extend(length.map(str::to_owned));
     whole.push(format!("aero/harvest/{}", word(coefficient)));
@@ -150,9 +185,20 @@ fn sum(xml: &mut Xml, products: &[Vec<String>]) {
 
 /// The table of one derivative.
 fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
-    xml.open("function", &[("name", &format!("aero/harvest/{}", table.derivative))]);
-    let over_mach = if table.machs.is_empty() { "" } else { "; at the Mach numbers flown" };
-    xml.text("description", &[], &format!("{} ({}){over_mach}", table.sources(), table.unit));
+    xml.open(
+        "function",
+        &[("name", &format!("aero/harvest/{}", table.derivative))],
+    );
+    let over_mach = if table.machs.is_empty() {
+        ""
+    } else {
+        "; at the Mach numbers flown"
+    };
+    xml.text(
+        "description",
+        &[],
+        &format!("{} ({}){over_mach}", table.sources(), table.unit),
+    );
     let third = third(contents, std::slice::from_ref(table)).unwrap_or_default();
     let axes = [
         ("aero/alpha-deg", table.alphas_deg.as_slice()),
@@ -161,13 +207,24 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
     ];
     let values: Vec<f64> = table.cells.iter().map(|c| c.value).collect();
     // A variable with one breakpoint is none: the cells stay as they are.
-    let axes: Vec<(&str, &[f64])> = axes.into_iter().filter(|(_, points)| points.len() > 1).collect();
+    let axes: Vec<(&str, &[f64])> = axes
+        .into_iter()
+        .filter(|(_, points)| points.len() > 1)
+        .collect();
     match axes.as_slice() {
-        [] => xml.text("value", &[], &values.first().copied().unwrap_or_default().to_string()),
+        [] => xml.text(
+            "value",
+            &[],
+            &values.first().copied().unwrap_or_default().to_string(),
+        ),
         [(property, points)] => {
             xml.open("table", &[]);
             xml.text("independentVar", &[("lookup", "row")], property);
-            let lines: Vec<String> = points.iter().zip(&values).map(|(x, y)| format!("{x} {y}")).collect();
+            let lines: Vec<String> = points
+                .iter()
+                .zip(&values)
+                .map(|(x, y)| format!("{x} {y}"))
+                .collect();
             xml.block("tableData", &[], &lines);
             xml.close();
         }
@@ -179,7 +236,11 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
             if let [(property, breakpoints), ..] = rest {
                 xml.text("independentVar", &[("lookup", "table")], property);
                 for (breakpoint, values) in breakpoints.iter().zip(values.chunks(size)) {
-                    xml.block("tableData", &[("breakPoint", &breakpoint.to_string())], &plane(rows, columns, values));
+                    xml.block(
+                        "tableData",
+                        &[("breakPoint", &breakpoint.to_string())],
+                        &plane(rows, columns, values),
+                    );
                 }
             } else {
                 xml.block("tableData", &[], &plane(rows, columns, &values));
@@ -193,10 +254,20 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
 /// A table of two variables: the columns' breakpoints, then each row's with its values. The rows' variable varies fastest
 /// in `values`.
 fn plane(rows: &[f64], columns: &[f64], values: &[f64]) -> Vec<String> {
-    let words = |values: Vec<f64>| values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let words = |values: Vec<f64>| {
+        values
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
     let line = |(i, row): (usize, &f64)| {
-        let across = (0..columns.len()).filter_map(|j| values.get(j * rows.len() + i).copied()).collect();
+        let across = (0..columns.len())
+            .filter_map(|j| values.get(j * rows.len() + i).copied())
+            .collect();
         format!("{row} {}", words(across))
     };
-    std::iter::once(words(columns.to_vec())).chain(rows.iter().enumerate().map(line)).collect()
+    std::iter::once(words(columns.to_vec()))
+        .chain(rows.iter().enumerate().map(line))
+        .collect()
 }

@@ -103,12 +103,23 @@ impl Flown {
             let unit = config.buildup.unit_of(name).unwrap().name();
             for (i, alpha) in ALPHAS.into_iter().enumerate() {
                 let tunnel = config.tunnel.value(name, alpha, 0.3).unwrap().value;
-                trends.push(trend_row(name, unit, group, alpha, 1.2 * tunnel + 0.001 * i as f64));
+                trends.push(trend_row(
+                    name,
+                    unit,
+                    group,
+                    alpha,
+                    1.2 * tunnel + 0.001 * i as f64,
+                ));
             }
             estimates.extend(["m1", "m2"].map(|id| estimate(id, "PPSS", name)));
         }
         let maneuvers = vec![maneuver("m1", "PPSS", 0.25), maneuver("m2", "PPSS", 0.35)];
-        Flown { config, trends, estimates, maneuvers }
+        Flown {
+            config,
+            trends,
+            estimates,
+            maneuvers,
+        }
     }
 
     fn contents(&self) -> Contents<'_> {
@@ -127,14 +138,25 @@ impl Flown {
 
     /// A tunnel of one derivative over two Mach numbers and two altitudes.
     fn over_mach_and_altitude(mut self) -> Flown {
-        let third = Some(wind_tunnel::Third { name: "altitude_ft".into(), at: 20e3 });
-        let mut tunnel = WindTunnel::new(wind_tunnel::Settings { third, ..Default::default() });
+        let third = Some(wind_tunnel::Third {
+            name: "altitude_ft".into(),
+            at: 20e3,
+        });
+        let mut tunnel = WindTunnel::new(wind_tunnel::Settings {
+            third,
+            ..Default::default()
+        });
         for altitude in [10e3, 40e3] {
             for mach in [0.2, 0.9] {
                 for alpha_deg in [5.0, 20.0, 50.0] {
                     let value = alpha_deg * (1.0 + mach) + 1e-4 * altitude;
-                    let point =
-                        TunnelPoint { alpha_deg, mach: Some(mach), value, uncertainty: Some(0.5), source: None };
+                    let point = TunnelPoint {
+                        alpha_deg,
+                        mach: Some(mach),
+                        value,
+                        uncertainty: Some(0.5),
+                        source: None,
+                    };
                     tunnel.insert_at("CN_alpha", Some(altitude), point);
                 }
             }
@@ -148,40 +170,74 @@ impl Flown {
 fn flight_stands_where_it_has_data_and_the_tunnel_elsewhere() {
     let flown = Flown::new();
     let tables = tables(&flown.contents());
-    assert_eq!(tables.len(), flown.config.buildup.derivatives.len() + flown.config.buildup.combined.len());
+    assert_eq!(
+        tables.len(),
+        flown.config.buildup.derivatives.len() + flown.config.buildup.combined.len()
+    );
     for table in &tables {
         for (at, cell) in table.points() {
-            let trend = flown
-                .trends
-                .iter()
-                .find(|t| t.derivative == table.derivative && (t.alpha_deg - at.alpha_deg).abs() < 1e-9);
-            assert_eq!(cell.is_flight, trend.is_some(), "{} {at:?}", table.derivative);
-            let tunnel = flown.config.tunnel.value(&table.derivative, at.alpha_deg, 0.3).unwrap().value;
-            assert_eq!(cell.value.to_bits(), trend.map_or(tunnel, |t| t.value).to_bits());
+            let trend = flown.trends.iter().find(|t| {
+                t.derivative == table.derivative && (t.alpha_deg - at.alpha_deg).abs() < 1e-9
+            });
+            assert_eq!(
+                cell.is_flight,
+                trend.is_some(),
+                "{} {at:?}",
+                table.derivative
+            );
+            let tunnel = flown
+                .config
+                .tunnel
+                .value(&table.derivative, at.alpha_deg, 0.3)
+                .unwrap()
+                .value;
+            assert_eq!(
+                cell.value.to_bits(),
+                trend.map_or(tunnel, |t| t.value).to_bits()
+            );
         }
     }
     let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
-    assert_eq!(slope.sources(), "wind tunnel: 5°, 45° to 60°; flight, trend of all: 10° to 40°");
+    assert_eq!(
+        slope.sources(),
+        "wind tunnel: 5°, 45° to 60°; flight, trend of all: 10° to 40°"
+    );
 }
 
 #[test]
 fn the_exported_constant_and_slope_add_up_to_the_sum_that_was_flown() {
     let mut flown = Flown::new();
-    for (name, of) in [("CN_0", &(|_| 0.3) as &dyn Fn(f64) -> f64), ("CN_ba", &|a| 0.07 * a - 0.05)] {
+    for (name, of) in [
+        ("CN_0", &(|_| 0.3) as &dyn Fn(f64) -> f64),
+        ("CN_ba", &|a| 0.07 * a - 0.05),
+    ] {
         let group = &flown.config.trend.group_of(name).unwrap().name;
-        flown.trends.extend(ALPHAS.map(|alpha| trend_row(name, "-", group, alpha, of(alpha))));
+        flown
+            .trends
+            .extend(ALPHAS.map(|alpha| trend_row(name, "-", group, alpha, of(alpha))));
         flown.estimates.push(estimate("m1", "PPSS", name));
     }
     let tables = tables(&flown.contents());
     let at = |name: &str, alpha_deg: f64| {
         let table = tables.iter().find(|t| t.derivative == name).unwrap();
-        table.points().find(|(at, _)| same(at.alpha_deg, alpha_deg)).unwrap().1
+        table
+            .points()
+            .find(|(at, _)| same(at.alpha_deg, alpha_deg))
+            .unwrap()
+            .1
     };
     for alpha in ALPHAS {
-        assert_relative_eq!(at("CN_0", alpha).value + at("CN_alpha", alpha).value * alpha, 0.07 * alpha - 0.05);
+        assert_relative_eq!(
+            at("CN_0", alpha).value + at("CN_alpha", alpha).value * alpha,
+            0.07 * alpha - 0.05
+        );
         assert_eq!(at("CN_0", alpha).source, "flight, CN_ba − CN_alpha α");
         let wanted = (0.01 + 1e-4 * alpha) * alpha.hypot(1.0);
-        assert_relative_eq!(at("CN_0", alpha).uncertainty.unwrap(), wanted, max_relative = 1e-12);
+        assert_relative_eq!(
+            at("CN_0", alpha).uncertainty.unwrap(),
+            wanted,
+            max_relative = 1e-12
+        );
     }
     let tunnel = flown.config.tunnel.value("CN_0", 50.0, 0.3).unwrap().value;
     assert_eq!(at("CN_0", 50.0).value.to_bits(), tunnel.to_bits());
@@ -194,10 +250,14 @@ fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
     let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
     assert_eq!(slope.machs, [0.2, 0.25, 0.35, 0.9]);
     assert_eq!(slope.thirds, [10e3, 25e3, 40e3]);
-    assert_eq!(slope.alphas_deg, [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0]);
+    assert_eq!(
+        slope.alphas_deg,
+        [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0]
+    );
     for (at, cell) in slope.points() {
-        let inside =
-            (0.25..=0.35).contains(&at.mach) && at.third == Some(25e3) && (10.0..=40.0).contains(&at.alpha_deg);
+        let inside = (0.25..=0.35).contains(&at.mach)
+            && at.third == Some(25e3)
+            && (10.0..=40.0).contains(&at.alpha_deg);
         assert_eq!(cell.is_flight, inside, "{at:?}");
     }
 }
@@ -221,10 +281,24 @@ fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
         let contents = flown.contents();
         let tables = tables(&contents);
         let folder = tempfile::tempdir().unwrap();
-        let third = flown.config.tunnel.settings().third.as_ref().map(|t| t.name.as_str());
-        crate::store::table::publish_export(&crate::store::table::Shelf::of(folder.path()), &rows(&tables), third)
-            .unwrap();
-        std::fs::write(folder.path().join("flight_updated.dml"), daveml::document(&contents, &tables)).unwrap();
+        let third = flown
+            .config
+            .tunnel
+            .settings()
+            .third
+            .as_ref()
+            .map(|t| t.name.as_str());
+        crate::store::table::publish_export(
+            &crate::store::table::Shelf::of(folder.path()),
+            &rows(&tables),
+            third,
+        )
+        .unwrap();
+        std::fs::write(
+            folder.path().join("flight_updated.dml"),
+            daveml::document(&contents, &tables),
+        )
+        .unwrap();
         let names: Vec<&str> = tables.iter().map(|t| t.derivative.as_str()).collect();
         let read = |extension: &str| {
             let path = folder.path().join(format!("flight_updated.{extension}"));
@@ -245,7 +319,9 @@ fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
         assert_eq!(read("csv"), written);
         assert_eq!(read("parquet"), written);
         let of_values = |all: &BTreeMap<Place, (u64, Option<u64>)>| -> BTreeMap<Place, u64> {
-            all.iter().map(|(place, (value, _))| (place.clone(), *value)).collect()
+            all.iter()
+                .map(|(place, (value, _))| (place.clone(), *value))
+                .collect()
         };
         assert_eq!(of_values(&read("dml")), of_values(&written));
     }
@@ -261,7 +337,8 @@ fn daveml_keeps_the_uncertainties_where_every_value_has_one() {
     std::fs::write(&path, text).unwrap();
     let found = tunnel::rows(&path, Some("altitude_ft"), |name| name == "CN_alpha").unwrap();
     assert!(
-        found.iter().any(|(_, r)| r.uncertainty == Some(0.5)) && found.iter().all(|(_, r)| r.uncertainty.is_some())
+        found.iter().any(|(_, r)| r.uncertainty == Some(0.5))
+            && found.iter().all(|(_, r)| r.uncertainty.is_some())
     );
 }
 
@@ -286,7 +363,10 @@ fn the_grammar_sees_what_is_out_of_order() {
         (" org=\"not stated\"", ""),
     ] {
         assert!(text.contains(from), "{from}");
-        assert!(!grammar::faults(&text.replacen(from, to, 1)).is_empty(), "{from}");
+        assert!(
+            !grammar::faults(&text.replacen(from, to, 1)).is_empty(),
+            "{from}"
+        );
     }
 }
 
@@ -306,18 +386,33 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
     let contents = flown.contents();
     let (tables, a) = (tables(&contents), contents.aircraft);
     let section = section_of(&contents, &tables);
-    let mut surfaces: Vec<String> =
-        contents.buildup.derivatives.iter().filter_map(|d| d.regressor.surface().map(str::to_owned)).collect();
+    let mut surfaces: Vec<String> = contents
+        .buildup
+        .derivatives
+        .iter()
+        .filter_map(|d| d.regressor.surface().map(str::to_owned))
+        .collect();
     surfaces.sort();
     surfaces.dedup();
     let deflections: Vec<f64> = (0..surfaces.len()).map(|i| 3.0 - 1.1 * i as f64).collect();
     let names: Vec<String> = surfaces.iter().map(|s| format!("harvest/{s}")).collect();
-    let truth =
-        Aerodynamics::new(contents.buildup, database(&tables, &wind_tunnel::Settings::default()), &surfaces).unwrap();
+    let truth = Aerodynamics::new(
+        contents.buildup,
+        database(&tables, &wind_tunnel::Settings::default()),
+        &surfaces,
+    )
+    .unwrap();
     for (alpha_deg, beta_deg, rates) in states() {
         let (alpha, beta) = (alpha_deg.to_radians(), f64::to_radians(beta_deg));
-        let air = AirData { velocity_ft_s: 310.0, alpha, beta, mach: 0.3, qbar_psf: 55.0 };
-        let (force, moment) = truth.loads(a, &truth.values(alpha_deg, 0.3), &air, &rates, &deflections);
+        let air = AirData {
+            velocity_ft_s: 310.0,
+            alpha,
+            beta,
+            mach: 0.3,
+            qbar_psf: 55.0,
+        };
+        let (force, moment) =
+            truth.loads(a, &truth.values(alpha_deg, 0.3), &air, &rates, &deflections);
         let mut properties: BTreeMap<&str, f64> = BTreeMap::from([
             ("aero/alpha-deg", alpha_deg),
             ("aero/beta-deg", beta_deg),
@@ -332,7 +427,12 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
             ("metrics/bw-ft", a.span_ft),
             ("metrics/cbarw-ft", a.chord_ft),
         ]);
-        properties.extend(names.iter().map(String::as_str).zip(deflections.iter().copied()));
+        properties.extend(
+            names
+                .iter()
+                .map(String::as_str)
+                .zip(deflections.iter().copied()),
+        );
         let axes = jsbsim::axes(&section, &properties);
         // JSBSim's body forces: X = −AXIAL, Y = SIDE, Z = −NORMAL.
         for (axis, expected) in [
@@ -355,9 +455,22 @@ fn the_jsbsim_tables_over_three_variables_are_the_database_s() {
     let tables = tables(&contents);
     let section = section_of(&contents, &tables);
     let database = database(&tables, contents.tunnel.settings());
-    for (alpha_deg, mach, altitude) in [(12.0, 0.3, 25e3), (33.3, 0.5, 12e3), (3.0, 0.1, 50e3), (50.0, 0.25, 25e3)] {
-        let condition = Condition { alpha_deg, mach, third: Some(altitude) };
-        let properties = [("aero/alpha-deg", alpha_deg), ("velocities/mach", mach), ("position/h-sl-ft", altitude)];
+    for (alpha_deg, mach, altitude) in [
+        (12.0, 0.3, 25e3),
+        (33.3, 0.5, 12e3),
+        (3.0, 0.1, 50e3),
+        (50.0, 0.25, 25e3),
+    ] {
+        let condition = Condition {
+            alpha_deg,
+            mach,
+            third: Some(altitude),
+        };
+        let properties = [
+            ("aero/alpha-deg", alpha_deg),
+            ("velocities/mach", mach),
+            ("position/h-sl-ft", altitude),
+        ];
         let rest = [
             "aero/beta-deg",
             "aero/bi2vel",
@@ -370,17 +483,31 @@ fn the_jsbsim_tables_over_three_variables_are_the_database_s() {
             "metrics/bw-ft",
             "metrics/cbarw-ft",
         ];
-        let all = properties.into_iter().chain(rest.map(|name| (name, 0.0))).collect();
+        let all = properties
+            .into_iter()
+            .chain(rest.map(|name| (name, 0.0)))
+            .collect();
         let value = jsbsim::evaluated(&section, &all)["aero/harvest/CN_alpha"];
-        assert_relative_eq!(value, database.at("CN_alpha", &condition).unwrap().value, max_relative = 1e-12);
+        assert_relative_eq!(
+            value,
+            database.at("CN_alpha", &condition).unwrap().value,
+            max_relative = 1e-12
+        );
     }
 }
 
 #[test]
 fn an_analyst_s_property_takes_the_place_of_the_house_s() {
     let mut flown = Flown::new();
-    flown.config.export.jsbsim_properties.insert("de_deg".into(), "fcs/elevator-pos-deg".into());
+    flown
+        .config
+        .export
+        .jsbsim_properties
+        .insert("de_deg".into(), "fcs/elevator-pos-deg".into());
     let contents = flown.contents();
     let section = section_of(&contents, &tables(&contents));
-    assert!(section.contains("<property>fcs/elevator-pos-deg</property>") && !section.contains("harvest/de_deg"));
+    assert!(
+        section.contains("<property>fcs/elevator-pos-deg</property>")
+            && !section.contains("harvest/de_deg")
+    );
 }

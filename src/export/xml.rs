@@ -11,7 +11,10 @@ pub(super) struct Xml {
 
 /// Text as it may stand in an element or an attribute.
 pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 fn with(attributes: &[(&str, &str)]) -> String {
@@ -21,12 +24,20 @@ fn with(attributes: &[(&str, &str)]) -> String {
 
 impl Xml {
     pub(super) fn new(declaration: &str) -> Xml {
-        Xml { text: format!("{declaration}\n"), open: Vec::new() }
+        Xml {
+            text: format!("{declaration}\n"),
+            open: Vec::new(),
+        }
     }
 
     fn line(&mut self, line: &str) {
         // Writing into a String cannot fail.
-        let _ = writeln!(self.text, "{:indent$}{line}", "", indent = 2 * self.open.len());
+        let _ = writeln!(
+            self.text,
+            "{:indent$}{line}",
+            "",
+            indent = 2 * self.open.len()
+        );
     }
 
     pub(super) fn open(&mut self, name: &'static str, attributes: &[(&str, &str)]) {
@@ -45,11 +56,20 @@ impl Xml {
     }
 
     pub(super) fn text(&mut self, name: &str, attributes: &[(&str, &str)], text: &str) {
-        self.line(&format!("<{name}{}>{}</{name}>", with(attributes), escaped(text)));
+        self.line(&format!(
+            "<{name}{}>{}</{name}>",
+            with(attributes),
+            escaped(text)
+        ));
     }
 
     /// Lines of numbers as an element's text.
-    pub(super) fn block(&mut self, name: &'static str, attributes: &[(&str, &str)], lines: &[String]) {
+    pub(super) fn block(
+        &mut self,
+        name: &'static str,
+        attributes: &[(&str, &str)],
+        lines: &[String],
+    ) {
         self.open(name, attributes);
         for line in lines {
             self.line(line);

@@ -14,5 +14,9 @@ pub use record::{Mark, Record};
 #[must_use]
 pub fn is_stretch(id: &str, flight_id: &str) -> bool {
     let rest = id.strip_prefix(flight_id);
-    rest.is_some_and(|r| r.is_empty() || r.strip_prefix('.').is_some_and(|n| n.parse::<usize>().is_ok()))
+    rest.is_some_and(|r| {
+        r.is_empty()
+            || r.strip_prefix('.')
+                .is_some_and(|n| n.parse::<usize>().is_ok())
+    })
 }

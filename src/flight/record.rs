@@ -74,7 +74,11 @@ impl Record {
     #[must_use]
     pub fn sample_at(&self, time_s: f64) -> usize {
         let k = ((time_s - self.start_s) / self.step_s).round().max(0.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and not negative")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded and not negative"
+        )]
         let k = k as usize;
         k.min(self.samples.saturating_sub(1))
     }
@@ -88,14 +92,24 @@ impl Record {
     /// The share of samples, among all of these signals from one time to another, with which something went wrong; a
     /// signal that the record does not have counts as missing throughout.
     #[must_use]
-    pub fn marked_share<'a>(&self, signals: impl IntoIterator<Item = &'a str>, start_s: f64, end_s: f64) -> f64 {
-        let (from, to) = (self.sample_at(start_s), (self.sample_at(end_s) + 1).min(self.samples));
+    pub fn marked_share<'a>(
+        &self,
+        signals: impl IntoIterator<Item = &'a str>,
+        start_s: f64,
+        end_s: f64,
+    ) -> f64 {
+        let (from, to) = (
+            self.sample_at(start_s),
+            (self.sample_at(end_s) + 1).min(self.samples),
+        );
         let (mut faults, mut all) = (0_usize, 0_usize);
         for signal in signals {
             let length = to.saturating_sub(from);
             all += length;
             let marks = self.signals.get(signal).and_then(|s| s.marks.get(from..to));
-            faults += marks.map_or(length, |marks| marks.iter().filter(|m| m.is_fault()).count());
+            faults += marks.map_or(length, |marks| {
+                marks.iter().filter(|m| m.is_fault()).count()
+            });
         }
         faults as f64 / all.max(1) as f64
     }
@@ -107,13 +121,18 @@ impl Record {
             values: s.values.get(samples.clone()).unwrap_or_default().to_vec(),
             marks: s.marks.get(samples.clone()).unwrap_or_default().to_vec(),
         };
-        let wanted = self.signals.iter().filter(|(name, _)| signals.is_none_or(|s| s.contains(*name)));
+        let wanted = self
+            .signals
+            .iter()
+            .filter(|(name, _)| signals.is_none_or(|s| s.contains(*name)));
         Record {
             flight_id: self.flight_id.clone(),
             start_s: self.time_s(samples.start),
             step_s: self.step_s,
             samples: samples.len(),
-            signals: wanted.map(|(name, series)| (name.clone(), cut(series))).collect(),
+            signals: wanted
+                .map(|(name, series)| (name.clone(), cut(series)))
+                .collect(),
         }
     }
 

@@ -35,6 +35,6 @@ pub const IXZ: &str = "ixz_slug_ft2";
 
 /// Every signal without which the equations cannot be written down: each must be a channel or a constant.
 pub const REQUIRED: &[&str] = &[
-    ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST, RPM_LEFT,
-    RPM_RIGHT, MASS, X_CG, Y_CG, Z_CG, IX, IY, IZ, IXZ,
+    ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST,
+    RPM_LEFT, RPM_RIGHT, MASS, X_CG, Y_CG, Z_CG, IX, IY, IZ, IXZ,
 ];

@@ -27,7 +27,12 @@ impl Taps {
                 0.5 * f + 2.0 * f2 - 1.5 * f3,
                 0.5 * (f3 - f2),
             ],
-            slopes: [-0.5 + 2.0 * f - 1.5 * f2, -5.0 * f + 4.5 * f2, 0.5 + 4.0 * f - 4.5 * f2, 1.5 * f2 - f],
+            slopes: [
+                -0.5 + 2.0 * f - 1.5 * f2,
+                -5.0 * f + 4.5 * f2,
+                0.5 + 4.0 * f - 4.5 * f2,
+                1.5 * f2 - f,
+            ],
         }
     }
 
@@ -58,7 +63,11 @@ impl Taps {
     pub fn each(&self, k: usize, samples: usize) -> impl Iterator<Item = (usize, f64, f64)> {
         let (first, last) = (self.first, samples.saturating_sub(1));
         let place = move |i: usize| (k + i).saturating_add_signed(first).min(last);
-        self.weights.into_iter().zip(self.slopes).enumerate().map(move |(i, (w, s))| (place(i), w, s))
+        self.weights
+            .into_iter()
+            .zip(self.slopes)
+            .enumerate()
+            .map(move |(i, (w, s))| (place(i), w, s))
     }
 }
 
@@ -82,7 +91,11 @@ mod tests {
         let value = |shift| Taps::at(shift).sum(10, 21, |k| (k as f64).sin()).0;
         for shift in [-1.0, -0.3, 0.0, 0.7, 2.0] {
             let numeric = (value(shift + 1e-6) - value(shift - 1e-6)) / 2e-6;
-            assert_abs_diff_eq!(Taps::at(shift).sum(10, 21, |k| (k as f64).sin()).1, numeric, epsilon = 1e-6);
+            assert_abs_diff_eq!(
+                Taps::at(shift).sum(10, 21, |k| (k as f64).sin()).1,
+                numeric,
+                epsilon = 1e-6
+            );
         }
     }
 

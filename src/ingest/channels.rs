@@ -14,7 +14,10 @@ use crate::units::Unit;
 ///
 /// # Errors
 /// The first channel whose stated unit is another.
-pub fn check_units(source: &(impl Source + ?Sized), channels: &BTreeMap<String, Channel>) -> Result<(), Spoilt> {
+pub fn check_units(
+    source: &(impl Source + ?Sized),
+    channels: &BTreeMap<String, Channel>,
+) -> Result<(), Spoilt> {
     for (name, channel) in channels {
         let stated = (0..source.files()).filter_map(|file| source.unit(file, name));
         let other = |unit: &&str| !unit.is_empty() && !same_unit(unit, &channel.unit);
@@ -41,26 +44,39 @@ fn same_unit(stated: &str, mapped: &str) -> bool {
 ///
 /// # Errors
 /// The column is in no file, or has a unit that its signal cannot be in.
-pub fn factor(source: &(impl Source + ?Sized), name: &str, channel: &Channel) -> Result<f64, Spoilt> {
+pub fn factor(
+    source: &(impl Source + ?Sized),
+    name: &str,
+    channel: &Channel,
+) -> Result<f64, Spoilt> {
     let at = |reason: String| Err((format!("channel `{name}`"), reason));
     if !(0..source.files()).any(|file| source.has(file, name)) {
-        return at(format!("channel `{name}` (signal `{}`) is not in the file", channel.signal));
+        return at(format!(
+            "channel `{name}` (signal `{}`) is not in the file",
+            channel.signal
+        ));
     }
     let target = Unit::of_signal(&channel.signal);
-    Unit::parse(&channel.unit).ok().and_then(|u| u.factor_to(target)).map_or_else(
-        || {
-            at(format!(
-                "signal `{}` is in {}, which `{}` does not convert to",
-                channel.signal, target.name, channel.unit
-            ))
-        },
-        Ok,
-    )
+    Unit::parse(&channel.unit)
+        .ok()
+        .and_then(|u| u.factor_to(target))
+        .map_or_else(
+            || {
+                at(format!(
+                    "signal `{}` is in {}, which `{}` does not convert to",
+                    channel.signal, target.name, channel.unit
+                ))
+            },
+            Ok,
+        )
 }
 
 /// A channel that is there and never has a value.
 pub fn holds_nothing(name: &str, channel: &Channel, rows: usize) -> Spoilt {
-    let reason = format!("channel `{name}` (signal `{}`) holds no number in {rows} rows", channel.signal);
+    let reason = format!(
+        "channel `{name}` (signal `{}`) holds no number in {rows} rows",
+        channel.signal
+    );
     (format!("channel `{name}`"), reason)
 }
 
@@ -70,11 +86,19 @@ const NAMED: usize = 3;
 /// A channel that stood still where it should have moved.
 pub fn stuck(name: &str, done: &Done, clock: &Clock) -> Option<Spoilt> {
     let from_to = |&(from, to): &(usize, usize)| {
-        format!("from {:.1} s to {:.1} s", clock.time_s(from), clock.time_s(to.saturating_sub(1)))
+        format!(
+            "from {:.1} s to {:.1} s",
+            clock.time_s(from),
+            clock.time_s(to.saturating_sub(1))
+        )
     };
     let named: Vec<String> = done.stuck.iter().take(NAMED).map(from_to).collect();
     let more = done.stuck.len().saturating_sub(NAMED);
-    let more = if more > 0 { format!(" and {more} times more") } else { String::new() };
+    let more = if more > 0 {
+        format!(" and {more} times more")
+    } else {
+        String::new()
+    };
     (!named.is_empty()).then(|| {
         let reason = format!(
             "its value is stuck {}{more}: noise changed it before, and then nothing; it is left out there",
@@ -86,14 +110,18 @@ pub fn stuck(name: &str, done: &Done, clock: &Clock) -> Option<Spoilt> {
 
 /// Two channels for one signal.
 pub fn twice(name: &str, channel: &Channel) -> Spoilt {
-    let reason = format!("channel `{name}` and another one are both mapped to signal `{}`", channel.signal);
+    let reason = format!(
+        "channel `{name}` and another one are both mapped to signal `{}`",
+        channel.signal
+    );
     (format!("channel `{name}`"), reason)
 }
 
 /// A required signal that is neither a channel nor a constant.
 pub fn nobody_gives(signal: &str) -> Spoilt {
-    let reason =
-        format!("signal `{signal}` is neither a channel nor a constant; map a channel to it or give its value");
+    let reason = format!(
+        "signal `{signal}` is neither a channel nor a constant; map a channel to it or give its value"
+    );
     (format!("signal `{signal}`"), reason)
 }
 

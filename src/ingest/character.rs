@@ -48,7 +48,10 @@ pub struct Rate {
 
 impl Rate {
     /// A value in every sample.
-    pub const FULL: Rate = Rate { period: 1, held: None };
+    pub const FULL: Rate = Rate {
+        period: 1,
+        held: None,
+    };
 }
 
 /// What a channel is like over one spell.
@@ -67,11 +70,22 @@ pub struct Character {
 
 impl Character {
     /// Nothing known yet.
-    pub const UNKNOWN: Character =
-        Character { rate: Rate::FULL, floor: 0.0, noise: f64::NAN, quantisation: None, stuck: None };
+    pub const UNKNOWN: Character = Character {
+        rate: Rate::FULL,
+        floor: 0.0,
+        noise: f64::NAN,
+        quantisation: None,
+        stuck: None,
+    };
 
     /// The character of a spell that begins at sample `first`, after one that was like `before`.
-    pub fn of(values: &[f64], first: usize, step_s: f64, before: &Character, settings: &Stuck) -> Character {
+    pub fn of(
+        values: &[f64],
+        first: usize,
+        step_s: f64,
+        before: &Character,
+        settings: &Stuck,
+    ) -> Character {
         let rate = rate(values, first).unwrap_or(before.rate);
         let own: Vec<f64>;
         let recorded = if rate == Rate::FULL {
@@ -81,15 +95,36 @@ impl Character {
             &own
         };
         let (floor, noise) = spikes::floors(recorded);
-        let stuck = if settings.find { stuck(recorded, step_s * rate.period as f64, before, settings) } else { None };
-        Character { rate, floor, noise, quantisation: quantisation(recorded), stuck }
+        let stuck = if settings.find {
+            stuck(recorded, step_s * rate.period as f64, before, settings)
+        } else {
+            None
+        };
+        Character {
+            rate,
+            floor,
+            noise,
+            quantisation: quantisation(recorded),
+            stuck,
+        }
     }
 }
 
 /// The recorded values of a slow channel with their places.
-pub fn recorded(values: &[f64], first: usize, rate: Rate) -> impl Iterator<Item = (usize, f64)> + '_ {
-    let own = move |k: usize| rate.held.is_none_or(|phase| (first + k) % rate.period == phase);
-    values.iter().enumerate().filter(move |(k, v)| v.is_finite() && own(*k)).map(|(k, v)| (k, *v))
+pub fn recorded(
+    values: &[f64],
+    first: usize,
+    rate: Rate,
+) -> impl Iterator<Item = (usize, f64)> + '_ {
+    let own = move |k: usize| {
+        rate.held
+            .is_none_or(|phase| (first + k) % rate.period == phase)
+    };
+    values
+        .iter()
+        .enumerate()
+        .filter(move |(k, v)| v.is_finite() && own(*k))
+        .map(|(k, v)| (k, *v))
 }
 
 /// How often the channel is recorded; none where the spell does not say.
@@ -100,7 +135,9 @@ fn rate(values: &[f64], first: usize) -> Option<Rate> {
     }
     if known == values.len() {
         // Most channels change so often that no period fits: these need no list of changes.
-        let changed = pairs(values).filter(|(before, value)| before.to_bits() != value.to_bits()).count();
+        let changed = pairs(values)
+            .filter(|(before, value)| before.to_bits() != value.to_bits())
+            .count();
         if changed < FEW_CHANGES {
             return None;
         }
@@ -148,10 +185,15 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
 fn between_nulls(distances: &[usize]) -> Option<usize> {
     let total: usize = distances.iter().sum();
     let (period, _) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
-    let near: usize = distances.iter().skip(period.saturating_sub(1)).take(3).sum();
+    let near: usize = distances
+        .iter()
+        .skip(period.saturating_sub(1))
+        .take(3)
+        .sum();
     let fits = near as f64 >= FITS * total as f64 && total >= FEW_CHANGES;
     // Next to a full-rate channel's distance of one, two is a lost sample.
-    (period > 1 && fits && 2 * distances.get(1).copied().unwrap_or_default() < total).then_some(period)
+    (period > 1 && fits && 2 * distances.get(1).copied().unwrap_or_default() < total)
+        .then_some(period)
 }
 
 /// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one of so many chances.
@@ -178,7 +220,10 @@ fn held(changes: &[usize]) -> Option<Rate> {
             phases[change % period] += 1;
         }
         let (phase, most) = phases.iter().enumerate().max_by_key(|(_, n)| **n)?;
-        (*most as f64 >= FITS * changes.len() as f64).then_some(Rate { period, held: Some(phase) })
+        (*most as f64 >= FITS * changes.len() as f64).then_some(Rate {
+            period,
+            held: Some(phase),
+        })
     };
     (SHORTEST_PERIOD..=LONGEST_PERIOD).rev().find_map(of_period)
 }
@@ -207,11 +252,15 @@ fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> O
     let least = super::clock::index(settings.least_s / step_s).max(4);
     let known = values.iter().filter(|v| v.is_finite()).count();
     let first = values.first().is_some_and(|v| v.is_finite());
-    let anew = |(before, value): &(&f64, &f64)| value.is_finite() && value.to_bits() != before.to_bits();
+    let anew =
+        |(before, value): &(&f64, &f64)| value.is_finite() && value.to_bits() != before.to_bits();
     let runs = usize::from(first) + pairs(values).filter(anew).count();
     let long = long_runs(values, least / 3);
-    let (lasting, samples) =
-        long.iter().map(Range::len).filter(|n| *n >= least).fold((0, 0), |(r, s), n| (r + 1, s + n));
+    let (lasting, samples) = long
+        .iter()
+        .map(Range::len)
+        .filter(|n| *n >= least)
+        .fold((0, 0), |(r, s), n| (r + 1, s + n));
     if known - samples < FEW_SAMPLES {
         return before.stuck;
     }
@@ -223,9 +272,16 @@ fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> O
     let longest = least.max(super::clock::index(chance));
     // The runs at the ends may be parts of longer ones. Between chance and stuck there is nothing.
     let finite = |v: &f64| v.is_finite();
-    let (first, last) = (values.iter().position(finite)?, values.iter().rposition(finite)?);
-    let inner = long.iter().filter(|run| !run.contains(&first) && !run.contains(&last));
-    let doubtful = inner.map(Range::len).any(|n| (longest / 3..longest).contains(&n));
+    let (first, last) = (
+        values.iter().position(finite)?,
+        values.iter().rposition(finite)?,
+    );
+    let inner = long
+        .iter()
+        .filter(|run| !run.contains(&first) && !run.contains(&last));
+    let doubtful = inner
+        .map(Range::len)
+        .any(|n| (longest / 3..longest).contains(&n));
     let many = long.iter().filter(|run| run.len() >= longest).count() > MOST_RUNS;
     (!doubtful && !many).then_some(longest)
 }
@@ -260,15 +316,32 @@ const OFF_GRID: f64 = 0.05;
 fn quantisation(values: &[f64]) -> Option<f64> {
     let every = (values.len() / (4 * CHANGES)).max(1);
     let change = |pair: &[f64]| (pair[1] - pair[0]).abs();
-    let finest = 1e-9 * values.iter().take(CHANGES).filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let changes: Vec<f64> =
-        values.windows(2).step_by(every).map(change).filter(|c| *c > finest).take(CHANGES).collect();
+    let finest = 1e-9
+        * values
+            .iter()
+            .take(CHANGES)
+            .filter(|v| v.is_finite())
+            .fold(0.0_f64, |m, v| m.max(v.abs()));
+    let changes: Vec<f64> = values
+        .windows(2)
+        .step_by(every)
+        .map(change)
+        .filter(|c| *c > finest)
+        .take(CHANGES)
+        .collect();
     if changes.len() < FEW_CHANGES {
         return None;
     }
     let smallest = changes.iter().copied().fold(f64::INFINITY, f64::min);
-    let small: Vec<f64> = changes.iter().map(|c| c / smallest).filter(|n| *n < 0.25 / OFF_GRID * 8.0).collect();
-    let on_grid = small.iter().filter(|n| (*n - n.round()).abs() < OFF_GRID).count();
+    let small: Vec<f64> = changes
+        .iter()
+        .map(|c| c / smallest)
+        .filter(|n| *n < 0.25 / OFF_GRID * 8.0)
+        .collect();
+    let on_grid = small
+        .iter()
+        .filter(|n| (*n - n.round()).abs() < OFF_GRID)
+        .count();
     let share = on_grid as f64 / small.len().max(1) as f64;
     (small.len() >= FEW_CHANGES && share >= FITS).then_some(smallest)
 }
@@ -296,7 +369,24 @@ mod tests {
 
     #[test]
     fn runs_are_found_wherever_they_lie_and_no_shorter_ones() {
-        let values = [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, f64::NAN, f64::NAN, f64::NAN, 4.0, 4.0, 4.0, 4.0, 0.0, -0.0, 0.0];
+        let values = [
+            1.0,
+            1.0,
+            1.0,
+            2.0,
+            3.0,
+            3.0,
+            f64::NAN,
+            f64::NAN,
+            f64::NAN,
+            4.0,
+            4.0,
+            4.0,
+            4.0,
+            0.0,
+            -0.0,
+            0.0,
+        ];
         assert_eq!(long_runs(&values, 3), [0..3, 9..13]);
         assert_eq!(long_runs(&values, 2), [0..3, 4..6, 9..13]);
         assert_eq!(long_runs(&values, 1).len(), 7);
@@ -313,9 +403,21 @@ mod tests {
     #[test]
     fn a_rate_is_known_by_nulls_or_by_repeated_values() {
         let nulls = spell(|k| if k % 4 == 3 { noise(k) } else { f64::NAN });
-        assert_eq!(character(&nulls).rate, Rate { period: 4, held: None });
+        assert_eq!(
+            character(&nulls).rate,
+            Rate {
+                period: 4,
+                held: None
+            }
+        );
         let held = spell(|k| noise((k + 5) / 8));
-        assert_eq!(character(&held).rate, Rate { period: 8, held: Some(3) });
+        assert_eq!(
+            character(&held).rate,
+            Rate {
+                period: 8,
+                held: Some(3)
+            }
+        );
         let lost = spell(|k| if k % 97 == 5 { f64::NAN } else { noise(k) });
         assert_eq!(character(&lost).rate, Rate::FULL);
     }
@@ -336,7 +438,10 @@ mod tests {
     fn only_noise_makes_a_stand_still_suspicious() {
         let rounded = |k: usize, by: f64| (noise(k) / by).round() * by;
         let noisy = character(&spell(|k| rounded(k, 0.2)));
-        assert!(noisy.stuck.is_some_and(|n| (40..80).contains(&n)), "{noisy:?}");
+        assert!(
+            noisy.stuck.is_some_and(|n| (40..80).contains(&n)),
+            "{noisy:?}"
+        );
         assert_eq!(character(&spell(|k| rounded(k, 2.5))).stuck, None);
         assert_eq!(character(&spell(|k| (k as f64 * 0.01).sin())).stuck, None);
         // A spell that is stuck throughout is like the one before.
@@ -344,10 +449,22 @@ mod tests {
         assert_eq!(after.stuck, noisy.stuck);
         let often = spell(|k| if k % 1000 < 100 { 0.4 } else { rounded(k, 0.2) });
         assert_eq!(character(&often).stuck, None);
-        let once = spell(|k| if (HALF..HALF + 100).contains(&k) { 0.4 } else { rounded(k, 0.2) });
+        let once = spell(|k| {
+            if (HALF..HALF + 100).contains(&k) {
+                0.4
+            } else {
+                rounded(k, 0.2)
+            }
+        });
         assert!(character(&once).stuck.is_some());
         // Where nothing was recorded between the test points, nothing stands still.
-        let points = spell(|k| if k % 2000 < 1200 { f64::NAN } else { rounded(k, 0.2) });
+        let points = spell(|k| {
+            if k % 2000 < 1200 {
+                f64::NAN
+            } else {
+                rounded(k, 0.2)
+            }
+        });
         assert_eq!(character(&points).stuck, noisy.stuck);
     }
 }

@@ -81,10 +81,16 @@ pub struct Fit {
 /// All relations whose signals the record has.
 pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
     let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
-    let relations: Vec<Relation> = relations::all(settings).into_iter().filter(possible).collect();
+    let relations: Vec<Relation> = relations::all(settings)
+        .into_iter()
+        .filter(possible)
+        .collect();
     let windows = windows(&relations, blocks, aircraft, settings);
-    let sides: Vec<Sides> =
-        relations.into_iter().zip(windows).map(|(relation, pairs)| Sides::of(relation, pairs, settings)).collect();
+    let sides: Vec<Sides> = relations
+        .into_iter()
+        .zip(windows)
+        .map(|(relation, pairs)| Sides::of(relation, pairs, settings))
+        .collect();
     let jumped: BTreeSet<usize> = sides.iter().flat_map(|s| &s.jumps).copied().collect();
     sides.iter().map(|s| s.check(&jumped, settings)).collect()
 }
@@ -102,7 +108,11 @@ impl Sides {
     fn of(relation: Relation, pairs: Vec<Pair>, settings: &Checks) -> Sides {
         let pairs = chosen(&relation, pairs, settings);
         let jumps = jumps(&relation, &pairs, settings);
-        Sides { relation, pairs, jumps }
+        Sides {
+            relation,
+            pairs,
+            jumps,
+        }
     }
 
     /// How the relation comes out, `jumped` being the windows in which any relation sees the record jump: where it does so
@@ -111,16 +121,30 @@ impl Sides {
     fn check(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
         let own = self.without(&self.jumps.iter().copied().collect(), settings);
         let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
-        if disagrees { self.without(jumped, settings) } else { own }
+        if disagrees {
+            self.without(jumped, settings)
+        } else {
+            own
+        }
     }
 
     /// How the relation comes out without some windows.
     fn without(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
         let relation = self.relation;
-        let pairs: Vec<Pair> = self.pairs.iter().filter(|p| !jumped.contains(&p.window)).copied().collect();
+        let pairs: Vec<Pair> = self
+            .pairs
+            .iter()
+            .filter(|p| !jumped.contains(&p.window))
+            .copied()
+            .collect();
         let jumps = self.jumps.len();
         if pairs.len() < settings.least_windows.max(2) {
-            return Check { relation, verdict: Verdict::NotExcited, fit: None, jumps };
+            return Check {
+                relation,
+                verdict: Verdict::NotExcited,
+                fit: None,
+                jumps,
+            };
         }
         let fit = fit(&pairs, &self.pairs);
         // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
@@ -129,7 +153,12 @@ impl Sides {
             Choice::Largest { .. } => Verdict::NotExcited,
         };
         let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
-        Check { relation, verdict, fit, jumps }
+        Check {
+            relation,
+            verdict,
+            fit,
+            jumps,
+        }
     }
 }
 
@@ -141,20 +170,37 @@ pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
 
 /// The sides of each relation in every window in which both are known. The motion is computed window by
 /// window: that of a whole flight would be the largest thing in memory.
-fn windows(relations: &[Relation], blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Vec<Pair>> {
+fn windows(
+    relations: &[Relation],
+    blocks: &Blocks,
+    aircraft: &Aircraft,
+    settings: &Checks,
+) -> Vec<Vec<Pair>> {
     let length = super::gaps::longest(settings.window_s, blocks.block_s).max(1);
     let mut pairs = vec![Vec::new(); relations.len()];
     let mut motion: Vec<Option<Motion>> = Vec::new();
-    for (window, start) in (0..blocks.count.saturating_sub(length)).step_by(length).enumerate() {
+    for (window, start) in (0..blocks.count.saturating_sub(length))
+        .step_by(length)
+        .enumerate()
+    {
         // The last block of a window is the first of the next.
-        let last = motion.pop().unwrap_or_else(|| Motion::of(blocks, start, aircraft, settings));
+        let last = motion
+            .pop()
+            .unwrap_or_else(|| Motion::of(blocks, start, aircraft, settings));
         motion.clear();
         motion.push(last);
-        motion.extend((start + 1..=start + length).map(|k| Motion::of(blocks, k, aircraft, settings)));
+        motion.extend(
+            (start + 1..=start + length).map(|k| Motion::of(blocks, k, aircraft, settings)),
+        );
         for (relation, pairs) in relations.iter().zip(&mut pairs) {
-            let value = |side: &Side| over(side, &motion, blocks.block_s).map(|v| v * relation.unit);
+            let value =
+                |side: &Side| over(side, &motion, blocks.block_s).map(|v| v * relation.unit);
             let sides = value(&relation.predicted).zip(value(&relation.measured));
-            pairs.extend(sides.map(|(predicted, measured)| Pair { window, predicted, measured }));
+            pairs.extend(sides.map(|(predicted, measured)| Pair {
+                window,
+                predicted,
+                measured,
+            }));
         }
     }
     pairs
@@ -166,7 +212,9 @@ fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
     let window: Vec<&Motion> = window.iter().map(Option::as_ref).collect::<Option<_>>()?;
     let (first, last) = (window.first()?, window.last()?);
     let steps = (window.len() - 1) as f64;
-    let change = side.state.map_or(0.0, |state| (state(last) - state(first)) / (steps * block_s));
+    let change = side.state.map_or(0.0, |state| {
+        (state(last) - state(first)) / (steps * block_s)
+    });
     let integral = side.rate.map_or(0.0, |rate| {
         let sum: f64 = window.iter().map(|m| rate(m)).sum();
         (sum - 0.5 * (rate(first) + rate(last))) / steps
@@ -190,7 +238,11 @@ fn chosen(relation: &Relation, mut pairs: Vec<Pair>, settings: &Checks) -> Vec<P
                 pair.measured -= measured;
             }
             pairs.sort_by(|a, b| b.predicted.abs().total_cmp(&a.predicted.abs()));
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a share of the length"
+            )]
             let count = (pairs.len() as f64 * share).ceil().max(0.0) as usize;
             // Of a short flight more than the share, or too few decide.
             pairs.truncate(count.max(SEVERAL * settings.least_windows));
@@ -209,7 +261,11 @@ fn jumps(relation: &Relation, pairs: &[Pair], settings: &Checks) -> Vec<usize> {
     let off = |p: &Pair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
     let spread = 1.4826 * median(pairs.iter().map(off).collect());
     let limit = (JUMP_DEVIATIONS * spread).max(relation.choice.level());
-    let jumps: Vec<usize> = pairs.iter().filter(|p| off(p) > limit).map(|p| p.window).collect();
+    let jumps: Vec<usize> = pairs
+        .iter()
+        .filter(|p| off(p) > limit)
+        .map(|p| p.window)
+        .collect();
     let few = slope.is_finite() && jumps.len() as f64 <= settings.jumps_share * pairs.len() as f64;
     if few { jumps } else { Vec::new() }
 }
@@ -219,7 +275,9 @@ fn jumps(relation: &Relation, pairs: &[Pair], settings: &Checks) -> Vec<usize> {
 fn middle_slope(pairs: &[Pair]) -> f64 {
     let most = median(pairs.iter().map(|p| p.predicted.abs()).collect());
     let moved = pairs.iter().filter(|p| p.predicted != 0.0);
-    let mut slopes: Vec<(f64, f64)> = moved.map(|p| (p.measured / p.predicted, p.predicted.abs().min(most))).collect();
+    let mut slopes: Vec<(f64, f64)> = moved
+        .map(|p| (p.measured / p.predicted, p.predicted.abs().min(most)))
+        .collect();
     slopes.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = 0.5 * slopes.iter().map(|s| s.1).sum::<f64>();
     let mut sum = 0.0;
@@ -238,7 +296,10 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Of the windows without jumps, the misfit of all; none where one side is nothing but zeros.
 fn fit(pairs: &[Pair], all: &[Pair]) -> Option<Fit> {
     let sum_of = |pairs: &[Pair], term: &dyn Fn(f64, f64) -> f64| {
-        pairs.iter().map(|p| term(p.predicted, p.measured)).sum::<f64>()
+        pairs
+            .iter()
+            .map(|p| term(p.predicted, p.measured))
+            .sum::<f64>()
     };
     let sum = |term: &dyn Fn(f64, f64) -> f64| sum_of(pairs, term);
     let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
@@ -252,7 +313,10 @@ fn fit(pairs: &[Pair], all: &[Pair]) -> Option<Fit> {
         size: (xx / pairs.len() as f64).sqrt(),
         misfit: (sum_of(all, &|x, y| (y - x).powi(2)) / all_xx.max(all_yy)).sqrt(),
     };
-    [fit.slope, fit.standard_error, fit.correlation, fit.misfit].iter().all(|v| v.is_finite()).then_some(fit)
+    [fit.slope, fit.standard_error, fit.correlation, fit.misfit]
+        .iter()
+        .all(|v| v.is_finite())
+        .then_some(fit)
 }
 
 /// What biases may leave of a relation, as a share of the level from which it counts as excited.
@@ -261,7 +325,8 @@ const BIAS: f64 = 0.5;
 /// A verdict needs the slope to be wrong by several standard errors and by more than biases can make it. Correlation counts only where the windows were chosen
 /// by a level that noise does not reach.
 fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
-    let margin = settings.standard_errors * fit.standard_error + BIAS * relation.choice.level() / fit.size;
+    let margin =
+        settings.standard_errors * fit.standard_error + BIAS * relation.choice.level() / fit.size;
     let (low, high) = (fit.slope - margin, fit.slope + margin);
     let level = matches!(relation.choice, Choice::Above(_));
     if level && fit.correlation.abs() < relation.correlation {
@@ -285,8 +350,22 @@ mod tests {
 
     fn verdict(choice: Choice, slope: f64, standard_error: f64, correlation: f64) -> Verdict {
         let settings = Checks::default();
-        let relation = Relation { choice, correlation: 0.5, ..relations::all(&settings)[0] };
-        judge(&Fit { slope, standard_error, correlation, size: 10.0, misfit: 0.1 }, &relation, &settings)
+        let relation = Relation {
+            choice,
+            correlation: 0.5,
+            ..relations::all(&settings)[0]
+        };
+        judge(
+            &Fit {
+                slope,
+                standard_error,
+                correlation,
+                size: 10.0,
+                misfit: 0.1,
+            },
+            &relation,
+            &settings,
+        )
     }
 
     #[test]
@@ -298,7 +377,10 @@ mod tests {
         assert_eq!(verdict(level, 0.02, 0.001, 0.99), Verdict::WrongScale);
         assert_eq!(verdict(level, 0.1, 0.1, 0.1), Verdict::DoesNotAgree);
         assert_eq!(verdict(level, 0.6, 0.05, 0.8), Verdict::Ok);
-        let weak = Choice::Largest { share: 0.05, level: 0.01 };
+        let weak = Choice::Largest {
+            share: 0.05,
+            level: 0.01,
+        };
         assert_eq!(verdict(weak, 0.4, 0.15, 0.3), Verdict::NotExcited);
         assert_eq!(verdict(weak, 0.9, 0.1, 0.7), Verdict::Ok);
         assert_eq!(verdict(weak, -0.9, 0.1, -0.7), Verdict::WrongSign);
@@ -315,14 +397,19 @@ mod tests {
 
     /// Windows of a relation that holds within noise.
     fn windows(slope: f64) -> Vec<Pair> {
-        let sides = (0..200).map(|k| f64::from(k % 21) - 10.0).map(|x| (x, slope * x + 0.01 * (7.0 * x).sin()));
+        let sides = (0..200)
+            .map(|k| f64::from(k % 21) - 10.0)
+            .map(|x| (x, slope * x + 0.01 * (7.0 * x).sin()));
         pairs(&sides.collect::<Vec<_>>())
     }
 
     #[test]
     fn a_few_jumps_of_the_record_decide_nothing_and_a_wrong_channel_is_no_jump() {
         let settings = Checks::default();
-        let relation = Relation { choice: Choice::Above(1.0), ..relations::all(&settings)[0] };
+        let relation = Relation {
+            choice: Choice::Above(1.0),
+            ..relations::all(&settings)[0]
+        };
         let found = |pairs: &[Pair]| jumps(&relation, pairs, &settings);
         let mut jumped = windows(1.0);
         for k in [20, 90, 150] {
@@ -331,8 +418,15 @@ mod tests {
         assert_eq!(found(&jumped), [20, 90, 150]);
         // A flight put together from many parts: it jumps on either side of the relation.
         let mut patched = windows(1.0);
-        patched.iter_mut().step_by(5).for_each(|p| p.measured += 60.0);
-        patched.iter_mut().skip(2).step_by(10).for_each(|p| p.predicted += 300.0);
+        patched
+            .iter_mut()
+            .step_by(5)
+            .for_each(|p| p.measured += 60.0);
+        patched
+            .iter_mut()
+            .skip(2)
+            .step_by(10)
+            .for_each(|p| p.predicted += 300.0);
         assert_eq!(found(&patched).len(), 60);
         let mut often = windows(1.0);
         often.iter_mut().step_by(2).for_each(|p| p.measured += 60.0);
@@ -345,22 +439,45 @@ mod tests {
     }
 
     #[test]
-    fn a_relation_that_disagrees_only_where_others_jump_says_nothing_and_one_with_a_wrong_sign_is_not_excused() {
+    fn a_relation_that_disagrees_only_where_others_jump_says_nothing_and_one_with_a_wrong_sign_is_not_excused()
+     {
         let settings = Checks::default();
-        let relation = Relation { choice: Choice::Above(1.0), ..relations::all(&settings)[0] };
+        let relation = Relation {
+            choice: Choice::Above(1.0),
+            ..relations::all(&settings)[0]
+        };
         let compared = |slope: f64| {
-            let sides: Vec<(f64, f64)> =
-                (0..12).map(|k| f64::from(k % 5) - 2.0).map(|x| (x, slope * x + 9.0 * (3.0 * x).cos())).collect();
-            Sides::of(relation, if slope < 0.0 { windows(slope) } else { pairs(&sides) }, &settings)
+            let sides: Vec<(f64, f64)> = (0..12)
+                .map(|k| f64::from(k % 5) - 2.0)
+                .map(|x| (x, slope * x + 9.0 * (3.0 * x).cos()))
+                .collect();
+            Sides::of(
+                relation,
+                if slope < 0.0 {
+                    windows(slope)
+                } else {
+                    pairs(&sides)
+                },
+                &settings,
+            )
         };
         let verdicts = |sides: &Sides| {
             let jumped: BTreeSet<usize> = (0..200).collect();
-            (sides.check(&BTreeSet::new(), &settings).verdict, sides.check(&jumped, &settings).verdict)
+            (
+                sides.check(&BTreeSet::new(), &settings).verdict,
+                sides.check(&jumped, &settings).verdict,
+            )
         };
         let jumping = compared(0.0);
         assert!(jumping.jumps.is_empty(), "too many for jumps of its own");
-        assert_eq!(verdicts(&jumping), (Verdict::DoesNotAgree, Verdict::NotExcited));
-        assert_eq!(verdicts(&compared(-1.0)), (Verdict::WrongSign, Verdict::WrongSign));
+        assert_eq!(
+            verdicts(&jumping),
+            (Verdict::DoesNotAgree, Verdict::NotExcited)
+        );
+        assert_eq!(
+            verdicts(&compared(-1.0)),
+            (Verdict::WrongSign, Verdict::WrongSign)
+        );
     }
 
     #[test]

@@ -59,8 +59,18 @@ pub struct Slots {
 impl Slots {
     #[must_use]
     pub fn of(stretch: &Stretch) -> Slots {
-        let clock = Clock { start_s: stretch.start_s, step_s: stretch.step_s, ..Clock::default() };
-        Slots { step_s: stretch.step_s, phase: 0.0, last_s: f64::NAN, squares: 0.0, clock }
+        let clock = Clock {
+            start_s: stretch.start_s,
+            step_s: stretch.step_s,
+            ..Clock::default()
+        };
+        Slots {
+            step_s: stretch.step_s,
+            phase: 0.0,
+            last_s: f64::NAN,
+            squares: 0.0,
+            clock,
+        }
     }
 
     /// Times of rows of a piece, from row `row` of its file on.
@@ -93,11 +103,17 @@ impl Slots {
         let clock = &mut self.clock;
         clock.rows += 1;
         clock.samples = sample + 1;
-        let goes_on =
-            |run: &&mut Run| run.file == file && run.row + run.count == row && run.sample + run.count == sample;
+        let goes_on = |run: &&mut Run| {
+            run.file == file && run.row + run.count == row && run.sample + run.count == sample
+        };
         match clock.runs.last_mut().filter(goes_on) {
             Some(run) => run.count += 1,
-            None => clock.runs.push(Run { file, row, sample, count: 1 }),
+            None => clock.runs.push(Run {
+                file,
+                row,
+                sample,
+                count: 1,
+            }),
         }
     }
 
@@ -108,15 +124,23 @@ impl Slots {
     pub fn finish(self, settings: &Settings) -> Result<Clock, String> {
         let mut clock = self.clock;
         if clock.rows < 2 {
-            return Err(format!("{} rows are no record; at least 2 are needed", clock.rows));
+            return Err(format!(
+                "{} rows are no record; at least 2 are needed",
+                clock.rows
+            ));
         }
         if let Some(rate) = settings.sampling_rate_hz
             && (self.step_s * rate - 1.0).abs() > RATE_TOLERANCE
         {
-            return Err(format!("the record runs at {:.2} Hz, sampling_rate_hz says {rate} Hz", 1.0 / self.step_s));
+            return Err(format!(
+                "the record runs at {:.2} Hz, sampling_rate_hz says {rate} Hz",
+                1.0 / self.step_s
+            ));
         }
         clock.jitter_s = (self.squares / clock.rows as f64).sqrt() * self.step_s;
-        if clock.samples / SAMPLES_PER_ROW > clock.rows || clock.jitter_s > MOST_JITTER * self.step_s {
+        if clock.samples / SAMPLES_PER_ROW > clock.rows
+            || clock.jitter_s > MOST_JITTER * self.step_s
+        {
             return Err(format!(
                 "{} rows span {:.1} s, {} steps of {:.3} ms, and scatter about them by {:.3} ms: the time step is not steady",
                 clock.rows,
@@ -133,7 +157,11 @@ impl Slots {
 
 /// The nearest whole number, not below zero.
 pub(super) fn index(value: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and not negative")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounded and not negative"
+    )]
     let index = value.round().max(0.0) as usize;
     index
 }
@@ -147,13 +175,24 @@ impl Clock {
 
     /// The runs of a range of samples, cut to it.
     pub fn runs_of(&self, samples: std::ops::Range<usize>) -> impl Iterator<Item = Run> + '_ {
-        let first = self.runs.partition_point(|r| r.sample + r.count <= samples.start);
-        let within = self.runs.iter().skip(first).take_while(move |r| r.sample < samples.end);
+        let first = self
+            .runs
+            .partition_point(|r| r.sample + r.count <= samples.start);
+        let within = self
+            .runs
+            .iter()
+            .skip(first)
+            .take_while(move |r| r.sample < samples.end);
         let (from, to) = (samples.start, samples.end);
         within.map(move |r| {
             let skipped = from.saturating_sub(r.sample);
             let count = (r.sample + r.count).min(to) - r.sample - skipped;
-            Run { row: r.row + skipped, sample: r.sample + skipped, count, ..*r }
+            Run {
+                row: r.row + skipped,
+                sample: r.sample + skipped,
+                count,
+                ..*r
+            }
         })
     }
 }
@@ -174,7 +213,9 @@ mod tests {
         let mut scan = Scan::of_file(0);
         scan.push(times);
         let never = |_: &Piece, _: &Piece| Ok(false);
-        let plan = stretches::plan(&[scan.finish()], settings, &|_| String::new(), &mut { never })?;
+        let plan = stretches::plan(&[scan.finish()], settings, &|_| String::new(), &mut {
+            never
+        })?;
         let stretch = plan.stretches.first().ok_or("no rows")?;
         let mut slots = Slots::of(stretch);
         for used in &stretch.pieces {
@@ -186,7 +227,11 @@ mod tests {
 
     /// The sample of every row that has one.
     fn samples(clock: &Clock) -> Vec<usize> {
-        clock.runs.iter().flat_map(|r| r.sample..r.sample + r.count).collect()
+        clock
+            .runs
+            .iter()
+            .flat_map(|r| r.sample..r.sample + r.count)
+            .collect()
     }
 
     #[test]
@@ -195,7 +240,12 @@ mod tests {
         assert_eq!(samples(&clock), [0, 1, 2, 5, 6]);
         assert_eq!((clock.samples, clock.rows, clock.runs.len()), (7, 5, 2));
         let cut: Vec<Run> = clock.runs_of(1..6).collect();
-        let run = |row, sample, count| Run { file: 0, row, sample, count };
+        let run = |row, sample, count| Run {
+            file: 0,
+            row,
+            sample,
+            count,
+        };
         assert_eq!(cut, [run(1, 1, 2), run(3, 5, 1)]);
         assert_eq!(clock.runs_of(3..5).count(), 0);
     }
@@ -203,9 +253,16 @@ mod tests {
     #[test]
     fn jitter_does_not_move_a_row_into_another_sample() {
         let jitter = [0.0, 0.0011, -0.0009, 0.0004, -0.0012, 0.0007];
-        let times: Vec<f64> = (0..3000).map(|k| k as f64 * 0.025 + jitter[k % 6]).collect();
+        let times: Vec<f64> = (0..3000)
+            .map(|k| k as f64 * 0.025 + jitter[k % 6])
+            .collect();
         let clock = clock(&times).unwrap();
-        assert!(samples(&clock).iter().enumerate().all(|(k, sample)| k == *sample));
+        assert!(
+            samples(&clock)
+                .iter()
+                .enumerate()
+                .all(|(k, sample)| k == *sample)
+        );
         assert_abs_diff_eq!(clock.jitter_s, 0.000_85, epsilon = 1e-4);
     }
 
@@ -219,7 +276,10 @@ mod tests {
 
     #[test]
     fn a_clock_slightly_off_its_nominal_rate_does_not_slip() {
-        let settings = Settings { sampling_rate_hz: Some(40.0), ..Settings::default() };
+        let settings = Settings {
+            sampling_rate_hz: Some(40.0),
+            ..Settings::default()
+        };
         let times: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 0.025_01).collect();
         let clock = with(&times, &settings).unwrap();
         assert_eq!(clock.samples, 100_000);
@@ -230,7 +290,10 @@ mod tests {
     fn a_gap_is_counted_in_whole_steps_despite_jitter() {
         let jitter = [0.0, 0.0008, -0.0006, 0.0002, -0.0005];
         let rows: Vec<usize> = (0..2000).chain(4_000..6_000).collect();
-        let times: Vec<f64> = rows.iter().map(|&k| k as f64 * 0.025 + jitter[k % 5]).collect();
+        let times: Vec<f64> = rows
+            .iter()
+            .map(|&k| k as f64 * 0.025 + jitter[k % 5])
+            .collect();
         assert_eq!(samples(&clock(&times).unwrap()), rows);
     }
 
@@ -244,9 +307,15 @@ mod tests {
 
     #[test]
     fn a_rate_other_than_the_configured_one_is_refused() {
-        let settings = Settings { sampling_rate_hz: Some(50.0), ..Settings::default() };
+        let settings = Settings {
+            sampling_rate_hz: Some(50.0),
+            ..Settings::default()
+        };
         let what = with(&[0.0, 0.025, 0.05, 0.075], &settings).unwrap_err();
-        assert_eq!(what, "the record runs at 40.00 Hz, sampling_rate_hz says 50 Hz");
+        assert_eq!(
+            what,
+            "the record runs at 40.00 Hz, sampling_rate_hz says 50 Hz"
+        );
     }
 
     #[test]

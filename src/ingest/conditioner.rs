@@ -43,13 +43,26 @@ struct Unwrap {
 
 impl Unwrap {
     fn of(channel: &Channel, step_s: f64, settings: &Settings) -> Option<Unwrap> {
-        let unit = Unit::parse(&channel.unit).ok().filter(|u| u.quantity == Quantity::Angle);
-        let circle = unit.and_then(|u| Unit::of_signal("_deg").factor_to(u)).map(|f| 360.0 * f);
+        let unit = Unit::parse(&channel.unit)
+            .ok()
+            .filter(|u| u.quantity == Quantity::Angle);
+        let circle = unit
+            .and_then(|u| Unit::of_signal("_deg").factor_to(u))
+            .map(|f| 360.0 * f);
         let stated = channel.wraps_at.map(|period| (period, 0.5));
         let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
         let longest = gaps::longest(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
         let about_zero = channel.wraps_at.is_none();
-        Some(Unwrap { period, share, about_zero, longest, missing: 0, turns: 0.0, before: f64::NAN, wraps: 0 })
+        Some(Unwrap {
+            period,
+            share,
+            about_zero,
+            longest,
+            missing: 0,
+            turns: 0.0,
+            before: f64::NAN,
+            wraps: 0,
+        })
     }
 
     /// Whether nothing before the next value says how many turns it is on.
@@ -64,7 +77,11 @@ impl Unwrap {
         }
         if self.begins() {
             // What is beyond a whole turn is no angle that wraps around.
-            self.turns = if value.abs() <= self.period { 0.0 - (value / self.period).round() } else { 0.0 };
+            self.turns = if value.abs() <= self.period {
+                0.0 - (value / self.period).round()
+            } else {
+                0.0
+            };
             self.before = value + self.turns * self.period;
             self.wraps += usize::from(self.turns != 0.0);
         }
@@ -87,7 +104,9 @@ impl Unwrap {
         let jumps = |before: f64, value: f64| (value - before).abs() > self.share * self.period;
         let (first, last) = (recorded.first()?, recorded.last()?);
         let known = recorded.iter().fold(true, |all, v| all & v.is_finite());
-        let goes_on = recorded.windows(2).fold(true, |all, pair| all & !jumps(pair[0], pair[1]));
+        let goes_on = recorded
+            .windows(2)
+            .fold(true, |all, pair| all & !jumps(pair[0], pair[1]));
         if !known || !goes_on || jumps(self.before - moved, *first) {
             return None;
         }
@@ -143,7 +162,13 @@ pub struct Conditioner {
 impl Conditioner {
     /// For a channel whose values times `factor` are in the signal's unit, over so many samples.
     #[must_use]
-    pub fn new(channel: &Channel, factor: f64, step_s: f64, samples: usize, settings: &Settings) -> Conditioner {
+    pub fn new(
+        channel: &Channel,
+        factor: f64,
+        step_s: f64,
+        samples: usize,
+        settings: &Settings,
+    ) -> Conditioner {
         Conditioner {
             settings: settings.clone(),
             step_s,
@@ -178,7 +203,11 @@ impl Conditioner {
     /// The samples up to here could leave.
     #[must_use]
     pub fn ready(&self) -> usize {
-        let complete = if self.pushed() == self.samples { return self.samples } else { self.pushed() / SPELL * SPELL };
+        let complete = if self.pushed() == self.samples {
+            return self.samples;
+        } else {
+            self.pushed() / SPELL * SPELL
+        };
         complete.saturating_sub(MARGIN)
     }
 
@@ -191,13 +220,23 @@ impl Conditioner {
     /// The next samples as recorded, NaN where there is none.
     pub fn push(&mut self, recorded: &[f64]) {
         let factor = self.factor;
-        let converted = |value: f64| if value.is_finite() { value * factor } else { f64::NAN };
+        let converted = |value: f64| {
+            if value.is_finite() {
+                value * factor
+            } else {
+                f64::NAN
+            }
+        };
         match &mut self.unwrap {
             Some(unwrap) => {
                 for some in recorded.chunks(SOME) {
                     match unwrap.common(some) {
-                        Some(moved) => self.values.extend(some.iter().map(|v| (v + moved) * factor)),
-                        None => self.values.extend(some.iter().map(|v| converted(unwrap.next(*v)))),
+                        Some(moved) => self
+                            .values
+                            .extend(some.iter().map(|v| (v + moved) * factor)),
+                        None => self
+                            .values
+                            .extend(some.iter().map(|v| converted(unwrap.next(*v)))),
                     }
                 }
             }
@@ -215,11 +254,13 @@ impl Conditioner {
 
     fn characterise(&mut self, from: usize, to: usize) {
         let spell = &self.values[from - self.first..to - self.first];
-        let mut character = Character::of(spell, from, self.step_s, &self.latest, &self.settings.stuck);
+        let mut character =
+            Character::of(spell, from, self.step_s, &self.latest, &self.settings.stuck);
         if self.flag {
             (character.stuck, character.rate.held) = (None, None);
         }
-        self.noises.extend(character.noise.is_finite().then_some(character.noise));
+        self.noises
+            .extend(character.noise.is_finite().then_some(character.noise));
         self.periods.push(character.rate.period);
         let finer = |a: f64| self.done.quantisation.map_or(a, |b: f64| b.min(a));
         self.done.quantisation = character.quantisation.map(finer).or(self.done.quantisation);
@@ -239,7 +280,11 @@ impl Conditioner {
         let to = (until + MARGIN).min(self.pushed());
         let mut values = self.values[from - self.first..to - self.first].to_vec();
         let stuck = self.leave_out(&mut values, from);
-        let despiked = if self.flag { Vec::new() } else { self.despike(&mut values, from) };
+        let despiked = if self.flag {
+            Vec::new()
+        } else {
+            self.despike(&mut values, from)
+        };
         let mut marks = self.bridge(&mut values, from);
         for range in stuck {
             marks[range].fill(Mark::Stuck);
@@ -251,7 +296,10 @@ impl Conditioner {
         self.count(&marks[core.clone()]);
         self.settled = until;
         self.forget();
-        Series { values: only(values, &core), marks: only(marks, &core) }
+        Series {
+            values: only(values, &core),
+            marks: only(marks, &core),
+        }
     }
 
     fn count(&mut self, marks: &[Mark]) {
@@ -275,7 +323,8 @@ impl Conditioner {
     /// Drops what no later sample depends on.
     fn forget(&mut self) {
         let keep = self.settled.saturating_sub(MARGIN);
-        self.values.drain(..keep.saturating_sub(self.first).min(self.values.len()));
+        self.values
+            .drain(..keep.saturating_sub(self.first).min(self.values.len()));
         self.first = self.first.max(keep);
         while self.first_spell < self.first / SPELL && !self.characters.is_empty() {
             self.characters.pop_front();
@@ -288,33 +337,52 @@ impl Conditioner {
         let to = from + length;
         let spells = from / SPELL..to.div_ceil(SPELL);
         let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
-        spells.map(|s| (cut(s)..cut(s + 1), *self.character(s * SPELL))).collect()
+        spells
+            .map(|s| (cut(s)..cut(s + 1), *self.character(s * SPELL)))
+            .collect()
     }
 
     /// Repeated values of a slow channel and stuck values become NaN; returns where it is stuck.
     fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<Range<usize>> {
         let parts = self.parts(from, values.len());
         for (range, character) in &parts {
-            let Rate { period, held: Some(phase) } = character.rate else { continue };
+            let Rate {
+                period,
+                held: Some(phase),
+            } = character.rate
+            else {
+                continue;
+            };
             for k in range.clone() {
                 if (from + k) % period != phase {
                     values[k] = f64::NAN;
                 }
             }
         }
-        let Some(fewest) = parts.iter().filter_map(|(_, c)| c.stuck).min() else { return Vec::new() };
+        let Some(fewest) = parts.iter().filter_map(|(_, c)| c.stuck).min() else {
+            return Vec::new();
+        };
         let is_stuck = |run: &Range<usize>, count: usize| {
-            let least = self.character(from + run.start).stuck.or(self.character(from + run.end - 1).stuck);
+            let least = self
+                .character(from + run.start)
+                .stuck
+                .or(self.character(from + run.end - 1).stuck);
             least.is_some_and(|least| count >= least)
         };
         let stuck: Vec<Range<usize>> = if values.iter().all(|v| v.is_finite()) {
-            long_runs(values, fewest).into_iter().filter(|run| is_stuck(run, run.len())).collect()
+            long_runs(values, fewest)
+                .into_iter()
+                .filter(|run| is_stuck(run, run.len()))
+                .collect()
         } else {
             // What is missing between two values that are the same counts for nothing.
             let (places, own) = known(values);
-            let runs =
-                long_runs(&own, fewest).into_iter().map(|run| (places[run.start]..places[run.end - 1] + 1, run.len()));
-            runs.filter(|(run, count)| is_stuck(run, *count)).map(|(run, _)| run).collect()
+            let runs = long_runs(&own, fewest)
+                .into_iter()
+                .map(|run| (places[run.start]..places[run.end - 1] + 1, run.len()));
+            runs.filter(|(run, count)| is_stuck(run, *count))
+                .map(|(run, _)| run)
+                .collect()
         };
         for range in &stuck {
             values[range.clone()].fill(f64::NAN);
@@ -326,17 +394,25 @@ impl Conditioner {
     fn despike(&self, values: &mut [f64], from: usize) -> Vec<usize> {
         let parts = self.parts(from, values.len());
         if parts.iter().all(|(_, c)| c.rate.period == 1) {
-            let floors: Vec<_> = parts.into_iter().map(|(range, c)| (range, c.floor)).collect();
+            let floors: Vec<_> = parts
+                .into_iter()
+                .map(|(range, c)| (range, c.floor))
+                .collect();
             return spikes::remove(values, self.step_s, &floors, &self.settings.spikes);
         }
         let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
         let (places, mut own) = known(values);
         let place = |sample: usize| places.partition_point(|k| *k < sample);
-        let floors: Vec<_> = parts.iter().map(|(r, c)| (place(r.start)..place(r.end), c.floor)).collect();
+        let floors: Vec<_> = parts
+            .iter()
+            .map(|(r, c)| (place(r.start)..place(r.end), c.floor))
+            .collect();
         let step_s = self.step_s * period as f64;
         let spikes = spikes::remove(&mut own, step_s, &floors, &self.settings.spikes);
-        let spikes: Vec<(usize, f64)> =
-            spikes.into_iter().filter_map(|i| Some((*places.get(i)?, *own.get(i)?))).collect();
+        let spikes: Vec<(usize, f64)> = spikes
+            .into_iter()
+            .filter_map(|i| Some((*places.get(i)?, *own.get(i)?)))
+            .collect();
         for (k, value) in &spikes {
             values[*k] = *value;
         }
@@ -345,7 +421,11 @@ impl Conditioner {
 
     fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
         let longest = gaps::longest(self.settings.longest_bridge_s, self.step_s);
-        let bridge = if self.flag { gaps::Bridge::Held } else { gaps::Bridge::Line };
+        let bridge = if self.flag {
+            gaps::Bridge::Held
+        } else {
+            gaps::Bridge::Line
+        };
         let period = |k: usize| self.character(from + k).rate.period;
         gaps::fill(values, longest, bridge, period)
     }
@@ -356,9 +436,17 @@ impl Conditioner {
         let middle = |n: usize| n / 2;
         self.noises.sort_by(f64::total_cmp);
         self.periods.sort_unstable();
-        self.done.noise = self.noises.get(middle(self.noises.len())).copied().filter(|_| !self.flag);
+        self.done.noise = self
+            .noises
+            .get(middle(self.noises.len()))
+            .copied()
+            .filter(|_| !self.flag);
         self.done.quantisation = self.done.quantisation.filter(|_| !self.flag);
-        self.done.period = self.periods.get(middle(self.periods.len())).copied().unwrap_or(1);
+        self.done.period = self
+            .periods
+            .get(middle(self.periods.len()))
+            .copied()
+            .unwrap_or(1);
         self.done.wraps = self.unwrap.map_or(0, |u| u.wraps);
         self.done
     }
@@ -382,10 +470,23 @@ mod tests {
 
     /// As they are put together from pieces of some length.
     fn unwrapped_in(piece: usize, wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
-        let channel = Channel { signal: "x_deg".into(), unit: "deg".into(), sign: 1.0, scale: 1.0, wraps_at };
-        let mut conditioner = Conditioner::new(&channel, 1.0, 0.025, values.len(), &Settings::default());
-        values.chunks(piece).for_each(|piece| conditioner.push(piece));
-        conditioner.values.into_iter().filter(|v| v.is_finite()).collect()
+        let channel = Channel {
+            signal: "x_deg".into(),
+            unit: "deg".into(),
+            sign: 1.0,
+            scale: 1.0,
+            wraps_at,
+        };
+        let mut conditioner =
+            Conditioner::new(&channel, 1.0, 0.025, values.len(), &Settings::default());
+        values
+            .chunks(piece)
+            .for_each(|piece| conditioner.push(piece));
+        conditioner
+            .values
+            .into_iter()
+            .filter(|v| v.is_finite())
+            .collect()
     }
 
     fn unwrapped(wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
@@ -396,16 +497,26 @@ mod tests {
 
     #[test]
     fn an_angle_recorded_from_0_to_360_deg_begins_about_zero_and_again_after_a_long_gap() {
-        assert_eq!(unwrapped(None, &[359.0, 1.0, 350.0, 2.0]), [-1.0, 1.0, -10.0, 2.0]);
-        let gap = |samples: usize| [&[30.0][..], &vec![f64::NAN; samples], &[330.0, 359.0, 1.0]].concat();
+        assert_eq!(
+            unwrapped(None, &[359.0, 1.0, 350.0, 2.0]),
+            [-1.0, 1.0, -10.0, 2.0]
+        );
+        let gap =
+            |samples: usize| [&[30.0][..], &vec![f64::NAN; samples], &[330.0, 359.0, 1.0]].concat();
         assert_eq!(unwrapped(None, &gap(41)), [30.0, -30.0, -1.0, 1.0]);
         // A roll that goes on through a dropout stays as many turns on.
-        assert_eq!(unwrapped(None, &[170.0, 179.0, f64::NAN, -175.0, -170.0]), [170.0, 179.0, 185.0, 190.0]);
+        assert_eq!(
+            unwrapped(None, &[170.0, 179.0, f64::NAN, -175.0, -170.0]),
+            [170.0, 179.0, 185.0, 190.0]
+        );
         assert_eq!(unwrapped(None, &[400.0, 410.0]), [400.0, 410.0]);
     }
 
     #[test]
     fn a_heading_stays_as_recorded_where_it_begins() {
-        assert_eq!(unwrapped(Some(360.0), &[310.0, 359.0, 1.0]), [310.0, 359.0, 361.0]);
+        assert_eq!(
+            unwrapped(Some(360.0), &[310.0, 359.0, 1.0]),
+            [310.0, 359.0, 361.0]
+        );
     }
 }

@@ -43,7 +43,11 @@ impl<'a> Flow<'a> {
     /// A planned channel over a stretch.
     #[must_use]
     pub fn new(plan: &Plan<'a>, stretch: &'a Surveyed, settings: &Settings) -> Flow<'a> {
-        let Plan { name, channel, factor } = *plan;
+        let Plan {
+            name,
+            channel,
+            factor,
+        } = *plan;
         let (step_s, samples) = (stretch.clock.step_s, stretch.clock.samples);
         Flow {
             name,
@@ -72,10 +76,18 @@ impl<'a> Flow<'a> {
         piece: usize,
         sink: &mut dyn FnMut(&Series) -> Result<(), String>,
     ) -> Result<(), Spoilt> {
-        let range = self.conditioner.pushed()..self.conditioner.wanted(until).max(self.conditioner.pushed());
+        let range = self.conditioner.pushed()
+            ..self
+                .conditioner
+                .wanted(until)
+                .max(self.conditioner.pushed());
         let clock = &self.stretch.clock;
         let on_clock = |c: &Clock| c.runs.iter().any(|r| source.has(r.file, self.name));
-        let (conditioner, averaging, samples) = (&mut self.conditioner, &mut self.averaging, &mut self.samples);
+        let (conditioner, averaging, samples) = (
+            &mut self.conditioner,
+            &mut self.averaging,
+            &mut self.samples,
+        );
         let mut said = Ok(());
         let mut through = |values: &[f64]| {
             conditioner.push(values);
@@ -94,7 +106,15 @@ impl<'a> Flow<'a> {
             rows_into(source, self.name, clock, range, &mut through)
         } else {
             let beside: Vec<&Clock> = self.stretch.others.iter().filter(|c| on_clock(c)).collect();
-            brought_to(source, self.name, clock, &beside, range, piece, &mut through)
+            brought_to(
+                source,
+                self.name,
+                clock,
+                &beside,
+                range,
+                piece,
+                &mut through,
+            )
         };
         feed?;
         // What was pushed with an earlier piece may be all that is wanted.
@@ -105,8 +125,20 @@ impl<'a> Flow<'a> {
     /// What the channel leaves behind.
     #[must_use]
     pub fn finish(self) -> Flowed<'a> {
-        let Flow { name, channel, averaging, samples, .. } = self;
-        Flowed { name, channel, done: self.conditioner.finish(), averaging, samples }
+        let Flow {
+            name,
+            channel,
+            averaging,
+            samples,
+            ..
+        } = self;
+        Flowed {
+            name,
+            channel,
+            done: self.conditioner.finish(),
+            averaging,
+            samples,
+        }
     }
 }
 
@@ -120,13 +152,19 @@ struct Group {
 fn groups(runs: impl Iterator<Item = Run>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for run in runs {
-        let near = |g: &&mut Group| g.file == run.file && run.row >= g.rows.end && run.row - g.rows.end < FAR;
+        let near = |g: &&mut Group| {
+            g.file == run.file && run.row >= g.rows.end && run.row - g.rows.end < FAR
+        };
         match groups.last_mut().filter(near) {
             Some(group) => {
                 group.rows.end = run.row + run.count;
                 group.runs.push(run);
             }
-            None => groups.push(Group { file: run.file, rows: run.row..run.row + run.count, runs: vec![run] }),
+            None => groups.push(Group {
+                file: run.file,
+                rows: run.row..run.row + run.count,
+                runs: vec![run],
+            }),
         }
     }
     groups
@@ -141,18 +179,28 @@ fn rows_into(
     sink: &mut dyn FnMut(&[f64]),
 ) -> Result<(), Spoilt> {
     let mut at = range.start;
-    for group in groups(clock.runs_of(range.clone())).iter().filter(|g| source.has(g.file, name)) {
+    for group in groups(clock.runs_of(range.clone()))
+        .iter()
+        .filter(|g| source.has(g.file, name))
+    {
         let mut runs = group.runs.iter();
         let mut run = runs.next();
         let mut row = group.rows.start;
         let mut place = |values: &[f64]| {
             let batch = row..row + values.len();
             while let Some(current) = run {
-                let (from, to) = (current.row.max(batch.start), (current.row + current.count).min(batch.end));
+                let (from, to) = (
+                    current.row.max(batch.start),
+                    (current.row + current.count).min(batch.end),
+                );
                 if from < to {
                     let sample = current.sample + from - current.row;
                     nothing(at..sample, sink);
-                    sink(values.get(from - batch.start..to - batch.start).unwrap_or_default());
+                    sink(
+                        values
+                            .get(from - batch.start..to - batch.start)
+                            .unwrap_or_default(),
+                    );
                     at = sample + to - from;
                 }
                 if current.row + current.count > batch.end {
@@ -196,7 +244,10 @@ fn brought_to(
         for own in beside {
             let near = |sample: usize| (clock.time_s(sample) - own.start_s) / own.step_s;
             let reach = 2.0 + clock.step_s / own.step_s;
-            let (first, last) = (index((near(from) - reach).floor()), index((near(to) + reach).ceil()));
+            let (first, last) = (
+                index((near(from) - reach).floor()),
+                index((near(to) + reach).ceil()),
+            );
             let samples = first.min(own.samples)..last.min(own.samples);
             let mut recorded = Vec::with_capacity(samples.len());
             let mut keep = |v: &[f64]| recorded.extend_from_slice(v);
@@ -205,12 +256,25 @@ fn brought_to(
                 let time_s = own.time_s(samples.start + i);
                 let sample = index((time_s - clock.start_s) / clock.step_s);
                 let off = (clock.time_s(sample) - time_s) / own.step_s;
-                let Some(k) = sample.checked_sub(from).filter(|k| *k < nearest.len() && off.abs() < nearest[*k]) else {
+                let Some(k) = sample
+                    .checked_sub(from)
+                    .filter(|k| *k < nearest.len() && off.abs() < nearest[*k])
+                else {
                     continue;
                 };
-                let beyond = if off < 0.0 { i.checked_sub(1) } else { Some(i + 1) };
-                let neighbour = beyond.and_then(|j| recorded.get(j)).copied().filter(|v| v.is_finite());
-                (values[k], nearest[k]) = (value + off.abs() * (neighbour.unwrap_or(*value) - value), off.abs());
+                let beyond = if off < 0.0 {
+                    i.checked_sub(1)
+                } else {
+                    Some(i + 1)
+                };
+                let neighbour = beyond
+                    .and_then(|j| recorded.get(j))
+                    .copied()
+                    .filter(|v| v.is_finite());
+                (values[k], nearest[k]) = (
+                    value + off.abs() * (neighbour.unwrap_or(*value) - value),
+                    off.abs(),
+                );
             }
         }
         sink(&values);

@@ -14,7 +14,11 @@ pub enum Bridge {
 /// The largest number of samples that a gap of this length lacks.
 pub fn longest(bridge_s: f64, step_s: f64) -> usize {
     let samples = (bridge_s / step_s + 1e-6).floor().max(0.0);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "floored and not negative")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "floored and not negative"
+    )]
     let samples = samples as usize;
     samples
 }
@@ -22,12 +26,27 @@ pub fn longest(bridge_s: f64, step_s: f64) -> usize {
 /// Bridges the gaps (NaN) of at most `longest` samples in place and says what every sample is now. A gap at either end
 /// of the record has only one side and stays missing. Where a channel is recorded once in several samples (`period`), a
 /// gap that is no longer is none: it lies between two samples.
-pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge, period: impl Fn(usize) -> usize) -> Vec<Mark> {
+pub fn fill(
+    values: &mut [f64],
+    longest: usize,
+    bridge: Bridge,
+    period: impl Fn(usize) -> usize,
+) -> Vec<Mark> {
     let mut marks = vec![Mark::Measured; values.len()];
     let mut from = 0;
-    while let Some(start) = values[from..].iter().position(|v| v.is_nan()).map(|k| from + k) {
-        let end = values[start..].iter().position(|v| !v.is_nan()).map_or(values.len(), |k| start + k);
-        let sides = start.checked_sub(1).and_then(|k| values.get(k).copied()).zip(values.get(end).copied());
+    while let Some(start) = values[from..]
+        .iter()
+        .position(|v| v.is_nan())
+        .map(|k| from + k)
+    {
+        let end = values[start..]
+            .iter()
+            .position(|v| !v.is_nan())
+            .map_or(values.len(), |k| start + k);
+        let sides = start
+            .checked_sub(1)
+            .and_then(|k| values.get(k).copied())
+            .zip(values.get(end).copied());
         let period = period(start);
         let between = period > 1 && end - start <= period;
         let mark = match sides {
@@ -35,9 +54,17 @@ pub fn fill(values: &mut [f64], longest: usize, bridge: Bridge, period: impl Fn(
                 let steps = (end - start + 1) as f64;
                 for (k, value) in values[start..end].iter_mut().enumerate() {
                     let share = (k + 1) as f64 / steps;
-                    *value = if bridge == Bridge::Line { before + share * (after - before) } else { before };
+                    *value = if bridge == Bridge::Line {
+                        before + share * (after - before)
+                    } else {
+                        before
+                    };
                 }
-                if between { Mark::Between } else { Mark::Bridged }
+                if between {
+                    Mark::Between
+                } else {
+                    Mark::Bridged
+                }
             }
             _ => Mark::Missing,
         };
@@ -60,7 +87,16 @@ mod tests {
         let mut values = [1.0, GAP, GAP, 4.0, 5.0];
         let marks = fill(&mut values, 2, Bridge::Line, |_| 1);
         assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0]);
-        assert_eq!(marks, [Mark::Measured, Mark::Bridged, Mark::Bridged, Mark::Measured, Mark::Measured]);
+        assert_eq!(
+            marks,
+            [
+                Mark::Measured,
+                Mark::Bridged,
+                Mark::Bridged,
+                Mark::Measured,
+                Mark::Measured
+            ]
+        );
     }
 
     #[test]

@@ -31,8 +31,15 @@ pub struct Guilty {
 impl Guilty {
     /// For the `channels` table.
     pub fn verdict(&self) -> String {
-        let cause = self.cause.as_deref().unwrap_or("does not agree with the other channels");
-        if self.alone { cause.to_owned() } else { format!("suspect: {cause}") }
+        let cause = self
+            .cause
+            .as_deref()
+            .unwrap_or("does not agree with the other channels");
+        if self.alone {
+            cause.to_owned()
+        } else {
+            format!("suspect: {cause}")
+        }
     }
 }
 
@@ -63,7 +70,9 @@ pub fn find(
     let still = still(blocks, recorded, settings);
     let dead = |s: &str| {
         still.contains(&s)
-            || found.iter().any(|c| c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks))
+            || found.iter().any(|c| {
+                c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks)
+            })
     };
     let mut guilty = accused(channels, recorded, blocks, &dead);
     if !guilty.is_empty() {
@@ -90,7 +99,9 @@ pub fn find(
             }
         }
         trials.sort_by(|a, b| a.bad.cmp(&b.bad).then(a.misfit.total_cmp(&b.misfit)));
-        let Some(best) = trials.first().filter(|t| t.bad < bad(&found, &found)) else { break };
+        let Some(best) = trials.first().filter(|t| t.bad < bad(&found, &found)) else {
+            break;
+        };
         if best.bad == 0 {
             guilty.extend(as_good_as(best, &trials));
             return guilty;
@@ -106,10 +117,15 @@ pub fn find(
 /// The instruments that never change while the aircraft flies and most of the others do change: whatever relation they are
 /// in, it may say nothing for want of them.
 fn still(blocks: &Blocks, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
-    let instruments: BTreeSet<&'static str> =
-        relations::all(settings).iter().flat_map(|r| r.dominant().iter().copied()).collect();
+    let instruments: BTreeSet<&'static str> = relations::all(settings)
+        .iter()
+        .flat_map(|r| r.dominant().iter().copied())
+        .collect();
     let recorded = |s: &&&str| recorded.iter().any(|r| r == *s);
-    let (still, changing): (Vec<&str>, Vec<&str>) = instruments.iter().filter(recorded).partition(|s| blocks.still(s));
+    let (still, changing): (Vec<&str>, Vec<&str>) = instruments
+        .iter()
+        .filter(recorded)
+        .partition(|s| blocks.still(s));
     let long = blocks.count as f64 * blocks.block_s >= settings.dead_s;
     let tells = long && changing.len() > still.len() && blocks.flies(settings.least_velocity_ft_s);
     if tells { still } else { Vec::new() }
@@ -149,17 +165,29 @@ fn suspects<'a>(
     channels: &'a BTreeMap<String, Channel>,
     recorded: &[String],
 ) -> Vec<(&'a str, &'a Channel)> {
-    let failed = |signal: &str| found.iter().any(|c| c.verdict.failed() && c.relation.signals.contains(&signal));
+    let failed = |signal: &str| {
+        found
+            .iter()
+            .any(|c| c.verdict.failed() && c.relation.signals.contains(&signal))
+    };
     let suspect = |c: &Channel| recorded.contains(&c.signal) && failed(&c.signal);
-    channels.iter().filter(|(_, c)| suspect(c)).map(|(name, c)| (name.as_str(), c)).collect()
+    channels
+        .iter()
+        .filter(|(_, c)| suspect(c))
+        .map(|(name, c)| (name.as_str(), c))
+        .collect()
 }
 
 /// The factors that would correct a channel, each with what it would mean.
 fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     let mut corrections = vec![(-1.0, "its sign is reversed".to_owned())];
-    let Ok(mapped) = Unit::parse(&channel.unit) else { return corrections };
+    let Ok(mapped) = Unit::parse(&channel.unit) else {
+        return corrections;
+    };
     for other in mapped.alike() {
-        let Some(factor) = other.factor_to(mapped).filter(|f| (f - 1.0).abs() > 1e-6) else { continue };
+        let Some(factor) = other.factor_to(mapped).filter(|f| (f - 1.0).abs() > 1e-6) else {
+            continue;
+        };
         let (was, is) = (other.name, mapped.name);
         let recorded = format!("it is recorded in {was}, not in {is}");
         let twice = format!("it is converted from {was} to {is} once too often");
@@ -173,14 +201,22 @@ fn corrections(channel: &Channel) -> Vec<(f64, String)> {
 
 /// Relations that fail, or that say nothing any more though they did before.
 fn bad(checks: &[Check], before: &[Check]) -> usize {
-    let silenced = |c: &Check, b: &Check| c.verdict == Verdict::NotExcited && b.verdict != Verdict::NotExcited;
-    checks.iter().zip(before).filter(|(c, b)| c.verdict.failed() || silenced(c, b)).count()
+    let silenced =
+        |c: &Check, b: &Check| c.verdict == Verdict::NotExcited && b.verdict != Verdict::NotExcited;
+    checks
+        .iter()
+        .zip(before)
+        .filter(|(c, b)| c.verdict.failed() || silenced(c, b))
+        .count()
 }
 
 /// The sum of the squared misfits of the relations that say something.
 fn misfit(checks: &[Check]) -> f64 {
     let excited = checks.iter().filter(|c| c.verdict != Verdict::NotExcited);
-    excited.filter_map(|c| c.fit).map(|f| f.misfit.powi(2)).sum()
+    excited
+        .filter_map(|c| c.fit)
+        .map(|f| f.misfit.powi(2))
+        .sum()
 }
 
 /// The best trial and the best ones of other channels that explain the failure as well: with as small a misfit, and with as
@@ -189,7 +225,11 @@ fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     let mut chosen: Vec<&Trial> = Vec::new();
     let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
     let as_few = |t: &&Trial| jumps(t) <= jumps(best);
-    for trial in trials.iter().filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit).filter(as_few) {
+    for trial in trials
+        .iter()
+        .filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit)
+        .filter(as_few)
+    {
         if !chosen.iter().any(|c| c.name == trial.name) {
             chosen.push(trial);
         }
@@ -200,7 +240,12 @@ fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
 
 /// The channels that all failed relations share, without those that another relation confirms; where the failed relations
 /// share none, every unconfirmed channel that dominates one of them.
-fn common(found: &[Check], blocks: &Blocks, channels: &BTreeMap<String, Channel>, recorded: &[String]) -> Vec<Guilty> {
+fn common(
+    found: &[Check],
+    blocks: &Blocks,
+    channels: &BTreeMap<String, Channel>,
+    recorded: &[String],
+) -> Vec<Guilty> {
     let cleared = checks::cleared(found);
     let failed: Vec<&Check> = found.iter().filter(|c| c.verdict.failed()).collect();
     let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
@@ -212,8 +257,13 @@ fn common(found: &[Check], blocks: &Blocks, channels: &BTreeMap<String, Channel>
         &|s| dominates(s) && unconfirmed(s),
         &|s| dominates(s),
     ];
-    let attempts = attempts.iter().map(|test| accused(channels, recorded, blocks, test));
-    attempts.into_iter().find(|guilty| !guilty.is_empty()).unwrap_or_default()
+    let attempts = attempts
+        .iter()
+        .map(|test| accused(channels, recorded, blocks, test));
+    attempts
+        .into_iter()
+        .find(|guilty| !guilty.is_empty())
+        .unwrap_or_default()
 }
 
 /// The recorded channels whose signals pass a test, accused together.
@@ -223,12 +273,16 @@ fn accused(
     blocks: &Blocks,
     test: &dyn Fn(&str) -> bool,
 ) -> Vec<Guilty> {
-    let suspects = channels.iter().filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal));
+    let suspects = channels
+        .iter()
+        .filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal));
     let mut guilty: Vec<Guilty> = suspects
         .map(|(name, channel)| Guilty {
             channel: name.clone(),
             signal: channel.signal.clone(),
-            cause: blocks.still(&channel.signal).then(|| "it never changes".to_owned()),
+            cause: blocks
+                .still(&channel.signal)
+                .then(|| "it never changes".to_owned()),
             factor: None,
             alone: true,
         })
@@ -242,30 +296,60 @@ fn accused(
 
 /// What the failed checks and the guilty channels amount to; none where nothing failed and none is dead.
 pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
-    let failed: Vec<String> = found.iter().filter(|c| c.verdict.failed()).map(described).collect();
+    let failed: Vec<String> = found
+        .iter()
+        .filter(|c| c.verdict.failed())
+        .map(described)
+        .collect();
     if failed.is_empty() && guilty.is_empty() {
         return None;
     }
     let named = |g: &Guilty| format!("`{}`", g.channel);
-    let causes: Vec<String> =
-        guilty.iter().filter_map(|g| Some(format!("`{}`: {}", g.channel, g.cause.as_ref()?))).collect();
+    let causes: Vec<String> = guilty
+        .iter()
+        .filter_map(|g| Some(format!("`{}`: {}", g.channel, g.cause.as_ref()?)))
+        .collect();
     let names: Vec<String> = guilty.iter().map(named).collect();
-    let several = if guilty.iter().any(|g| !g.alone) { "one of these is wrong: " } else { "" };
+    let several = if guilty.iter().any(|g| !g.alone) {
+        "one of these is wrong: "
+    } else {
+        ""
+    };
     let likely = if causes.is_empty() {
         "no sign and no unit would set it right".to_owned()
     } else {
         format!("likely {}", causes.join(", or "))
     };
     let disagreement = if failed.is_empty() {
-        format!("{} {} one value throughout, while the aircraft flies", names.join(", "), one(&names, "has", "have"))
+        format!(
+            "{} {} one value throughout, while the aircraft flies",
+            names.join(", "),
+            one(&names, "has", "have")
+        )
     } else {
         let (names, do_not) = (names.join(", "), one(&names, "does not", "do not"));
-        format!("{names} {do_not} agree with the other channels ({})", failed.join("; "))
+        format!(
+            "{names} {do_not} agree with the other channels ({})",
+            failed.join("; ")
+        )
     };
-    let reason = format!("{several}{disagreement}; {likely}. Correct the channel map, or leave the flight out");
-    let place = if names.len() == 1 { "channel" } else { "channels" };
-    let required = guilty.is_empty() || guilty.iter().any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
-    Some(Accusation { place: format!("{place} {}", names.join(", ")), reason, required })
+    let reason = format!(
+        "{several}{disagreement}; {likely}. Correct the channel map, or leave the flight out"
+    );
+    let place = if names.len() == 1 {
+        "channel"
+    } else {
+        "channels"
+    };
+    let required = guilty.is_empty()
+        || guilty
+            .iter()
+            .any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
+    Some(Accusation {
+        place: format!("{place} {}", names.join(", ")),
+        reason,
+        required,
+    })
 }
 
 fn one<'a>(names: &[String], singular: &'a str, plural: &'a str) -> &'a str {

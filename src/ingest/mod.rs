@@ -85,9 +85,22 @@ pub fn record(
     aircraft: &Aircraft,
     settings: &Settings,
 ) -> Result<Ingested, Problem> {
-    let basis = Basis { channels, constants, aircraft, settings };
-    let first = records(std::slice::from_ref(raw), &basis, usize::MAX)?.into_iter().next();
-    first.unwrap_or_else(|| Err(problem(&raw.flight_id, String::new(), "no stretch".to_owned())))
+    let basis = Basis {
+        channels,
+        constants,
+        aircraft,
+        settings,
+    };
+    let first = records(std::slice::from_ref(raw), &basis, usize::MAX)?
+        .into_iter()
+        .next();
+    first.unwrap_or_else(|| {
+        Err(problem(
+            &raw.flight_id,
+            String::new(),
+            "no stretch".to_owned(),
+        ))
+    })
 }
 
 /// The records of all stretches of a flight that is in memory, read in pieces of so many samples. The problems of the whole
@@ -95,7 +108,11 @@ pub fn record(
 ///
 /// # Errors
 /// A problem that refuses the whole flight; inside, one that refuses a stretch.
-pub fn records(files: &[RawFlight], basis: &Basis, piece: usize) -> Result<Vec<Result<Ingested, Problem>>, Problem> {
+pub fn records(
+    files: &[RawFlight],
+    basis: &Basis,
+    piece: usize,
+) -> Result<Vec<Result<Ingested, Problem>>, Problem> {
     let (plans, mut problems) = flows(files, basis)?;
     let survey = survey(files, basis.channels, basis.settings)?;
     problems.extend(survey.problems);
@@ -104,20 +121,31 @@ pub fn records(files: &[RawFlight], basis: &Basis, piece: usize) -> Result<Vec<R
         let mut finished = Vec::new();
         for plan in &plans {
             let mut flow = Flow::new(plan, stretch, basis.settings);
-            let mut whole = Series { values: Vec::new(), marks: Vec::new() };
+            let mut whole = Series {
+                values: Vec::new(),
+                marks: Vec::new(),
+            };
             let mut keep = |series: &Series| {
                 whole.values.extend_from_slice(&series.values);
                 whole.marks.extend_from_slice(&series.marks);
                 Ok(())
             };
-            let read = flow.run(files, stretch.clock.samples, piece.min(stretch.clock.samples).max(1), &mut keep);
+            let read = flow.run(
+                files,
+                stretch.clock.samples,
+                piece.min(stretch.clock.samples).max(1),
+                &mut keep,
+            );
             read.map_err(|(place, reason)| problem(&stretch.flight_id, place, reason))?;
             signals.insert(plan.channel.signal.clone(), whole);
             finished.push(flow.finish());
         }
         let samples = stretch.clock.samples;
         for (name, &value) in basis.constants {
-            let constant = || Series { values: vec![value; samples], marks: vec![Mark::Measured; samples] };
+            let constant = || Series {
+                values: vec![value; samples],
+                marks: vec![Mark::Measured; samples],
+            };
             signals.entry(name.clone()).or_insert_with(constant);
         }
         let mut record = Record {
@@ -127,10 +155,27 @@ pub fn records(files: &[RawFlight], basis: &Basis, piece: usize) -> Result<Vec<R
             samples,
             signals,
         };
-        let judged = judge(stretch, finished, basis, &|signals, range| Some(record.cut(Some(signals), range)))?;
-        judged.corrections.iter().for_each(|correction| correction.apply(&mut record));
-        let Judgement { channels, checks, instruments, problems, .. } = judged;
-        Ok(Ingested { record, channels, checks, instruments, problems })
+        let judged = judge(stretch, finished, basis, &|signals, range| {
+            Some(record.cut(Some(signals), range))
+        })?;
+        judged
+            .corrections
+            .iter()
+            .for_each(|correction| correction.apply(&mut record));
+        let Judgement {
+            channels,
+            checks,
+            instruments,
+            problems,
+            ..
+        } = judged;
+        Ok(Ingested {
+            record,
+            channels,
+            checks,
+            instruments,
+            problems,
+        })
     };
     let mut records: Vec<Result<Ingested, Problem>> = survey.stretches.iter().map(one).collect();
     if let Some(Ok(first)) = records.first_mut() {
@@ -152,7 +197,10 @@ pub struct Plan<'a> {
 /// # Errors
 /// A problem that refuses the flight: a unit in a file that is not the channel map's, a required channel that is in no
 /// file, a signal with two channels, or a required signal that nobody gives.
-pub fn flows<'a>(source: &(impl Source + ?Sized), basis: &Basis<'a>) -> Result<(Vec<Plan<'a>>, Vec<Problem>), Problem> {
+pub fn flows<'a>(
+    source: &(impl Source + ?Sized),
+    basis: &Basis<'a>,
+) -> Result<(Vec<Plan<'a>>, Vec<Problem>), Problem> {
     let refused = |(place, reason): Spoilt| problem(source.flight_id(), place, reason);
     channels::check_units(source, basis.channels).map_err(refused)?;
     let mut plans: BTreeMap<&str, Plan> = BTreeMap::new();
@@ -160,7 +208,17 @@ pub fn flows<'a>(source: &(impl Source + ?Sized), basis: &Basis<'a>) -> Result<(
     for (name, channel) in basis.channels.iter().filter(|(_, c)| c.signal != TIME) {
         match channels::factor(source, name, channel) {
             Ok(factor) => {
-                if plans.insert(&channel.signal, Plan { name, channel, factor }).is_some() {
+                if plans
+                    .insert(
+                        &channel.signal,
+                        Plan {
+                            name,
+                            channel,
+                            factor,
+                        },
+                    )
+                    .is_some()
+                {
                     return Err(refused(channels::twice(name, channel)));
                 }
             }
@@ -205,14 +263,26 @@ const PART: usize = 1 << 17;
 ///
 /// # Errors
 /// A problem that refuses the stretch: a required channel without any number, or one that the relations prove wrong.
-pub fn judge(stretch: &Surveyed, flowed: Vec<Flowed>, basis: &Basis, read: &Read) -> Result<Judgement, Problem> {
+pub fn judge(
+    stretch: &Surveyed,
+    flowed: Vec<Flowed>,
+    basis: &Basis,
+    read: &Read,
+) -> Result<Judgement, Problem> {
     let id = stretch.flight_id.as_str();
     let clock = &stretch.clock;
     let refused = |(place, reason): Spoilt| problem(id, place, reason);
     let checks = &basis.settings.checks;
     let (mut means, mut done, mut problems) = (BTreeMap::new(), Vec::new(), Vec::new());
     let mut signature = Vec::new();
-    for Flowed { name, channel, done: own, averaging, samples } in flowed {
+    for Flowed {
+        name,
+        channel,
+        done: own,
+        averaging,
+        samples,
+    } in flowed
+    {
         if own.count(Mark::Missing) == clock.samples {
             let spoilt = refused(channels::holds_nothing(name, channel, clock.rows));
             if !basis.spares(&channel.signal) {
@@ -229,7 +299,8 @@ pub fn judge(stretch: &Surveyed, flowed: Vec<Flowed>, basis: &Basis, read: &Read
     }
     let recorded: Vec<String> = means.keys().cloned().collect();
     for (signal, value) in basis.constants {
-        let constant = motion::Averaging::constant(signal, *value, clock.samples, clock.step_s, checks);
+        let constant =
+            motion::Averaging::constant(signal, *value, clock.samples, clock.step_s, checks);
         if let Some(constant) = constant {
             means.entry(signal.clone()).or_insert(constant);
         }
@@ -239,18 +310,34 @@ pub fn judge(stretch: &Surveyed, flowed: Vec<Flowed>, basis: &Basis, read: &Read
     let examine = |set_right: &dyn Fn(&mut Record)| {
         let count = clock.samples.div_ceil(PART);
         let part = |i: usize| {
-            let mut record = read(&compatibility::signals(), i * PART..((i + 1) * PART).min(clock.samples))?;
+            let mut record = read(
+                &compatibility::signals(),
+                i * PART..((i + 1) * PART).min(clock.samples),
+            )?;
             set_right(&mut record);
             Some(record)
         };
         let settings = &basis.settings.compatibility;
         let parts = (0..count).filter_map(part);
-        compatibility::examine(parts, count, basis.channels, &recorded, basis.aircraft, settings)
+        compatibility::examine(
+            parts,
+            count,
+            basis.channels,
+            &recorded,
+            basis.aircraft,
+            settings,
+        )
     };
     let (judged, findings) = reconciled(&blocks, judge, examine);
     if let Some(accusation) = &judged.accusation {
-        let besides = findings.accusations().map(|a| format!(". Besides, {a}")).unwrap_or_default();
-        let spoilt = refused((accusation.place.clone(), format!("{}{besides}", accusation.reason)));
+        let besides = findings
+            .accusations()
+            .map(|a| format!(". Besides, {a}"))
+            .unwrap_or_default();
+        let spoilt = refused((
+            accusation.place.clone(),
+            format!("{}{besides}", accusation.reason),
+        ));
         if basis.settings.on_failed_check == OnFailedCheck::Refuse && accusation.required {
             return Err(spoilt);
         }
@@ -314,7 +401,12 @@ fn together(id: &str, problems: &[Problem]) -> Problem {
 type Spoilt = (String, String);
 
 fn problem(flight_id: &str, place: String, reason: String) -> Problem {
-    Problem { stage: "ingest".to_owned(), flight_id: flight_id.to_owned(), place, reason }
+    Problem {
+        stage: "ingest".to_owned(),
+        flight_id: flight_id.to_owned(),
+        place,
+        reason,
+    }
 }
 
 /// What the relations say about the channels of a record.
@@ -330,7 +422,14 @@ impl Judged {
     fn of(flight_id: &str, blocks: &motion::Blocks, basis: &Basis, recorded: &[String]) -> Judged {
         let settings = &basis.settings.checks;
         let found = checks::all(blocks, basis.aircraft, settings);
-        let guilty = guilt::find(blocks, &found, basis.channels, recorded, basis.aircraft, settings);
+        let guilty = guilt::find(
+            blocks,
+            &found,
+            basis.channels,
+            recorded,
+            basis.aircraft,
+            settings,
+        );
         Judged {
             checks: found.iter().map(|c| c.row(flight_id)).collect(),
             cleared: checks::cleared(&found),
@@ -342,7 +441,9 @@ impl Judged {
     /// Multiplies the guilty signals by what sets them right.
     fn set_right(&self, record: &mut Record) {
         for guilty in &self.guilty {
-            if let (Some(factor), Some(series)) = (guilty.factor, record.signals.get_mut(&guilty.signal)) {
+            if let (Some(factor), Some(series)) =
+                (guilty.factor, record.signals.get_mut(&guilty.signal))
+            {
                 series.values.iter_mut().for_each(|v| *v *= factor);
             }
         }
@@ -393,15 +494,20 @@ fn channel_rows(
         wraps: done.wraps,
         quantisation: done.quantisation,
         noise: done.noise,
-        verdict: findings.verdict(&channel.signal).unwrap_or_else(|| judged.verdict(&channel.signal)),
+        verdict: findings
+            .verdict(&channel.signal)
+            .unwrap_or_else(|| judged.verdict(&channel.signal)),
         ..row(name, channel)
     };
     // A lost frame's time is known all the same: it is a step after the one before.
-    let time = channels.iter().find(|(_, c)| c.signal == TIME).map(|(name, channel)| ChannelRow {
-        bridged: clock.samples - clock.rows,
-        noise: Some(clock.jitter_s),
-        ..row(name, channel)
-    });
+    let time = channels
+        .iter()
+        .find(|(_, c)| c.signal == TIME)
+        .map(|(name, channel)| ChannelRow {
+            bridged: clock.samples - clock.rows,
+            noise: Some(clock.jitter_s),
+            ..row(name, channel)
+        });
     let mut rows: Vec<ChannelRow> = done.iter().map(of_channel).chain(time).collect();
     rows.sort_by(|a, b| a.channel.cmp(&b.channel));
     rows

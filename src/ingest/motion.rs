@@ -47,7 +47,13 @@ impl Averaging {
     #[must_use]
     pub fn of(signal: &str, step_s: f64, settings: &Checks) -> Option<Averaging> {
         let length = block_length(step_s, settings);
-        USED.contains(&signal).then(|| Averaging { length, sum: 0.0, known: 0, seen: 0, means: Vec::new() })
+        USED.contains(&signal).then(|| Averaging {
+            length,
+            sum: 0.0,
+            known: 0,
+            seen: 0,
+            means: Vec::new(),
+        })
     }
 
     /// The next samples.
@@ -62,7 +68,11 @@ impl Averaging {
             self.seen += now.len();
             values = later;
             if self.seen == self.length {
-                let mean = if 2 * self.known >= self.length { self.sum / self.known as f64 } else { f64::NAN };
+                let mean = if 2 * self.known >= self.length {
+                    self.sum / self.known as f64
+                } else {
+                    f64::NAN
+                };
                 self.means.push(mean);
                 (self.sum, self.known, self.seen) = (0.0, 0, 0);
             }
@@ -71,7 +81,13 @@ impl Averaging {
 
     /// The same for a signal that is one value throughout.
     #[must_use]
-    pub fn constant(signal: &str, value: f64, samples: usize, step_s: f64, settings: &Checks) -> Option<Averaging> {
+    pub fn constant(
+        signal: &str,
+        value: f64,
+        samples: usize,
+        step_s: f64,
+        settings: &Checks,
+    ) -> Option<Averaging> {
         let mut averaging = Averaging::of(signal, step_s, settings)?;
         averaging.means = vec![value; samples / averaging.length];
         Some(averaging)
@@ -94,12 +110,22 @@ pub struct Blocks {
 impl Blocks {
     /// Of signals averaged over all samples of a record.
     #[must_use]
-    pub fn of(averaged: BTreeMap<String, Averaging>, samples: usize, step_s: f64, settings: &Checks) -> Blocks {
+    pub fn of(
+        averaged: BTreeMap<String, Averaging>,
+        samples: usize,
+        step_s: f64,
+        settings: &Checks,
+    ) -> Blocks {
         let length = block_length(step_s, settings);
         let mut averaged = averaged;
-        let mut value = |name: &&'static str| Some((*name, (Arc::new(averaged.remove(*name)?.means), 1.0)));
+        let mut value =
+            |name: &&'static str| Some((*name, (Arc::new(averaged.remove(*name)?.means), 1.0)));
         let values = USED.iter().filter_map(&mut value).collect();
-        Blocks { block_s: length as f64 * step_s, count: samples / length, values }
+        Blocks {
+            block_s: length as f64 * step_s,
+            count: samples / length,
+            values,
+        }
     }
 
     pub fn has(&self, signal: &str) -> bool {
@@ -110,7 +136,9 @@ impl Blocks {
     pub fn still(&self, signal: &str) -> bool {
         let means = self.values.get(signal).map(|(means, _)| means.iter());
         let mut known = means.into_iter().flatten().filter(|v| v.is_finite());
-        known.next().is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
+        known
+            .next()
+            .is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
     }
 
     /// Whether airspeed, dynamic pressure or Mach number say for most of the record that the aircraft is faster than this,
@@ -119,9 +147,17 @@ impl Blocks {
         // Of this velocity at sea level: higher up it takes more of it.
         let (density, sound) = atmosphere(0.0);
         let pressure = 0.5 * density * faster_ft_s * faster_ft_s;
-        let levels = [(signal::VELOCITY, faster_ft_s), (signal::QBAR, pressure), (signal::MACH, faster_ft_s / sound)];
+        let levels = [
+            (signal::VELOCITY, faster_ft_s),
+            (signal::QBAR, pressure),
+            (signal::MACH, faster_ft_s / sound),
+        ];
         let mostly = |(signal, level): (&str, f64)| {
-            let known = || (0..self.count).map(|k| self.at(signal, k)).filter(|v| v.is_finite());
+            let known = || {
+                (0..self.count)
+                    .map(|k| self.at(signal, k))
+                    .filter(|v| v.is_finite())
+            };
             2 * known().filter(|v| v.abs() > level).count() > known().count()
         };
         levels.into_iter().any(mostly)
@@ -148,7 +184,10 @@ impl Blocks {
     }
 
     fn at(&self, signal: &str, block: usize) -> f64 {
-        let value = self.values.get(signal).and_then(|(means, factor)| Some(means.get(block)? * factor));
+        let value = self
+            .values
+            .get(signal)
+            .and_then(|(means, factor)| Some(means.get(block)? * factor));
         value.unwrap_or(f64::NAN)
     }
 }
@@ -191,11 +230,24 @@ impl Motion {
             return None;
         }
         let rates = [angle(signal::P), angle(signal::Q), angle(signal::R)];
-        let cg = Position { x_ft: at(signal::X_CG), y_ft: at(signal::Y_CG), z_ft: at(signal::Z_CG) };
-        let read = Flow { alpha: angle(signal::ALPHA_VANE), beta: angle(signal::BETA_VANE), velocity, rates };
+        let cg = Position {
+            x_ft: at(signal::X_CG),
+            y_ft: at(signal::Y_CG),
+            z_ft: at(signal::Z_CG),
+        };
+        let read = Flow {
+            alpha: angle(signal::ALPHA_VANE),
+            beta: angle(signal::BETA_VANE),
+            velocity,
+            rates,
+        };
         let flow = aircraft.sensors.flow_at_cg(&read, cg);
         let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
-        let (theta, phi, altitude) = (angle(signal::THETA), angle(signal::PHI), at(signal::ALTITUDE));
+        let (theta, phi, altitude) = (
+            angle(signal::THETA),
+            angle(signal::PHI),
+            at(signal::ALTITUDE),
+        );
         let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
         let g = gravity_ft_s2(aircraft.latitude_deg, altitude);
         let (density, sound) = atmosphere(altitude);
@@ -228,7 +280,11 @@ impl Motion {
     /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance beside the change of the velocity.
     pub fn turning(&self) -> [f64; 3] {
         let turned = cross(self.rates, self.along);
-        [turned[0] - self.gravity[0], turned[1] - self.gravity[1], turned[2] - self.gravity[2]]
+        [
+            turned[0] - self.gravity[0],
+            turned[1] - self.gravity[1],
+            turned[2] - self.gravity[2],
+        ]
     }
 
     /// ω × (ω × arm), ft/s².
@@ -250,7 +306,11 @@ impl Motion {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
@@ -265,7 +325,10 @@ pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
     } else {
         22_632.06 * (-(h - 11_000.0) / 6_341.62).exp()
     };
-    (pressure / (GAS * temperature) / KG_M3, (1.4 * GAS * temperature).sqrt() / FT)
+    (
+        pressure / (GAS * temperature) / KG_M3,
+        (1.4 * GAS * temperature).sqrt() / FT,
+    )
 }
 
 #[cfg(test)]
@@ -275,9 +338,11 @@ mod tests {
 
     #[test]
     fn the_atmosphere_is_the_standard_one() {
-        for (altitude, density, sound) in
-            [(0.0, 2.376_9e-3, 1116.45), (25_000.0, 1.065_5e-3, 1016.1), (45_000.0, 4.622_7e-4, 968.08)]
-        {
+        for (altitude, density, sound) in [
+            (0.0, 2.376_9e-3, 1116.45),
+            (25_000.0, 1.065_5e-3, 1016.1),
+            (45_000.0, 4.622_7e-4, 968.08),
+        ] {
             let (rho, a) = atmosphere(altitude);
             // The tables are over geometric altitude, the formula takes it for geopotential.
             assert_relative_eq!(rho, density, max_relative = 5e-3);
@@ -287,7 +352,10 @@ mod tests {
 
     #[test]
     fn a_block_with_fewer_than_half_its_samples_has_no_mean() {
-        let settings = Checks { block_s: 0.1, ..Checks::default() };
+        let settings = Checks {
+            block_s: 0.1,
+            ..Checks::default()
+        };
         let mut averaging = Averaging::of(signal::Q, 0.025, &settings).unwrap();
         averaging.push(&[1.0, f64::NAN, f64::NAN]);
         averaging.push(&[f64::NAN, 1.0, f64::NAN, 3.0, f64::NAN, 7.0]);

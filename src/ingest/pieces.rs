@@ -71,7 +71,10 @@ pub struct Scan {
 impl Scan {
     #[must_use]
     pub fn of_file(file: usize) -> Scan {
-        Scan { file, ..Scan::default() }
+        Scan {
+            file,
+            ..Scan::default()
+        }
     }
 
     /// The next times, s.
@@ -106,7 +109,11 @@ impl Scan {
             self.begin();
         }
         let (sum, count) = self.whole;
-        self.found.step_s = if count > 0.0 { sum / count } else { self.median_s.unwrap_or_default() };
+        self.found.step_s = if count > 0.0 {
+            sum / count
+        } else {
+            self.median_s.unwrap_or_default()
+        };
         self.found
     }
 
@@ -119,7 +126,9 @@ impl Scan {
             return;
         }
         let median = self.median_s.unwrap_or_default();
-        let Some(last) = self.last else { return self.open(row, t) };
+        let Some(last) = self.last else {
+            return self.open(row, t);
+        };
         let step = t - last;
         if step == 0.0 {
             // Left out; the next row begins a piece that goes on.
@@ -135,7 +144,11 @@ impl Scan {
             }
             return self.open(row, t);
         }
-        let full = self.found.pieces.last().is_some_and(|p| p.rows >= LONGEST_PIECE);
+        let full = self
+            .found
+            .pieces
+            .last()
+            .is_some_and(|p| p.rows >= LONGEST_PIECE);
         if step > JUMP_S.max(4.0 * median) || full || self.closed {
             return self.open(row, t);
         }
@@ -151,7 +164,13 @@ impl Scan {
     }
 
     fn open(&mut self, row: usize, t: f64) {
-        self.found.pieces.push(Piece { file: self.file, row, rows: 1, start_s: t, end_s: t });
+        self.found.pieces.push(Piece {
+            file: self.file,
+            row,
+            rows: 1,
+            start_s: t,
+            end_s: t,
+        });
         (self.before_last, self.last, self.closed) = (None, Some(t), false);
     }
 
@@ -167,9 +186,17 @@ impl Scan {
 
 /// The median step of times, s; zero where there are too few.
 pub fn median_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|p| p[1] - p[0]).filter(|s| s.is_finite() && *s > 0.0).collect();
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|p| p[1] - p[0])
+        .filter(|s| s.is_finite() && *s > 0.0)
+        .collect();
     let middle = steps.len() / 2;
-    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    if steps.is_empty() {
+        0.0
+    } else {
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
 }
 
 #[cfg(test)]
@@ -205,11 +232,27 @@ mod tests {
     #[test]
     fn rows_without_a_usable_time_are_left_out_and_counted() {
         let mut times = clock(200);
-        (times[20], times[60], times[90], times[150]) = (f64::NAN, 900.0, times[89], times[150] + 0.6);
+        (times[20], times[60], times[90], times[150]) =
+            (f64::NAN, 900.0, times[89], times[150] + 0.6);
         let found = scan(&times);
-        assert_eq!(rows(&found), [(0, 20), (21, 39), (60, 1), (61, 29), (91, 59), (151, 49)]);
-        assert_eq!(found.unreadable, Unusable { rows: 2, first: Some((0, 21)) });
-        assert_eq!(found.still, Unusable { rows: 1, first: Some((0, 91)) });
+        assert_eq!(
+            rows(&found),
+            [(0, 20), (21, 39), (60, 1), (61, 29), (91, 59), (151, 49)]
+        );
+        assert_eq!(
+            found.unreadable,
+            Unusable {
+                rows: 2,
+                first: Some((0, 21))
+            }
+        );
+        assert_eq!(
+            found.still,
+            Unusable {
+                rows: 1,
+                first: Some((0, 91))
+            }
+        );
     }
 
     #[test]

@@ -64,15 +64,24 @@ impl Relation {
 }
 
 const fn change(state: Term) -> Side {
-    Side { state: Some(state), rate: None }
+    Side {
+        state: Some(state),
+        rate: None,
+    }
 }
 
 const fn integral(rate: Term) -> Side {
-    Side { state: None, rate: Some(rate) }
+    Side {
+        state: None,
+        rate: Some(rate),
+    }
 }
 
 const fn both(state: Term, rate: Term) -> Side {
-    Side { state: Some(state), rate: Some(rate) }
+    Side {
+        state: Some(state),
+        rate: Some(rate),
+    }
 }
 
 /// All relations, attitudes first.
@@ -107,7 +116,9 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
             "phi rate against p, q and r",
             &[s::PHI, s::P, s::Q, s::R, s::THETA],
             change(|m| m.phi),
-            integral(|m| m.rates[0] + m.theta.tan() * (m.rates[1] * m.phi.sin() + m.rates[2] * m.phi.cos())),
+            integral(|m| {
+                m.rates[0] + m.theta.tan() * (m.rates[1] * m.phi.sin() + m.rates[2] * m.phi.cos())
+            }),
         ),
         relation(
             "psi rate against q and r",
@@ -132,7 +143,16 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
     vec![
         relation(
             "normal acceleration against the motion",
-            &[s::AN, s::THETA, s::PHI, s::Q, s::P, s::ALPHA_VANE, s::BETA_VANE, s::VELOCITY],
+            &[
+                s::AN,
+                s::THETA,
+                s::PHI,
+                s::Q,
+                s::P,
+                s::ALPHA_VANE,
+                s::BETA_VANE,
+                s::VELOCITY,
+            ],
             integral(|m| m.an),
             both(
                 |m| -(m.along[2] + m.swing(m.arms[0])[2]) / G0_FT_S2,
@@ -142,7 +162,15 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         ),
         relation(
             "axial acceleration against the motion",
-            &[s::AX, s::THETA, s::Q, s::R, s::ALPHA_VANE, s::BETA_VANE, s::VELOCITY],
+            &[
+                s::AX,
+                s::THETA,
+                s::Q,
+                s::R,
+                s::ALPHA_VANE,
+                s::BETA_VANE,
+                s::VELOCITY,
+            ],
             integral(|m| m.ax),
             both(
                 |m| (m.along[0] + m.swing(m.arms[1])[0]) / G0_FT_S2,
@@ -153,13 +181,25 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         // The sensor is far less noisy than the motion here, so it is the predicting side.
         relation(
             "lateral acceleration of the motion against ay",
-            &[s::AY, s::BETA_VANE, s::R, s::PHI, s::P, s::THETA, s::ALPHA_VANE, s::VELOCITY],
+            &[
+                s::AY,
+                s::BETA_VANE,
+                s::R,
+                s::PHI,
+                s::P,
+                s::THETA,
+                s::ALPHA_VANE,
+                s::VELOCITY,
+            ],
             both(
                 |m| (m.along[1] + m.swing(m.arms[2])[1]) / G0_FT_S2,
                 |m| (m.turning()[1] + m.centripetal(m.arms[2])[1]) / G0_FT_S2,
             ),
             integral(|m| m.ay),
-            Choice::Largest { share: settings.excitation.lateral_share, level: settings.excitation.lateral_g },
+            Choice::Largest {
+                share: settings.excitation.lateral_share,
+                level: settings.excitation.lateral_g,
+            },
         ),
     ]
 }
@@ -179,21 +219,47 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
     vec![
         relation(
             "forward velocity against ax and theta",
-            &[s::VELOCITY, s::AX, s::THETA, s::Q, s::R, s::ALPHA_VANE, s::BETA_VANE],
+            &[
+                s::VELOCITY,
+                s::AX,
+                s::THETA,
+                s::Q,
+                s::R,
+                s::ALPHA_VANE,
+                s::BETA_VANE,
+            ],
             3,
             change(|m| m.along[0]),
             integral(|m| m.force()[0] - m.turning()[0]),
         ),
         relation(
             "side velocity against r, p and phi",
-            &[s::BETA_VANE, s::R, s::VELOCITY, s::P, s::PHI, s::THETA, s::AY, s::ALPHA_VANE],
+            &[
+                s::BETA_VANE,
+                s::R,
+                s::VELOCITY,
+                s::P,
+                s::PHI,
+                s::THETA,
+                s::AY,
+                s::ALPHA_VANE,
+            ],
             2,
             change(|m| m.along[1]),
             integral(|m| m.force()[1] - m.turning()[1]),
         ),
         relation(
             "downward velocity against q and an",
-            &[s::ALPHA_VANE, s::Q, s::VELOCITY, s::AN, s::P, s::THETA, s::PHI, s::BETA_VANE],
+            &[
+                s::ALPHA_VANE,
+                s::Q,
+                s::VELOCITY,
+                s::AN,
+                s::P,
+                s::THETA,
+                s::PHI,
+                s::BETA_VANE,
+            ],
             2,
             change(|m| m.along[2]),
             integral(|m| m.force()[2] - m.turning()[2]),
@@ -215,7 +281,14 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
     vec![
         relation(
             "climb against the flight path",
-            &[s::ALTITUDE, s::VELOCITY, s::ALPHA_VANE, s::THETA, s::PHI, s::BETA_VANE],
+            &[
+                s::ALTITUDE,
+                s::VELOCITY,
+                s::ALPHA_VANE,
+                s::THETA,
+                s::PHI,
+                s::BETA_VANE,
+            ],
             4,
             change(|m| m.altitude),
             integral(Motion::climb),

@@ -78,7 +78,11 @@ pub struct Stuck {
 
 impl Default for Stuck {
     fn default() -> Stuck {
-        Stuck { find: true, least_s: 1.0, most_repeats: 0.5 }
+        Stuck {
+            find: true,
+            least_s: 1.0,
+            most_repeats: 0.5,
+        }
     }
 }
 
@@ -100,7 +104,12 @@ pub struct Spikes {
 
 impl Default for Spikes {
     fn default() -> Spikes {
-        Spikes { remove: true, deviations: 8.0, window_s: 0.5, agreement: 0.5 }
+        Spikes {
+            remove: true,
+            deviations: 8.0,
+            window_s: 0.5,
+            agreement: 0.5,
+        }
     }
 }
 

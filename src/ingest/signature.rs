@@ -28,13 +28,22 @@ pub struct Samples {
 impl Samples {
     #[must_use]
     pub fn of(clock: &Clock) -> Samples {
-        Samples { start_s: clock.start_s, step_s: clock.step_s, next: 0, at: 0, found: BTreeMap::new() }
+        Samples {
+            start_s: clock.start_s,
+            step_s: clock.step_s,
+            next: 0,
+            at: 0,
+            found: BTreeMap::new(),
+        }
     }
 
     /// The time that sample `next` is the first of.
     fn time(&self) -> i64 {
         let time_s = self.start_s + self.next as f64 * self.step_s;
-        #[expect(clippy::cast_possible_truncation, reason = "tens of seconds of a flight")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "tens of seconds of a flight"
+        )]
         let time = (time_s / EVERY_S).round() as i64;
         time
     }
@@ -45,7 +54,11 @@ impl Samples {
             let first_s = (self.start_s / EVERY_S).ceil() * EVERY_S;
             self.next = index((first_s - self.start_s) / self.step_s);
         }
-        while let Some(k) = self.next.checked_sub(self.at).filter(|k| *k < series.values.len()) {
+        while let Some(k) = self
+            .next
+            .checked_sub(self.at)
+            .filter(|k| *k < series.values.len())
+        {
             let time = self.time();
             if series.marks[k] == Mark::Measured {
                 self.found.insert(time, series.values[k].to_bits());
@@ -79,7 +92,12 @@ impl Signature {
     #[must_use]
     pub fn common(&self, other: &Signature) -> Option<(f64, f64, f64)> {
         let others: BTreeMap<i64, u64> = other.0.iter().copied().collect();
-        let mut same: Vec<(i64, u64)> = self.0.iter().filter(|(t, v)| others.get(t) == Some(v)).copied().collect();
+        let mut same: Vec<(i64, u64)> = self
+            .0
+            .iter()
+            .filter(|(t, v)| others.get(t) == Some(v))
+            .copied()
+            .collect();
         let (first, last) = (same.first()?.0, same.last()?.0);
         let share = same.len() as f64 / self.0.len() as f64;
         same.sort_by_key(|(_, v)| *v);
@@ -96,12 +114,20 @@ mod tests {
     /// A signal whose value depends on time alone, recorded from some second on.
     fn signature(from_s: f64, seconds: usize, offset: f64) -> Signature {
         let (samples, step_s) = (40 * seconds, 0.025);
-        let clock = Clock { start_s: from_s, step_s, samples, ..Clock::default() };
+        let clock = Clock {
+            start_s: from_s,
+            step_s,
+            samples,
+            ..Clock::default()
+        };
         let value = |k: usize| (clock.time_s(k) * 40.0).round().sin() + offset;
         let mut signal = Samples::of(&clock);
         for from in (0..samples).step_by(777) {
             let values: Vec<f64> = (from..(from + 777).min(samples)).map(value).collect();
-            signal.push(&Series { marks: vec![Mark::Measured; values.len()], values });
+            signal.push(&Series {
+                marks: vec![Mark::Measured; values.len()],
+                values,
+            });
         }
         Signature::of(std::iter::once(signal))
     }
@@ -115,7 +141,13 @@ mod tests {
 
     #[test]
     fn records_of_other_values_have_nothing_in_common() {
-        assert_eq!(signature(0.0, 200, 0.0).common(&signature(0.0, 200, 0.1)), None);
-        assert_eq!(signature(0.0, 20, 0.0).common(&signature(0.0, 20, 0.0)), None);
+        assert_eq!(
+            signature(0.0, 200, 0.0).common(&signature(0.0, 200, 0.1)),
+            None
+        );
+        assert_eq!(
+            signature(0.0, 20, 0.0).common(&signature(0.0, 20, 0.0)),
+            None
+        );
     }
 }

@@ -24,7 +24,13 @@ pub trait Source: Sync {
     ///
     /// # Errors
     /// Why they cannot be read, in words.
-    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String>;
+    fn read(
+        &self,
+        file: usize,
+        column: &str,
+        rows: Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), String>;
 }
 
 /// Several files in memory.
@@ -42,19 +48,35 @@ impl Source for [RawFlight] {
     }
 
     fn rows(&self, file: usize) -> usize {
-        self.get(file).map_or(0, |f| f.columns.values().map(|c| c.values.len()).max().unwrap_or(0))
+        self.get(file).map_or(0, |f| {
+            f.columns
+                .values()
+                .map(|c| c.values.len())
+                .max()
+                .unwrap_or(0)
+        })
     }
 
     fn has(&self, file: usize, column: &str) -> bool {
-        self.get(file).is_some_and(|f| f.columns.contains_key(column))
+        self.get(file)
+            .is_some_and(|f| f.columns.contains_key(column))
     }
 
     fn unit(&self, file: usize, column: &str) -> Option<&str> {
         self.get(file)?.columns.get(column)?.unit.as_deref()
     }
 
-    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
-        let values = self.get(file).and_then(|f| f.columns.get(column)).and_then(|c| c.values.get(rows));
+    fn read(
+        &self,
+        file: usize,
+        column: &str,
+        rows: Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), String> {
+        let values = self
+            .get(file)
+            .and_then(|f| f.columns.get(column))
+            .and_then(|c| c.values.get(rows));
         sink(values.ok_or_else(|| format!("column `{column}` has no such rows"))?);
         Ok(())
     }

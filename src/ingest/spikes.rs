@@ -32,8 +32,11 @@ const EVERY: usize = 4;
 
 /// What a spike is measured against, and the noise's standard deviation alone.
 pub fn floors(values: &[f64]) -> (f64, f64) {
-    let mut roughness: Vec<f64> =
-        (1..values.len()).step_by(EVERY).map(|k| off_mean(values, k).abs()).filter(|r| r.is_finite()).collect();
+    let mut roughness: Vec<f64> = (1..values.len())
+        .step_by(EVERY)
+        .map(|k| off_mean(values, k).abs())
+        .filter(|r| r.is_finite())
+        .collect();
     if roughness.is_empty() {
         return (0.0, f64::NAN);
     }
@@ -43,24 +46,41 @@ pub fn floors(values: &[f64]) -> (f64, f64) {
 
 /// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floors` says for ranges of samples
 /// what a spike is measured against.
-pub fn remove(values: &mut [f64], step_s: f64, floors: &[(Range<usize>, f64)], settings: &Spikes) -> Vec<usize> {
+pub fn remove(
+    values: &mut [f64],
+    step_s: f64,
+    floors: &[(Range<usize>, f64)],
+    settings: &Spikes,
+) -> Vec<usize> {
     if !settings.remove {
         return Vec::new();
     }
     let window = super::gaps::longest(settings.window_s, step_s).max(4);
     let mut spikes = Vec::new();
     for (range, floor) in floors {
-        let (from, to) = (range.start.max(1), range.end.min(values.len().saturating_sub(1)));
+        let (from, to) = (
+            range.start.max(1),
+            range.end.min(values.len().saturating_sub(1)),
+        );
         let around = values.get(from.saturating_sub(1)..=to).unwrap_or_default();
-        for (k, three) in around.windows(3).enumerate().map(|(i, three)| (from + i, three)) {
+        for (k, three) in around
+            .windows(3)
+            .enumerate()
+            .map(|(i, three)| (from + i, three))
+        {
             let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
             // Also false beside a gap.
-            if off_mean > settings.deviations * floor && stands_off(values, k, *floor, window, settings) {
+            if off_mean > settings.deviations * floor
+                && stands_off(values, k, *floor, window, settings)
+            {
                 spikes.push(k);
             }
         }
     }
-    let repaired: Vec<f64> = spikes.iter().map(|&k| values[k] - off_mean(values, k)).collect();
+    let repaired: Vec<f64> = spikes
+        .iter()
+        .map(|&k| values[k] - off_mean(values, k))
+        .collect();
     for (&k, value) in spikes.iter().zip(repaired) {
         values[k] = value;
     }
@@ -69,11 +89,16 @@ pub fn remove(values: &mut [f64], step_s: f64, floors: &[(Range<usize>, f64)], s
 
 /// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike does.
 fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Spikes) -> bool {
-    let Some(height) = height(values, k) else { return false };
-    let stands_off = |noise: f64| {
-        height.off_mean > settings.deviations * noise && height.off_lines > LINES * settings.deviations * noise
+    let Some(height) = height(values, k) else {
+        return false;
     };
-    let lines_meet = |noise: f64| height.lines_miss <= settings.agreement * height.off_mean + LINES_NOISE * noise;
+    let stands_off = |noise: f64| {
+        height.off_mean > settings.deviations * noise
+            && height.off_lines > LINES * settings.deviations * noise
+    };
+    let lines_meet = |noise: f64| {
+        height.lines_miss <= settings.agreement * height.off_mean + LINES_NOISE * noise
+    };
     // The noise around a sample takes long to find; of most samples the least and the largest that it could be tell enough.
     if !stands_off(floor) || !lines_meet(height.off_mean / settings.deviations) {
         return false;
@@ -84,7 +109,11 @@ fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Sp
 
 /// A sample minus the mean of its neighbours; NaN at the ends and beside a gap.
 fn off_mean(values: &[f64], k: usize) -> f64 {
-    match (k.checked_sub(1).and_then(|i| values.get(i)), values.get(k), values.get(k + 1)) {
+    match (
+        k.checked_sub(1).and_then(|i| values.get(i)),
+        values.get(k),
+        values.get(k + 1),
+    ) {
         (Some(before), Some(x), Some(after)) => x - 0.5 * (before + after),
         _ => f64::NAN,
     }
@@ -101,20 +130,31 @@ struct Height {
 
 /// How a sample stands off; none beside a gap. Where only one sample is left on a side, its line is level.
 fn height(values: &[f64], k: usize) -> Option<Height> {
-    let at = |i: Option<usize>| i.and_then(|i| values.get(i)).copied().filter(|v| v.is_finite());
+    let at = |i: Option<usize>| {
+        i.and_then(|i| values.get(i))
+            .copied()
+            .filter(|v| v.is_finite())
+    };
     let (x, before, after) = (at(Some(k))?, at(k.checked_sub(1))?, at(Some(k + 1))?);
     let left = 2.0 * before - at(k.checked_sub(2)).unwrap_or(before);
     let right = 2.0 * after - at(Some(k + 2)).unwrap_or(after);
     let off_mean = x - 0.5 * (before + after);
     let off_lines = ((x - left) * off_mean.signum()).min((x - right) * off_mean.signum());
-    Some(Height { off_mean: off_mean.abs(), off_lines, lines_miss: (left - right).abs() })
+    Some(Height {
+        off_mean: off_mean.abs(),
+        off_lines,
+        lines_miss: (left - right).abs(),
+    })
 }
 
 /// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left out.
 fn local(values: &[f64], k: usize, window: usize) -> f64 {
     let around = k.saturating_sub(window)..(k + window + 1).min(values.len());
-    let mut roughness: Vec<f64> =
-        around.filter(|i| i.abs_diff(k) > 1).map(|i| off_mean(values, i).abs()).filter(|r| r.is_finite()).collect();
+    let mut roughness: Vec<f64> = around
+        .filter(|i| i.abs_diff(k) > 1)
+        .map(|i| off_mean(values, i).abs())
+        .filter(|r| r.is_finite())
+        .collect();
     MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5)
 }
 
@@ -122,16 +162,28 @@ fn local(values: &[f64], k: usize, window: usize) -> f64 {
 /// nothing. A low quantile, as a repaired or converted sample may lie off the grid; a channel that hardly ever changes has
 /// too few of them to say.
 fn rounding(values: &[f64], mut roughness: Vec<f64>) -> f64 {
-    let largest = values.iter().step_by(EVERY).map(|v| v.abs()).fold(0.0, f64::max);
+    let largest = values
+        .iter()
+        .step_by(EVERY)
+        .map(|v| v.abs())
+        .fold(0.0, f64::max);
     roughness.retain(|r| *r > EXACT * largest);
-    if roughness.len() < FEW_STEPS { 0.0 } else { quantile(&mut roughness, 0.05) }
+    if roughness.len() < FEW_STEPS {
+        0.0
+    } else {
+        quantile(&mut roughness, 0.05)
+    }
 }
 
 fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the length")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of the length"
+    )]
     let rank = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
@@ -155,14 +207,18 @@ mod tests {
         let mut state = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678;
         let mut sum = 0.0;
         for _ in 0..12 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             sum += (state >> 11) as f64 / (1u64 << 53) as f64;
         }
         sum - 6.0
     }
 
     fn noisy(samples: usize, sd: f64, signal: impl Fn(f64) -> f64) -> Vec<f64> {
-        (0..samples).map(|k| signal(k as f64 * 0.025) + sd * noise(k)).collect()
+        (0..samples)
+            .map(|k| signal(k as f64 * 0.025) + sd * noise(k))
+            .collect()
     }
 
     #[test]
@@ -219,7 +275,13 @@ mod tests {
 
     #[test]
     fn a_vibration_is_its_own_noise() {
-        let vibration = |t: f64| if (4.0..6.0).contains(&t) { (97.0 * t).sin() } else { 0.0 };
+        let vibration = |t: f64| {
+            if (4.0..6.0).contains(&t) {
+                (97.0 * t).sin()
+            } else {
+                0.0
+            }
+        };
         assert!(spikes(&noisy(400, 0.01, vibration)).is_empty());
     }
 

@@ -51,7 +51,10 @@ pub fn plan(
     let mut files: Vec<&Scanned> = files.iter().filter(|f| !f.pieces.is_empty()).collect();
     let starts = |f: &&Scanned| f.pieces.first().map_or(0.0, |p| p.start_s);
     files.sort_by(|a, b| starts(a).total_cmp(&starts(b)));
-    let all: Vec<(&Piece, f64)> = files.iter().flat_map(|f| f.pieces.iter().map(|p| (p, f.step_s))).collect();
+    let all: Vec<(&Piece, f64)> = files
+        .iter()
+        .flat_map(|f| f.pieces.iter().map(|p| (p, f.step_s)))
+        .collect();
     let mut plan = Plan::default();
     for (i, (piece, step_s)) in all.iter().enumerate() {
         let next = all.get(i + 1).map(|(p, _)| *p);
@@ -82,7 +85,10 @@ impl Plan {
             if short && !next_fits {
                 self.stray.push(*piece);
             } else if gap_s > settings.longest_clock_gap_s {
-                let because = format!("the clock lacks {gap_s:.1} s from {end_s:.1} s to {:.1} s", piece.start_s);
+                let because = format!(
+                    "the clock lacks {gap_s:.1} s from {end_s:.1} s to {:.1} s",
+                    piece.start_s
+                );
                 self.begin(piece, step_s, Some(because));
             } else if too_long {
                 let because = format!("a stretch is at most {} h long", settings.longest_stretch_h);
@@ -114,8 +120,17 @@ impl Plan {
     }
 
     fn begin(&mut self, piece: &Piece, step_s: f64, because: Option<String>) {
-        let pieces = vec![Used { piece: *piece, after_s: f64::NEG_INFINITY }];
-        self.stretches.push(Stretch { pieces, step_s, start_s: piece.start_s, end_s: piece.end_s, because });
+        let pieces = vec![Used {
+            piece: *piece,
+            after_s: f64::NEG_INFINITY,
+        }];
+        self.stretches.push(Stretch {
+            pieces,
+            step_s,
+            start_s: piece.start_s,
+            end_s: piece.end_s,
+            because,
+        });
     }
 
     /// The stretch that holds rows of this piece already.
@@ -126,7 +141,8 @@ impl Plan {
     ) -> Result<Option<usize>, String> {
         for (i, stretch) in self.stretches.iter().enumerate().rev() {
             for used in &stretch.pieces {
-                let overlap = used.piece.start_s <= piece.end_s && piece.start_s <= used.piece.end_s;
+                let overlap =
+                    used.piece.start_s <= piece.end_s && piece.start_s <= used.piece.end_s;
                 if overlap && same(&used.piece, piece)? {
                     return Ok(Some(i));
                 }
@@ -138,7 +154,10 @@ impl Plan {
 
 impl Stretch {
     fn go_on(&mut self, piece: &Piece, after_s: f64) {
-        self.pieces.push(Used { piece: *piece, after_s });
+        self.pieces.push(Used {
+            piece: *piece,
+            after_s,
+        });
         self.end_s = self.end_s.max(piece.end_s);
     }
 }
@@ -155,7 +174,11 @@ mod tests {
             start_s,
             end_s: start_s + 9.975,
         };
-        Scanned { pieces: pieces.iter().map(piece).collect(), step_s: 0.025, ..Scanned::default() }
+        Scanned {
+            pieces: pieces.iter().map(piece).collect(),
+            step_s: 0.025,
+            ..Scanned::default()
+        }
     }
 
     fn planned(files: &[Scanned], same: bool) -> Plan {
@@ -167,7 +190,11 @@ mod tests {
     fn files_in_any_order_are_one_stretch() {
         let plan = planned(&[file(&[(0, 0, 10.0)]), file(&[(1, 0, 0.0)])], false);
         assert_eq!(plan.stretches.len(), 1);
-        let order: Vec<usize> = plan.stretches[0].pieces.iter().map(|u| u.piece.file).collect();
+        let order: Vec<usize> = plan.stretches[0]
+            .pieces
+            .iter()
+            .map(|u| u.piece.file)
+            .collect();
         assert_eq!(order, [1, 0]);
     }
 
@@ -185,14 +212,23 @@ mod tests {
         let plan = planned(&[file(&[(0, 0, 0.0), (0, 400, 0.0)])], false);
         assert_eq!(plan.stretches.len(), 2);
         let because = plan.stretches[1].because.clone().unwrap();
-        assert_eq!(because, "time jumps back from 9.975 s to 0.000 s in row 401 of part-0");
+        assert_eq!(
+            because,
+            "time jumps back from 9.975 s to 0.000 s in row 401 of part-0"
+        );
     }
 
     #[test]
     fn a_long_gap_begins_a_stretch_and_a_short_one_does_not() {
-        let plan = planned(&[file(&[(0, 0, 0.0), (0, 400, 30.0), (0, 800, 200.0)])], false);
+        let plan = planned(
+            &[file(&[(0, 0, 0.0), (0, 400, 30.0), (0, 800, 200.0)])],
+            false,
+        );
         assert_eq!(plan.stretches.len(), 2);
-        assert_eq!(plan.stretches[1].because.as_deref(), Some("the clock lacks 160.0 s from 40.0 s to 200.0 s"));
+        assert_eq!(
+            plan.stretches[1].because.as_deref(),
+            Some("the clock lacks 160.0 s from 40.0 s to 200.0 s")
+        );
     }
 
     #[test]

@@ -52,7 +52,11 @@ pub fn survey(
     settings: &Settings,
 ) -> Result<Survey, Problem> {
     let refused = |(place, reason): Spoilt| problem(source.flight_id(), place, reason);
-    let surveyor = Surveyor { source, channels, settings };
+    let surveyor = Surveyor {
+        source,
+        channels,
+        settings,
+    };
     surveyor.survey().map_err(refused)
 }
 
@@ -81,7 +85,12 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
         }
         // The most channels, then the highest rate.
         let step = |s: &Stream| s.files.first().map_or(f64::INFINITY, |f| f.step_s);
-        streams.sort_by(|a, b| b.columns.len().cmp(&a.columns.len()).then(step(a).total_cmp(&step(b))));
+        streams.sort_by(|a, b| {
+            b.columns
+                .len()
+                .cmp(&a.columns.len())
+                .then(step(a).total_cmp(&step(b)))
+        });
         let mut survey = Survey::default();
         for stream in &streams {
             self.tell(stream, &mut survey.problems)?;
@@ -94,29 +103,52 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
     }
 
     fn at_time(&self, reason: String) -> Spoilt {
-        let name = self.channels.iter().find(|(_, c)| c.signal == TIME).map_or("", |(name, _)| name.as_str());
+        let name = self
+            .channels
+            .iter()
+            .find(|(_, c)| c.signal == TIME)
+            .map_or("", |(name, _)| name.as_str());
         (format!("channel `{name}`"), reason)
     }
 
     /// The time channel of a file with the factor that makes seconds of it.
     fn time(&self, file: usize) -> Result<(&str, f64), Spoilt> {
-        let mut clocks = self.channels.iter().filter(|(_, c)| c.signal == TIME).peekable();
+        let mut clocks = self
+            .channels
+            .iter()
+            .filter(|(_, c)| c.signal == TIME)
+            .peekable();
         if clocks.peek().is_none() {
             let reason = format!("no channel is mapped to `{TIME}`; the record has no clock");
             return Err(("channel map".to_owned(), reason));
         }
         let Some((name, channel)) = clocks.find(|(name, _)| self.source.has(file, name)) else {
-            let names: Vec<String> =
-                self.channels.iter().filter(|(_, c)| c.signal == TIME).map(|(name, _)| format!("`{name}`")).collect();
-            return Err(self.at_time(format!("the time channel {} is not in the file", names.join(", "))));
+            let names: Vec<String> = self
+                .channels
+                .iter()
+                .filter(|(_, c)| c.signal == TIME)
+                .map(|(name, _)| format!("`{name}`"))
+                .collect();
+            return Err(self.at_time(format!(
+                "the time channel {} is not in the file",
+                names.join(", ")
+            )));
         };
-        let factor = Unit::parse(&channel.unit).ok().and_then(|u| u.factor_to(Unit::of_signal(TIME)));
-        let factor = factor.ok_or_else(|| self.at_time(format!("`{}` is not a unit of time", channel.unit)))?;
+        let factor = Unit::parse(&channel.unit)
+            .ok()
+            .and_then(|u| u.factor_to(Unit::of_signal(TIME)));
+        let factor = factor
+            .ok_or_else(|| self.at_time(format!("`{}` is not a unit of time", channel.unit)))?;
         Ok((name, factor * channel.sign * channel.scale))
     }
 
     /// Hands over the times of some rows of a file, s.
-    fn times(&self, file: usize, rows: std::ops::Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), Spoilt> {
+    fn times(
+        &self,
+        file: usize,
+        rows: std::ops::Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), Spoilt> {
         let (name, factor) = self.time(file)?;
         let mut times = Vec::new();
         let mut scaled = |values: &[f64]| {
@@ -124,7 +156,9 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
             times.extend(values.iter().map(|t| t * factor));
             sink(&times);
         };
-        self.source.read(file, name, rows, &mut scaled).map_err(|reason| (self.source.name(file), reason))
+        self.source
+            .read(file, name, rows, &mut scaled)
+            .map_err(|reason| (self.source.name(file), reason))
     }
 
     /// The files by what they hold; each is scanned.
@@ -132,10 +166,14 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
         let mut streams: Vec<Stream> = Vec::new();
         for file in 0..self.source.files() {
             let mapped = self.channels.iter().filter(|(_, c)| c.signal != TIME);
-            let columns: BTreeSet<String> =
-                mapped.map(|(name, _)| name.clone()).filter(|name| self.source.has(file, name)).collect();
+            let columns: BTreeSet<String> = mapped
+                .map(|(name, _)| name.clone())
+                .filter(|name| self.source.has(file, name))
+                .collect();
             let mut scan = Scan::of_file(file);
-            self.times(file, 0..self.source.rows(file), &mut |times| scan.push(times))?;
+            self.times(file, 0..self.source.rows(file), &mut |times| {
+                scan.push(times)
+            })?;
             let pieces = scan.finish();
             let half = |stream: &&mut Stream| {
                 let common = stream.columns.intersection(&columns).count();
@@ -146,24 +184,42 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
                     stream.columns.extend(columns);
                     stream.files.push(pieces);
                 }
-                None => streams.push(Stream { columns, files: vec![pieces], plan: Plan::default() }),
+                None => streams.push(Stream {
+                    columns,
+                    files: vec![pieces],
+                    plan: Plan::default(),
+                }),
             }
         }
         Ok(streams)
     }
 
     /// Whether the rows of the second piece that have times of the first are its rows again.
-    fn same(&self, columns: &BTreeSet<String>, first: &Piece, second: &Piece) -> Result<bool, String> {
-        let common = |name: &&String| self.source.has(first.file, name) && self.source.has(second.file, name);
+    fn same(
+        &self,
+        columns: &BTreeSet<String>,
+        first: &Piece,
+        second: &Piece,
+    ) -> Result<bool, String> {
+        let common = |name: &&String| {
+            self.source.has(first.file, name) && self.source.has(second.file, name)
+        };
         let from_s = first.start_s.max(second.start_s);
-        let (a, b) = (self.rows_from(first, from_s)?, self.rows_from(second, from_s)?);
+        let (a, b) = (
+            self.rows_from(first, from_s)?,
+            self.rows_from(second, from_s)?,
+        );
         let (mut same, mut all) = (0_usize, 0_usize);
         let pairs = meeting(&a, &b);
         for name in columns.iter().filter(common) {
             let [x, y] = [(first, &a), (second, &b)].map(|(piece, rows)| {
                 let mut values = Vec::new();
                 let range = rows.row..rows.row + rows.times.len();
-                self.source.read(piece.file, name, range, &mut |v| values.extend_from_slice(v)).map(|()| values)
+                self.source
+                    .read(piece.file, name, range, &mut |v| {
+                        values.extend_from_slice(v)
+                    })
+                    .map(|()| values)
             });
             let (x, y) = (x?, y?);
             let still = x.windows(2).all(|p| p[0].to_bits() == p[1].to_bits());
@@ -181,7 +237,13 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
 
     /// The first rows of a piece at or after a time.
     fn rows_from(&self, piece: &Piece, from_s: f64) -> Result<Rows, String> {
-        let (mut found, mut row) = (Rows { row: piece.row, times: Vec::new() }, piece.row);
+        let (mut found, mut row) = (
+            Rows {
+                row: piece.row,
+                times: Vec::new(),
+            },
+            piece.row,
+        );
         let mut take = |times: &[f64]| {
             for time in times {
                 if *time >= from_s && found.times.len() < COMPARED {
@@ -193,7 +255,8 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
                 row += 1;
             }
         };
-        self.times(piece.file, piece.row..piece.row + piece.rows, &mut take).map_err(|(_, reason)| reason)?;
+        self.times(piece.file, piece.row..piece.row + piece.rows, &mut take)
+            .map_err(|(_, reason)| reason)?;
         Ok(found)
     }
 
@@ -204,16 +267,27 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
         let mut unreadable = Unusable::default();
         let mut still = Unusable::default();
         for file in &stream.files {
-            for (sum, own) in [(&mut unreadable, &file.unreadable), (&mut still, &file.still)] {
+            for (sum, own) in [
+                (&mut unreadable, &file.unreadable),
+                (&mut still, &file.still),
+            ] {
                 sum.rows += own.rows;
                 sum.first = sum.first.or(own.first);
             }
         }
-        stream.plan.stray.iter().for_each(|p| (0..p.rows).for_each(|i| unreadable.add(p.file, p.row + i)));
+        stream
+            .plan
+            .stray
+            .iter()
+            .for_each(|p| (0..p.rows).for_each(|i| unreadable.add(p.file, p.row + i)));
         let first = |u: &Unusable| {
-            u.first.map(|(file, row)| format!("row {row} of {}", self.source.name(file))).unwrap_or_default()
+            u.first
+                .map(|(file, row)| format!("row {row} of {}", self.source.name(file)))
+                .unwrap_or_default()
         };
-        if unreadable.rows + still.rows > 0 && (unreadable.rows + still.rows) as f64 > MOST_UNUSABLE * rows as f64 {
+        if unreadable.rows + still.rows > 0
+            && (unreadable.rows + still.rows) as f64 > MOST_UNUSABLE * rows as f64
+        {
             let (no, stands) = (unreadable.rows, still.rows);
             return Err(self.at_time(format!(
                 "of {rows} rows {no} have a time that is not a number or fits nowhere and {stands} one that stands \
@@ -230,10 +304,18 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
         }
         if still.rows > 0 {
             let (n, first) = (still.rows, first(&still));
-            tell(self.at_time(format!("time stands still in {n} rows, the first is {first}; they are left out")));
+            tell(self.at_time(format!(
+                "time stands still in {n} rows, the first is {first}; they are left out"
+            )));
         }
         for piece in &stream.plan.again {
-            let Piece { row, rows, start_s, end_s, file } = *piece;
+            let Piece {
+                row,
+                rows,
+                start_s,
+                end_s,
+                file,
+            } = *piece;
             tell((
                 self.source.name(file),
                 format!(
@@ -251,34 +333,60 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
         let id = self.source.flight_id();
         let others: Vec<Vec<Clock>> = others
             .iter()
-            .map(|stream| stream.plan.stretches.iter().map(|s| self.clock(s)).collect::<Result<_, _>>())
+            .map(|stream| {
+                stream
+                    .plan
+                    .stretches
+                    .iter()
+                    .map(|s| self.clock(s))
+                    .collect::<Result<_, _>>()
+            })
             .collect::<Result<_, Spoilt>>()?;
         let count = main.plan.stretches.len();
         for (i, stretch) in main.plan.stretches.iter().enumerate() {
-            let own = if i == 0 { id.to_owned() } else { format!("{id}.{}", i + 1) };
+            let own = if i == 0 {
+                id.to_owned()
+            } else {
+                format!("{id}.{}", i + 1)
+            };
             if count > 1 && stretch.end_s - stretch.start_s < self.settings.least_stretch_s {
                 let reason = format!(
                     "the stretch from {:.3} s to {:.3} s is shorter than least_stretch_s = {} s; it is left out",
                     stretch.start_s, stretch.end_s, self.settings.least_stretch_s
                 );
-                survey.problems.push(problem(id, format!("stretch `{own}`"), reason));
+                survey
+                    .problems
+                    .push(problem(id, format!("stretch `{own}`"), reason));
                 continue;
             }
             let clock = self.clock(stretch)?;
             if let Some(because) = &stretch.because {
                 let reason = format!("{because}: what follows is a record of its own, `{own}`");
-                survey.problems.push(problem(id, format!("stretch `{own}`"), reason));
+                survey
+                    .problems
+                    .push(problem(id, format!("stretch `{own}`"), reason));
             }
             let beside = |clocks: &Vec<Clock>| -> Vec<Clock> {
-                if clocks.len() == count { clocks.get(i).cloned().into_iter().collect() } else { clocks.clone() }
+                if clocks.len() == count {
+                    clocks.get(i).cloned().into_iter().collect()
+                } else {
+                    clocks.clone()
+                }
             };
             let others = others.iter().flat_map(beside).collect();
-            survey.stretches.push(Surveyed { flight_id: own, clock, others });
+            survey.stretches.push(Surveyed {
+                flight_id: own,
+                clock,
+                others,
+            });
         }
         if survey.stretches.is_empty() {
             return Err(self.at_time(match count {
                 0 => "0 rows are no record; at least 2 are needed".to_owned(),
-                _ => format!("time jumps {} times and leaves no stretch that is long enough", count - 1),
+                _ => format!(
+                    "time jumps {} times and leaves no stretch that is long enough",
+                    count - 1
+                ),
             }));
         }
         Ok(())
@@ -295,7 +403,9 @@ impl<S: Source + ?Sized> Surveyor<'_, S> {
             };
             self.times(used.piece.file, rows, &mut push)?;
         }
-        slots.finish(self.settings).map_err(|reason| self.at_time(reason))
+        slots
+            .finish(self.settings)
+            .map_err(|reason| self.at_time(reason))
     }
 }
 

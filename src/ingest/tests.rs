@@ -12,8 +12,17 @@ const ROWS: usize = 2000;
 const STEP_S: f64 = 0.025;
 
 fn aircraft() -> Aircraft {
-    let at = Position { x_ft: 30.0, y_ft: 0.0, z_ft: 8.0 };
-    let vane = Vane { x_ft: 30.0, y_ft: 0.0, z_ft: 8.0, factor: 1.0 };
+    let at = Position {
+        x_ft: 30.0,
+        y_ft: 0.0,
+        z_ft: 8.0,
+    };
+    let vane = Vane {
+        x_ft: 30.0,
+        y_ft: 0.0,
+        z_ft: 8.0,
+        factor: 1.0,
+    };
     Aircraft {
         name: "steady".to_owned(),
         wing_area_ft2: 400.0,
@@ -51,7 +60,9 @@ fn steady() -> Vec<(&'static str, &'static str, &'static str, f64)> {
     ];
     let given: Vec<&str> = channels.iter().map(|c| c.1).collect();
     let zero = signal::REQUIRED.iter().filter(|s| !given.contains(s));
-    let zero: Vec<_> = zero.map(|s| (*s, *s, crate::units::Unit::of_signal(s).name, 0.0)).collect();
+    let zero: Vec<_> = zero
+        .map(|s| (*s, *s, crate::units::Unit::of_signal(s).name, 0.0))
+        .collect();
     channels.extend(zero);
     channels
 }
@@ -65,21 +76,55 @@ struct Flight {
 
 impl Flight {
     fn steady() -> Flight {
-        let mut raw = RawFlight { flight_id: "007".to_owned(), columns: BTreeMap::new() };
+        let mut raw = RawFlight {
+            flight_id: "007".to_owned(),
+            columns: BTreeMap::new(),
+        };
         let mut channels = BTreeMap::new();
         let mut add = |name: &str, signal: &str, unit: &str, values: Vec<f64>| {
-            raw.columns.insert(name.to_owned(), RawColumn { unit: Some(unit.to_owned()), values });
+            raw.columns.insert(
+                name.to_owned(),
+                RawColumn {
+                    unit: Some(unit.to_owned()),
+                    values,
+                },
+            );
             let (signal, unit) = (signal.to_owned(), unit.to_owned());
-            channels.insert(name.to_owned(), Channel { signal, unit, sign: 1.0, scale: 1.0, wraps_at: None });
+            channels.insert(
+                name.to_owned(),
+                Channel {
+                    signal,
+                    unit,
+                    sign: 1.0,
+                    scale: 1.0,
+                    wraps_at: None,
+                },
+            );
         };
-        add("time", TIME, "s", (0..ROWS).map(|k| k as f64 * STEP_S).collect());
+        add(
+            "time",
+            TIME,
+            "s",
+            (0..ROWS).map(|k| k as f64 * STEP_S).collect(),
+        );
         for (name, signal, unit, value) in steady() {
             add(name, signal, unit, vec![value; ROWS]);
         }
         // What the instruments are off by has tests of its own, and takes longer than all of these.
-        let compatibility = Compatibility { reconstruct: false, ..Compatibility::default() };
-        let settings = Settings { compatibility, ..Settings::default() };
-        Flight { raw, channels, constants: BTreeMap::new(), settings }
+        let compatibility = Compatibility {
+            reconstruct: false,
+            ..Compatibility::default()
+        };
+        let settings = Settings {
+            compatibility,
+            ..Settings::default()
+        };
+        Flight {
+            raw,
+            channels,
+            constants: BTreeMap::new(),
+            settings,
+        }
     }
 
     fn values(&mut self, name: &str) -> &mut Vec<f64> {
@@ -94,12 +139,19 @@ impl Flight {
     fn noisy() -> Flight {
         let mut flight = Flight::steady();
         let mut state = 1_u64;
-        for (name, column) in flight.raw.columns.iter_mut().filter(|(name, _)| *name != "time") {
+        for (name, column) in flight
+            .raw
+            .columns
+            .iter_mut()
+            .filter(|(name, _)| *name != "time")
+        {
             let flag = name == "flag";
             for value in column.values.iter_mut().filter(|_| !flag) {
                 let mut sum = 0.0;
                 for _ in 0..4 {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
                     sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
                 }
                 *value += 0.01 * ((sum - 2.0) * 20.0).round() / 10.0;
@@ -111,7 +163,9 @@ impl Flight {
     /// Another file of the flight: some of its rows.
     fn part(&self, rows: std::ops::Range<usize>) -> RawFlight {
         let mut part = self.raw.clone();
-        part.columns.values_mut().for_each(|c| c.values = c.values[rows.clone()].to_vec());
+        part.columns
+            .values_mut()
+            .for_each(|c| c.values = c.values[rows.clone()].to_vec());
         part
     }
 
@@ -123,11 +177,21 @@ impl Flight {
             aircraft: &aircraft,
             settings: &self.settings,
         };
-        records(files, &basis, piece).unwrap().into_iter().map(Result::unwrap).collect()
+        records(files, &basis, piece)
+            .unwrap()
+            .into_iter()
+            .map(Result::unwrap)
+            .collect()
     }
 
     fn ingest(&self) -> Result<Ingested, Problem> {
-        record(&self.raw, &self.channels, &self.constants, &aircraft(), &self.settings)
+        record(
+            &self.raw,
+            &self.channels,
+            &self.constants,
+            &aircraft(),
+            &self.settings,
+        )
     }
 
     fn refused(&self) -> Problem {
@@ -136,7 +200,13 @@ impl Flight {
 }
 
 fn verdict(ingested: &Ingested, channel: &str) -> String {
-    ingested.channels.iter().find(|c| c.channel == channel).unwrap().verdict.clone()
+    ingested
+        .channels
+        .iter()
+        .find(|c| c.channel == channel)
+        .unwrap()
+        .verdict
+        .clone()
 }
 
 #[test]
@@ -150,7 +220,11 @@ fn steady_flight_is_a_record_without_problems() {
     assert_eq!(verdict(&ingested, "an"), "ok");
     assert_eq!(verdict(&ingested, "V"), "ok");
     assert_eq!(verdict(&ingested, "q_deg_s"), "not checked");
-    let rate = ingested.checks.iter().find(|c| c.relation == "theta rate against q and r").unwrap();
+    let rate = ingested
+        .checks
+        .iter()
+        .find(|c| c.relation == "theta rate against q and r")
+        .unwrap();
     assert_eq!((rate.slope, rate.verdict.as_str()), (None, "not excited"));
 }
 
@@ -162,7 +236,11 @@ fn unit_sign_and_scale_are_those_of_the_channel_map() {
     flight.raw.columns.get_mut("alpha").unwrap().unit = Some("rad".to_owned());
     flight.values("alpha").fill(-10.0 / DEG);
     let ingested = flight.ingest().unwrap();
-    assert_relative_eq!(ingested.record.values(signal::ALPHA_VANE).unwrap()[5], 20.0, max_relative = 1e-12);
+    assert_relative_eq!(
+        ingested.record.values(signal::ALPHA_VANE).unwrap()[5],
+        20.0,
+        max_relative = 1e-12
+    );
     assert_eq!(ingested.problems, []);
 }
 
@@ -171,9 +249,16 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
     let mut flight = Flight::steady();
     flight.raw.columns.get_mut("theta").unwrap().unit = Some("rad".to_owned());
     let problem = flight.refused();
-    assert_eq!((problem.stage.as_str(), problem.flight_id.as_str()), ("ingest", "007"));
+    assert_eq!(
+        (problem.stage.as_str(), problem.flight_id.as_str()),
+        ("ingest", "007")
+    );
     assert_eq!(problem.place, "channel `theta`");
-    assert!(problem.reason.contains("the file states `rad` for channel `theta`, the channel map `deg`"));
+    assert!(
+        problem
+            .reason
+            .contains("the file states `rad` for channel `theta`, the channel map `deg`")
+    );
     flight.raw.columns.get_mut("theta").unwrap().unit = None;
     assert!(flight.ingest().is_ok());
 }
@@ -182,19 +267,33 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
 fn a_missing_or_empty_required_channel_refuses_the_flight_unless_a_constant_stands_in() {
     let mut flight = Flight::steady();
     flight.raw.columns.remove("V");
-    assert_eq!(flight.refused().reason, "channel `V` (signal `velocity_ft_s`) is not in the file");
+    assert_eq!(
+        flight.refused().reason,
+        "channel `V` (signal `velocity_ft_s`) is not in the file"
+    );
     flight.constants.insert(signal::VELOCITY.to_owned(), 600.0);
     let ingested = flight.ingest().unwrap();
-    assert_eq!(ingested.record.values(signal::VELOCITY).unwrap(), [600.0; ROWS]);
+    assert_eq!(
+        ingested.record.values(signal::VELOCITY).unwrap(),
+        [600.0; ROWS]
+    );
     assert_eq!(ingested.problems.len(), 1);
 
     let mut flight = Flight::steady();
     flight.values("qbar").fill(f64::NAN);
-    assert_eq!(flight.refused().reason, "channel `qbar` (signal `qbar_psf`) holds no number in 2000 rows");
+    assert_eq!(
+        flight.refused().reason,
+        "channel `qbar` (signal `qbar_psf`) holds no number in 2000 rows"
+    );
 
     let mut flight = Flight::steady();
     flight.channels.remove("mach");
-    assert!(flight.refused().reason.starts_with("signal `mach` is neither a channel nor a constant"));
+    assert!(
+        flight
+            .refused()
+            .reason
+            .starts_with("signal `mach` is neither a channel nor a constant")
+    );
 }
 
 #[test]
@@ -206,7 +305,12 @@ fn another_missing_or_empty_channel_is_a_problem_and_the_rest_goes_on() {
     let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
     assert_eq!(places, ["channel `de`", "channel `psi`"]);
     assert!(ingested.record.values("de_deg").is_none());
-    assert!(ingested.checks.iter().all(|c| !c.relation.starts_with("psi rate")));
+    assert!(
+        ingested
+            .checks
+            .iter()
+            .all(|c| !c.relation.starts_with("psi rate"))
+    );
 }
 
 #[test]
@@ -218,10 +322,20 @@ fn a_time_that_fits_nowhere_or_stands_still_costs_its_row_and_is_named() {
     let ingested = flight.ingest().unwrap();
     let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
     assert_eq!(places, ["channel `time`", "channel `time`"]);
-    assert!(ingested.problems[0].reason.starts_with("2 rows have a time that is not a number or fits nowhere"));
-    assert!(ingested.problems[1].reason.starts_with("time stands still in 1 rows, the first is row 301 of part 1"));
+    assert!(
+        ingested.problems[0]
+            .reason
+            .starts_with("2 rows have a time that is not a number or fits nowhere")
+    );
+    assert!(
+        ingested.problems[1]
+            .reason
+            .starts_with("time stands still in 1 rows, the first is row 301 of part 1")
+    );
     let velocity = &ingested.record.signals[signal::VELOCITY];
-    let bridged: Vec<usize> = (0..ROWS).filter(|&k| velocity.marks[k] == Mark::Bridged).collect();
+    let bridged: Vec<usize> = (0..ROWS)
+        .filter(|&k| velocity.marks[k] == Mark::Bridged)
+        .collect();
     assert_eq!(bridged, [100, 300, 500]);
 }
 
@@ -231,7 +345,13 @@ fn a_clock_that_cannot_be_followed_or_is_absent_is_refused_and_named() {
     flight.values("time")[500..900].fill(f64::NAN);
     let problem = flight.refused();
     assert_eq!(problem.place, "channel `time`");
-    assert!(problem.reason.starts_with("of 2000 rows 400 have a time that is not a number"), "{}", problem.reason);
+    assert!(
+        problem
+            .reason
+            .starts_with("of 2000 rows 400 have a time that is not a number"),
+        "{}",
+        problem.reason
+    );
     flight.raw.columns.remove("time");
     assert!(flight.refused().reason.contains("is not in the file"));
     flight.channels.remove("time");
@@ -242,11 +362,21 @@ fn a_clock_that_cannot_be_followed_or_is_absent_is_refused_and_named() {
 fn a_signal_with_two_channels_and_a_unit_of_another_quantity_are_refused() {
     let mut flight = Flight::steady();
     flight.channel("de").signal = signal::THETA.to_owned();
-    assert!(flight.refused().reason.contains("both mapped to signal `theta_deg`"));
+    assert!(
+        flight
+            .refused()
+            .reason
+            .contains("both mapped to signal `theta_deg`")
+    );
     let mut flight = Flight::steady();
     flight.channel("theta").unit = "ft".to_owned();
     flight.raw.columns.get_mut("theta").unwrap().unit = None;
-    assert!(flight.refused().reason.contains("is in deg, which `ft` does not convert to"));
+    assert!(
+        flight
+            .refused()
+            .reason
+            .contains("is in deg, which `ft` does not convert to")
+    );
 }
 
 #[test]
@@ -261,10 +391,22 @@ fn dropouts_spikes_and_lost_frames_are_repaired_marked_and_counted() {
     let ingested = flight.ingest().unwrap();
     assert_eq!(ingested.record.samples, ROWS);
     let velocity = &ingested.record.signals[signal::VELOCITY];
-    assert_eq!((velocity.marks[51], velocity.values[51]), (Mark::Bridged, 600.0));
-    assert_eq!((velocity.marks[250], velocity.values[250].is_nan()), (Mark::Missing, true));
-    assert_eq!((velocity.marks[1000], velocity.values[1000]), (Mark::Despiked, 600.0));
-    assert_eq!((velocity.marks[1501], velocity.values[1501]), (Mark::Bridged, 600.0));
+    assert_eq!(
+        (velocity.marks[51], velocity.values[51]),
+        (Mark::Bridged, 600.0)
+    );
+    assert_eq!(
+        (velocity.marks[250], velocity.values[250].is_nan()),
+        (Mark::Missing, true)
+    );
+    assert_eq!(
+        (velocity.marks[1000], velocity.values[1000]),
+        (Mark::Despiked, 600.0)
+    );
+    assert_eq!(
+        (velocity.marks[1501], velocity.values[1501]),
+        (Mark::Bridged, 600.0)
+    );
     let row = ingested.channels.iter().find(|c| c.channel == "V").unwrap();
     assert_eq!((row.bridged, row.despiked, row.missing), (7, 1, 100));
 }
@@ -277,7 +419,10 @@ fn a_flag_is_never_despiked_and_holds_its_last_value() {
     flight.values("flag")[796..800].fill(f64::NAN);
     let flag = flight.ingest().unwrap().record.signals["obes"].clone();
     assert_eq!((flag.values[700], flag.marks[700]), (1.0, Mark::Measured));
-    assert_eq!((flag.values[799], flag.marks[799], flag.values[800]), (0.0, Mark::Bridged, 1.0));
+    assert_eq!(
+        (flag.values[799], flag.marks[799], flag.values[800]),
+        (0.0, Mark::Bridged, 1.0)
+    );
 }
 
 #[test]
@@ -287,7 +432,11 @@ fn a_wrong_channel_refuses_the_flight_or_is_reported_as_the_settings_say() {
     let problem = flight.refused();
     assert_eq!(problem.place, "channel `an`");
     assert!(problem.reason.contains("slope -1.00"), "{}", problem.reason);
-    assert!(problem.reason.contains("its sign is reversed"), "{}", problem.reason);
+    assert!(
+        problem.reason.contains("its sign is reversed"),
+        "{}",
+        problem.reason
+    );
     flight.settings.on_failed_check = OnFailedCheck::Report;
     let ingested = flight.ingest().unwrap();
     assert_eq!(ingested.problems, [problem]);
@@ -300,7 +449,11 @@ fn a_channel_of_nothing_but_zeros_is_among_those_that_never_change() {
     flight.values("an").fill(0.0);
     let problem = flight.refused();
     assert!(problem.place.contains("`an`"), "{}", problem.place);
-    assert!(problem.reason.contains("`an`: it never changes"), "{}", problem.reason);
+    assert!(
+        problem.reason.contains("`an`: it never changes"),
+        "{}",
+        problem.reason
+    );
 }
 
 #[test]
@@ -308,11 +461,21 @@ fn an_instrument_that_is_dead_throughout_is_named_though_no_relation_is_excited_
     for (name, signal) in [("V", signal::VELOCITY), (signal::AY, signal::AY)] {
         let mut flight = Flight::noisy();
         flight.values(name).fill(0.0);
-        assert_eq!(flight.ingest().map(|i| i.problems), Ok(Vec::new()), "too short a record to tell {signal}");
+        assert_eq!(
+            flight.ingest().map(|i| i.problems),
+            Ok(Vec::new()),
+            "too short a record to tell {signal}"
+        );
         flight.settings.checks.dead_s = 20.0;
         let problem = flight.refused();
         assert_eq!(problem.place, format!("channel `{name}`"));
-        assert!(problem.reason.contains("one value throughout, while the aircraft flies"), "{}", problem.reason);
+        assert!(
+            problem
+                .reason
+                .contains("one value throughout, while the aircraft flies"),
+            "{}",
+            problem.reason
+        );
         // On the ground the airspeed may well be zero.
         flight.values("qbar").fill(0.3);
         flight.values("mach").fill(0.01);
@@ -322,7 +485,11 @@ fn an_instrument_that_is_dead_throughout_is_named_though_no_relation_is_excited_
 }
 
 fn reasons(ingested: &Ingested) -> Vec<&str> {
-    ingested.problems.iter().map(|p| p.reason.as_str()).collect()
+    ingested
+        .problems
+        .iter()
+        .map(|p| p.reason.as_str())
+        .collect()
 }
 
 /// Signals alike to the bit, and all else.
@@ -332,7 +499,10 @@ fn assert_same(a: &Ingested, b: &Ingested) {
         assert_eq!(series.marks, b.record.signals[name].marks, "{name}");
         assert_eq!(bits(series), bits(&b.record.signals[name]), "{name}");
     }
-    assert_eq!((&a.channels, &a.checks, &a.problems), (&b.channels, &b.checks, &b.problems));
+    assert_eq!(
+        (&a.channels, &a.checks, &a.problems),
+        (&b.channels, &b.checks, &b.problems)
+    );
 }
 
 #[test]
@@ -343,17 +513,37 @@ fn a_record_does_not_depend_on_the_pieces_it_was_read_in() {
         (0..24).for_each(|_| column.values.extend_from_slice(&once));
     }
     let rows = flight.values("time").len();
-    flight.values("time").iter_mut().enumerate().for_each(|(k, t)| *t = k as f64 * STEP_S);
+    flight
+        .values("time")
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, t)| *t = k as f64 * STEP_S);
     flight.values("V")[16_380..16_390].fill(f64::NAN);
     flight.values("V")[30_000] += 5.0;
-    flight.values("psi").iter_mut().enumerate().for_each(|(k, v)| *v = (*v + 0.01 * k as f64) % 360.0);
+    flight
+        .values("psi")
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, v)| *v = (*v + 0.01 * k as f64) % 360.0);
     flight.channel("psi").wraps_at = Some(360.0);
     flight.values("theta")[20_000..20_600].fill(20.01);
-    flight.raw.columns.values_mut().for_each(|c| drop(c.values.drain(40_000..40_003)));
+    flight
+        .raw
+        .columns
+        .values_mut()
+        .for_each(|c| drop(c.values.drain(40_000..40_003)));
     let files = std::slice::from_ref(&flight.raw);
     let whole = flight.of_files(files, usize::MAX);
     assert_eq!(whole[0].record.samples, rows);
-    assert_eq!(whole[0].channels.iter().find(|c| c.channel == "theta").unwrap().stuck, 600);
+    assert_eq!(
+        whole[0]
+            .channels
+            .iter()
+            .find(|c| c.channel == "theta")
+            .unwrap()
+            .stuck,
+        600
+    );
     for piece in [1000, 16_384, 20_000] {
         assert_same(&whole[0], &flight.of_files(files, piece)[0]);
     }
@@ -368,21 +558,36 @@ fn rows_that_are_there_twice_are_used_once_and_named() {
         column.values.splice(900..900, again);
     }
     let plain = flight.ingest().unwrap();
-    let [once] = &flight.of_files(&[twice], usize::MAX)[..] else { panic!("one stretch") };
+    let [once] = &flight.of_files(&[twice], usize::MAX)[..] else {
+        panic!("one stretch")
+    };
     assert_eq!(once.record, plain.record);
-    assert!(reasons(once)[0].starts_with("rows from row 901 on"), "{:?}", once.problems);
+    assert!(
+        reasons(once)[0].starts_with("rows from row 901 on"),
+        "{:?}",
+        once.problems
+    );
 }
 
 #[test]
 fn overlapping_files_and_copies_are_used_once_and_named() {
     let flight = Flight::noisy();
     let plain = flight.ingest().unwrap();
-    let cases = [vec![flight.part(0..1200), flight.part(800..ROWS)], vec![flight.raw.clone(), flight.raw.clone()]];
+    let cases = [
+        vec![flight.part(0..1200), flight.part(800..ROWS)],
+        vec![flight.raw.clone(), flight.raw.clone()],
+    ];
     for files in cases {
-        let [once] = &flight.of_files(&files, usize::MAX)[..] else { panic!("one stretch") };
+        let [once] = &flight.of_files(&files, usize::MAX)[..] else {
+            panic!("one stretch")
+        };
         assert_eq!(once.record, plain.record);
         assert_eq!(once.problems.len(), 1, "{:?}", once.problems);
-        assert!(reasons(once)[0].contains("are there already"), "{:?}", once.problems);
+        assert!(
+            reasons(once)[0].contains("are there already"),
+            "{:?}",
+            once.problems
+        );
     }
 }
 
@@ -390,20 +595,40 @@ fn overlapping_files_and_copies_are_used_once_and_named() {
 fn files_in_the_wrong_order_are_one_flight() {
     let flight = Flight::noisy();
     let files = [flight.part(1000..ROWS), flight.part(0..1000)];
-    assert_eq!(flight.of_files(&files, usize::MAX)[0].record, flight.ingest().unwrap().record);
+    assert_eq!(
+        flight.of_files(&files, usize::MAX)[0].record,
+        flight.ingest().unwrap().record
+    );
 }
 
 #[test]
 fn a_clock_that_starts_anew_or_a_long_gap_makes_a_stretch_with_an_id_of_its_own() {
-    for (back, word) in [(-20.0, "time jumps back from"), (500.0, "the clock lacks 500.0 s")] {
+    for (back, word) in [
+        (-20.0, "time jumps back from"),
+        (500.0, "the clock lacks 500.0 s"),
+    ] {
         let mut flight = Flight::noisy();
-        flight.values("time")[1000..].iter_mut().for_each(|t| *t += back);
+        flight.values("time")[1000..]
+            .iter_mut()
+            .for_each(|t| *t += back);
         let stretches = flight.of_files(std::slice::from_ref(&flight.raw), usize::MAX);
-        let ids: Vec<&str> = stretches.iter().map(|s| s.record.flight_id.as_str()).collect();
+        let ids: Vec<&str> = stretches
+            .iter()
+            .map(|s| s.record.flight_id.as_str())
+            .collect();
         assert_eq!(ids, ["007", "007.2"]);
-        assert_eq!((stretches[0].record.samples, stretches[1].record.samples), (1000, 1000));
-        assert!(reasons(&stretches[0])[0].contains(word), "{:?}", stretches[0].problems);
-        assert!(reasons(&stretches[0])[0].ends_with("what follows is a record of its own, `007.2`"));
+        assert_eq!(
+            (stretches[0].record.samples, stretches[1].record.samples),
+            (1000, 1000)
+        );
+        assert!(
+            reasons(&stretches[0])[0].contains(word),
+            "{:?}",
+            stretches[0].problems
+        );
+        assert!(
+            reasons(&stretches[0])[0].ends_with("what follows is a record of its own, `007.2`")
+        );
         assert_eq!(reasons(&stretches[1]), Vec::<&str>::new());
     }
 }
@@ -414,16 +639,34 @@ fn a_slow_channel_is_measured_where_it_is_recorded_and_on_a_line_between() {
     for held in [false, true] {
         let mut flight = Flight::noisy();
         let slow = |(k, v): (usize, &mut f64)| {
-            *v = if k % 4 == 1 || held { recorded(k - (k + 3) % 4 % k.max(1)) } else { f64::NAN };
+            *v = if k % 4 == 1 || held {
+                recorded(k - (k + 3) % 4 % k.max(1))
+            } else {
+                f64::NAN
+            };
         };
         flight.values("theta").iter_mut().enumerate().for_each(slow);
         let ingested = flight.ingest().unwrap();
         let theta = &ingested.record.signals[signal::THETA];
-        let measured: Vec<usize> = (8..60).filter(|&k| theta.marks[k] == Mark::Measured).collect();
-        assert_eq!(measured, (9..60).step_by(4).collect::<Vec<_>>(), "held {held}");
+        let measured: Vec<usize> = (8..60)
+            .filter(|&k| theta.marks[k] == Mark::Measured)
+            .collect();
+        assert_eq!(
+            measured,
+            (9..60).step_by(4).collect::<Vec<_>>(),
+            "held {held}"
+        );
         assert!((10..60).all(|k| k % 4 == 1 || theta.marks[k] == Mark::Between));
-        assert_relative_eq!(theta.values[11], 0.5 * (recorded(9) + recorded(13)), max_relative = 1e-12);
-        let row = ingested.channels.iter().find(|c| c.channel == "theta").unwrap();
+        assert_relative_eq!(
+            theta.values[11],
+            0.5 * (recorded(9) + recorded(13)),
+            max_relative = 1e-12
+        );
+        let row = ingested
+            .channels
+            .iter()
+            .find(|c| c.channel == "theta")
+            .unwrap();
         assert_relative_eq!(row.rate_hz.unwrap(), 10.0, max_relative = 1e-6);
         assert_eq!((row.bridged, row.despiked, row.stuck), (0, 0, 0));
     }
@@ -432,20 +675,42 @@ fn a_slow_channel_is_measured_where_it_is_recorded_and_on_a_line_between() {
 #[test]
 fn a_channel_in_a_file_of_its_own_is_brought_to_the_record_s_clock() {
     let mut flight = Flight::noisy();
-    let mut own = RawFlight { flight_id: "007".to_owned(), columns: BTreeMap::new() };
+    let mut own = RawFlight {
+        flight_id: "007".to_owned(),
+        columns: BTreeMap::new(),
+    };
     // 10 Hz, 7 ms late, of a value that rises slowly.
     let times: Vec<f64> = (0..500).map(|k| f64::from(k) * 0.1 + 0.007).collect();
-    own.columns
-        .insert("psi".to_owned(), RawColumn { unit: None, values: times.iter().map(|t| 100.0 + 0.2 * t).collect() });
-    own.columns.insert("time".to_owned(), RawColumn { unit: None, values: times });
+    own.columns.insert(
+        "psi".to_owned(),
+        RawColumn {
+            unit: None,
+            values: times.iter().map(|t| 100.0 + 0.2 * t).collect(),
+        },
+    );
+    own.columns.insert(
+        "time".to_owned(),
+        RawColumn {
+            unit: None,
+            values: times,
+        },
+    );
     flight.raw.columns.remove("psi");
     for files in [[flight.raw.clone(), own.clone()], [own, flight.raw.clone()]] {
-        let [one] = &flight.of_files(&files, 700)[..] else { panic!("one stretch") };
+        let [one] = &flight.of_files(&files, 700)[..] else {
+            panic!("one stretch")
+        };
         let psi = &one.record.signals[signal::PSI];
-        let own: Vec<usize> = (100..120).filter(|&k| psi.marks[k] == Mark::Measured).collect();
+        let own: Vec<usize> = (100..120)
+            .filter(|&k| psi.marks[k] == Mark::Measured)
+            .collect();
         assert_eq!(own, [100, 104, 108, 112, 116]);
         for k in [100, 101, 102, 103] {
-            assert_relative_eq!(psi.values[k], 100.0 + 0.2 * k as f64 * STEP_S, max_relative = 1e-9);
+            assert_relative_eq!(
+                psi.values[k],
+                100.0 + 0.2 * k as f64 * STEP_S,
+                max_relative = 1e-9
+            );
         }
         assert_eq!(psi.marks[101], Mark::Between);
         assert_eq!(one.problems, []);
@@ -460,17 +725,40 @@ fn a_stuck_channel_is_left_out_from_its_first_repetition_and_named() {
     let alpha = &ingested.record.signals[signal::ALPHA_VANE];
     assert!((600..800).all(|k| alpha.marks[k] == Mark::Stuck && alpha.values[k].is_nan()));
     assert_eq!(alpha.marks[599], Mark::Measured);
-    assert_eq!((reasons(&ingested).len(), ingested.problems[0].place.as_str()), (1, "channel `alpha`"));
-    assert!(reasons(&ingested)[0].starts_with("its value is stuck from 15.0 s to 20.0 s"), "{:?}", ingested.problems);
+    assert_eq!(
+        (
+            reasons(&ingested).len(),
+            ingested.problems[0].place.as_str()
+        ),
+        (1, "channel `alpha`")
+    );
+    assert!(
+        reasons(&ingested)[0].starts_with("its value is stuck from 15.0 s to 20.0 s"),
+        "{:?}",
+        ingested.problems
+    );
 }
 
 #[test]
 fn a_control_at_rest_and_a_coarse_channel_are_not_stuck() {
     let mut flight = Flight::noisy();
     // A stick without noise that moves now and then, and a surface in steps much larger than its noise.
-    let moved = |k: usize| if (400..460).contains(&k) { (k - 400) as f64 * 0.05 } else { 0.0 };
-    flight.values("de").iter_mut().enumerate().for_each(|(k, v)| *v = moved(k));
-    flight.values("mach").iter_mut().for_each(|v| *v = (*v * 20.0).round() / 20.0);
+    let moved = |k: usize| {
+        if (400..460).contains(&k) {
+            (k - 400) as f64 * 0.05
+        } else {
+            0.0
+        }
+    };
+    flight
+        .values("de")
+        .iter_mut()
+        .enumerate()
+        .for_each(|(k, v)| *v = moved(k));
+    flight
+        .values("mach")
+        .iter_mut()
+        .for_each(|v| *v = (*v * 20.0).round() / 20.0);
     let ingested = flight.ingest().unwrap();
     assert_eq!(ingested.problems, []);
 }
@@ -485,11 +773,24 @@ fn noise_and_quantisation_are_estimated_and_wraps_counted() {
         .for_each(|(k, v)| *v = (*v + 0.7 * k as f64 + 180.0) % 360.0 - 180.0);
     flight.settings.on_failed_check = OnFailedCheck::Report;
     let ingested = flight.ingest().unwrap();
-    let row = |name: &str| ingested.channels.iter().find(|c| c.channel == name).unwrap();
+    let row = |name: &str| {
+        ingested
+            .channels
+            .iter()
+            .find(|c| c.channel == name)
+            .unwrap()
+    };
     assert_relative_eq!(row("V").quantisation.unwrap(), 0.001, max_relative = 1e-6);
     let noise = row("V").noise.unwrap();
     assert!((0.008..0.016).contains(&noise), "{noise}");
     assert_eq!(row("phi_deg").wraps, 4);
-    assert!(ingested.record.values(signal::PHI).unwrap().windows(2).all(|p| (p[1] - p[0]).abs() < 1.0));
+    assert!(
+        ingested
+            .record
+            .values(signal::PHI)
+            .unwrap()
+            .windows(2)
+            .all(|p| (p[1] - p[0]).abs() < 1.0)
+    );
     assert_eq!(row("time").samples, ROWS);
 }

@@ -111,8 +111,16 @@ impl Recognition {
     /// The signals that make the maneuver: those that must step, pulse or sweep.
     #[must_use]
     pub fn inputs(&self) -> BTreeSet<&str> {
-        let stepping = self.steps.iter().filter(|(_, count)| count.at_least > 0).map(|(signal, _)| signal);
-        stepping.chain(self.pulses.keys()).chain(self.sweep.keys()).map(String::as_str).collect()
+        let stepping = self
+            .steps
+            .iter()
+            .filter(|(_, count)| count.at_least > 0)
+            .map(|(signal, _)| signal);
+        stepping
+            .chain(self.pulses.keys())
+            .chain(self.sweep.keys())
+            .map(String::as_str)
+            .collect()
     }
 
     /// The signals that it asks something of.
@@ -122,7 +130,11 @@ impl Recognition {
 
     /// The signals that need a smallest step, for something of theirs is counted.
     pub fn counted(&self) -> impl Iterator<Item = &String> {
-        self.steps.keys().chain(self.moves.keys()).chain(self.pulses.keys()).chain(self.sweep.keys())
+        self.steps
+            .keys()
+            .chain(self.moves.keys())
+            .chain(self.pulses.keys())
+            .chain(self.sweep.keys())
     }
 }
 
@@ -183,7 +195,9 @@ impl Class {
     }
 
     fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &Overrides> {
-        self.overrides.iter().filter(move |o| alpha_deg > o.above_alpha_deg)
+        self.overrides
+            .iter()
+            .filter(move |o| alpha_deg > o.above_alpha_deg)
     }
 }
 
@@ -211,7 +225,10 @@ mod tests {
         assert_eq!(class.weight(Output::P, 22.5), Some(3.0));
         assert_eq!(class.weight(Output::P, 22.6), Some(6.0));
         let above = class.at(25.0);
-        assert_eq!((above.status("CY_da", 10.0), above.weight(Output::P, 10.0)), (Some(Status::Estimated), Some(6.0)));
+        assert_eq!(
+            (above.status("CY_da", 10.0), above.weight(Output::P, 10.0)),
+            (Some(Status::Estimated), Some(6.0))
+        );
         assert_eq!(class.at(20.0).status("CY_da", 25.0), Some(Status::Held));
     }
 }

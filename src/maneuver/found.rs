@@ -109,14 +109,22 @@ impl Maneuver {
     /// Where a tunnel is read for this maneuver: its means, as far as the tunnel's third variable is among them.
     #[must_use]
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
-        let third = tunnel.settings().third.as_ref().and_then(|third| match third.name.as_str() {
-            "altitude_ft" => Some(self.altitude_ft),
-            "qbar_psf" => Some(self.qbar_psf),
-            "velocity_ft_s" => Some(self.velocity_ft_s),
-            "mass_slug" => Some(self.mass_slug),
-            "x_cg_ft" => Some(self.x_cg_ft),
-            _ => None,
-        });
-        Condition { alpha_deg: self.alpha_deg, mach: self.mach, third: third.filter(|v| v.is_finite()) }
+        let third = tunnel
+            .settings()
+            .third
+            .as_ref()
+            .and_then(|third| match third.name.as_str() {
+                "altitude_ft" => Some(self.altitude_ft),
+                "qbar_psf" => Some(self.qbar_psf),
+                "velocity_ft_s" => Some(self.velocity_ft_s),
+                "mass_slug" => Some(self.mass_slug),
+                "x_cg_ft" => Some(self.x_cg_ft),
+                _ => None,
+            });
+        Condition {
+            alpha_deg: self.alpha_deg,
+            mach: self.mach,
+            third: third.filter(|v| v.is_finite()),
+        }
     }
 }

@@ -15,7 +15,10 @@ pub(super) struct Autoregression {
 impl Autoregression {
     /// White noise.
     pub fn white(variance: f64) -> Autoregression {
-        Autoregression { coefficients: vec![], innovation: variance }
+        Autoregression {
+            coefficients: vec![],
+            innovation: variance,
+        }
     }
 
     pub fn is_white(&self) -> bool {
@@ -41,7 +44,10 @@ impl Autoregression {
     /// Becomes the process of the next order, unless no further autocovariance is given or no process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
-        let Some((next, past)) = autocovariances.get(1..a.len() + 2).and_then(<[f64]>::split_last) else {
+        let Some((next, past)) = autocovariances
+            .get(1..a.len() + 2)
+            .and_then(<[f64]>::split_last)
+        else {
             return false;
         };
         let predicted: f64 = a.iter().zip(past.iter().rev()).map(|(a, c)| a * c).sum();
@@ -51,7 +57,10 @@ impl Autoregression {
             let last = a.len();
             for (i, j) in (0..last.div_ceil(2)).map(|i| (i, last - 1 - i)) {
                 let (forward, backward) = (a[i], a[j]);
-                (a[i], a[j]) = (forward + reflection * backward, backward + reflection * forward);
+                (a[i], a[j]) = (
+                    forward + reflection * backward,
+                    backward + reflection * forward,
+                );
             }
             a.push(reflection);
             self.innovation *= 1.0 - reflection * reflection;
@@ -61,7 +70,8 @@ impl Autoregression {
 
     fn criterion(&self, samples: f64) -> f64 {
         let (n, parameters) = (samples, self.coefficients.len() as f64 + 1.0);
-        n * self.innovation.max(f64::MIN_POSITIVE).ln() + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0)
+        n * self.innovation.max(f64::MIN_POSITIVE).ln()
+            + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0)
     }
 
     /// Spectral density at frequency zero: the variance of the sum of many values, per value.
@@ -78,7 +88,12 @@ impl Autoregression {
         let order = self.coefficients.len();
         let (mut answer, mut last) = (vec![1.0], 0);
         while order > 0 && answer.len() <= longest {
-            let now: f64 = -self.coefficients.iter().zip(answer.iter().rev()).map(|(a, h)| a * h).sum::<f64>();
+            let now: f64 = -self
+                .coefficients
+                .iter()
+                .zip(answer.iter().rev())
+                .map(|(a, h)| a * h)
+                .sum::<f64>();
             if now.abs() > DEAD {
                 last = answer.len();
             }
@@ -87,7 +102,11 @@ impl Autoregression {
                 break;
             }
         }
-        if order == 0 { 0 } else { (last + order).min(longest) }
+        if order == 0 {
+            0
+        } else {
+            (last + order).min(longest)
+        }
     }
 }
 
@@ -120,19 +139,34 @@ mod tests {
         assert_eq!(process.coefficients.len(), 2);
         assert_relative_eq!(process.coefficients[0], -1.2, epsilon = 1e-12);
         assert_relative_eq!(process.coefficients[1], 0.5, epsilon = 1e-12);
-        assert_relative_eq!(process.innovation, 1.0 - 1.2 * 0.8 + 0.5 * (1.2 * 0.8 - 0.5), epsilon = 1e-12);
+        assert_relative_eq!(
+            process.innovation,
+            1.0 - 1.2 * 0.8 + 0.5 * (1.2 * 0.8 - 0.5),
+            epsilon = 1e-12
+        );
     }
 
     #[test]
     fn white_noise_has_order_zero_and_no_memory() {
         let process = Autoregression::fitted(&[2.0, 0.01, -0.02, 0.03], 500.0);
-        assert_eq!(process, Autoregression { coefficients: vec![], innovation: 2.0 });
+        assert_eq!(
+            process,
+            Autoregression {
+                coefficients: vec![],
+                innovation: 2.0
+            }
+        );
         assert_eq!(process.memory(100), 0);
     }
 
     #[test]
     fn autocovariances_that_no_process_can_have_end_the_recursion() {
-        assert_eq!(Autoregression::fitted(&[1.0, 1.5, 3.0], 500.0).coefficients.len(), 0);
+        assert_eq!(
+            Autoregression::fitted(&[1.0, 1.5, 3.0], 500.0)
+                .coefficients
+                .len(),
+            0
+        );
         assert_relative_eq!(Autoregression::fitted(&[0.0, 0.0], 500.0).innovation, 0.0);
         assert_relative_eq!(Autoregression::fitted(&[], 500.0).innovation, 0.0);
     }

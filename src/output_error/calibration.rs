@@ -37,9 +37,19 @@ pub struct Misreading<'a> {
 impl Calibration {
     /// Its errors, one standard deviation each, of which each is independent of the other.
     pub fn misreadings<'a>(&self, signal: &'a str) -> impl Iterator<Item = Misreading<'a>> {
-        let scale = Misreading { signal, scale: self.scale_pct / 100.0, bias: 0.0 };
-        let bias = Misreading { signal, scale: 0.0, bias: self.bias };
-        [scale, bias].into_iter().filter(|m| m.scale != 0.0 || m.bias != 0.0)
+        let scale = Misreading {
+            signal,
+            scale: self.scale_pct / 100.0,
+            bias: 0.0,
+        };
+        let bias = Misreading {
+            signal,
+            scale: 0.0,
+            bias: self.bias,
+        };
+        [scale, bias]
+            .into_iter()
+            .filter(|m| m.scale != 0.0 || m.bias != 0.0)
     }
 }
 
@@ -63,8 +73,15 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         let held = self.all_held();
         let right = self.computed(self.window, &held)?;
         let sensitivities = self.case.sensitivities(self.values)?;
-        let acts = |error: &Misreading| held.iter().any(|(d, _)| d.regressor.surface() == Some(error.signal));
-        let surfaces = if errors.iter().any(acts) { Some(Surfaces::of(self, &held)?) } else { None };
+        let acts = |error: &Misreading| {
+            held.iter()
+                .any(|(d, _)| d.regressor.surface() == Some(error.signal))
+        };
+        let surfaces = if errors.iter().any(acts) {
+            Some(Surfaces::of(self, &held)?)
+        } else {
+            None
+        };
         let shift = |error: &Misreading| match surfaces.as_ref().filter(|_| acts(error)) {
             Some(surfaces) => Ok(surfaces.gradient_shift(error)),
             None => self.gradient_shift(error, &held, &right, &sensitivities),
@@ -86,27 +103,53 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         let mut lanes = vec![0.0; sensitivities.width];
         for (k, (now, before)) in computed.iter().zip(right).enumerate() {
             for o in (0..OUTPUTS).filter(|&o| measurements.used[k][o]) {
-                let measured = if read[o] { error.scale * measurements.values[k][o] + error.bias } else { 0.0 };
+                let measured = if read[o] {
+                    error.scale * measurements.values[k][o] + error.bias
+                } else {
+                    0.0
+                };
                 let factor = self.weights[o] * (measured - (now[o] - before[o]));
                 for (sum, s) in lanes.iter_mut().zip(sensitivities.row(k, o)) {
                     *sum += factor * s;
                 }
             }
         }
-        Ok(DVector::from_iterator(sensitivities.lanes.len(), sensitivities.lanes.iter().map(|lane| lanes[*lane])))
+        Ok(DVector::from_iterator(
+            sensitivities.lanes.len(),
+            sensitivities.lanes.iter().map(|lane| lanes[*lane]),
+        ))
     }
 
     /// Every derivative at the value of the fit.
     fn all_held(&self) -> Vec<(&Derivative, f64)> {
-        let value = |d: &&Derivative| self.case.names.iter().position(|n| *n == d.name).map(|j| self.values[j]);
+        let value = |d: &&Derivative| {
+            self.case
+                .names
+                .iter()
+                .position(|n| *n == d.name)
+                .map(|j| self.values[j])
+        };
         let free = self.model.free.iter().filter_map(|d| Some((*d, value(d)?)));
         free.chain(self.model.held.iter().copied()).collect()
     }
 
     /// The outputs of a window at the values of the fit, without the biases.
-    fn computed(&self, window: &Window, held: &[(&Derivative, f64)]) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
-        let model = Model { held: held.to_vec(), initial_state: InitialState::Measured, ..Model::default() };
-        let mut case = Case::<NX, E>::new(self.aircraft, window, self.case.measurements.clone(), &model);
+    fn computed(
+        &self,
+        window: &Window,
+        held: &[(&Derivative, f64)],
+    ) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
+        let model = Model {
+            held: held.to_vec(),
+            initial_state: InitialState::Measured,
+            ..Model::default()
+        };
+        let mut case = Case::<NX, E>::new(
+            self.aircraft,
+            window,
+            self.case.measurements.clone(),
+            &model,
+        );
         if self.case.initial_state == InitialState::Estimated {
             let first = self.values.len() - NX;
             case.start.copy_from_slice(&self.values[first..]);
@@ -137,16 +180,33 @@ impl<'a> Surfaces<'a> {
         fitted: &Fitted<NX, E>,
         held: &[(&'a Derivative, f64)],
     ) -> Result<Surfaces<'a>, Diverged> {
-        let Fitted { window, model, case, values, weights, .. } = fitted;
+        let Fitted {
+            window,
+            model,
+            case,
+            values,
+            weights,
+            ..
+        } = fitted;
         let is_free = |d: &Derivative| model.free.iter().any(|f| f.name == d.name);
-        let (acting, rest): (Vec<_>, Vec<_>) = held.iter().partition(|(d, _)| d.regressor.surface().is_some());
+        let (acting, rest): (Vec<_>, Vec<_>) = held
+            .iter()
+            .partition(|(d, _)| d.regressor.surface().is_some());
         let constants: Vec<Derivative> = E::AXIS
             .coefficients()
             .into_iter()
             .flat_map(|coefficient| {
-                [Regressor::Surface(ONE.to_owned()), Regressor::Vane(ONE.to_owned())].map(|regressor| {
+                [
+                    Regressor::Surface(ONE.to_owned()),
+                    Regressor::Vane(ONE.to_owned()),
+                ]
+                .map(|regressor| {
                     let name = constant(coefficient, &regressor);
-                    Derivative { name, coefficient, regressor }
+                    Derivative {
+                        name,
+                        coefficient,
+                        regressor,
+                    }
                 })
             })
             .collect();
@@ -160,12 +220,16 @@ impl<'a> Surfaces<'a> {
             initial_state: case.initial_state,
         };
         let window = window.with_constant(ONE, 1.0);
-        let mut wide = Case::<NX, E>::new(fitted.aircraft, &window, case.measurements.clone(), &wide);
+        let mut wide =
+            Case::<NX, E>::new(fitted.aircraft, &window, case.measurements.clone(), &wide);
         wide.start = case.start;
         let place = |name: &String| case.names.iter().position(|n| n == name);
         let value = |name: &String| match place(name) {
             Some(j) => values[j],
-            None => acting.iter().find(|(d, _)| d.name == *name).map_or(0.0, |(_, value)| *value),
+            None => acting
+                .iter()
+                .find(|(d, _)| d.name == *name)
+                .map_or(0.0, |(_, value)| *value),
         };
         let start: Vec<f64> = wide.names.iter().map(value).collect();
         let mut response = wide.response();
@@ -173,7 +237,12 @@ impl<'a> Surfaces<'a> {
         let at = |name: &String| wide.names.iter().position(|n| n == name).unwrap_or(0);
         let parameters = case.names.iter().map(at).collect();
         let information = cost::sums(&response, weights).information;
-        Ok(Surfaces { acting, parameters, names: wide.names, information })
+        Ok(Surfaces {
+            acting,
+            parameters,
+            names: wide.names,
+            information,
+        })
     }
 
     fn gradient_shift(&self, error: &Misreading) -> DVector<f64> {
@@ -185,9 +254,16 @@ impl<'a> Surfaces<'a> {
                 }
             }
         };
-        for (derivative, value) in self.acting.iter().filter(|(d, _)| d.regressor.surface() == Some(error.signal)) {
+        for (derivative, value) in self
+            .acting
+            .iter()
+            .filter(|(d, _)| d.regressor.surface() == Some(error.signal))
+        {
             add(&derivative.name, error.scale * value);
-            add(&constant(derivative.coefficient, &derivative.regressor), error.bias * value);
+            add(
+                &constant(derivative.coefficient, &derivative.regressor),
+                error.bias * value,
+            );
         }
         shift
     }
@@ -196,5 +272,8 @@ impl<'a> Surfaces<'a> {
 /// The name of what a constant deflection of a surface, or force of a vane, changes of a coefficient.
 fn constant(coefficient: Coefficient, regressor: &Regressor) -> String {
     let vane = matches!(regressor, Regressor::Vane(_));
-    format!("{coefficient:?} of a constant {}", if vane { "vane" } else { "surface" })
+    format!(
+        "{coefficient:?} of a constant {}",
+        if vane { "vane" } else { "surface" }
+    )
 }

@@ -4,8 +4,14 @@
 //! state: c = offset + slope · x. Held derivatives are summed once into offset and slope, free ones once per iteration.
 //!
 //! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states if they are free.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -60,7 +66,9 @@ impl<const NX: usize> Coefficients<NX> {
             None => &mut self.offset[acting.coefficient],
         };
         sum.resize(column.len(), 0.0);
-        sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += value * r);
+        sum.iter_mut()
+            .zip(column)
+            .for_each(|(sum, r)| *sum += value * r);
     }
 
     /// Those of a point.
@@ -86,11 +94,18 @@ pub(super) struct Near<const NX: usize> {
 }
 
 impl<const NX: usize> Near<NX> {
-    pub const NONE: Near<NX> = Near { offset: [[0.0; WHOLE]; COEFFICIENTS], slope: [[[0.0; WHOLE]; NX]; COEFFICIENTS] };
+    pub const NONE: Near<NX> = Near {
+        offset: [[0.0; WHOLE]; COEFFICIENTS],
+        slope: [[[0.0; WHOLE]; NX]; COEFFICIENTS],
+    };
 
     /// Their values at one of the points when the state is x.
     #[inline(always)]
-    pub fn coefficients<E: Equations<NX>>(&self, point: usize, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+    pub fn coefficients<E: Equations<NX>>(
+        &self,
+        point: usize,
+        x: &SVector<f64, NX>,
+    ) -> [f64; COEFFICIENTS] {
         let mut values = [0.0; COEFFICIENTS];
         for k in 0..COEFFICIENTS {
             values[k] = self.offset[k][point];
@@ -190,19 +205,36 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Makes a maneuver ready. `window` must contain the surfaces of the model's derivatives.
     #[must_use]
-    pub fn new(aircraft: &Aircraft, window: &Window, measurements: Measurements, model: &Model) -> Self {
+    pub fn new(
+        aircraft: &Aircraft,
+        window: &Window,
+        measurements: Measurements,
+        model: &Model,
+    ) -> Self {
         let mut free = model.free.clone();
         free.sort_by_key(|d| d.coefficient.index());
         let mut columns = Columns::<NX, E>::new(aircraft, window);
         let acting: Vec<Acting> = free.iter().map(|d| columns.acting(d)).collect();
-        let held: Vec<(Acting, f64)> = model.held.iter().map(|(d, value)| (columns.acting(d), *value)).collect();
+        let held: Vec<(Acting, f64)> = model
+            .held
+            .iter()
+            .map(|(d, value)| (columns.acting(d), *value))
+            .collect();
         let mut along = Along::<NX, E>::over(aircraft, window);
         let mut columns = columns.filled(&along);
         for column in &mut columns {
             column.extend([0.0; BEYOND]);
         }
         // A step needs three points, also the one that would follow the last sample.
-        along.known.extend(along.known.last().cloned().into_iter().cycle().take(2 * WIDEST_STRIDE));
+        along.known.extend(
+            along
+                .known
+                .last()
+                .cloned()
+                .into_iter()
+                .cycle()
+                .take(2 * WIDEST_STRIDE),
+        );
         let mut held_part = Coefficients::zero();
         for (acting, value) in held {
             held_part.add(value, acting, &columns[acting.column]);
@@ -215,9 +247,16 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
         let outputs = E::AXIS.outputs();
         let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
-        let biased: Vec<usize> =
-            model.biases.iter().filter_map(|b| outputs.iter().position(|o| *o == b.output)).collect();
-        let initial = if model.initial_state == InitialState::Estimated { NX } else { 0 };
+        let biased: Vec<usize> = model
+            .biases
+            .iter()
+            .filter_map(|b| outputs.iter().position(|o| *o == b.output))
+            .collect();
+        let initial = if model.initial_state == InitialState::Estimated {
+            NX
+        } else {
+            0
+        };
         let lanes = Lanes::new(&acting, E::FOLLOWED, initial, biased.len());
         Case {
             step_s: window.step_s,
@@ -303,7 +342,14 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 
     /// What the free derivatives add to the coefficients.
     pub(super) fn terms(&self, parameters: &[f64]) -> Vec<Term> {
-        self.acting.iter().zip(parameters).map(|(acting, value)| Term { acting: *acting, value: *value }).collect()
+        self.acting
+            .iter()
+            .zip(parameters)
+            .map(|(acting, value)| Term {
+                acting: *acting,
+                value: *value,
+            })
+            .collect()
     }
 
     /// The coefficients at the points of a chunk.
@@ -347,7 +393,12 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// The parameters to start from: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
     #[must_use]
     pub fn starting_values(&self, derivative: impl Fn(&str) -> f64) -> Vec<f64> {
-        let mut values: Vec<f64> = self.names.iter().take(self.derivatives()).map(|name| derivative(name)).collect();
+        let mut values: Vec<f64> = self
+            .names
+            .iter()
+            .take(self.derivatives())
+            .map(|name| derivative(name))
+            .collect();
         values.extend(self.biased.iter().map(|_| 0.0));
         if self.initial_state == InitialState::Estimated {
             values.extend(self.start.iter());
@@ -359,14 +410,20 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 /// Adds a value times a column's points; a column that is empty is zero throughout.
 #[inline(always)]
 fn add(value: f64, column: &[f64], points: Spaced, sum: &mut [f64; WHOLE]) {
-    let Some(column) = column.get(points.first..) else { return };
+    let Some(column) = column.get(points.first..) else {
+        return;
+    };
     if points.stride == 1 {
-        let Some(column) = column.first_chunk::<WHOLE>() else { return };
+        let Some(column) = column.first_chunk::<WHOLE>() else {
+            return;
+        };
         for k in 0..WHOLE {
             sum[k] = value.mul_add(column[k], sum[k]);
         }
     } else {
-        sum.iter_mut().zip(column.iter().step_by(points.stride)).for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
+        sum.iter_mut()
+            .zip(column.iter().step_by(points.stride))
+            .for_each(|(sum, c)| *sum = value.mul_add(*c, *sum));
     }
 }
 
@@ -390,7 +447,11 @@ impl<const NX: usize, E: Equations<NX>> Along<NX, E> {
             states: Vec::with_capacity(samples),
             implied: Vec::with_capacity(samples),
         };
-        Arch::new().dispatch(Over { aircraft, window, along: &mut along });
+        Arch::new().dispatch(Over {
+            aircraft,
+            window,
+            along: &mut along,
+        });
         along
     }
 }
@@ -407,7 +468,11 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Over<'_, NX, E> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Over { aircraft, window, along } = self;
+        let Over {
+            aircraft,
+            window,
+            along,
+        } = self;
         let motion = window.motion(aircraft);
         for point in 0..window.len() {
             let motion = motion.at(point);
@@ -416,7 +481,9 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Over<'_, NX, E> {
             if point % 2 == 0 {
                 along.sensed.push(E::sensed(aircraft, &motion));
                 along.states.push(E::measured_state(&motion));
-                along.implied.push(E::coefficients(aircraft, &motion, &known));
+                along
+                    .implied
+                    .push(E::coefficients(aircraft, &motion, &known));
             }
             along.known.push(known);
         }
@@ -434,18 +501,30 @@ struct Columns<'a, const NX: usize, E: Equations<NX>> {
 
 impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
     fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
-        Columns { aircraft, window, asked: vec![], equations: PhantomData }
+        Columns {
+            aircraft,
+            window,
+            asked: vec![],
+            equations: PhantomData,
+        }
     }
 
     /// How a derivative acts. Two share a column when they have the same regressor, but a vane's moment is not its force.
     fn acting(&mut self, derivative: &'a Derivative) -> Acting {
-        let moment = |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
-        let same = |d: &&Derivative| d.regressor == derivative.regressor && moment(d) == moment(derivative);
+        let moment =
+            |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
+        let same = |d: &&Derivative| {
+            d.regressor == derivative.regressor && moment(d) == moment(derivative)
+        };
         let column = self.asked.iter().position(same).unwrap_or_else(|| {
             self.asked.push(derivative);
             self.asked.len() - 1
         });
-        Acting { coefficient: derivative.coefficient.index(), along: E::state_of(&derivative.regressor), column }
+        Acting {
+            coefficient: derivative.coefficient.index(),
+            along: E::state_of(&derivative.regressor),
+            column,
+        }
     }
 
     /// Every column at every point, with room for points beyond.
@@ -463,7 +542,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
         let (aircraft, velocity) = (self.aircraft, self.window.signal(signal::VELOCITY));
         let regressor = &derivative.regressor;
         if E::state_of(regressor).is_some() {
-            let factor = |v: &f64| E::state_regressor(aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor);
+            let factor = |v: &f64| {
+                E::state_regressor(aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor)
+            };
             return column.extend(velocity.iter().map(factor));
         }
         let mut rate = |name: &str, length: f64| {
@@ -479,8 +560,14 @@ impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
             Regressor::Beta => column.extend(along.flow.iter().map(|[_, beta]| beta * DEG)),
             Regressor::Surface(name) => column.extend(self.window.signal(name)),
             Regressor::Vane(name) => {
-                let both = self.window.signal(name).iter().zip(self.window.signal(signal::QBAR));
-                column.extend(both.map(|(force, qbar)| force * surface_factor(aircraft, *qbar, derivative)));
+                let both = self
+                    .window
+                    .signal(name)
+                    .iter()
+                    .zip(self.window.signal(signal::QBAR));
+                column.extend(
+                    both.map(|(force, qbar)| force * surface_factor(aircraft, *qbar, derivative)),
+                );
             }
         }
     }
@@ -496,13 +583,19 @@ pub(super) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Deriva
         crate::aero::Axis::Longitudinal => aircraft.chord_ft,
         crate::aero::Axis::Lateral => aircraft.span_ft,
     };
-    1.0 / if derivative.coefficient.is_moment() { force * length } else { force }
+    1.0 / if derivative.coefficient.is_moment() {
+        force * length
+    } else {
+        force
+    }
 }
 
 /// Samples from which the initial state is averaged: there the maneuver is still trimmed.
 const TRIMMED: usize = 10;
 
-fn mean<'a, const NX: usize>(states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>) -> SVector<f64, NX> {
+fn mean<'a, const NX: usize>(
+    states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>,
+) -> SVector<f64, NX> {
     let count = states.len().max(1) as f64;
     states.fold(SVector::zeros(), |sum: SVector<f64, NX>, x| sum + x) / count
 }

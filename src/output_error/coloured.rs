@@ -107,7 +107,10 @@ pub(super) fn covariance(inverse: &Padded, outputs: &[Series]) -> Estimated {
     for output in &outputs {
         output.know(&mut known);
     }
-    Estimated { covariance: scatter(&outputs, inverse.columns()).matrix(), freedom: known.freedom() }
+    Estimated {
+        covariance: scatter(&outputs, inverse.columns()).matrix(),
+        freedom: known.freedom(),
+    }
 }
 
 /// The noise that residuals of a fit speak for, given H⁻¹.
@@ -115,7 +118,14 @@ pub(super) fn covariance(inverse: &Padded, outputs: &[Series]) -> Estimated {
 pub fn noise(inverse: &DMatrix<f64>, outputs: &[Series]) -> Noise {
     let inverse = Padded::symmetric(inverse);
     let settled = settled(&inverse, outputs).into_iter();
-    Noise(settled.map(|o| OutputNoise { slow: o.slow, fast: o.output.fast }).collect())
+    Noise(
+        settled
+            .map(|o| OutputNoise {
+                slow: o.slow,
+                fast: o.output.fast,
+            })
+            .collect(),
+    )
 }
 
 /// The variance of white noise that is as strong as the slowest part of these values, NaN where one does not count, and
@@ -124,13 +134,26 @@ pub fn noise(inverse: &DMatrix<f64>, outputs: &[Series]) -> Noise {
 pub fn level(values: &[f64], step_s: f64) -> f64 {
     let counted = |values: &[f64]| {
         let finite = || values.iter().filter(|v| v.is_finite());
-        (Block { count: finite().count() as f64, residual: finite().sum() }, finite().map(|v| v * v).sum::<f64>())
+        (
+            Block {
+                count: finite().count() as f64,
+                residual: finite().sum(),
+            },
+            finite().map(|v| v * v).sum::<f64>(),
+        )
     };
     let (all, square) = counted(values);
-    let series =
-        Series::new(step_s, 1.0, values.len(), square, &DMatrix::zeros(1, 1), |samples, _| counted(&values[samples]).0);
+    let series = Series::new(
+        step_s,
+        1.0,
+        values.len(),
+        square,
+        &DMatrix::zeros(1, 1),
+        |samples, _| counted(&values[samples]).0,
+    );
     let pairs = series.pairs();
-    let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]).long_run_variance();
+    let slow =
+        Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]).long_run_variance();
     (slow * series.block).max(square / all.count.max(1.0))
 }
 
@@ -145,14 +168,23 @@ pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
         if noise.slow.is_white() {
             scatter.add(&output.between, factor);
         } else {
-            scatter.add(&output.filtered(&output.sensitivities, &noise.slow).squares(), factor);
+            scatter.add(
+                &output
+                    .filtered(&output.sensitivities, &noise.slow)
+                    .squares(),
+                factor,
+            );
         }
     }
     scatter.matrix()
 }
 
 /// Samples of a block.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a small positive number"
+)]
 pub(super) fn samples_of_block(step_s: f64) -> usize {
     (BLOCK_S / step_s).round().max(1.0) as usize
 }
@@ -177,7 +209,8 @@ impl Series {
         // Of blocks that do not count whole, what their mean's square is larger by.
         let mut more = Vec::new();
         for (k, row) in sensitivities.rows_mut().enumerate() {
-            let Block { count, residual } = block_of(k * length..samples.min((k + 1) * length), row);
+            let Block { count, residual } =
+                block_of(k * length..samples.min((k + 1) * length), row);
             let mean = residual / count.max(1.0);
             counts.push(count);
             residuals.push(mean);
@@ -197,24 +230,50 @@ impl Series {
         let fast_freedom = f64::max(freedom, 1.0);
         let fast = square.max(0.0) / fast_freedom;
         let residuals = Padded::column(&residuals);
-        Series { weight, block, residuals, fast, fast_freedom, counts, sensitivities, between, within }
+        Series {
+            weight,
+            block,
+            residuals,
+            fast,
+            fast_freedom,
+            counts,
+            sensitivities,
+            between,
+            within,
+        }
     }
 
     /// The same with other parameters: `places` says where each stands among them.
     #[must_use]
     pub fn widened(&self, places: &[usize], parameters: usize) -> Series {
-        let place = |own: &[f64], wide: &mut [f64]| places.iter().zip(own).for_each(|(&place, s)| wide[place] = *s);
+        let place = |own: &[f64], wide: &mut [f64]| {
+            places
+                .iter()
+                .zip(own)
+                .for_each(|(&place, s)| wide[place] = *s)
+        };
         let mut sensitivities = Padded::zeros(self.blocks(), parameters);
-        self.sensitivities.rows().zip(sensitivities.rows_mut()).for_each(|(own, wide)| place(own, wide));
+        self.sensitivities
+            .rows()
+            .zip(sensitivities.rows_mut())
+            .for_each(|(own, wide)| place(own, wide));
         let square = |own: &Padded| {
             let mut wide = Padded::zeros(parameters, parameters);
             for (own, &row) in own.rows().zip(places) {
-                wide.rows_mut().skip(row).take(1).for_each(|wide| place(own, wide));
+                wide.rows_mut()
+                    .skip(row)
+                    .take(1)
+                    .for_each(|wide| place(own, wide));
             }
             wide
         };
         let (between, within) = (square(&self.between), square(&self.within));
-        Series { sensitivities, between, within, ..self.clone() }
+        Series {
+            sensitivities,
+            between,
+            within,
+            ..self.clone()
+        }
     }
 
     fn blocks(&self) -> usize {
@@ -229,12 +288,18 @@ impl Series {
     fn pairs(&self) -> Vec<f64> {
         let used: Vec<f64> = self.counts.iter().map(|count| count.min(1.0)).collect();
         let used = Padded::column(&used);
-        used.lagged(&used, self.lags()).iter().map(|pairs| pairs.max(1.0)).collect()
+        used.lagged(&used, self.lags())
+            .iter()
+            .map(|pairs| pairs.max(1.0))
+            .collect()
     }
 
     fn autocovariances(&self, pairs: &[f64]) -> Vec<f64> {
         let sums = self.residuals.lagged(&self.residuals, self.lags());
-        sums.iter().zip(pairs).map(|(sum, pairs)| sum / pairs).collect()
+        sums.iter()
+            .zip(pairs)
+            .map(|(sum, pairs)| sum / pairs)
+            .collect()
     }
 
     /// Rows of the blocks filtered by a process, until that has died away.
@@ -248,7 +313,10 @@ impl Series {
     fn spread(&self, mut filtered: Padded, process: &Autoregression) -> Padded {
         filtered.filter_back(process);
         filtered.truncate(self.blocks());
-        let unused = filtered.rows_mut().zip(&self.counts).filter(|(_, count)| **count <= 0.0);
+        let unused = filtered
+            .rows_mut()
+            .zip(&self.counts)
+            .filter(|(_, count)| **count <= 0.0);
         unused.for_each(|(row, _)| row.fill(0.0));
         filtered
     }
@@ -256,7 +324,10 @@ impl Series {
 
 /// The outputs with the noise that is left when what the parameters took is added back.
 fn settled<'a>(inverse: &'a Padded, outputs: &'a [Series]) -> Vec<Settling<'a>> {
-    let mut outputs: Vec<_> = outputs.iter().map(|output| Settling::new(inverse, output)).collect();
+    let mut outputs: Vec<_> = outputs
+        .iter()
+        .map(|output| Settling::new(inverse, output))
+        .collect();
     for _ in 0..ROUNDS {
         let scatter = scatter(&outputs, inverse.columns());
         for output in &mut outputs {
@@ -357,10 +428,21 @@ impl<'a> Settling<'a> {
         self.followed = followed;
         let taken = self.taken(scatter);
         let left = self.variance - taken[0] / pairs;
-        let stronger =
-            if self.slow.is_white() && left > LITTLE * self.variance { self.observed[0] / left } else { 1.0 };
-        let shares = taken.iter().zip(&self.pairs).map(|(taken, pairs)| stronger * taken / pairs);
-        let whole: Vec<f64> = self.observed.iter().zip(shares).map(|(observed, share)| observed + share).collect();
+        let stronger = if self.slow.is_white() && left > LITTLE * self.variance {
+            self.observed[0] / left
+        } else {
+            1.0
+        };
+        let shares = taken
+            .iter()
+            .zip(&self.pairs)
+            .map(|(taken, pairs)| stronger * taken / pairs);
+        let whole: Vec<f64> = self
+            .observed
+            .iter()
+            .zip(shares)
+            .map(|(observed, share)| observed + share)
+            .collect();
         let expected = stronger * self.slow.long_run_variance();
         self.take(&whole);
         let found = self.slow.long_run_variance();
@@ -369,16 +451,28 @@ impl<'a> Settling<'a> {
 
     /// R C Sᵀ + S Cᵀ R − S K Sᵀ summed along its diagonals.
     fn taken(&mut self, scatter: &Padded) -> Vec<f64> {
-        let (sums, block, lags) = (&self.output.sensitivities, self.output.block, self.output.lags());
+        let (sums, block, lags) = (
+            &self.output.sensitivities,
+            self.output.block,
+            self.output.lags(),
+        );
         let factor = self.slow.innovation / block;
         let mut inner = scatter.clone().times(-0.5 / (block * block));
         if let Some(mut half) = self.spread.take() {
             half.add_product(sums, &inner.times(1.0 / factor));
-            let both = half.lagged(sums, lags).into_iter().zip(sums.lagged(&half, lags));
-            both.map(|(before, after)| factor * (before + after)).collect()
+            let both = half
+                .lagged(sums, lags)
+                .into_iter()
+                .zip(sums.lagged(&half, lags));
+            both.map(|(before, after)| factor * (before + after))
+                .collect()
         } else {
             inner.add(self.inverse, factor * self.output.weight);
-            sums.product(&inner).lagged(sums, lags).iter().map(|half| 2.0 * half).collect()
+            sums.product(&inner)
+                .lagged(sums, lags)
+                .iter()
+                .map(|half| 2.0 * half)
+                .collect()
         }
     }
 
@@ -391,7 +485,13 @@ impl<'a> Settling<'a> {
         match &self.changes {
             Some(changes) if !self.slow.is_white() => {
                 let filtered = self.output.filtered(changes, &self.slow);
-                Part { noise: &self.slow, filtered, freedom, known }.add();
+                Part {
+                    noise: &self.slow,
+                    filtered,
+                    freedom,
+                    known,
+                }
+                .add();
             }
             _ => known.add(self.by_slow.diagonal(), freedom),
         }
@@ -408,12 +508,25 @@ mod tests {
     /// An output whose sensitivity is one wherever it counts.
     fn of_a_sum(weight: f64, residuals: &[f64], used: &[bool]) -> Series {
         let count = |used: &[bool]| used.iter().filter(|used| **used).count() as f64;
-        let (square, squares) = (residuals.iter().map(|v| v * v).sum(), DMatrix::from_element(1, 1, count(used)));
-        Series::new(0.1, weight, residuals.len(), square, &squares, |samples, row| {
-            let block = Block { count: count(&used[samples.clone()]), residual: residuals[samples].iter().sum() };
-            row[0] += block.count;
-            block
-        })
+        let (square, squares) = (
+            residuals.iter().map(|v| v * v).sum(),
+            DMatrix::from_element(1, 1, count(used)),
+        );
+        Series::new(
+            0.1,
+            weight,
+            residuals.len(),
+            square,
+            &squares,
+            |samples, row| {
+                let block = Block {
+                    count: count(&used[samples.clone()]),
+                    residual: residuals[samples].iter().sum(),
+                };
+                row[0] += block.count;
+                block
+            },
+        )
     }
 
     /// The variance stated for the mean of values, given their residuals from it; H = w N and H⁻¹ = 1/H.
@@ -421,10 +534,22 @@ mod tests {
         let weight = 3.0;
         let count = used.iter().filter(|used| **used).count() as f64;
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
-        let mean = values.iter().zip(used).map(|(v, used)| of(*used, *v)).sum::<f64>() / count;
-        let residuals: Vec<f64> = values.iter().zip(used).map(|(v, used)| of(*used, v - mean)).collect();
+        let mean = values
+            .iter()
+            .zip(used)
+            .map(|(v, used)| of(*used, *v))
+            .sum::<f64>()
+            / count;
+        let residuals: Vec<f64> = values
+            .iter()
+            .zip(used)
+            .map(|(v, used)| of(*used, v - mean))
+            .collect();
         let series = of_a_sum(weight, &residuals, used);
-        covariance(&Padded::symmetric(&DMatrix::from_element(1, 1, 1.0 / (weight * count))), &[series])
+        covariance(
+            &Padded::symmetric(&DMatrix::from_element(1, 1, 1.0 / (weight * count))),
+            &[series],
+        )
     }
 
     #[test]
@@ -436,7 +561,11 @@ mod tests {
         let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
         // Nine blocks, so that a degree of freedom not counted would be 11%.
         let said = of_the_mean(&values, &[true; 18]);
-        assert_relative_eq!(said.covariance[(0, 0)], square / 8.0 / 9.0, max_relative = 0.02);
+        assert_relative_eq!(
+            said.covariance[(0, 0)],
+            square / 8.0 / 9.0,
+            max_relative = 0.02
+        );
         // The interval is Student's with as many.
         assert_relative_eq!(said.freedom[0], 8.0, max_relative = 1e-9);
         let longer = said.clone().of_student()[(0, 0)] / said.covariance[(0, 0)];
@@ -446,12 +575,21 @@ mod tests {
     #[test]
     fn white_noise_does_to_the_gradient_what_it_does_to_the_blocks() {
         let (count, weight) = (40, 3.0);
-        let residuals: Vec<f64> = (0..count).map(|k| if k % 4 < 2 { 1.0 } else { -1.0 }).collect();
+        let residuals: Vec<f64> = (0..count)
+            .map(|k| if k % 4 < 2 { 1.0 } else { -1.0 })
+            .collect();
         let series = of_a_sum(weight, &residuals, &vec![true; residuals.len()]);
-        let noise = super::Noise(vec![OutputNoise { slow: Autoregression::white(2.0), fast: 1.0 }]);
+        let noise = super::Noise(vec![OutputNoise {
+            slow: Autoregression::white(2.0),
+            fast: 1.0,
+        }]);
         // A block of two samples whose mean has the variance 2 gives the sum over it 8.
         let expected = weight * weight * 8.0 * f64::from(count) / 2.0;
-        assert_relative_eq!(gradient_covariance(&[series], &noise)[(0, 0)], expected, max_relative = 1e-12);
+        assert_relative_eq!(
+            gradient_covariance(&[series], &noise)[(0, 0)],
+            expected,
+            max_relative = 1e-12
+        );
     }
 
     #[test]
@@ -469,13 +607,21 @@ mod tests {
                 })
                 .collect();
             stated += of_the_mean(&values, &used).covariance[(0, 0)] / f64::from(draws);
-            let counted: Vec<f64> = values.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect();
+            let counted: Vec<f64> = values
+                .iter()
+                .zip(&used)
+                .filter(|(_, used)| **used)
+                .map(|(v, _)| *v)
+                .collect();
             let mean = counted.iter().sum::<f64>() / counted.len() as f64;
             scatter += mean * mean / f64::from(draws);
         }
         let product = |k: usize, l: usize| c.powi(i32::try_from(k.abs_diff(l)).unwrap());
         let counted: Vec<usize> = (0..samples).filter(|&k| used[k]).collect();
-        let sum: f64 = counted.iter().flat_map(|&k| counted.iter().map(move |&l| product(k, l))).sum();
+        let sum: f64 = counted
+            .iter()
+            .flat_map(|&k| counted.iter().map(move |&l| product(k, l)))
+            .sum();
         let exact = sum / (counted.len() * counted.len()) as f64;
         // 200 draws give the scatter to 10%, the mean of the stated variances to some 3%.
         assert_relative_eq!(stated, exact, max_relative = 0.1);
@@ -502,9 +648,18 @@ mod tests {
             normal += within(said.covariance[(0, 0)]);
             student += within(said.of_student()[(0, 0)]);
         }
-        let (normal, student) = (f64::from(normal) / f64::from(draws), f64::from(student) / f64::from(draws));
+        let (normal, student) = (
+            f64::from(normal) / f64::from(draws),
+            f64::from(student) / f64::from(draws),
+        );
         // 1000 draws give a share to 0.7 %.
-        assert!(student > normal + 0.005, "Student {student}, normal {normal}");
-        assert!((0.93..0.975).contains(&student), "Student {student}, normal {normal}");
+        assert!(
+            student > normal + 0.005,
+            "Student {student}, normal {normal}"
+        );
+        assert!(
+            (0.93..0.975).contains(&student),
+            "Student {student}, normal {normal}"
+        );
     }
 }

@@ -30,8 +30,13 @@ impl Sums {
 /// Residuals measured minus computed; zero where a sample does not count.
 #[must_use]
 pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; OUTPUTS]> {
-    let rows = measurements.values.iter().zip(&measurements.used).zip(&response.outputs);
-    rows.map(|((z, used), y)| std::array::from_fn(|o| if used[o] { z[o] - y[o] } else { 0.0 })).collect()
+    let rows = measurements
+        .values
+        .iter()
+        .zip(&measurements.used)
+        .zip(&response.outputs);
+    rows.map(|((z, used), y)| std::array::from_fn(|o| if used[o] { z[o] - y[o] } else { 0.0 }))
+        .collect()
 }
 
 /// Sums of a response to the case's parameters for weights W (on residuals in deg, deg/s and g).

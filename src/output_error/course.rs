@@ -2,7 +2,10 @@
 //! slopes A = ∂ẋ/∂x (through the coefficients included) and B = ∂ẋ/∂c.
 //!
 //! A stage waits for the one before it, so the chain goes stage by stage beside other work ([`Meanwhile`]).
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
 
 use nalgebra::{SMatrix, SVector};
 
@@ -45,7 +48,8 @@ pub(super) struct Path<const NX: usize> {
 
 impl<const NX: usize> Path<NX> {
     pub const NONE: Path<NX> = Path {
-        states: [SVector::<f64, NX>::from_array_storage(nalgebra::ArrayStorage([[0.0; NX]; 1])); CHUNK],
+        states: [SVector::<f64, NX>::from_array_storage(nalgebra::ArrayStorage([[0.0; NX]; 1]));
+            CHUNK],
         times: [[[1.0; VECTOR]; CHUNK]; STAGES],
         a: [[[[0.0; CHUNK]; NX]; NX]; STAGES],
         b: [[[[0.0; CHUNK]; COEFFICIENTS]; NX]; STAGES],
@@ -53,7 +57,9 @@ impl<const NX: usize> Path<NX> {
 
     /// The first of some samples whose state left the bounds of sense or is no number.
     pub fn senseless(&self, samples: usize) -> Option<usize> {
-        self.states[..samples].iter().position(|x| !x.iter().all(|x| x.abs() < BEYOND_SENSE))
+        self.states[..samples]
+            .iter()
+            .position(|x| !x.iter().all(|x| x.abs() < BEYOND_SENSE))
     }
 }
 
@@ -86,10 +92,25 @@ impl<'a, const NX: usize, E: Equations<NX>> Course<'a, NX, E> {
         samples: usize,
     ) -> Self {
         let h = points.stride as f64 * case.step_s;
-        let (ahead_s, part_s) = ([0.5 * h, 0.5 * h, h, 0.0], [h / 6.0, h / 3.0, h / 3.0, h / 6.0]);
+        let (ahead_s, part_s) = (
+            [0.5 * h, 0.5 * h, h, 0.0],
+            [h / 6.0, h / 3.0, h / 3.0, h / 6.0],
+        );
         let (at, next) = (x, x);
-        let mut course =
-            Course { case, near, path, x, at, next, points, sample: 0, stage: 0, end: samples, ahead_s, part_s };
+        let mut course = Course {
+            case,
+            near,
+            path,
+            x,
+            at,
+            next,
+            points,
+            sample: 0,
+            stage: 0,
+            end: samples,
+            ahead_s,
+            part_s,
+        };
         course.arrive(x);
         course
     }
@@ -129,7 +150,11 @@ impl<const NX: usize, E: Equations<NX>> Meanwhile for Course<'_, NX, E> {
         let (sample, stage) = (self.sample, self.stage);
         let point = POINT[stage];
         let c = self.near.coefficients::<E>(2 * sample + point, &self.at);
-        let rates = E::rates(&self.case.known[self.points.at(2 * sample + point)], &self.at, &c);
+        let rates = E::rates(
+            &self.case.known[self.points.at(2 * sample + point)],
+            &self.at,
+            &c,
+        );
         for i in 0..NX {
             self.next[i] = rates.rates[i].mul_add(self.part_s[stage], self.next[i]);
         }
@@ -174,7 +199,8 @@ impl<const NX: usize> Near<NX> {
     ) -> SMatrix<f64, N, NX> {
         for &(i, k) in places {
             for &j in E::FOLLOWED {
-                by_state[(i, j)] = by_coefficient[(i, k)].mul_add(self.slope[k][j][point], by_state[(i, j)]);
+                by_state[(i, j)] =
+                    by_coefficient[(i, k)].mul_add(self.slope[k][j][point], by_state[(i, j)]);
             }
         }
         by_state

@@ -21,13 +21,17 @@ use crate::dynamics::{Equations, OUTPUTS};
 /// 1/√H_jj, one where the data say nothing of a parameter.
 #[must_use]
 pub fn scale(information: &DMatrix<f64>) -> DVector<f64> {
-    information.diagonal().map(|h| if h > 0.0 { 1.0 / h.sqrt() } else { 1.0 })
+    information
+        .diagonal()
+        .map(|h| if h > 0.0 { 1.0 / h.sqrt() } else { 1.0 })
 }
 
 /// H with rows and columns scaled.
 #[must_use]
 pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(information.nrows(), information.ncols(), |i, j| information[(i, j)] * scale[i] * scale[j])
+    DMatrix::from_fn(information.nrows(), information.ncols(), |i, j| {
+        information[(i, j)] * scale[i] * scale[j]
+    })
 }
 
 /// Whether the data determine every parameter.
@@ -51,27 +55,45 @@ const TAKES_PART: f64 = 0.1;
 /// Inverts the information matrix, or names what it does not determine.
 #[must_use]
 pub fn identified(information: &DMatrix<f64>, max_condition_number: f64) -> Identified {
-    let silent: Vec<usize> = (0..information.nrows()).filter(|&i| information[(i, i)] <= 0.0).collect();
+    let silent: Vec<usize> = (0..information.nrows())
+        .filter(|&i| information[(i, i)] <= 0.0)
+        .collect();
     if !silent.is_empty() || !information.iter().all(|h| h.is_finite()) {
-        return Identified::Undetermined { condition_number: None, parameters: silent };
+        return Identified::Undetermined {
+            condition_number: None,
+            parameters: silent,
+        };
     }
     let scaled = scaled(information, &scale(information));
     let eigenvalues = scaled.symmetric_eigenvalues();
     let (smallest, most) = (eigenvalues.min(), eigenvalues.max());
     if let Some(inverse) = inverse(information).filter(|_| smallest > most / max_condition_number) {
-        return Identified::Determined { inverse, condition_number: most / smallest };
+        return Identified::Determined {
+            inverse,
+            condition_number: most / smallest,
+        };
     }
     let eigen = SymmetricEigen::new(scaled);
     let direction = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let parameters = (0..direction.len()).filter(|&j| direction[j] * direction[j] >= TAKES_PART).collect();
-    Identified::Undetermined { condition_number: (smallest > 0.0).then(|| most / smallest), parameters }
+    let parameters = (0..direction.len())
+        .filter(|&j| direction[j] * direction[j] >= TAKES_PART)
+        .collect();
+    Identified::Undetermined {
+        condition_number: (smallest > 0.0).then(|| most / smallest),
+        parameters,
+    }
 }
 
 /// The inverse alone, whatever the condition; none where no direction less would do.
 #[must_use]
 pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(information);
-    Some(scaled(&Padded::symmetric(&scaled(information, &scale)).inverse()?.matrix(), &scale))
+    Some(scaled(
+        &Padded::symmetric(&scaled(information, &scale))
+            .inverse()?
+            .matrix(),
+        &scale,
+    ))
 }
 
 /// Variances of the residuals from Σ v² and the samples of each output, with the parameters counted as spread evenly over
@@ -99,17 +121,25 @@ pub fn bounds<D: Likelihood>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Resp
     let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
     let residuals = coloured::covariance(&inverse, &series).of_student();
     let corrected = never_below(residuals, &covariance) + scattered(inputs);
-    Bounds { covariance, corrected }
+    Bounds {
+        covariance,
+        corrected,
+    }
 }
 
 /// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
 #[must_use]
-pub fn noise<D: Likelihood>(data: &D, fit: &Fit<D::Response>, max_condition_number: f64) -> Option<coloured::Noise> {
+pub fn noise<D: Likelihood>(
+    data: &D,
+    fit: &Fit<D::Response>,
+    max_condition_number: f64,
+) -> Option<coloured::Noise> {
     let sums = data.sums(&fit.response, &fit.weights);
     match identified(&sums.information, max_condition_number) {
-        Identified::Determined { inverse, .. } => {
-            Some(coloured::noise(&inverse, &data.series(&fit.response, &fit.weights)))
-        }
+        Identified::Determined { inverse, .. } => Some(coloured::noise(
+            &inverse,
+            &data.series(&fit.response, &fit.weights),
+        )),
         Identified::Undetermined { .. } => None,
     }
 }
@@ -139,7 +169,16 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     fit: &mut Fit,
 ) {
     let places = (0..case.parameters()).collect();
-    consider_together(&[Considered { case, wide, values: values.clone(), places }], uncertainties, fit);
+    consider_together(
+        &[Considered {
+            case,
+            wide,
+            values: values.clone(),
+            places,
+        }],
+        uncertainties,
+        fit,
+    );
 }
 
 /// [`consider`] for maneuvers that share parameters: the error of a held value is common to all that hold it, so its
@@ -149,7 +188,10 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     uncertainties: &BTreeMap<&str, f64>,
     fit: &mut Fit<R>,
 ) {
-    let (Some(covariance), Some(corrected)) = (&mut fit.covariance, &mut fit.covariance_corrected) else { return };
+    let (Some(covariance), Some(corrected)) = (&mut fit.covariance, &mut fit.covariance_corrected)
+    else {
+        return;
+    };
     let n = covariance.nrows();
     let mut own = DMatrix::zeros(n, n);
     let mut crosses = vec![DVector::zeros(n); uncertainties.len()];
@@ -164,7 +206,9 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
         let information = sums(&response, &fit.weights).information;
         let at = |name: &str| wide.names.iter().position(|n| n == name);
         let names = member.case.names.iter().zip(&member.places);
-        let free: Vec<(usize, usize)> = names.filter_map(|(name, place)| Some((at(name)?, *place))).collect();
+        let free: Vec<(usize, usize)> = names
+            .filter_map(|(name, place)| Some((at(name)?, *place)))
+            .collect();
         for &(i, row) in &free {
             for &(j, column) in &free {
                 own[(row, column)] += information[(i, j)];
@@ -187,9 +231,17 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
 
 /// Adds to a fit's corrected covariance what errors common to all its data do to the estimates: of each, the change of the
 /// gradient with one standard deviation of it ([`super::calibration`]).
-pub fn miscalibrated<D: Likelihood>(data: &D, gradient_shifts: &[DVector<f64>], fit: &mut Fit<D::Response>) {
-    let Some(corrected) = &mut fit.covariance_corrected else { return };
-    let Some(inverse) = inverse(&data.sums(&fit.response, &fit.weights).information) else { return };
+pub fn miscalibrated<D: Likelihood>(
+    data: &D,
+    gradient_shifts: &[DVector<f64>],
+    fit: &mut Fit<D::Response>,
+) {
+    let Some(corrected) = &mut fit.covariance_corrected else {
+        return;
+    };
+    let Some(inverse) = inverse(&data.sums(&fit.response, &fit.weights).information) else {
+        return;
+    };
     let mut common = DMatrix::zeros(inverse.nrows(), inverse.ncols());
     for gradient_shift in gradient_shifts {
         let shift = &inverse * gradient_shift;

@@ -39,7 +39,10 @@ fn regress<const NX: usize, E: Equations<NX>>(
     let range = case.ranges[coefficient].clone();
     let mut regressors = vec![0.0; case.derivatives()];
     let coefficients = case.with(prior);
-    let (mut normal, mut right) = (DMatrix::zeros(range.len(), range.len()), DVector::zeros(range.len()));
+    let (mut normal, mut right) = (
+        DMatrix::zeros(range.len(), range.len()),
+        DVector::zeros(range.len()),
+    );
     for (sample, (state, implied)) in case.states.iter().zip(&case.implied).enumerate() {
         let computed = coefficients.at(2 * sample).with(state);
         case.regressors_at(2 * sample, state, &mut regressors);
@@ -83,16 +86,28 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
             continue;
         }
         let rows = rows(case, k, &none);
-        let (mut normal, mut right) = (DMatrix::zeros(range.len(), range.len()), DVector::zeros(range.len()));
+        let (mut normal, mut right) = (
+            DMatrix::zeros(range.len(), range.len()),
+            DVector::zeros(range.len()),
+        );
         let moment = E::AXIS.coefficients()[k].is_moment();
-        for (seen, used) in rows.windows(window.len()).zip(case.measurements.used.windows(window.len())) {
+        for (seen, used) in rows
+            .windows(window.len())
+            .zip(case.measurements.used.windows(window.len()))
+        {
             if used.iter().any(|used| *used != [true; OUTPUTS]) {
                 continue;
             }
             let row = seen_through(&window, seen);
-            let [regressors @ .., held, force] = row.as_slice() else { continue };
+            let [regressors @ .., held, force] = row.as_slice() else {
+                continue;
+            };
             // A moment's acceleration is a slope: it has been seen through the window already.
-            let implied = if moment { seen[SLOPE_REACH].last().unwrap_or(force) } else { force };
+            let implied = if moment {
+                seen[SLOPE_REACH].last().unwrap_or(force)
+            } else {
+                force
+            };
             add_square(&mut normal, 1.0, regressors);
             for (b, r) in right.iter_mut().zip(regressors) {
                 *b += (implied - held) * r;
@@ -109,7 +124,11 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
 }
 
 /// At every sample the regressors of a coefficient, then the held part of it, then what the measured motion implies.
-fn rows<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usize, none: &[f64]) -> Vec<Vec<f64>> {
+fn rows<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    coefficient: usize,
+    none: &[f64],
+) -> Vec<Vec<f64>> {
     let mut regressors = vec![0.0; case.derivatives()];
     let coefficients = case.with(none);
     let samples = case.states.iter().zip(&case.implied).enumerate();
@@ -164,10 +183,14 @@ mod tests {
         let x = |t: f64| t.powi(2);
         let derivative = |t: f64| 2.0 * t;
         let reach = i32::try_from(SLOPE_REACH).unwrap();
-        let slope: f64 =
-            (1..=reach).map(|d| f64::from(d) * (x(10.0 + f64::from(d)) - x(10.0 - f64::from(d)))).sum::<f64>()
-                / (1..=reach).map(|d| 2.0 * f64::from(d * d)).sum::<f64>();
-        let seen: f64 = (-reach..=reach).zip(slope_window()).map(|(d, w)| w * derivative(10.0 + f64::from(d))).sum();
+        let slope: f64 = (1..=reach)
+            .map(|d| f64::from(d) * (x(10.0 + f64::from(d)) - x(10.0 - f64::from(d))))
+            .sum::<f64>()
+            / (1..=reach).map(|d| 2.0 * f64::from(d * d)).sum::<f64>();
+        let seen: f64 = (-reach..=reach)
+            .zip(slope_window())
+            .map(|(d, w)| w * derivative(10.0 + f64::from(d)))
+            .sum();
         assert_relative_eq!(seen, slope, max_relative = 1e-12);
     }
 
@@ -180,9 +203,14 @@ mod tests {
         let window = slope_window();
         assert_relative_eq!(window.iter().sum::<f64>(), 1.0, max_relative = 1e-12);
         for k in -6..=6 {
-            let slope: f64 = (1..=reach).map(|d| f64::from(d) * (rate(k + d) - rate(k - d))).sum::<f64>()
+            let slope: f64 = (1..=reach)
+                .map(|d| f64::from(d) * (rate(k + d) - rate(k - d)))
+                .sum::<f64>()
                 / (1..=reach).map(|d| 2.0 * f64::from(d * d)).sum::<f64>();
-            let seen: f64 = (-reach..=reach).zip(&window).map(|(d, w)| w * derivative(k + d)).sum();
+            let seen: f64 = (-reach..=reach)
+                .zip(&window)
+                .map(|(d, w)| w * derivative(k + d))
+                .sum();
             assert_relative_eq!(seen, slope, epsilon = 1e-12);
         }
     }

@@ -22,12 +22,20 @@ const FEWEST: f64 = 3.0;
 
 impl Known {
     pub fn nothing(parameters: usize) -> Known {
-        Known { variance: vec![0.0; parameters], of_variance: vec![0.0; parameters] }
+        Known {
+            variance: vec![0.0; parameters],
+            of_variance: vec![0.0; parameters],
+        }
     }
 
     /// Adds independent parts that are known with so many degrees of freedom.
     pub fn add(&mut self, parts: impl Iterator<Item = f64>, freedom: f64) {
-        for ((variance, of), part) in self.variance.iter_mut().zip(&mut self.of_variance).zip(parts) {
+        for ((variance, of), part) in self
+            .variance
+            .iter_mut()
+            .zip(&mut self.of_variance)
+            .zip(parts)
+        {
             *variance += part;
             *of += 2.0 * part * part / freedom.max(1.0);
         }
@@ -35,8 +43,18 @@ impl Known {
 
     /// Degrees of freedom of each variance.
     pub fn freedom(&self) -> Vec<f64> {
-        let of = |(variance, of): (&f64, &f64)| if *of > 0.0 { 2.0 * variance * variance / of } else { f64::INFINITY };
-        self.variance.iter().zip(&self.of_variance).map(of).collect()
+        let of = |(variance, of): (&f64, &f64)| {
+            if *of > 0.0 {
+                2.0 * variance * variance / of
+            } else {
+                f64::INFINITY
+            }
+        };
+        self.variance
+            .iter()
+            .zip(&self.of_variance)
+            .map(of)
+            .collect()
     }
 }
 
@@ -53,19 +71,37 @@ pub(super) struct Part<'a> {
 impl Part<'_> {
     /// Adds it to what is known.
     pub fn add(self) {
-        let Part { noise, filtered, freedom, known } = self;
+        let Part {
+            noise,
+            filtered,
+            freedom,
+            known,
+        } = self;
         let order = noise.coefficients.len();
         let mut twice = filtered.clone();
         twice.filter(noise);
         let covariance = coefficient_covariance(&noise.coefficients, freedom);
         // Σ u², and −½ of its slopes along the coefficients.
         let square = filtered.column_products(&filtered, 0);
-        let slopes: Vec<Vec<f64>> = (1..=order).map(|i| twice.column_products(&filtered, i)).collect();
-        for (j, (known, of_known)) in known.variance.iter_mut().zip(&mut known.of_variance).enumerate() {
-            let (variance, slope) = (noise.innovation * square[j], |i: usize| -2.0 * noise.innovation * slopes[i][j]);
+        let slopes: Vec<Vec<f64>> = (1..=order)
+            .map(|i| twice.column_products(&filtered, i))
+            .collect();
+        for (j, (known, of_known)) in known
+            .variance
+            .iter_mut()
+            .zip(&mut known.of_variance)
+            .enumerate()
+        {
+            let (variance, slope) = (noise.innovation * square[j], |i: usize| {
+                -2.0 * noise.innovation * slopes[i][j]
+            });
             let mut of_variance = 2.0 * variance * variance / freedom.max(1.0);
             for (i, row) in covariance.iter().enumerate() {
-                of_variance += row.iter().enumerate().map(|(l, c)| slope(i) * c * slope(l)).sum::<f64>();
+                of_variance += row
+                    .iter()
+                    .enumerate()
+                    .map(|(l, c)| slope(i) * c * slope(l))
+                    .sum::<f64>();
             }
             *known += variance;
             *of_known += of_variance;
@@ -111,8 +147,14 @@ mod tests {
     #[test]
     fn intervals_are_longer_as_student_says() {
         for freedom in [3.0, 4.0, 6.5, 10.0, 30.0, 1000.0] {
-            let t = StudentsT::new(0.0, 1.0, freedom).unwrap().inverse_cdf(0.975);
-            assert_relative_eq!(longer(freedom), t / 1.959_963_984_540_054, max_relative = 2e-3);
+            let t = StudentsT::new(0.0, 1.0, freedom)
+                .unwrap()
+                .inverse_cdf(0.975);
+            assert_relative_eq!(
+                longer(freedom),
+                t / 1.959_963_984_540_054,
+                max_relative = 2e-3
+            );
         }
         assert_relative_eq!(longer(f64::INFINITY), 1.0);
         assert_relative_eq!(longer(0.0), longer(3.0));
@@ -123,7 +165,8 @@ mod tests {
         // v_k = 1.2 v_{k−1} − 0.5 v_{k−2} + e_k: ρ1 = 1.2/1.5, γ0 = σ²/(1 − 1.2 ρ1 + 0.5 ρ2).
         let (r1, r2) = (0.8, 1.2 * 0.8 - 0.5);
         let variance = 1.0 / (1.0 - 1.2 * r1 + 0.5 * r2);
-        let own = DMatrix::from_row_slice(2, 2, &[variance, variance * r1, variance * r1, variance]);
+        let own =
+            DMatrix::from_row_slice(2, 2, &[variance, variance * r1, variance * r1, variance]);
         let expected = own.try_inverse().unwrap() / 50.0;
         let said = coefficient_covariance(&[-1.2, 0.5], 50.0);
         for i in 0..2 {
@@ -139,13 +182,22 @@ mod tests {
         let mut filtered = changes.followed_by(noise.memory(values));
         filtered.filter(noise);
         let mut known = Known::nothing(1);
-        Part { noise, filtered, freedom: values as f64 - 1.0, known: &mut known }.add();
+        Part {
+            noise,
+            filtered,
+            freedom: values as f64 - 1.0,
+            known: &mut known,
+        }
+        .add();
         (known.variance[0], known.freedom()[0])
     }
 
     #[test]
     fn the_variance_of_a_mean_of_white_values_has_as_many_degrees_of_freedom_as_residuals() {
-        let white = Autoregression { coefficients: vec![], innovation: 2.0 };
+        let white = Autoregression {
+            coefficients: vec![],
+            innovation: 2.0,
+        };
         let (variance, freedom) = of_the_mean(&white, 20);
         assert_relative_eq!(variance, 2.0 / 20.0, max_relative = 1e-12);
         assert_relative_eq!(freedom, 19.0, max_relative = 1e-12);
@@ -155,7 +207,10 @@ mod tests {
     fn the_scatter_of_variances_of_a_coloured_mean_is_as_said() {
         // First-order processes of 400 values, fitted again and again.
         let (values, draws, a) = (400, 400, 0.6);
-        let truth = Autoregression { coefficients: vec![-a], innovation: 1.0 };
+        let truth = Autoregression {
+            coefficients: vec![-a],
+            innovation: 1.0,
+        };
         let (_, freedom) = of_the_mean(&truth, values);
         let mut noise = Noise(31);
         let mut variances = Vec::new();
@@ -167,12 +222,23 @@ mod tests {
                     v
                 })
                 .collect();
-            let lag = |l: usize| series.iter().zip(&series[l..]).map(|(a, b)| a * b).sum::<f64>() / values as f64;
+            let lag = |l: usize| {
+                series
+                    .iter()
+                    .zip(&series[l..])
+                    .map(|(a, b)| a * b)
+                    .sum::<f64>()
+                    / values as f64
+            };
             let fitted = Autoregression::fitted(&[lag(0), lag(1)], values as f64);
             variances.push(of_the_mean(&fitted, values).0);
         }
         let mean = variances.iter().sum::<f64>() / f64::from(draws);
-        let of = variances.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / f64::from(draws);
+        let of = variances
+            .iter()
+            .map(|v| (v - mean) * (v - mean))
+            .sum::<f64>()
+            / f64::from(draws);
         // 400 draws give the variance of a variance to some 10%.
         assert_relative_eq!(2.0 * mean * mean / of, freedom, max_relative = 0.25);
     }

@@ -43,7 +43,11 @@ pub enum Because {
     NotToldApart(Vec<usize>),
     /// Free, its bound would be larger than the uncertainty of the value it is held at. The estimate it would correlate
     /// with most, and how.
-    Bound { bound: f64, uncertainty: f64, partner: Option<(usize, f64)> },
+    Bound {
+        bound: f64,
+        uncertainty: f64,
+        partner: Option<(usize, f64)>,
+    },
 }
 
 /// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this: a
@@ -78,7 +82,12 @@ impl Candidates {
         case.respond(values, &mut response).ok()?;
         let information = sums(&response, weights).information;
         let scatter = coloured::gradient_covariance(&case.series(&response, weights), noise);
-        Some(Candidates { information, scatter, uncertainty, max_condition_number })
+        Some(Candidates {
+            information,
+            scatter,
+            uncertainty,
+            max_condition_number,
+        })
     }
 
     /// What must be held besides `held` for the data to determine the rest, as far as it may be held.
@@ -120,7 +129,10 @@ impl Candidates {
         let at = free.iter().position(|&j| j == parameter)?;
         match self.known(&free) {
             Known::Undetermined(direction) if direction[at] != 0.0 => {
-                let others = free.iter().enumerate().filter(|(i, _)| *i != at && direction[*i] != 0.0);
+                let others = free
+                    .iter()
+                    .enumerate()
+                    .filter(|(i, _)| *i != at && direction[*i] != 0.0);
                 Some(Because::NotToldApart(others.map(|(_, &j)| j).collect()))
             }
             Known::Undetermined(_) => None,
@@ -133,7 +145,11 @@ impl Candidates {
                     .max_by(|&a, &b| correlation(a).abs().total_cmp(&correlation(b).abs()))
                     .map(|i| (free[i], correlation(i)));
                 let bound = bounds[at];
-                (bound > uncertainty).then_some(Because::Bound { bound, uncertainty, partner })
+                (bound > uncertainty).then_some(Because::Bound {
+                    bound,
+                    uncertainty,
+                    partner,
+                })
             }
         }
     }
@@ -141,7 +157,8 @@ impl Candidates {
     /// The free parameter that is not felt, or of an undetermined direction the one that the tunnel knows best along it.
     fn undetermined(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
-        let silent = |j: &usize| self.uncertainty[*j].is_some() && self.information[(*j, *j)] <= 0.0;
+        let silent =
+            |j: &usize| self.uncertainty[*j].is_some() && self.information[(*j, *j)] <= 0.0;
         match free.iter().copied().find(silent) {
             Some(j) => Some(j),
             None => match self.known(&free) {
@@ -162,8 +179,14 @@ impl Candidates {
 
     /// Of the parameters that may be held that of the largest size over the tunnel's uncertainty, above a limit.
     fn largest_ratio(&self, free: &[usize], sizes: &DVector<f64>, limit: f64) -> Option<usize> {
-        let ratios = free.iter().zip(sizes.iter()).filter_map(|(&j, size)| Some((j, size / self.uncertainty[j]?)));
-        ratios.filter(|(_, ratio)| *ratio > limit).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(j, _)| j)
+        let ratios = free
+            .iter()
+            .zip(sizes.iter())
+            .filter_map(|(&j, size)| Some((j, size / self.uncertainty[j]?)));
+        ratios
+            .filter(|(_, ratio)| *ratio > limit)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(j, _)| j)
     }
 
     /// The held parameter of the smallest ratio, below one, that has not been freed yet.
@@ -178,16 +201,26 @@ impl Candidates {
                 Known::Undetermined(_) => None,
             }
         };
-        let candidates = indices(held, true).into_iter().filter(|&j| !released[j] && self.information[(j, j)] > 0.0);
+        let candidates = indices(held, true)
+            .into_iter()
+            .filter(|&j| !released[j] && self.information[(j, j)] > 0.0);
         let ratios = candidates.filter_map(|j| Some((j, ratio(j)?)));
-        ratios.filter(|(_, ratio)| *ratio < 1.0).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(j, _)| j)
+        ratios
+            .filter(|(_, ratio)| *ratio < 1.0)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(j, _)| j)
     }
 
     fn known(&self, free: &[usize]) -> Known {
-        let part = |m: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i], free[j])]);
+        let part = |m: &DMatrix<f64>| {
+            DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i], free[j])])
+        };
         let own = part(&self.information);
         if own.is_empty() {
-            return Known::Determined { bounds: DVector::zeros(0), inverse: own };
+            return Known::Determined {
+                bounds: DVector::zeros(0),
+                inverse: own,
+            };
         }
         let unit = scale(&own);
         let eigen = SymmetricEigen::new(scaled(&own, &unit));
@@ -195,19 +228,29 @@ impl Candidates {
         if eigen.eigenvalues[least] <= eigen.eigenvalues.max() / self.max_condition_number {
             let vector = eigen.eigenvectors.column(least);
             let takes_part = |v: f64| if v * v >= TAKES_PART { v } else { 0.0 };
-            return Known::Undetermined(DVector::from_fn(free.len(), |i, _| takes_part(vector[i]) * unit[i]));
+            return Known::Undetermined(DVector::from_fn(free.len(), |i, _| {
+                takes_part(vector[i]) * unit[i]
+            }));
         }
         let inverse = &eigen.eigenvectors
             * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
             * eigen.eigenvectors.transpose();
         let inverse = scaled(&inverse, &unit);
         let covariance = &inverse * part(&self.scatter) * &inverse;
-        Known::Determined { bounds: covariance.diagonal().map(f64::sqrt), inverse }
+        Known::Determined {
+            bounds: covariance.diagonal().map(f64::sqrt),
+            inverse,
+        }
     }
 }
 
 fn indices(flags: &[bool], wanted: bool) -> Vec<usize> {
-    flags.iter().enumerate().filter(|(_, flag)| **flag == wanted).map(|(j, _)| j).collect()
+    flags
+        .iter()
+        .enumerate()
+        .filter(|(_, flag)| **flag == wanted)
+        .map(|(j, _)| j)
+        .collect()
 }
 
 #[cfg(test)]
@@ -217,7 +260,12 @@ mod tests {
 
     /// White noise of unit variance and weight: the scatter is the information.
     fn evidence(information: DMatrix<f64>, uncertainty: Vec<Option<f64>>) -> Candidates {
-        Candidates { scatter: information.clone(), information, uncertainty, max_condition_number: 1e10 }
+        Candidates {
+            scatter: information.clone(),
+            information,
+            uncertainty,
+            max_condition_number: 1e10,
+        }
     }
 
     fn settled(evidence: &Candidates) -> Vec<bool> {
@@ -227,7 +275,10 @@ mod tests {
 
     /// Two parameters that correlate by ρ = 0.9, of bound 1/√(1-ρ²) = 2.29 when both are free and 1 when alone.
     fn pair(first: Option<f64>, second: Option<f64>) -> Candidates {
-        evidence(DMatrix::from_row_slice(2, 2, &[1.0, 0.9, 0.9, 1.0]), vec![first, second])
+        evidence(
+            DMatrix::from_row_slice(2, 2, &[1.0, 0.9, 0.9, 1.0]),
+            vec![first, second],
+        )
     }
 
     #[test]
@@ -236,11 +287,19 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_correlate_the_one_that_the_tunnel_knows_best_is_held_and_the_other_is_then_free() {
+    fn of_two_that_correlate_the_one_that_the_tunnel_knows_best_is_held_and_the_other_is_then_free()
+    {
         // The second's bound, with the first held, is 1: below the tunnel's 1.2.
         let e = pair(Some(0.5), Some(1.2));
         assert_eq!(settled(&e), [true, false]);
-        let Some(Because::Bound { bound, uncertainty, partner }) = e.because(&[true, false], 0) else { panic!() };
+        let Some(Because::Bound {
+            bound,
+            uncertainty,
+            partner,
+        }) = e.because(&[true, false], 0)
+        else {
+            panic!()
+        };
         assert_relative_eq!(bound, 1.0 / (1.0_f64 - 0.81).sqrt(), max_relative = 1e-10);
         assert_relative_eq!(uncertainty, 0.5);
         let (with, correlation) = partner.unwrap();
@@ -264,15 +323,24 @@ mod tests {
 
     #[test]
     fn of_two_that_are_proportional_one_is_held_and_said_not_to_be_told_apart() {
-        let e = evidence(DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 4.0]), vec![Some(50.0), Some(20.0)]);
+        let e = evidence(
+            DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 4.0]),
+            vec![Some(50.0), Some(20.0)],
+        );
         // Along the undetermined direction (2, -1) the tunnel's uncertainties are passed at 50/2 and 20/1: the second first.
         assert_eq!(settled(&e), [false, true]);
-        assert_eq!(e.because(&[false, true], 1), Some(Because::NotToldApart(vec![0])));
+        assert_eq!(
+            e.because(&[false, true], 1),
+            Some(Because::NotToldApart(vec![0]))
+        );
     }
 
     #[test]
     fn what_the_data_do_not_feel_is_held() {
-        let e = evidence(DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]), vec![Some(10.0), Some(10.0)]);
+        let e = evidence(
+            DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]),
+            vec![Some(10.0), Some(10.0)],
+        );
         assert_eq!(settled(&e), [false, true]);
         assert_eq!(e.because(&[false, true], 1), Some(Because::NotFelt));
     }

@@ -67,7 +67,11 @@ pub struct Collinearity {
 /// Measures an information matrix; none where it is empty or no number. A parameter that the data do not feel at all
 /// (`H_jj = 0`) is in no group.
 #[must_use]
-pub fn collinearity(information: &DMatrix<f64>, max_condition_number: f64, limits: &Limits) -> Option<Collinearity> {
+pub fn collinearity(
+    information: &DMatrix<f64>,
+    max_condition_number: f64,
+    limits: &Limits,
+) -> Option<Collinearity> {
     let n = information.nrows();
     if n == 0 || !information.iter().all(|h| h.is_finite()) {
         return None;
@@ -76,7 +80,9 @@ pub fn collinearity(information: &DMatrix<f64>, max_condition_number: f64, limit
     if felt.is_empty() {
         return None;
     }
-    let own = DMatrix::from_fn(felt.len(), felt.len(), |i, j| information[(felt[i], felt[j])]);
+    let own = DMatrix::from_fn(felt.len(), felt.len(), |i, j| {
+        information[(felt[i], felt[j])]
+    });
     let eigen = SymmetricEigen::new(scaled(&own, &scale(&own)));
     let most = eigen.eigenvalues.max();
     // Rounding leaves a direction that the data do not determine with some tiny length of either sign.
@@ -95,7 +101,11 @@ pub fn collinearity(information: &DMatrix<f64>, max_condition_number: f64, limit
     Some(Collinearity {
         inflation,
         correlation: determined.then(|| directions.correlation()),
-        largest_index: if determined { (most / least).sqrt() } else { f64::INFINITY },
+        largest_index: if determined {
+            (most / least).sqrt()
+        } else {
+            f64::INFINITY
+        },
         groups,
     })
 }
@@ -122,7 +132,9 @@ impl Directions {
     }
 
     fn variance(&self, j: usize) -> f64 {
-        (0..self.eigen.eigenvalues.len()).map(|k| self.part(j, k)).sum()
+        (0..self.eigen.eigenvalues.len())
+            .map(|k| self.part(j, k))
+            .sum()
     }
 
     fn inflation(&self, j: usize) -> Option<f64> {
@@ -134,7 +146,9 @@ impl Directions {
 
     fn correlation(&self) -> DMatrix<f64> {
         let lengths = self.eigen.eigenvalues.map(|l| 1.0 / l);
-        let inverse = &self.eigen.eigenvectors * DMatrix::from_diagonal(&lengths) * self.eigen.eigenvectors.transpose();
+        let inverse = &self.eigen.eigenvectors
+            * DMatrix::from_diagonal(&lengths)
+            * self.eigen.eigenvectors.transpose();
         scaled(&inverse, &scale(&inverse))
     }
 
@@ -144,10 +158,18 @@ impl Directions {
         order.sort_by(|a, b| self.eigen.eigenvalues[*a].total_cmp(&self.eigen.eigenvalues[*b]));
         let named = order.into_iter().filter_map(|k| {
             let index = (self.most / self.length(k)).sqrt();
-            let share = |j: &usize| self.part(*j, k) / self.variance(*j) >= limits.variance_proportion;
+            let share =
+                |j: &usize| self.part(*j, k) / self.variance(*j) >= limits.variance_proportion;
             let parameters: Vec<usize> = (0..n).filter(share).collect();
-            let condition_index = if self.eigen.eigenvalues[k] <= self.floor { f64::INFINITY } else { index };
-            (index >= limits.condition_index && parameters.len() >= 2).then_some(Group { condition_index, parameters })
+            let condition_index = if self.eigen.eigenvalues[k] <= self.floor {
+                f64::INFINITY
+            } else {
+                index
+            };
+            (index >= limits.condition_index && parameters.len() >= 2).then_some(Group {
+                condition_index,
+                parameters,
+            })
         });
         named.collect()
     }
@@ -171,7 +193,16 @@ pub fn excitation(values: &[f64]) -> f64 {
 fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let rounding = 1e-12 * values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    values.iter().map(|v| if (v - mean).abs() <= rounding { 0.0 } else { v - mean }).collect()
+    values
+        .iter()
+        .map(|v| {
+            if (v - mean).abs() <= rounding {
+                0.0
+            } else {
+                v - mean
+            }
+        })
+        .collect()
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {
@@ -187,7 +218,21 @@ mod tests {
     /// lengths that unit diagonal must take out.
     fn designed(rho: f64) -> DMatrix<f64> {
         let (a, b, c) = (1.0, 1e3, 1e-4);
-        DMatrix::from_row_slice(3, 3, &[a * a, rho * a * b, 0.0, rho * a * b, b * b, 0.0, 0.0, 0.0, c * c])
+        DMatrix::from_row_slice(
+            3,
+            3,
+            &[
+                a * a,
+                rho * a * b,
+                0.0,
+                rho * a * b,
+                b * b,
+                0.0,
+                0.0,
+                0.0,
+                c * c,
+            ],
+        )
     }
 
     fn measured(information: &DMatrix<f64>) -> Collinearity {
@@ -207,8 +252,16 @@ mod tests {
         assert_relative_eq!(correlation[(0, 1)], -rho, max_relative = 1e-10);
         assert_relative_eq!(correlation[(0, 0)], 1.0, max_relative = 1e-10);
         assert!(correlation[(0, 2)].abs() < 1e-12);
-        assert_relative_eq!(c.largest_index, ((1.0 + rho) / (1.0 - rho)).sqrt(), max_relative = 1e-10);
-        assert!(c.groups.is_empty(), "an index of 6 is no group: {:?}", c.groups);
+        assert_relative_eq!(
+            c.largest_index,
+            ((1.0 + rho) / (1.0 - rho)).sqrt(),
+            max_relative = 1e-10
+        );
+        assert!(
+            c.groups.is_empty(),
+            "an index of 6 is no group: {:?}",
+            c.groups
+        );
     }
 
     #[test]
@@ -228,7 +281,13 @@ mod tests {
         assert_eq!((c.inflation[0], c.inflation[1]), (None, None));
         assert_relative_eq!(c.inflation[2].unwrap(), 1.0, max_relative = 1e-9);
         assert!(c.correlation.is_none() && c.largest_index.is_infinite());
-        assert_eq!(c.groups, [Group { condition_index: f64::INFINITY, parameters: vec![0, 1] }]);
+        assert_eq!(
+            c.groups,
+            [Group {
+                condition_index: f64::INFINITY,
+                parameters: vec![0, 1]
+            }]
+        );
     }
 
     #[test]
@@ -242,12 +301,23 @@ mod tests {
 
     #[test]
     fn correlation_and_excitation_are_about_the_mean() {
-        let sine: Vec<f64> =
-            (0..1000).map(|k| 20.0 + 3.0 * (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).sin()).collect();
+        let sine: Vec<f64> = (0..1000)
+            .map(|k| 20.0 + 3.0 * (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).sin())
+            .collect();
         let opposite: Vec<f64> = sine.iter().map(|v| 5.0 - 2.0 * v).collect();
-        let cosine: Vec<f64> = (0..1000).map(|k| (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).cos()).collect();
-        assert_relative_eq!(excitation(&sine), 3.0 / 2.0_f64.sqrt(), max_relative = 1e-10);
-        assert_relative_eq!(correlation(&sine, &opposite).unwrap(), -1.0, max_relative = 1e-10);
+        let cosine: Vec<f64> = (0..1000)
+            .map(|k| (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).cos())
+            .collect();
+        assert_relative_eq!(
+            excitation(&sine),
+            3.0 / 2.0_f64.sqrt(),
+            max_relative = 1e-10
+        );
+        assert_relative_eq!(
+            correlation(&sine, &opposite).unwrap(),
+            -1.0,
+            max_relative = 1e-10
+        );
         assert!(correlation(&sine, &cosine).unwrap().abs() < 1e-10);
         assert_eq!(correlation(&sine, &vec![0.1; 1000]), None);
         assert!(excitation(&vec![0.1; 1000]).abs() < f64::EPSILON);

@@ -7,7 +7,10 @@
 //! adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. However many surfaces there are, they reach the aircraft through three
 //! coefficients, so three vectors g a sample are enough.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use nalgebra::{DMatrix, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
@@ -56,14 +59,25 @@ pub fn noisy_surfaces(
 ) -> Vec<NoisySurface> {
     let qbar = window.signal(signal::QBAR);
     let free = free.iter().enumerate().map(|(j, d)| (*d, Value::Free(j)));
-    let all: Vec<(&Derivative, Value)> = free.chain(held.iter().map(|(d, v)| (*d, Value::Held(*v)))).collect();
-    let mut names: Vec<&str> = all.iter().filter_map(|(d, _)| d.regressor.surface()).collect();
+    let all: Vec<(&Derivative, Value)> = free
+        .chain(held.iter().map(|(d, v)| (*d, Value::Held(*v))))
+        .collect();
+    let mut names: Vec<&str> = all
+        .iter()
+        .filter_map(|(d, _)| d.regressor.surface())
+        .collect();
     names.sort_unstable();
     names.dedup();
     let surface = |name: &&str| {
-        let samples: Vec<f64> = window.signal(name).chunks(2).map(|points| points[0]).collect();
+        let samples: Vec<f64> = window
+            .signal(name)
+            .chunks(2)
+            .map(|points| points[0])
+            .collect();
         let variance = white_variance(&samples);
-        let acting = all.iter().filter(|(d, _)| d.regressor.surface() == Some(name));
+        let acting = all
+            .iter()
+            .filter(|(d, _)| d.regressor.surface() == Some(name));
         let effect = |(d, value): &(&Derivative, Value)| Effect {
             coefficient: d.coefficient.index(),
             value: *value,
@@ -75,7 +89,10 @@ pub fn noisy_surfaces(
                 _ => vec![],
             },
         };
-        (variance > 0.0).then(|| NoisySurface { variance, effects: acting.map(effect).collect() })
+        (variance > 0.0).then(|| NoisySurface {
+            variance,
+            effects: acting.map(effect).collect(),
+        })
     };
     names.iter().filter_map(surface).collect()
 }
@@ -88,8 +105,15 @@ pub fn white_variance(samples: &[f64]) -> f64 {
     // Sizes are in the order of their bits, which are compared faster; what is no number comes last.
     let size = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
     let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.windows(4).map(size).collect());
-    let finite = sizes.iter().filter(|size| **size < f64::INFINITY.to_bits()).count();
-    let median = if finite == 0 { 0.0 } else { f64::from_bits(*sizes.select_nth_unstable(finite / 2).1) };
+    let finite = sizes
+        .iter()
+        .filter(|size| **size < f64::INFINITY.to_bits())
+        .count();
+    let median = if finite == 0 {
+        0.0
+    } else {
+        f64::from_bits(*sizes.select_nth_unstable(finite / 2).1)
+    };
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 
@@ -101,12 +125,22 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     series: &[Series],
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
-    let (n, width) = (case.parameters(), case.parameters().next_multiple_of(VECTOR));
+    let (n, width) = (
+        case.parameters(),
+        case.parameters().next_multiple_of(VECTOR),
+    );
     if case.noisy_surfaces.is_empty() || n == 0 {
         return DMatrix::zeros(n, n);
     }
     let mut scatter = Aligned::zeros(width * width);
-    let adjoint = Adjoint { case, parameters, series, weights, width, scatter: scatter.slice_mut() };
+    let adjoint = Adjoint {
+        case,
+        parameters,
+        series,
+        weights,
+        width,
+        scatter: scatter.slice_mut(),
+    };
     Arch::new().dispatch(adjoint);
     let at = |i: usize, j: usize| scatter.slice()[i.max(j) * width + i.min(j)];
     DMatrix::from_fn(n, n, at)
@@ -190,7 +224,8 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                     }
                     let middle = simd.add_f64s(later[i], now[i]);
                     for j in 0..NX {
-                        before[j] = simd.mul_add_f64s(simd.splat_f64s(at.half[(i, j)]), middle, before[j]);
+                        before[j] =
+                            simd.mul_add_f64s(simd.splat_f64s(at.half[(i, j)]), middle, before[j]);
                     }
                 }
                 for i in 0..NX {
@@ -199,14 +234,23 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                 for c in 0..COEFFICIENTS {
                     let mut answer = simd.splat_f64s(0.0);
                     for d in c..COEFFICIENTS {
-                        answer = simd.mul_add_f64s(simd.splat_f64s(all * root[d][c]), by_coefficient[d], answer);
+                        answer = simd.mul_add_f64s(
+                            simd.splat_f64s(all * root[d][c]),
+                            by_coefficient[d],
+                            answer,
+                        );
                     }
                     store::<S>(rows, row + c * width + lane, answer);
                 }
             }
             if b % CHUNK == 0 {
                 let samples = COEFFICIENTS * CHUNK.min(blocks - b);
-                Rows { values: rows, stride: width, samples }.add_squares(simd, &whole, self.scatter, width);
+                Rows {
+                    values: rows,
+                    stride: width,
+                    samples,
+                }
+                .add_squares(simd, &whole, self.scatter, width);
             }
         }
     }
@@ -272,11 +316,20 @@ fn root(covariance: &[[f64; COEFFICIENTS]; COEFFICIENTS]) -> [[f64; COEFFICIENTS
     let mut root = [[0.0; COEFFICIENTS]; COEFFICIENTS];
     for j in 0..COEFFICIENTS {
         for i in j..COEFFICIENTS {
-            let done: f64 = root[i].iter().zip(&root[j]).take(j).map(|(a, b)| a * b).sum();
+            let done: f64 = root[i]
+                .iter()
+                .zip(&root[j])
+                .take(j)
+                .map(|(a, b)| a * b)
+                .sum();
             let left = covariance[i][j] - done;
             if i == j {
                 // Of fewer surfaces than coefficients rounding is all that is left.
-                root[j][j] = if left > 1e-14 * covariance[j][j] { left.sqrt() } else { 0.0 };
+                root[j][j] = if left > 1e-14 * covariance[j][j] {
+                    left.sqrt()
+                } else {
+                    0.0
+                };
             } else if root[j][j] > 0.0 {
                 root[i][j] = left / root[j][j];
             }
@@ -304,7 +357,10 @@ mod tests {
         let mut record = record();
         for name in SURFACES {
             let series = record.signals.get_mut(name).unwrap();
-            series.values.iter_mut().for_each(|v| *v += sd_deg * noise.gaussian());
+            series
+                .values
+                .iter_mut()
+                .for_each(|v| *v += sd_deg * noise.gaussian());
         }
         record
     }
@@ -317,10 +373,14 @@ mod tests {
     fn white_noise_is_told_from_doublets_and_feedback() {
         let mut noise = Noise(5);
         let values: Vec<f64> = (0..800)
-            .map(|k| 3.0 * f64::from(k / 100 % 2) + (0.1 * f64::from(k)).sin() + 0.05 * noise.gaussian())
+            .map(|k| {
+                3.0 * f64::from(k / 100 % 2) + (0.1 * f64::from(k)).sin() + 0.05 * noise.gaussian()
+            })
             .collect();
         assert_relative_eq!(white_variance(&values).sqrt(), 0.05, max_relative = 0.1);
-        let smooth: Vec<f64> = (0..800).map(|k| 3.0 * f64::from(k / 100 % 2) + (0.1 * f64::from(k)).sin()).collect();
+        let smooth: Vec<f64> = (0..800)
+            .map(|k| 3.0 * f64::from(k / 100 % 2) + (0.1 * f64::from(k)).sin())
+            .collect();
         assert!(white_variance(&smooth).sqrt() < 1e-3);
         assert!(white_variance(&[]) == 0.0 && white_variance(&[f64::NAN; 9]) == 0.0);
     }
@@ -339,7 +399,11 @@ mod tests {
         };
         let exact = window(&record());
         let mut case = Case::<NX, E>::new(&aircraft(), &exact, nothing_measured(), &model);
-        let derivative = |name: &str| free.iter().find(|(d, _)| d.name == name).map_or(0.0, |(_, v)| *v);
+        let derivative = |name: &str| {
+            free.iter()
+                .find(|(d, _)| d.name == name)
+                .map_or(0.0, |(_, v)| *v)
+        };
         let parameters = case.starting_values(derivative);
         let mut response = case.response();
         case.respond(&parameters, &mut response).unwrap();
@@ -348,22 +412,32 @@ mod tests {
         let mut scatter = vec![0.0; parameters.len()];
         let mut flown = case.response();
         for _ in 0..draws {
-            let other =
-                Case::<NX, E>::new(&aircraft(), &window(&noisy(sd_deg, &mut noise)), nothing_measured(), &model);
+            let other = Case::<NX, E>::new(
+                &aircraft(),
+                &window(&noisy(sd_deg, &mut noise)),
+                nothing_measured(),
+                &model,
+            );
             other.respond(&parameters, &mut flown).unwrap();
             let mut gradient = vec![0.0; parameters.len()];
             for (k, (y, moved)) in response.outputs.iter().zip(&flown.outputs).enumerate() {
                 for o in 0..OUTPUTS {
                     let v = y[o] - moved[o];
-                    gradient.iter_mut().enumerate().for_each(|(j, g)| *g += TABLE[o] * v * sensitivities.at(k, o, j));
+                    gradient
+                        .iter_mut()
+                        .enumerate()
+                        .for_each(|(j, g)| *g += TABLE[o] * v * sensitivities.at(k, o, j));
                 }
             }
             for (s, g) in scatter.iter_mut().zip(&gradient) {
                 *s += g * g / f64::from(draws);
             }
         }
-        let ordered: Vec<&Derivative> =
-            case.names.iter().filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name)).collect();
+        let ordered: Vec<&Derivative> = case
+            .names
+            .iter()
+            .filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name))
+            .collect();
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
         let series = case.series(&response, &TABLE);
@@ -371,7 +445,10 @@ mod tests {
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
             let ratio = (scatter[j] / said[(j, j)]).sqrt();
-            assert!((0.75..1.25).contains(&ratio), "{name}: scatter is {ratio:.2} of what is said");
+            assert!(
+                (0.75..1.25).contains(&ratio),
+                "{name}: scatter is {ratio:.2} of what is said"
+            );
         }
     }
 

@@ -36,7 +36,10 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
     }
 
     fn widened(&self, series: &[Series], parameters: usize) -> Vec<Series> {
-        series.iter().map(|own| own.widened(&self.places, parameters)).collect()
+        series
+            .iter()
+            .map(|own| own.widened(&self.places, parameters))
+            .collect()
     }
 
     fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
@@ -58,25 +61,45 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>,
         is_own: impl Fn(&str) -> bool,
     ) -> Result<Self, String> {
-        let mut joint = Joint { members: Vec::new(), shared: Vec::new(), names: Vec::new() };
+        let mut joint = Joint {
+            members: Vec::new(),
+            shared: Vec::new(),
+            names: Vec::new(),
+        };
         for (label, case) in cases {
             let derivatives = &case.names[..case.derivatives()];
             let first = joint.members.first().map_or(case, |m| m.case);
             if *derivatives != first.names[..first.derivatives()] {
-                return Err(format!("{label} has other free derivatives than the maneuvers it is joined with"));
+                return Err(format!(
+                    "{label} has other free derivatives than the maneuvers it is joined with"
+                ));
             }
             if joint.members.is_empty() {
-                joint.shared = (0..derivatives.len()).filter(|&j| !is_own(&derivatives[j])).collect();
-                joint.names.extend(joint.shared.iter().map(|&j| derivatives[j].clone()));
+                joint.shared = (0..derivatives.len())
+                    .filter(|&j| !is_own(&derivatives[j]))
+                    .collect();
+                joint
+                    .names
+                    .extend(joint.shared.iter().map(|&j| derivatives[j].clone()));
             }
             let mut places = Vec::with_capacity(case.names.len());
             for (j, name) in case.names.iter().enumerate() {
-                places.push(joint.shared.iter().position(|&s| s == j).unwrap_or(joint.names.len()));
+                places.push(
+                    joint
+                        .shared
+                        .iter()
+                        .position(|&s| s == j)
+                        .unwrap_or(joint.names.len()),
+                );
                 if !joint.shared.contains(&j) {
                     joint.names.push(format!("{name} of {label}"));
                 }
             }
-            joint.members.push(Member { label, case, places });
+            joint.members.push(Member {
+                label,
+                case,
+                places,
+            });
         }
         Ok(joint)
     }
@@ -98,7 +121,10 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
         let mut joint = shared.to_vec();
         for values in members {
-            let own = values.iter().enumerate().filter(|(j, _)| !self.shared.contains(j));
+            let own = values
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| !self.shared.contains(j));
             joint.extend(own.map(|(_, v)| *v));
         }
         joint
@@ -108,7 +134,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     #[must_use]
     pub fn costs(&self, response: &[Response], weights: &[f64; OUTPUTS]) -> Vec<f64> {
         let members = self.members.iter().zip(response);
-        members.map(|(m, r)| Likelihood::sums(m.case, r, weights).cost()).collect()
+        members
+            .map(|(m, r)| Likelihood::sums(m.case, r, weights).cost())
+            .collect()
     }
 }
 
@@ -121,7 +149,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     ) -> Result<(), Diverged> {
         let mut before = 0;
         for (member, response) in self.members.iter().zip(response) {
-            respond(member, response).map_err(|d| Diverged { sample: before + d.sample })?;
+            respond(member, response).map_err(|d| Diverged {
+                sample: before + d.sample,
+            })?;
             before += member.case.samples();
         }
         Ok(())
@@ -143,16 +173,27 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         self.members.iter().all(|member| member.case.has_coarse())
     }
 
-    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Vec<Response>) -> Result<(), Diverged> {
+    fn respond(
+        &self,
+        detail: Detail,
+        parameters: &[f64],
+        response: &mut Vec<Response>,
+    ) -> Result<(), Diverged> {
         self.each(response, |member, response| {
-            member.case.respond_with(detail, &member.parameters(parameters), response)
+            member
+                .case
+                .respond_with(detail, &member.parameters(parameters), response)
         })
     }
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
         let n = self.names.len();
-        let mut sums =
-            Sums { weighted_square: 0.0, gradient: DVector::zeros(n), information: DMatrix::zeros(n, n), count: 0 };
+        let mut sums = Sums {
+            weighted_square: 0.0,
+            gradient: DVector::zeros(n),
+            information: DMatrix::zeros(n, n),
+            count: 0,
+        };
         for (member, response) in self.members.iter().zip(response) {
             let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
@@ -169,7 +210,10 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     fn variances(&self, response: &Vec<Response>) -> [f64; OUTPUTS] {
         let (mut squares, mut counts) = ([0.0; OUTPUTS], [0.0; OUTPUTS]);
         for (member, response) in self.members.iter().zip(response) {
-            let (variances, used) = (Likelihood::variances(member.case, response), member.case.used());
+            let (variances, used) = (
+                Likelihood::variances(member.case, response),
+                member.case.used(),
+            );
             for o in 0..OUTPUTS {
                 squares[o] += variances[o] * used[o] as f64;
                 counts[o] += used[o] as f64;
@@ -180,7 +224,9 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
 
     fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<Series> {
         let members = self.members.iter().zip(response);
-        members.flat_map(|(m, r)| m.widened(&m.case.series(r, weights), self.names.len())).collect()
+        members
+            .flat_map(|(m, r)| m.widened(&m.case.series(r, weights), self.names.len()))
+            .collect()
     }
 
     fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
@@ -200,7 +246,9 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         let n = self.names.len();
         let (mut all, mut sum) = (Vec::new(), DMatrix::zeros(n, n));
         for (member, own) in self.members.iter().zip(response) {
-            let (series, inputs) = member.case.noisy(&member.parameters(parameters), own, weights);
+            let (series, inputs) = member
+                .case
+                .noisy(&member.parameters(parameters), own, weights);
             all.extend(member.widened(&series, n));
             member.add(&inputs, &mut sum);
         }
@@ -211,7 +259,11 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         let mut sample = diverged.sample;
         for member in &self.members {
             if sample < member.case.samples() {
-                return format!("{:.2} s into {}", sample as f64 * member.case.step_s, member.label);
+                return format!(
+                    "{:.2} s into {}",
+                    sample as f64 * member.case.step_s,
+                    member.label
+                );
             }
             sample -= member.case.samples();
         }

@@ -8,8 +8,14 @@
 //!
 //! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed alike in all of them, with
 //! fused multiplication, so the width does not show in the results.
-#![expect(clippy::inline_always, reason = "compiled into one loop for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into one loop for the processor at hand"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -97,7 +103,15 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             InitialState::Measured => self.start,
             InitialState::Estimated => SVector::from_fn(|i, _| parameters[first + i]),
         };
-        Pass { case: self, parameters, start, biases, stride: stride.clamp(1, WIDEST_STRIDE), outputs, sink }
+        Pass {
+            case: self,
+            parameters,
+            start,
+            biases,
+            stride: stride.clamp(1, WIDEST_STRIDE),
+            outputs,
+            sink,
+        }
     }
 }
 
@@ -131,10 +145,16 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         for (chunk, first) in (0..samples).step_by(CHUNK).enumerate() {
             // What one chunk left is read while the states of the next one leave theirs beside it.
             let [even, odd] = &mut paths;
-            let (path, ahead) = if chunk % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
+            let (path, ahead) = if chunk % 2 == 0 {
+                (&*even, odd)
+            } else {
+                (&*odd, even)
+            };
             let count = length(first);
             if let Some(sample) = path.senseless(count) {
-                return Err(Diverged { sample: stride * (first + sample) });
+                return Err(Diverged {
+                    sample: stride * (first + sample),
+                });
             }
             for k in 0..count {
                 let y = propagators.read(case, &near, path, stride * (first + k), k);
@@ -143,10 +163,19 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 }
             }
             propagators.set::<S, E>(simd, path, count, stride as f64 * case.step_s);
-            case.spread(Spaced { first: 2 * stride * first, stride }, regressors);
+            case.spread(
+                Spaced {
+                    first: 2 * stride * first,
+                    stride,
+                },
+                regressors,
+            );
             let next = first + count;
             let left = if next < samples { length(next) } else { 0 };
-            let points = Spaced { first: 2 * stride * next.min(samples - 1), stride };
+            let points = Spaced {
+                first: 2 * stride * next.min(samples - 1),
+                stride,
+            };
             case.near(&terms, points, &mut near);
             let mut course = Course::new(case, &near, ahead, x, points, left);
             let mut work = Work {
@@ -162,7 +191,10 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             work.all::<E>();
             self.sink.take(
                 simd,
-                Spaced { first: stride * first, stride },
+                Spaced {
+                    first: stride * first,
+                    stride,
+                },
                 &self.outputs[first..next],
                 rows,
                 &mut course,
@@ -220,30 +252,40 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
         let mut s = [[self.simd.splat_f64s(0.0); NX]; N];
         for n in 0..N {
             for i in 0..NX {
-                s[n][i] = self.sensitivities[(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES];
+                s[n][i] = self.sensitivities
+                    [(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES];
             }
         }
         for k in 0..self.count {
             let r = self.regressors_at::<N>(lane, groups, k);
-            let rows = &mut self.rows[k * OUTPUTS * width / S::F64_LANES..][..OUTPUTS * width / S::F64_LANES];
+            let rows = &mut self.rows[k * OUTPUTS * width / S::F64_LANES..]
+                [..OUTPUTS * width / S::F64_LANES];
             for n in 0..N {
                 let y = read::<S, NX, E>(self.simd, groups[n], self.propagators, k, &s[n], r[n][0]);
                 for o in 0..OUTPUTS {
-                    rows[(o * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] = y[o];
+                    rows[(o * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] =
+                        y[o];
                 }
             }
             s = step::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
         }
         for n in 0..N {
             for i in 0..NX {
-                self.sensitivities[(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] = s[n][i];
+                self.sensitivities
+                    [(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] =
+                    s[n][i];
             }
         }
     }
 
     /// What the derivatives of some groups' lanes multiply at the stages of a step; nothing for initial states.
     #[inline(always)]
-    fn regressors_at<const N: usize>(&self, lane: usize, groups: [usize; N], k: usize) -> [[S::f64s; STAGES]; N] {
+    fn regressors_at<const N: usize>(
+        &self,
+        lane: usize,
+        groups: [usize; N],
+        k: usize,
+    ) -> [[S::f64s; STAGES]; N] {
         let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
         for n in 0..N {
             if groups[n] == COEFFICIENTS {
@@ -251,9 +293,11 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
             }
             for stage in 0..STAGES {
                 let row = (2 * k + POINT[stage]) * self.lanes.row;
-                let regressor = self.regressors[(row + self.lanes.regressors[groups[n]] + lane) / S::F64_LANES];
+                let regressor =
+                    self.regressors[(row + self.lanes.regressors[groups[n]] + lane) / S::F64_LANES];
                 r[n][stage] = if lane < VECTOR {
-                    self.simd.mul_f64s(regressor, load::<S>(&self.path.times[stage][k], lane))
+                    self.simd
+                        .mul_f64s(regressor, load::<S>(&self.path.times[stage][k], lane))
                 } else {
                     regressor
                 };

@@ -50,37 +50,84 @@ impl Lanes {
     /// the states that derivatives can be along.
     pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
         let of = |k: usize| -> Vec<usize> {
-            acting.iter().filter(|a| a.coefficient == k && a.along.is_none()).map(|a| a.column).collect()
+            acting
+                .iter()
+                .filter(|a| a.coefficient == k && a.along.is_none())
+                .map(|a| a.column)
+                .collect()
         };
-        let all: Vec<usize> = (0..COEFFICIENTS).flat_map(of).collect::<BTreeSet<usize>>().into_iter().collect();
+        let all: Vec<usize> = (0..COEFFICIENTS)
+            .flat_map(of)
+            .collect::<BTreeSet<usize>>()
+            .into_iter()
+            .collect();
         let room = |columns: &[usize]| padded(followed.len() + columns.len());
-        let widest = (0..COEFFICIENTS).map(|k| room(&of(k))).max().filter(|_| !acting.is_empty()).unwrap_or(0);
+        let widest = (0..COEFFICIENTS)
+            .map(|k| room(&of(k)))
+            .max()
+            .filter(|_| !acting.is_empty())
+            .unwrap_or(0);
         let shared = room(&all) <= widest;
-        let slots: [Vec<usize>; COEFFICIENTS] = std::array::from_fn(|k| if shared { all.clone() } else { of(k) });
-        let mut lanes = Lanes { row: if shared { widest } else { COEFFICIENTS * widest }, ..Lanes::default() };
+        let slots: [Vec<usize>; COEFFICIENTS] =
+            std::array::from_fn(|k| if shared { all.clone() } else { of(k) });
+        let mut lanes = Lanes {
+            row: if shared {
+                widest
+            } else {
+                COEFFICIENTS * widest
+            },
+            ..Lanes::default()
+        };
         for k in 0..COEFFICIENTS {
             lanes.groups[k] = k * widest..(k + 1) * widest;
             lanes.regressors[k] = if shared { 0 } else { k * widest };
         }
         for a in acting {
-            let along = a.along.and_then(|state| followed.iter().position(|f| *f == state));
-            let beside = || slots[a.coefficient].iter().position(|column| *column == a.column);
-            let slot = along.or_else(|| beside().map(|slot| followed.len() + slot)).unwrap_or(0);
+            let along = a
+                .along
+                .and_then(|state| followed.iter().position(|f| *f == state));
+            let beside = || {
+                slots[a.coefficient]
+                    .iter()
+                    .position(|column| *column == a.column)
+            };
+            let slot = along
+                .or_else(|| beside().map(|slot| followed.len() + slot))
+                .unwrap_or(0);
             lanes.places.push(lanes.groups[a.coefficient].start + slot);
-            lanes.columns.push((lanes.regressors[a.coefficient] + slot, a.column));
+            lanes
+                .columns
+                .push((lanes.regressors[a.coefficient] + slot, a.column));
         }
         lanes.columns.sort_unstable();
         lanes.columns.dedup();
         let first = COEFFICIENTS * widest;
         lanes.groups[COEFFICIENTS] = first..first + padded(initial);
         lanes.places.extend(first..first + initial);
-        let left_over: Vec<usize> = (0..).filter(|lane| !lanes.places.contains(lane)).take(biases.max(2)).collect();
+        let left_over: Vec<usize> = (0..)
+            .filter(|lane| !lanes.places.contains(lane))
+            .take(biases.max(2))
+            .collect();
         (lanes.residual, lanes.one) = (left_over[0], left_over[1]);
         lanes.biases = left_over[..biases].to_vec();
-        let last = lanes.places.iter().chain(&left_over).copied().max().unwrap_or(0);
+        let last = lanes
+            .places
+            .iter()
+            .chain(&left_over)
+            .copied()
+            .max()
+            .unwrap_or(0);
         let last_of = |vector: usize| {
-            let lanes = lanes.places.iter().copied().chain([lanes.residual, lanes.one]);
-            lanes.filter(|lane| lane / VECTOR == vector).map(|lane| lane % VECTOR + 1).max().unwrap_or(0)
+            let lanes = lanes
+                .places
+                .iter()
+                .copied()
+                .chain([lanes.residual, lanes.one]);
+            lanes
+                .filter(|lane| lane / VECTOR == vector)
+                .map(|lane| lane % VECTOR + 1)
+                .max()
+                .unwrap_or(0)
         };
         lanes.used = (0..=last / VECTOR).map(last_of).collect();
         lanes
@@ -109,8 +156,15 @@ impl Aligned {
     pub fn zeros(length: usize) -> Aligned {
         const LINE: usize = 64;
         let buffer = vec![0.0; length + LINE / size_of::<f64>()];
-        let first = buffer.as_ptr().align_offset(LINE).min(LINE / size_of::<f64>());
-        Aligned { buffer, first, length }
+        let first = buffer
+            .as_ptr()
+            .align_offset(LINE)
+            .min(LINE / size_of::<f64>());
+        Aligned {
+            buffer,
+            first,
+            length,
+        }
     }
 
     #[inline]

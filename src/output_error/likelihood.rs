@@ -28,7 +28,12 @@ pub trait Likelihood {
     ///
     /// # Errors
     /// [`Diverged`] when an integration leaves the bounds of sense.
-    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Self::Response) -> Result<(), Diverged>;
+    fn respond(
+        &self,
+        detail: Detail,
+        parameters: &[f64],
+        response: &mut Self::Response,
+    ) -> Result<(), Diverged>;
 
     /// Cost, gradient and information for weights on residuals in deg, deg/s and g.
     fn sums(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Sums;
@@ -41,7 +46,8 @@ pub trait Likelihood {
     fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
 
     /// Σ Sᵀ W R W S for white residuals.
-    fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64>;
+    fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS])
+    -> DMatrix<f64>;
 
     /// These series, and what noise of what is taken as exact does to the gradient, at a whole response to these
     /// parameters.
@@ -71,7 +77,12 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         Case::has_coarse(self)
     }
 
-    fn respond(&self, detail: Detail, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+    fn respond(
+        &self,
+        detail: Detail,
+        parameters: &[f64],
+        response: &mut Response,
+    ) -> Result<(), Diverged> {
         self.respond_with(detail, parameters, response)
     }
 
@@ -89,25 +100,40 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
         let normal = &response.normal;
         let series = |o: usize| {
             let (square, squares) = (normal.square(o), normal.squares(o));
-            Series::new(self.step_s, weights[o], self.samples(), square, &squares, |samples, row| {
-                normal.block(samples.start / normal.block_samples(), o, row)
-            })
+            Series::new(
+                self.step_s,
+                weights[o],
+                self.samples(),
+                square,
+                &squares,
+                |samples, row| normal.block(samples.start / normal.block_samples(), o, row),
+            )
         };
         (0..OUTPUTS).map(series).collect()
     }
 
     fn white_covariance(&self, response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let variances = Likelihood::variances(self, response);
-        response.normal.information(&std::array::from_fn(|o| weights[o] * weights[o] * variances[o]))
+        response.normal.information(&std::array::from_fn(|o| {
+            weights[o] * weights[o] * variances[o]
+        }))
     }
 
-    fn noisy(&self, parameters: &[f64], response: &Response, weights: &[f64; OUTPUTS]) -> (Vec<Series>, DMatrix<f64>) {
+    fn noisy(
+        &self,
+        parameters: &[f64],
+        response: &Response,
+        weights: &[f64; OUTPUTS],
+    ) -> (Vec<Series>, DMatrix<f64>) {
         let series = self.series(response, weights);
         let inputs = input_noise::gradient_covariance(self, parameters, &series, weights);
         (series, inputs)
     }
 
     fn place(&self, diverged: Diverged) -> String {
-        format!("{:.2} s into the maneuver", diverged.sample as f64 * self.step_s)
+        format!(
+            "{:.2} s into the maneuver",
+            diverged.sample as f64 * self.step_s
+        )
     }
 }

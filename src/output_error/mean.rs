@@ -39,7 +39,10 @@ pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
 /// Inverse of a positive definite matrix, taken with unit diagonal.
 fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(matrix);
-    Some(scaled(&Cholesky::new(scaled(matrix, &scale))?.inverse(), &scale))
+    Some(scaled(
+        &Cholesky::new(scaled(matrix, &scale))?.inverse(),
+        &scale,
+    ))
 }
 
 #[cfg(test)]
@@ -48,8 +51,15 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn estimate(values: [f64; 2], covariance: [f64; 4]) -> Estimate {
-        let (values, covariance) = (DVector::from(values.to_vec()), DMatrix::from_row_slice(2, 2, &covariance));
-        Estimate { places: vec![0, 1], values, covariance }
+        let (values, covariance) = (
+            DVector::from(values.to_vec()),
+            DMatrix::from_row_slice(2, 2, &covariance),
+        );
+        Estimate {
+            places: vec![0, 1],
+            values,
+            covariance,
+        }
     }
 
     #[test]
@@ -66,7 +76,12 @@ mod tests {
     fn what_is_well_determined_of_correlated_parameters_is_kept() {
         // θ₀ + 20 θ₁ is 3 in both and known to a thousandth; θ₁ alone is known to a tenth in one, to ten in the other.
         let of = |slope: f64, variance: f64| {
-            let c = [400.0 * variance + 1e-6, -20.0 * variance, -20.0 * variance, variance];
+            let c = [
+                400.0 * variance + 1e-6,
+                -20.0 * variance,
+                -20.0 * variance,
+                variance,
+            ];
             estimate([3.0 - 20.0 * slope, slope], c)
         };
         let mean = weighted(&[of(0.05, 0.01), of(4.0, 100.0)], 2).unwrap();
@@ -76,7 +91,11 @@ mod tests {
 
     #[test]
     fn a_parameter_that_no_estimate_has_leaves_no_mean() {
-        let one = Estimate { places: vec![1], values: DVector::from(vec![1.0]), covariance: DMatrix::identity(1, 1) };
+        let one = Estimate {
+            places: vec![1],
+            values: DVector::from(vec![1.0]),
+            covariance: DMatrix::identity(1, 1),
+        };
         assert!(weighted(&[one], 2).is_none());
     }
 }

@@ -26,7 +26,11 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { max_iterations: 50, tolerance: 1e-8, max_condition_number: 1e10 }
+        Settings {
+            max_iterations: 50,
+            tolerance: 1e-8,
+            max_condition_number: 1e10,
+        }
     }
 }
 
@@ -80,7 +84,10 @@ pub fn estimate<D: Likelihood>(
                 break;
             }
             let next = residual_weights(data, &fit, resolution);
-            let settled = next.iter().zip(fit.weights).all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED);
+            let settled = next
+                .iter()
+                .zip(fit.weights)
+                .all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED);
             if settled {
                 break;
             }
@@ -94,7 +101,11 @@ pub fn estimate<D: Likelihood>(
     fit
 }
 
-fn residual_weights<D: Likelihood>(data: &D, fit: &Fit<D::Response>, resolution: [f64; OUTPUTS]) -> [f64; OUTPUTS] {
+fn residual_weights<D: Likelihood>(
+    data: &D,
+    fit: &Fit<D::Response>,
+    resolution: [f64; OUTPUTS],
+) -> [f64; OUTPUTS] {
     let variances = data.variances(&fit.response);
     std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
 }
@@ -144,16 +155,31 @@ fn approach<D: Likelihood>(
     }
     data.respond(Detail::Coarse, start, response).ok()?;
     let mut at = data.sums(response, weights);
-    let mut near = Near { values: start.to_vec(), iterations: 0, initial_cost: at.cost() };
+    let mut near = Near {
+        values: start.to_vec(),
+        iterations: 0,
+        initial_cost: at.cost(),
+    };
     let mut damping = 0.0;
     while near.iterations < settings.max_iterations {
         let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING))?;
         near.iterations += 1;
         if at.gradient.dot(&full) <= NEAR * at.weighted_square {
-            near.values.iter_mut().zip(full.iter()).for_each(|(value, d)| *value += d);
+            near.values
+                .iter_mut()
+                .zip(full.iter())
+                .for_each(|(value, d)| *value += d);
             break;
         }
-        let Some(better) = lower(data, Detail::Coarse, &near.values, &at, weights, &mut damping, response) else {
+        let Some(better) = lower(
+            data,
+            Detail::Coarse,
+            &near.values,
+            &at,
+            weights,
+            &mut damping,
+            response,
+        ) else {
             break;
         };
         (near.values, at) = better;
@@ -187,7 +213,10 @@ pub(super) fn descend<D: Likelihood>(
         covariance_corrected: None,
     };
     if let Err(diverged) = data.respond(Detail::Whole, &fit.values, &mut response) {
-        fit.reason = format!("the integration diverges {} with the starting values", data.place(diverged));
+        fit.reason = format!(
+            "the integration diverges {} with the starting values",
+            data.place(diverged)
+        );
         fit.response = data.response();
         return fit;
     }
@@ -209,7 +238,15 @@ pub(super) fn descend<D: Likelihood>(
             break;
         }
         fit.iterations += 1;
-        let better = lower(data, Detail::Whole, &fit.values, &at, &weights, &mut damping, &mut trial);
+        let better = lower(
+            data,
+            Detail::Whole,
+            &fit.values,
+            &at,
+            &weights,
+            &mut damping,
+            &mut trial,
+        );
         let Some(better) = better else {
             fit.reason = "no step lowers the cost".into();
             break;
@@ -284,14 +321,25 @@ fn judge<D: Likelihood>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
     }
     let at = data.sums(&fit.response, &fit.weights);
     match cramer_rao::identified(&at.information, settings.max_condition_number) {
-        Identified::Determined { inverse, condition_number } => {
+        Identified::Determined {
+            inverse,
+            condition_number,
+        } => {
             fit.condition_number = Some(condition_number);
             let bounds = cramer_rao::bounds(&inverse, data, fit);
-            (fit.covariance, fit.covariance_corrected) = (Some(bounds.covariance), Some(bounds.corrected));
+            (fit.covariance, fit.covariance_corrected) =
+                (Some(bounds.covariance), Some(bounds.corrected));
         }
-        Identified::Undetermined { condition_number, parameters } => {
+        Identified::Undetermined {
+            condition_number,
+            parameters,
+        } => {
             fit.condition_number = condition_number;
-            let names: Vec<&str> = parameters.iter().filter_map(|&j| data.names().get(j)).map(String::as_str).collect();
+            let names: Vec<&str> = parameters
+                .iter()
+                .filter_map(|&j| data.names().get(j))
+                .map(String::as_str)
+                .collect();
             fit.outcome = Outcome::Unidentifiable;
             fit.reason = format!("the data do not tell apart {}", names.join(", "));
             fit.undetermined = parameters;

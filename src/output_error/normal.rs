@@ -9,8 +9,14 @@
 //! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one symmetric matrix, updated
 //! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
 //! past, and only tiles that touch the lower triangle are computed.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd};
@@ -45,7 +51,13 @@ pub(super) struct Normal {
 
 impl Normal {
     /// The sums of so many samples, seen through blocks of `block` of them.
-    pub fn new(lanes: &Lanes, derivatives: usize, biased: &[usize], samples: usize, block: usize) -> Normal {
+    pub fn new(
+        lanes: &Lanes,
+        derivatives: usize,
+        biased: &[usize],
+        samples: usize,
+        block: usize,
+    ) -> Normal {
         let width = lanes.width();
         Normal {
             squares: std::array::from_fn(|_| Aligned::zeros(width * width)),
@@ -63,9 +75,16 @@ impl Normal {
 
     /// Begins anew, with every so many samples.
     pub fn clear(&mut self, stride: usize) {
-        self.squares.iter_mut().chain(&mut self.moments).for_each(|sums| sums.slice_mut().fill(0.0));
+        self.squares
+            .iter_mut()
+            .chain(&mut self.moments)
+            .for_each(|sums| sums.slice_mut().fill(0.0));
         (self.counts, self.stride) = ([0; OUTPUTS], stride);
-        let blocks = if stride == 1 { self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width() } else { 0 };
+        let blocks = if stride == 1 {
+            self.samples.div_ceil(self.block) * OUTPUTS * self.lanes.width()
+        } else {
+            0
+        };
         if self.blocks.slice().len() == blocks {
             self.blocks.slice_mut().fill(0.0);
         } else if blocks > 0 {
@@ -81,19 +100,36 @@ impl Normal {
     /// Writes the sensitivities of an output to all parameters, added up over a block's samples that count.
     pub fn block(&self, block: usize, output: usize, row: &mut [f64]) -> Block {
         let width = self.lanes.width();
-        let Some(sums) = self.blocks.slice().get((block * OUTPUTS + output) * width..).filter(|_| self.whole()) else {
-            return Block { count: 0.0, residual: 0.0 };
+        let Some(sums) = self
+            .blocks
+            .slice()
+            .get((block * OUTPUTS + output) * width..)
+            .filter(|_| self.whole())
+        else {
+            return Block {
+                count: 0.0,
+                residual: 0.0,
+            };
         };
         let sums = &sums[..width];
         let (derivatives, initial) = self.lanes.places.split_at(self.derivatives);
         let (of_derivatives, others) = row.split_at_mut(self.derivatives);
         let (of_biases, of_initial) = others.split_at_mut(self.biased.len());
-        of_derivatives.iter_mut().zip(derivatives).for_each(|(to, &lane)| *to = sums[lane]);
-        of_initial.iter_mut().zip(initial).for_each(|(to, &lane)| *to = sums[lane]);
+        of_derivatives
+            .iter_mut()
+            .zip(derivatives)
+            .for_each(|(to, &lane)| *to = sums[lane]);
+        of_initial
+            .iter_mut()
+            .zip(initial)
+            .for_each(|(to, &lane)| *to = sums[lane]);
         let count = sums[self.lanes.one];
         let biases = of_biases.iter_mut().zip(&self.biased);
         biases.for_each(|(to, biased)| *to = if *biased == output { count } else { 0.0 });
-        Block { count, residual: sums[self.lanes.residual] }
+        Block {
+            count,
+            residual: sums[self.lanes.residual],
+        }
     }
 
     /// Whether the sums are of all samples.
@@ -120,7 +156,11 @@ impl Normal {
         let (derivatives, initial) = self.lanes.places.split_at(self.derivatives);
         let biases = self.biased.iter().map(|&o| (self.lanes.one, Some(o)));
         let whole = |places: &[usize]| places.iter().map(|&lane| (lane, None)).collect::<Vec<_>>();
-        whole(derivatives).into_iter().chain(biases).chain(whole(initial)).collect()
+        whole(derivatives)
+            .into_iter()
+            .chain(biases)
+            .chain(whole(initial))
+            .collect()
     }
 
     /// Σ_o w_o Σ s v of all parameters.
@@ -128,7 +168,9 @@ impl Normal {
         let lanes = self.parameters();
         let of = |(lane, only): (usize, Option<usize>)| -> f64 {
             let outputs = (0..OUTPUTS).filter(|o| only.is_none_or(|only| only == *o));
-            outputs.map(|o| self.stride as f64 * weights[o] * self.moments[o].slice()[lane]).sum()
+            outputs
+                .map(|o| self.stride as f64 * weights[o] * self.moments[o].slice()[lane])
+                .sum()
         };
         DVector::from_iterator(lanes.len(), lanes.iter().map(|lane| of(*lane)))
     }
@@ -154,10 +196,16 @@ impl Normal {
         let mut sum = vec![0.0; width * width];
         for (squares, w) in self.squares.iter().zip(weights) {
             let factor = w * self.stride as f64;
-            Arch::new().dispatch(|| sum.iter_mut().zip(squares.slice()).for_each(|(sum, s)| *sum += factor * s));
+            Arch::new().dispatch(|| {
+                sum.iter_mut()
+                    .zip(squares.slice())
+                    .for_each(|(sum, s)| *sum += factor * s)
+            });
         }
         let lanes = self.parameters();
-        let both = |(i, first): (usize, Option<usize>), (j, second): (usize, Option<usize>)| match (first, second) {
+        let both = |(i, first): (usize, Option<usize>), (j, second): (usize, Option<usize>)| match (
+            first, second,
+        ) {
             (None, None) => sum[i.max(j) * width + i.min(j)],
             (Some(o), Some(other)) if o != other => 0.0,
             (Some(o), _) | (_, Some(o)) => weights[o] * self.at(o, i, j),
@@ -189,7 +237,16 @@ impl Sink for Summing<'_> {
         rows: &mut [f64],
         meanwhile: &mut impl Meanwhile,
     ) {
-        let Normal { squares, moments, counts, stride, lanes, blocks, block, .. } = &mut *self.normal;
+        let Normal {
+            squares,
+            moments,
+            counts,
+            stride,
+            lanes,
+            blocks,
+            block,
+            ..
+        } = &mut *self.normal;
         let width = lanes.width();
         for (k, y) in outputs.iter().enumerate() {
             for o in 0..OUTPUTS {
@@ -204,10 +261,21 @@ impl Sink for Summing<'_> {
             }
         }
         if *stride == 1 {
-            add_blocks(simd, samples.first, *block, rows, outputs.len(), blocks.slice_mut());
+            add_blocks(
+                simd,
+                samples.first,
+                *block,
+                rows,
+                outputs.len(),
+                blocks.slice_mut(),
+            );
         }
         for o in 0..OUTPUTS {
-            let all = Rows { values: &rows[o * width..], stride: OUTPUTS * width, samples: outputs.len() };
+            let all = Rows {
+                values: &rows[o * width..],
+                stride: OUTPUTS * width,
+                samples: outputs.len(),
+            };
             all.add_moments(simd, lanes.residual, moments[o].slice_mut());
             all.add_squares_beside(simd, &lanes.used, squares[o].slice_mut(), width, meanwhile);
         }
@@ -216,7 +284,14 @@ impl Sink for Summing<'_> {
 
 /// Adds the rows of some samples, from `first` on, to those of their blocks.
 #[inline(always)]
-fn add_blocks<S: Simd>(simd: S, first: usize, block: usize, rows: &[f64], samples: usize, blocks: &mut [f64]) {
+fn add_blocks<S: Simd>(
+    simd: S,
+    first: usize,
+    block: usize,
+    rows: &[f64],
+    samples: usize,
+    blocks: &mut [f64],
+) {
     let row = rows.len() / super::kernel::CHUNK;
     let mut k = 0;
     while k < samples {
@@ -349,7 +424,8 @@ impl Rows<'_> {
         meanwhile: &mut impl Meanwhile,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
-        let matrix = &mut matrix[first * width + lane..(first + T - 1) * width + lane + C * S::F64_LANES];
+        let matrix =
+            &mut matrix[first * width + lane..(first + T - 1) * width + lane + C * S::F64_LANES];
         for t in 0..T {
             let row = S::as_simd_f64s(&matrix[t * width..][..C * S::F64_LANES]).0;
             sums[t].copy_from_slice(row);

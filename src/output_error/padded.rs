@@ -1,7 +1,10 @@
 //! Rows of numbers padded to whole vectors, and the products of them that the corrected bounds take. In each of them a
 //! number is summed in one order, whatever the width of the processor's vectors.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
@@ -37,7 +40,11 @@ fn width(columns: usize) -> usize {
 
 impl Padded {
     pub fn zeros(rows: usize, columns: usize) -> Padded {
-        Padded { values: Aligned::zeros((rows + BEYOND) * width(columns)), rows, columns }
+        Padded {
+            values: Aligned::zeros((rows + BEYOND) * width(columns)),
+            rows,
+            columns,
+        }
     }
 
     /// Rows that were padded before.
@@ -50,22 +57,32 @@ impl Padded {
     /// Numbers below each other.
     pub fn column(values: &[f64]) -> Padded {
         let mut column = Padded::zeros(values.len(), 1);
-        column.rows_mut().zip(values).for_each(|(row, value)| row[0] = *value);
+        column
+            .rows_mut()
+            .zip(values)
+            .for_each(|(row, value)| row[0] = *value);
         column
     }
 
     /// A symmetric matrix.
     pub fn symmetric(matrix: &DMatrix<f64>) -> Padded {
         let mut padded = Padded::zeros(matrix.nrows(), matrix.ncols());
-        padded.rows_mut().zip(matrix.column_iter()).for_each(|(row, own)| {
-            row.iter_mut().zip(own.iter()).for_each(|(to, from)| *to = *from);
-        });
+        padded
+            .rows_mut()
+            .zip(matrix.column_iter())
+            .for_each(|(row, own)| {
+                row.iter_mut()
+                    .zip(own.iter())
+                    .for_each(|(to, from)| *to = *from);
+            });
         padded
     }
 
     /// The same without padding.
     pub fn matrix(&self) -> DMatrix<f64> {
-        DMatrix::from_fn(self.rows, self.columns, |i, j| self.values()[i * self.width() + j])
+        DMatrix::from_fn(self.rows, self.columns, |i, j| {
+            self.values()[i * self.width() + j]
+        })
     }
 
     /// Numbers from the beginning of a row to that of the next.
@@ -116,7 +133,10 @@ impl Padded {
 
     /// Σ of all numbers times those of another; lanes are summed apart, of which none waits for the others.
     pub fn dot(&self, other: &Padded) -> f64 {
-        let (a, b) = (self.values().as_chunks::<VECTOR>().0, other.values().as_chunks::<VECTOR>().0);
+        let (a, b) = (
+            self.values().as_chunks::<VECTOR>().0,
+            other.values().as_chunks::<VECTOR>().0,
+        );
         let mut sums = [0.0; VECTOR];
         for (a, b) in a.iter().zip(b) {
             for i in 0..VECTOR {
@@ -129,7 +149,11 @@ impl Padded {
     /// Adds another times a factor.
     pub fn add(&mut self, other: &Padded, factor: f64) {
         let (sums, values) = (self.values_mut(), other.values());
-        Arch::new().dispatch(|| sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += factor * v));
+        Arch::new().dispatch(|| {
+            sums.iter_mut()
+                .zip(values)
+                .for_each(|(sum, v)| *sum += factor * v)
+        });
     }
 
     pub fn times(mut self, factor: f64) -> Padded {
@@ -147,7 +171,11 @@ impl Padded {
 
     /// Adds rows times a matrix.
     pub fn add_product(&mut self, rows: &Padded, matrix: &Padded) {
-        Arch::new().dispatch(Product { from: rows, matrix, to: self.values.slice_mut() });
+        Arch::new().dispatch(Product {
+            from: rows,
+            matrix,
+            to: self.values.slice_mut(),
+        });
     }
 
     /// Of symmetric matrices the product self · inner · self.
@@ -166,12 +194,20 @@ impl Padded {
                     return false;
                 }
                 values[p * width + p] = 1.0;
-                values[p * width..(p + 1) * width].iter_mut().for_each(|v| *v /= pivot);
+                values[p * width..(p + 1) * width]
+                    .iter_mut()
+                    .for_each(|v| *v /= pivot);
                 let (before, from) = values.split_at_mut(p * width);
                 let (row, after) = from.split_at_mut(width);
-                for other in before.chunks_exact_mut(width).chain(after.chunks_exact_mut(width)) {
+                for other in before
+                    .chunks_exact_mut(width)
+                    .chain(after.chunks_exact_mut(width))
+                {
                     let factor = std::mem::replace(&mut other[p], 0.0);
-                    other.iter_mut().zip(&*row).for_each(|(v, r)| *v -= factor * r);
+                    other
+                        .iter_mut()
+                        .zip(&*row)
+                        .for_each(|(v, r)| *v -= factor * r);
                 }
             }
             true
@@ -182,7 +218,10 @@ impl Padded {
     /// Σ s sᵀ of the rows.
     pub fn squares(&self) -> Padded {
         let mut squares = Padded::zeros(self.columns, self.columns);
-        Arch::new().dispatch(Squares { of: self, to: squares.values.slice_mut() });
+        Arch::new().dispatch(Squares {
+            of: self,
+            to: squares.values.slice_mut(),
+        });
         let width = squares.width();
         for i in 0..self.columns {
             for j in 0..i {
@@ -204,7 +243,9 @@ impl Padded {
         let mut sums = vec![0.0; self.width()];
         Arch::new().dispatch(|| {
             for (a, b) in self.rows().zip(later.rows().skip(lag)) {
-                sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+                sums.iter_mut()
+                    .zip(a.iter().zip(b))
+                    .for_each(|(sum, (a, b))| *sum += a * b);
             }
         });
         sums
@@ -213,13 +254,23 @@ impl Padded {
     /// Each column filtered by a process.
     pub fn filter(&mut self, process: &Autoregression) {
         let width = self.width();
-        Arch::new().dispatch(Filter { process, series: self.values_mut(), width, back: false });
+        Arch::new().dispatch(Filter {
+            process,
+            series: self.values_mut(),
+            width,
+            back: false,
+        });
     }
 
     /// The same backwards in time.
     pub fn filter_back(&mut self, process: &Autoregression) {
         let width = self.width();
-        Arch::new().dispatch(Filter { process, series: self.values_mut(), width, back: true });
+        Arch::new().dispatch(Filter {
+            process,
+            series: self.values_mut(),
+            width,
+            back: true,
+        });
     }
 }
 
@@ -234,8 +285,15 @@ impl WithSimd for Squares<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Padded { rows, columns, .. } = *self.of;
-        let used: Vec<usize> = (0..columns).step_by(VECTOR).map(|first| (columns - first).min(VECTOR)).collect();
-        let rows = Rows { values: self.of.values(), stride: width(columns), samples: rows };
+        let used: Vec<usize> = (0..columns)
+            .step_by(VECTOR)
+            .map(|first| (columns - first).min(VECTOR))
+            .collect();
+        let rows = Rows {
+            values: self.of.values(),
+            stride: width(columns),
+            samples: rows,
+        };
         rows.add_squares(simd, &used, self.to, width(columns));
     }
 }
@@ -262,7 +320,11 @@ impl WithSimd for Product<'_> {
                 for (i, matrix) in self.matrix.rows().enumerate() {
                     let entries = load::<S>(matrix, lane);
                     for n in 0..ROWS_AT_ONCE {
-                        sums[n] = simd.mul_add_f64s(simd.splat_f64s(rows[n * from + i]), entries, sums[n]);
+                        sums[n] = simd.mul_add_f64s(
+                            simd.splat_f64s(rows[n * from + i]),
+                            entries,
+                            sums[n],
+                        );
                     }
                 }
                 for n in 0..ROWS_AT_ONCE {
@@ -286,11 +348,22 @@ impl WithSimd for Filter<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Filter { process, series, width, back } = self;
+        let Filter {
+            process,
+            series,
+            width,
+            back,
+        } = self;
         let rows = series.len() / width;
         for k in 1..rows {
             for lane in (0..width).step_by(S::F64_LANES) {
-                let place = |k: usize| if back { (rows - 1 - k) * width + lane } else { k * width + lane };
+                let place = |k: usize| {
+                    if back {
+                        (rows - 1 - k) * width + lane
+                    } else {
+                        k * width + lane
+                    }
+                };
                 let mut now = load::<S>(series, place(k));
                 // What is nearest last: it is what the sum would wait for.
                 for j in (1..=process.coefficients.len().min(k)).rev() {
@@ -379,26 +452,60 @@ mod tests {
     fn products_squares_and_lags_are_those_of_matrices_also_of_odd_sizes() {
         let (a, b) = (rows(29, 11), rows(29, 11));
         let (plain, square) = (a.matrix(), rows(11, 11).matrix());
-        assert_relative_eq!(a.product(&rows(11, 11)).matrix(), &plain * square, epsilon = 1e-12);
-        assert_relative_eq!(a.squares().matrix(), plain.transpose() * &plain, epsilon = 1e-12);
+        assert_relative_eq!(
+            a.product(&rows(11, 11)).matrix(),
+            &plain * square,
+            epsilon = 1e-12
+        );
+        assert_relative_eq!(
+            a.squares().matrix(),
+            plain.transpose() * &plain,
+            epsilon = 1e-12
+        );
         for (lag, sum) in a.lagged(&b, LONGEST_LAG + 1).into_iter().enumerate() {
-            let expected: f64 = (lag..29).map(|k| plain.row(k - lag).dot(&plain.row(k))).sum();
+            let expected: f64 = (lag..29)
+                .map(|k| plain.row(k - lag).dot(&plain.row(k)))
+                .sum();
             assert_relative_eq!(sum, expected, epsilon = 1e-12);
         }
     }
 
     /// What the kernels give with vectors of a width, as bits.
     fn bits<S: Simd>(simd: S) -> Vec<u64> {
-        let (a, matrix, process) =
-            (rows(29, 11), rows(11, 11), Autoregression { coefficients: vec![-0.8, 0.3], innovation: 1.0 });
-        let (mut product, mut squares, mut series) = (Padded::zeros(29, 11), Padded::zeros(11, 11), rows(29, 11));
-        simd.vectorize(Product { from: &a, matrix: &matrix, to: product.values.slice_mut() });
-        simd.vectorize(Squares { of: &a, to: squares.values.slice_mut() });
+        let (a, matrix, process) = (
+            rows(29, 11),
+            rows(11, 11),
+            Autoregression {
+                coefficients: vec![-0.8, 0.3],
+                innovation: 1.0,
+            },
+        );
+        let (mut product, mut squares, mut series) =
+            (Padded::zeros(29, 11), Padded::zeros(11, 11), rows(29, 11));
+        simd.vectorize(Product {
+            from: &a,
+            matrix: &matrix,
+            to: product.values.slice_mut(),
+        });
+        simd.vectorize(Squares {
+            of: &a,
+            to: squares.values.slice_mut(),
+        });
         let lagged = simd.vectorize(Lagged { a: &a, b: &product });
         for back in [false, true] {
-            simd.vectorize(Filter { process: &process, series: series.values_mut(), width: a.width(), back });
+            simd.vectorize(Filter {
+                process: &process,
+                series: series.values_mut(),
+                width: a.width(),
+                back,
+            });
         }
-        let all = product.values().iter().chain(squares.values()).chain(&lagged).chain(series.values());
+        let all = product
+            .values()
+            .iter()
+            .chain(squares.values())
+            .chain(&lagged)
+            .chain(series.values());
         all.map(|v| v.to_bits()).collect()
     }
 
@@ -408,8 +515,14 @@ mod tests {
         assert!(narrow.iter().all(|bits| f64::from_bits(*bits).is_finite()));
         #[cfg(target_arch = "x86_64")]
         {
-            assert!(pulp::x86::V3::try_new().is_none_or(|simd| bits(simd) == narrow), "four lanes");
-            assert!(pulp::x86::V4::try_new().is_none_or(|simd| bits(simd) == narrow), "eight lanes");
+            assert!(
+                pulp::x86::V3::try_new().is_none_or(|simd| bits(simd) == narrow),
+                "four lanes"
+            );
+            assert!(
+                pulp::x86::V4::try_new().is_none_or(|simd| bits(simd) == narrow),
+                "eight lanes"
+            );
         }
     }
 
@@ -418,16 +531,31 @@ mod tests {
         let matrix = rows(29, 11).squares();
         let unit = matrix.matrix() * matrix.clone().inverse().unwrap().matrix();
         assert_relative_eq!(unit, DMatrix::identity(11, 11), epsilon = 1e-9);
-        assert!(Padded::symmetric(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0])).inverse().is_none());
-        assert!(Padded::symmetric(&DMatrix::from_element(2, 2, f64::NAN)).inverse().is_none());
+        assert!(
+            Padded::symmetric(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]))
+                .inverse()
+                .is_none()
+        );
+        assert!(
+            Padded::symmetric(&DMatrix::from_element(2, 2, f64::NAN))
+                .inverse()
+                .is_none()
+        );
     }
 
     #[test]
     fn filtering_to_and_fro_multiplies_by_the_autocovariance_matrix() {
-        let process = Autoregression { coefficients: vec![-0.8], innovation: 0.36 };
+        let process = Autoregression {
+            coefficients: vec![-0.8],
+            innovation: 0.36,
+        };
         let (samples, impulse) = (100, 40);
         let mut series = Padded::zeros(samples, 1);
-        series.rows_mut().skip(impulse).take(1).for_each(|row| row[0] = 1.0);
+        series
+            .rows_mut()
+            .skip(impulse)
+            .take(1)
+            .for_each(|row| row[0] = 1.0);
         let mut series = series.followed_by(process.memory(samples));
         series.filter(&process);
         series.filter_back(&process);

@@ -4,8 +4,14 @@
 //! With ẋ_j the slope of stage j and A_j, B_j its slopes along states and coefficients, the step's end depends on the slopes
 //! of its stages as M₄ = h/6, M₃ = h/3 + h M₄A₄, M₂ = h/3 + h/2 M₃A₃, M₁ = h/6 + h/2 M₂A₂ (the later stages start from the
 //! earlier ones' slopes). Then Φ = 1 + Σ M_j A_j and Γ_j = M_j B_j.
-#![expect(clippy::inline_always, reason = "compiled into the kernel for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use pulp::Simd;
 
@@ -51,8 +57,12 @@ impl<const NX: usize> Propagators<NX> {
         for &(o, k) in E::OUTPUTS_BY_COEFFICIENT {
             self.d[o][k][sample] = read.by_coefficient[(o, k)];
         }
-        let slopes =
-            near.through::<E, OUTPUTS>(2 * sample, read.by_state, &read.by_coefficient, E::OUTPUTS_BY_COEFFICIENT);
+        let slopes = near.through::<E, OUTPUTS>(
+            2 * sample,
+            read.by_state,
+            &read.by_coefficient,
+            E::OUTPUTS_BY_COEFFICIENT,
+        );
         for &(o, i) in E::OUTPUTS_BY_STATE {
             self.c[o][i][sample] = slopes[(o, i)];
         }
@@ -61,22 +71,39 @@ impl<const NX: usize> Propagators<NX> {
 
     /// Φ and Γ of a chunk's steps.
     #[inline(always)]
-    pub fn set<S: Simd, E: Equations<NX>>(&mut self, simd: S, path: &Path<NX>, samples: usize, step_s: f64) {
+    pub fn set<S: Simd, E: Equations<NX>>(
+        &mut self,
+        simd: S,
+        path: &Path<NX>,
+        samples: usize,
+        step_s: f64,
+    ) {
         let h = step_s;
         for at in (0..samples).step_by(S::F64_LANES) {
             // M of the last stage is h/6 alone.
-            let (mut m, mut product) = ([[simd.splat_f64s(0.0); NX]; NX], [[simd.splat_f64s(0.0); NX]; NX]);
+            let (mut m, mut product) = (
+                [[simd.splat_f64s(0.0); NX]; NX],
+                [[simd.splat_f64s(0.0); NX]; NX],
+            );
             let mut phi = [[simd.splat_f64s(0.0); NX]; NX];
             let last = simd.splat_f64s(h / 6.0);
             for &(i, k) in E::RATES_BY_COEFFICIENT {
                 let b = load::<S>(&path.b[STAGES - 1][i][k], at);
-                store::<S>(&mut self.gamma[STAGES - 1][k][i], at, simd.mul_f64s(last, b));
+                store::<S>(
+                    &mut self.gamma[STAGES - 1][k][i],
+                    at,
+                    simd.mul_f64s(last, b),
+                );
             }
             for &(i, j) in E::RATES_BY_STATE {
                 product[i][j] = simd.mul_f64s(last, load::<S>(&path.a[STAGES - 1][i][j], at));
                 phi[i][j] = product[i][j];
             }
-            for (stage, part, reach) in [(2, h / 3.0, h), (1, h / 3.0, 0.5 * h), (0, h / 6.0, 0.5 * h)] {
+            for (stage, part, reach) in [
+                (2, h / 3.0, h),
+                (1, h / 3.0, 0.5 * h),
+                (0, h / 6.0, 0.5 * h),
+            ] {
                 for i in 0..NX {
                     for j in 0..NX {
                         let own = simd.splat_f64s(if i == j { part } else { 0.0 });

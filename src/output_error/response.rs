@@ -86,7 +86,9 @@ impl Sink for Keeping<'_> {
         for (row, used) in kept.chunks_exact_mut(row).zip(&self.used[samples.first..]) {
             for (o, row) in row.chunks_exact_mut(self.kept.width).enumerate() {
                 if used[o] {
-                    self.biases.iter().for_each(|(lane, output)| row[*lane] = f64::from(u8::from(*output == o)));
+                    self.biases
+                        .iter()
+                        .for_each(|(lane, output)| row[*lane] = f64::from(u8::from(*output == o)));
                 } else {
                     row.fill(0.0);
                 }
@@ -123,14 +125,27 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
-    pub fn respond_with(&self, detail: Detail, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
+    pub fn respond_with(
+        &self,
+        detail: Detail,
+        parameters: &[f64],
+        response: &mut Response,
+    ) -> Result<(), Diverged> {
         let stride = match detail {
             Detail::Coarse => self.coarse_stride(),
             Detail::Whole => 1,
         };
         let Response { outputs, normal } = response;
         normal.clear(stride);
-        self.pass(parameters, stride, outputs, &mut Summing { normal, measurements: &self.measurements })
+        self.pass(
+            parameters,
+            stride,
+            outputs,
+            &mut Summing {
+                normal,
+                measurements: &self.measurements,
+            },
+        )
     }
 
     /// Whether coarse steps are longer than the samples' own.
@@ -139,7 +154,11 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.coarse_stride() > 1
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small positive number"
+    )]
     fn coarse_stride(&self) -> usize {
         let within = (COARSE_STEP_S / self.step_s).round() as usize;
         let spare = self.samples() / (SAMPLES_A_PARAMETER * self.parameters().max(1));
@@ -158,9 +177,23 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             width: lanes.width(),
             lanes: [derivatives, &lanes.biases, initial].concat(),
         };
-        let biases = lanes.biases.iter().copied().zip(self.biased.iter().copied()).collect();
-        let mut keeping = Keeping { kept: &mut kept, used: &self.measurements.used, biases };
-        self.pass(parameters, 1, &mut vec![[0.0; OUTPUTS]; self.samples()], &mut keeping)?;
+        let biases = lanes
+            .biases
+            .iter()
+            .copied()
+            .zip(self.biased.iter().copied())
+            .collect();
+        let mut keeping = Keeping {
+            kept: &mut kept,
+            used: &self.measurements.used,
+            biases,
+        };
+        self.pass(
+            parameters,
+            1,
+            &mut vec![[0.0; OUTPUTS]; self.samples()],
+            &mut keeping,
+        )?;
         Ok(kept)
     }
 }

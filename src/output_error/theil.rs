@@ -32,7 +32,9 @@ impl Agreement {
     #[must_use]
     pub fn of(pairs: &[(f64, f64)]) -> Agreement {
         let n = pairs.len().max(1) as f64;
-        let mean = |value: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>() / n;
+        let mean = |value: &dyn Fn(f64, f64) -> f64| {
+            pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>() / n
+        };
         let (mean_measured, mean_computed) = (mean(&|z, _| z), mean(&|_, y| y));
         Agreement {
             samples: pairs.len(),
@@ -89,9 +91,20 @@ pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
         computed += weight * (output.square_computed + output.mean_computed.powi(2));
     }
     let (difference, size) = (parts.iter().sum::<f64>(), measured.sqrt() + computed.sqrt());
-    let share = |part: f64| if difference > 0.0 { part / difference } else { 0.0 };
+    let share = |part: f64| {
+        if difference > 0.0 {
+            part / difference
+        } else {
+            0.0
+        }
+    };
     let [bias, variance, covariance] = parts.map(share);
-    (size > 0.0).then(|| Theil { coefficient: difference.sqrt() / size, bias, variance, covariance })
+    (size > 0.0).then(|| Theil {
+        coefficient: difference.sqrt() / size,
+        bias,
+        variance,
+        covariance,
+    })
 }
 
 #[cfg(test)]
@@ -116,8 +129,16 @@ mod tests {
     fn a_pure_offset_is_all_bias() {
         let a = agreement(sine, |k| sine(k) + 0.5);
         let u = a.theil().unwrap();
-        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [1.0, 0.0, 0.0][..], epsilon = 1e-9);
-        assert_relative_eq!(u.coefficient, 0.5 / (0.5f64.sqrt() + 0.75f64.sqrt()), max_relative = 1e-12);
+        assert_abs_diff_eq!(
+            [u.bias, u.variance, u.covariance][..],
+            [1.0, 0.0, 0.0][..],
+            epsilon = 1e-9
+        );
+        assert_relative_eq!(
+            u.coefficient,
+            0.5 / (0.5f64.sqrt() + 0.75f64.sqrt()),
+            max_relative = 1e-12
+        );
         assert_relative_eq!(a.r_squared().unwrap(), 0.5, max_relative = 1e-12);
         assert_relative_eq!(a.root_mean_square(), 0.5, max_relative = 1e-12);
     }
@@ -126,7 +147,11 @@ mod tests {
     fn a_pure_scale_is_all_variance() {
         let a = agreement(sine, |k| 1.5 * sine(k));
         let u = a.theil().unwrap();
-        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [0.0, 1.0, 0.0][..], epsilon = 1e-9);
+        assert_abs_diff_eq!(
+            [u.bias, u.variance, u.covariance][..],
+            [0.0, 1.0, 0.0][..],
+            epsilon = 1e-9
+        );
         assert_relative_eq!(u.coefficient, 0.2, max_relative = 1e-12);
         assert_relative_eq!(a.r_squared().unwrap(), 0.75, max_relative = 1e-12);
     }
@@ -135,17 +160,27 @@ mod tests {
     fn another_shape_of_the_same_size_is_all_covariance() {
         let a = agreement(sine, cosine);
         let u = a.theil().unwrap();
-        assert_abs_diff_eq!([u.bias, u.variance, u.covariance][..], [0.0, 0.0, 1.0][..], epsilon = 1e-9);
+        assert_abs_diff_eq!(
+            [u.bias, u.variance, u.covariance][..],
+            [0.0, 0.0, 1.0][..],
+            epsilon = 1e-9
+        );
         assert_relative_eq!(u.coefficient, 0.5f64.sqrt(), max_relative = 1e-12);
         assert_relative_eq!(a.r_squared().unwrap(), -1.0, max_relative = 1e-12);
     }
 
     #[test]
     fn the_shares_add_up_to_one_and_the_parts_to_the_mean_square() {
-        let pairs: Vec<(f64, f64)> = (0..57).map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k))).collect();
+        let pairs: Vec<(f64, f64)> = (0..57)
+            .map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k)))
+            .collect();
         let a = Agreement::of(&pairs);
         let u = a.theil().unwrap();
-        assert_relative_eq!(u.bias + u.variance + u.covariance, 1.0, max_relative = 1e-12);
+        assert_relative_eq!(
+            u.bias + u.variance + u.covariance,
+            1.0,
+            max_relative = 1e-12
+        );
         let square = pairs.iter().map(|(z, y)| (z - y).powi(2)).sum::<f64>() / 57.0;
         assert_relative_eq!(a.root_mean_square().powi(2), square, max_relative = 1e-12);
     }
@@ -153,7 +188,11 @@ mod tests {
     #[test]
     fn outputs_together_count_by_weight_and_nothing_is_no_number() {
         let (good, bad) = (agreement(sine, sine), agreement(sine, |k| sine(k) + 1.0));
-        assert_abs_diff_eq!(theil(&[(good, 1.0), (bad, 0.0)]).unwrap().coefficient, 0.0, epsilon = 1e-9);
+        assert_abs_diff_eq!(
+            theil(&[(good, 1.0), (bad, 0.0)]).unwrap().coefficient,
+            0.0,
+            epsilon = 1e-9
+        );
         let both = theil(&[(good, 1.0), (bad, 1.0)]).unwrap();
         assert!(both.coefficient < bad.theil().unwrap().coefficient && both.bias > 0.999);
         assert_eq!(Agreement::of(&[]).theil(), None);

@@ -14,13 +14,29 @@ struct Campaign {
 
 impl Campaign {
     fn tables(&self) -> Tables<'_> {
-        let Campaign { lineage, maneuvers, fits, estimates, trends, verdicts } = self;
-        Tables { lineage, maneuvers, fits, estimates, trends, verdicts }
+        let Campaign {
+            lineage,
+            maneuvers,
+            fits,
+            estimates,
+            trends,
+            verdicts,
+        } = self;
+        Tables {
+            lineage,
+            maneuvers,
+            fits,
+            estimates,
+            trends,
+            verdicts,
+        }
     }
 
     fn fly(&mut self, flight: &str, class: &str, value: f64) {
         let maneuver_id = format!("{flight}_{class}");
-        self.lineage.flights.insert(flight.to_owned(), "01".to_owned());
+        self.lineage
+            .flights
+            .insert(flight.to_owned(), "01".to_owned());
         self.maneuvers.push(Window {
             maneuver_id: maneuver_id.clone(),
             flight_id: flight.to_owned(),
@@ -89,7 +105,11 @@ fn campaign() -> Campaign {
         value: 1.5,
         standard_error: 0.1,
     });
-    campaign.verdicts.push(PublishedVerdict { derivative: "Cm_de".into(), alpha_deg: 30.0, verdict: "agrees".into() });
+    campaign.verdicts.push(PublishedVerdict {
+        derivative: "Cm_de".into(),
+        alpha_deg: 30.0,
+        verdict: "agrees".into(),
+    });
     campaign
 }
 
@@ -108,9 +128,18 @@ fn a_new_flight_brings_new_maneuvers_and_is_why_a_trend_moved() {
     let changes = between("0001", &campaign().tables(), &now.tables());
     assert_eq!(changes.maneuvers.len(), 1);
     let new = &changes.maneuvers[0];
-    assert_eq!((&*new.maneuver_id, &*new.what, &*new.because), ("f3_one", "new", "new flight f3"));
-    assert_eq!((changes.trends.len(), &*changes.trends[0].because), (1, "new flight f3"));
-    assert_eq!((changes.verdicts.len(), &*changes.verdicts[0].because), (1, "new flight f3"));
+    assert_eq!(
+        (&*new.maneuver_id, &*new.what, &*new.because),
+        ("f3_one", "new", "new flight f3")
+    );
+    assert_eq!(
+        (changes.trends.len(), &*changes.trends[0].because),
+        (1, "new flight f3")
+    );
+    assert_eq!(
+        (changes.verdicts.len(), &*changes.verdicts[0].because),
+        (1, "new flight f3")
+    );
     assert!(changes.alert && changes.estimates.is_empty());
 }
 
@@ -128,20 +157,38 @@ fn what_moves_within_its_uncertainty_is_no_news_and_new_maneuvers_alone_no_alert
 fn a_class_s_setting_moves_its_own_maneuvers_and_the_method_those_of_all() {
     let mut before = campaign();
     let classes = |weight: f64| -> BTreeMap<String, serde_json::Value> {
-        [("classes".to_owned(), serde_json::json!({"one": {"w": weight}, "two": {"w": 1.0}}))].into()
+        [(
+            "classes".to_owned(),
+            serde_json::json!({"one": {"w": weight}, "two": {"w": 1.0}}),
+        )]
+        .into()
     };
-    before.lineage.configuration.insert(Stage::Estimate, classes(1.0));
+    before
+        .lineage
+        .configuration
+        .insert(Stage::Estimate, classes(1.0));
     let mut now = before.clone();
-    now.lineage.configuration.insert(Stage::Estimate, classes(2.0));
+    now.lineage
+        .configuration
+        .insert(Stage::Estimate, classes(2.0));
     now.estimates[0].value = Some(1.2);
     let changes = between("0001", &before.tables(), &now.tables());
-    assert_eq!((changes.estimates.len(), &*changes.estimates[0].of), (1, "f1_one"));
-    assert_eq!(changes.estimates[0].because, "configuration classes.one.w: 1.0 became 2.0");
+    assert_eq!(
+        (changes.estimates.len(), &*changes.estimates[0].of),
+        (1, "f1_one")
+    );
+    assert_eq!(
+        changes.estimates[0].because,
+        "configuration classes.one.w: 1.0 became 2.0"
+    );
     let mut now = before.clone();
     now.lineage.code.methods.insert("estimate".into(), 6);
     now.estimates[1].value = Some(2.2);
     let changes = between("0001", &before.tables(), &now.tables());
-    assert_eq!(changes.estimates[0].because, "method `estimate`: version 0 became 6");
+    assert_eq!(
+        changes.estimates[0].because,
+        "method `estimate`: version 0 became 6"
+    );
 }
 
 #[test]
@@ -155,9 +202,21 @@ fn a_maneuver_is_gone_with_its_flight_or_no_longer_what_it_was() {
     now.fits[0].outcome = "not_converged".into();
     now.lineage.flights.insert("f1".into(), "02".into());
     let changes = between("0001", &campaign().tables(), &now.tables());
-    let of = |id: &str| changes.maneuvers.iter().find(|m| m.maneuver_id == id).unwrap();
-    assert_eq!(of("f1_one").words, "10.00-20.00 s became 10.00-21.00 s, converged became not_converged");
+    let of = |id: &str| {
+        changes
+            .maneuvers
+            .iter()
+            .find(|m| m.maneuver_id == id)
+            .unwrap()
+    };
+    assert_eq!(
+        of("f1_one").words,
+        "10.00-20.00 s became 10.00-21.00 s, converged became not_converged"
+    );
     assert_eq!(of("f1_one").because, "the file of flight f1 changed");
-    assert_eq!((&*of("f2_two").what, &*of("f2_two").because), ("gone", "flight f2 is gone from the archive"));
+    assert_eq!(
+        (&*of("f2_two").what, &*of("f2_two").because),
+        ("gone", "flight f2 is gone from the archive")
+    );
     assert!(changes.alert);
 }

@@ -14,7 +14,8 @@ use crate::tables::EstimateRow;
 
 /// The published trends of the earlier campaigns that the analyst names.
 pub(super) fn earlier(config: &Config) -> Result<Vec<Earlier>> {
-    let read = |folder: &std::path::PathBuf| Ok(Earlier::new(folder, files::earlier_trends(folder)?));
+    let read =
+        |folder: &std::path::PathBuf| Ok(Earlier::new(folder, files::earlier_trends(folder)?));
     config.compare.against.iter().map(read).collect()
 }
 
@@ -27,17 +28,36 @@ pub(super) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow
         .map(|f| f.maneuver_id.as_str())
         .collect();
     let names = config.derivative_names();
-    let counts = |row: &&EstimateRow| converged.contains(&*row.maneuver_id) && names.contains(&row.derivative);
+    let counts = |row: &&EstimateRow| {
+        converged.contains(&*row.maneuver_id) && names.contains(&row.derivative)
+    };
     campaign.estimated().filter(counts).cloned().collect()
 }
 
 impl Run<'_> {
     pub(super) fn compare(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
-        let (tunnel, settings, shelf) = (&config.tunnel, &config.compare, self.shelf(Stage::Compare));
-        let comparison = compare::comparison(&campaign.trends, &campaign.maneuvers, tunnel, &config.trend, settings);
-        let of_maneuvers = compare::of_maneuvers(&converged(config, campaign), &campaign.maneuvers, tunnel, settings);
-        let beyond = beyond::beyond(&campaign.estimates, &campaign.maneuvers, &comparison, tunnel);
+        let (tunnel, settings, shelf) =
+            (&config.tunnel, &config.compare, self.shelf(Stage::Compare));
+        let comparison = compare::comparison(
+            &campaign.trends,
+            &campaign.maneuvers,
+            tunnel,
+            &config.trend,
+            settings,
+        );
+        let of_maneuvers = compare::of_maneuvers(
+            &converged(config, campaign),
+            &campaign.maneuvers,
+            tunnel,
+            settings,
+        );
+        let beyond = beyond::beyond(
+            &campaign.estimates,
+            &campaign.maneuvers,
+            &comparison,
+            tunnel,
+        );
         let (mut verdicts, mut worst) = ranges::of_tunnel(&comparison, tunnel, settings);
         let mut changes = Vec::new();
         for before in &self.earlier {
@@ -47,7 +67,11 @@ impl Run<'_> {
             verdicts.extend(words);
             worst.extend(furthest);
         }
-        (campaign.comparison, campaign.verdicts, campaign.disagreements) = (comparison, verdicts, worst);
+        (
+            campaign.comparison,
+            campaign.verdicts,
+            campaign.disagreements,
+        ) = (comparison, verdicts, worst);
         campaign.changes = changes;
         table::publish(&shelf, &campaign.comparison)?;
         table::publish(&shelf, &of_maneuvers)?;

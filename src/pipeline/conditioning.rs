@@ -40,7 +40,10 @@ impl Conditioned {
     /// Why its stretches were refused.
     pub fn reasons(&self) -> String {
         let problems = self.stretches.iter().flat_map(|f| &f.ingested.problems);
-        problems.map(|p| p.reason.as_str()).collect::<Vec<_>>().join("; ")
+        problems
+            .map(|p| p.reason.as_str())
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 }
 
@@ -78,14 +81,34 @@ impl Shares {
     pub fn of(memory_mb: f64, channels: usize, threads: usize) -> Shares {
         let half = 0.5e6 * memory_mb;
         let whole = |value: f64, least: usize, most: usize| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a range of counts")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "clamped to a range of counts"
+            )]
             let whole = value.clamp(least as f64, most.max(least) as f64) as usize;
             whole
         };
-        let flights = whole(half / (PER_FLIGHT + PER_CHANNEL * channels as f64), 1, threads);
-        let workers = whole(half / (ENCODED + PER_SAMPLE * LEAST_PIECE as f64), 1, threads);
-        let piece = whole((half / workers as f64 - ENCODED) / PER_SAMPLE, LEAST_PIECE, PIECE);
-        Shares { flights, piece, batch: BATCH * workers }
+        let flights = whole(
+            half / (PER_FLIGHT + PER_CHANNEL * channels as f64),
+            1,
+            threads,
+        );
+        let workers = whole(
+            half / (ENCODED + PER_SAMPLE * LEAST_PIECE as f64),
+            1,
+            threads,
+        );
+        let piece = whole(
+            (half / workers as f64 - ENCODED) / PER_SAMPLE,
+            LEAST_PIECE,
+            PIECE,
+        );
+        Shares {
+            flights,
+            piece,
+            batch: BATCH * workers,
+        }
     }
 }
 
@@ -99,7 +122,8 @@ impl Run<'_> {
     ) -> Result<Vec<R>> {
         self.progress.begin("ingest", flights.len());
         let next = AtomicUsize::new(0);
-        let results: Mutex<Vec<Option<Result<R>>>> = Mutex::new(flights.iter().map(|_| None).collect());
+        let results: Mutex<Vec<Option<Result<R>>>> =
+            Mutex::new(flights.iter().map(|_| None).collect());
         let worker = || {
             while let Some((i, flight)) = {
                 let i = next.fetch_add(1, Ordering::Relaxed);
@@ -120,7 +144,10 @@ impl Run<'_> {
         self.progress.end();
         let results = results.into_inner().unwrap_or_default();
         let lost = || Error::store(&self.config.store, &"a flight was not ingested; run again");
-        results.into_iter().map(|r| r.unwrap_or_else(|| Err(lost()))).collect()
+        results
+            .into_iter()
+            .map(|r| r.unwrap_or_else(|| Err(lost())))
+            .collect()
     }
 
     fn basis_of_ingest(&self) -> Basis<'_> {
@@ -138,7 +165,9 @@ impl Run<'_> {
         let id = &files.flight_id;
         let content = match self.inputs.content(id) {
             Ok(content) => content,
-            Err(reason) => return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason))),
+            Err(reason) => {
+                return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason)));
+            }
         };
         if let Some(done) = self.ingested(id, content) {
             return Ok(done);
@@ -146,13 +175,24 @@ impl Run<'_> {
         let fingerprint = self.ingest_fingerprint(id, content);
         let kept = self.ingest_files(files, &fingerprint)?;
         // What the network is at fault of is not kept.
-        if let Some((file, why)) = files.files.iter().find_map(|file| Some((file, object::failed(file)?))) {
+        if let Some((file, why)) = files
+            .files
+            .iter()
+            .find_map(|file| Some((file, object::failed(file)?)))
+        {
             return Ok(self.refused(id, problem("ingest", id, &file.display().to_string(), &why)));
         }
         // What was read must be what the fingerprint is of.
-        if let Some(changed) = files.files.iter().find(|file| !self.contents.is_unchanged(file)) {
+        if let Some(changed) = files
+            .files
+            .iter()
+            .find(|file| !self.contents.is_unchanged(file))
+        {
             let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
-            return Ok(self.refused(id, problem("ingest", id, &changed.display().to_string(), reason)));
+            return Ok(self.refused(
+                id,
+                problem("ingest", id, &changed.display().to_string(), reason),
+            ));
         }
         let artefact = self.store.path("ingest", id, &fingerprint, "json");
         self.store.save(&artefact, &kept)?;
@@ -168,7 +208,10 @@ impl Run<'_> {
             Some(digest) => self.has_record(&self.record_path(id, &fingerprint), digest),
             None => !ingested.accepted,
         };
-        kept.stretches.iter().all(is_whole).then(|| self.conditioned(kept, &fingerprint, artefact))
+        kept.stretches
+            .iter()
+            .all(is_whole)
+            .then(|| self.conditioned(kept, &fingerprint, artefact))
     }
 
     /// Whether a record is in the store as it was written. One that lies in the object store alone is looked at when it is
@@ -184,12 +227,23 @@ impl Run<'_> {
     /// The records that an artefact of ingest tells of, relative to the store, with what they hold; none of another kind.
     pub(super) fn recorded(&self, artefact: &str) -> Vec<(PathBuf, Digest)> {
         let path = self.store.folder().join(artefact);
-        let fingerprint = path.file_stem().and_then(|stem| stem.to_str()?.rsplit_once('-').map(|(_, f)| f.to_owned()));
-        let kept = if artefact.starts_with("ingest/") { self.store.load::<Kept>(&path) } else { None };
-        let (Some(fingerprint), Some(kept)) = (fingerprint, kept) else { return vec![] };
+        let fingerprint = path
+            .file_stem()
+            .and_then(|stem| stem.to_str()?.rsplit_once('-').map(|(_, f)| f.to_owned()));
+        let kept = if artefact.starts_with("ingest/") {
+            self.store.load::<Kept>(&path)
+        } else {
+            None
+        };
+        let (Some(fingerprint), Some(kept)) = (fingerprint, kept) else {
+            return vec![];
+        };
         let record = |(id, ingested): (String, Ingested)| {
             let path = self.record_path(&id, &fingerprint);
-            Some((path.strip_prefix(self.store.folder()).ok()?.to_owned(), ingested.record?))
+            Some((
+                path.strip_prefix(self.store.folder()).ok()?.to_owned(),
+                ingested.record?,
+            ))
         };
         kept.stretches.into_iter().filter_map(record).collect()
     }
@@ -215,7 +269,11 @@ impl Run<'_> {
             ingested,
         };
         let stretches = kept.stretches.into_iter().map(stretch).collect();
-        Conditioned { stretches, problems: kept.problems, artefact: Some(artefact) }
+        Conditioned {
+            stretches,
+            problems: kept.problems,
+            artefact: Some(artefact),
+        }
     }
 
     /// A flight without a record, for a reason that is not kept.
@@ -226,7 +284,11 @@ impl Run<'_> {
             record: self.record_path(id, "none"),
             ingested: Ingested::refused(problem),
         };
-        Conditioned { stretches: vec![flight], problems: vec![], artefact: None }
+        Conditioned {
+            stretches: vec![flight],
+            problems: vec![],
+            artefact: None,
+        }
     }
 
     pub(super) fn record_path(&self, id: &str, fingerprint: &str) -> PathBuf {
@@ -244,7 +306,8 @@ impl Run<'_> {
             Err(problem) => return Ok(refused(problem)),
         };
         let flows = ingest::flows(&opened, &basis);
-        let surveyed = flows.and_then(|f| Ok((f, ingest::survey(&opened, basis.channels, basis.settings)?)));
+        let surveyed =
+            flows.and_then(|f| Ok((f, ingest::survey(&opened, basis.channels, basis.settings)?)));
         let ((plans, mut problems), survey) = match surveyed {
             Ok(surveyed) => surveyed,
             Err(problem) => return Ok(refused(problem)),
@@ -255,7 +318,10 @@ impl Run<'_> {
             let ingested = self.ingest_stretch(&opened, &plans, stretch, fingerprint)?;
             stretches.push((stretch.flight_id.clone(), ingested));
         }
-        Ok(Kept { problems, stretches })
+        Ok(Kept {
+            problems,
+            stretches,
+        })
     }
 
     /// Writes the record of a stretch; where the stretch is refused none is left.
@@ -269,18 +335,30 @@ impl Run<'_> {
         let basis = self.basis_of_ingest();
         let path = self.record_path(&stretch.flight_id, fingerprint);
         let mut draft = Draft::of(&path)?;
-        let mut flows: Vec<Flow> = plans.iter().map(|p| Flow::new(p, stretch, basis.settings)).collect();
+        let mut flows: Vec<Flow> = plans
+            .iter()
+            .map(|p| Flow::new(p, stretch, basis.settings))
+            .collect();
         let read = self.write_record(opened, stretch, &mut flows, &mut draft);
         let finished = read.and_then(|()| {
-            let written = record_file::open(draft.draft()).map_err(|e| Halt::Store(e.to_string()))?;
+            let written =
+                record_file::open(draft.draft()).map_err(|e| Halt::Store(e.to_string()))?;
             let spoilt = Mutex::new(None);
             let window = |signals: &BTreeSet<String>, samples: Range<usize>| {
-                let window = written.window(Some(signals), samples).map_err(|e| e.to_string());
-                window.map_err(|reason| spoilt.lock().map(|mut spoilt| *spoilt = Some(reason))).ok()
+                let window = written
+                    .window(Some(signals), samples)
+                    .map_err(|e| e.to_string());
+                window
+                    .map_err(|reason| spoilt.lock().map(|mut spoilt| *spoilt = Some(reason)))
+                    .ok()
             };
             let flowed = flows.into_iter().map(Flow::finish).collect();
             let judged = ingest::judge(stretch, flowed, &basis, &window).map_err(Halt::Refused);
-            spoilt.into_inner().ok().flatten().map_or(judged, |reason| Err(Halt::Store(reason)))
+            spoilt
+                .into_inner()
+                .ok()
+                .flatten()
+                .map_or(judged, |reason| Err(Halt::Store(reason)))
         });
         match finished {
             Ok(judged) => {
@@ -312,16 +390,26 @@ impl Run<'_> {
     ) -> std::result::Result<(), Halt> {
         let clock = &stretch.clock;
         let recorded: Vec<String> = flows.iter().map(|f| f.signal().to_owned()).collect();
-        let constants = self.config.constants.iter().filter(|(name, _)| !recorded.contains(*name));
+        let constants = self
+            .config
+            .constants
+            .iter()
+            .filter(|(name, _)| !recorded.contains(*name));
         let about = About {
             flight_id: stretch.flight_id.clone(),
             start_s: clock.start_s,
             step_s: clock.step_s,
             samples: clock.samples,
-            constants: constants.map(|(name, value)| (name.clone(), *value)).collect(),
+            constants: constants
+                .map(|(name, value)| (name.clone(), *value))
+                .collect(),
         };
-        let mut writer = record_file::Writer::create(&about, recorded.iter().map(String::as_str), draft.writer())
-            .map_err(Halt::Store)?;
+        let mut writer = record_file::Writer::create(
+            &about,
+            recorded.iter().map(String::as_str),
+            draft.writer(),
+        )
+        .map_err(Halt::Store)?;
         for from in (0..clock.samples).step_by(GROUP) {
             let until = (from + GROUP).min(clock.samples);
             let writers = writer.group().map_err(Halt::Store)?;
@@ -333,10 +421,15 @@ impl Run<'_> {
                 }
                 let batch: Vec<_> = work.drain(..self.shares.batch.min(work.len())).collect();
                 let encode = |(flow, mut signal): (&mut Flow, SignalWriter)| {
-                    flow.run(opened, until, self.shares.piece, &mut |series| signal.push(series))?;
-                    signal.close().map_err(|reason| (flow.signal().to_owned(), reason))
+                    flow.run(opened, until, self.shares.piece, &mut |series| {
+                        signal.push(series)
+                    })?;
+                    signal
+                        .close()
+                        .map_err(|reason| (flow.signal().to_owned(), reason))
                 };
-                let encoded: std::result::Result<Vec<_>, _> = batch.into_par_iter().map(encode).collect();
+                let encoded: std::result::Result<Vec<_>, _> =
+                    batch.into_par_iter().map(encode).collect();
                 encoded.map(Some).map_err(|why: (String, String)| {
                     let reason = why.1.clone();
                     spoilt = Some(why);
@@ -346,7 +439,12 @@ impl Run<'_> {
             match (appended, spoilt) {
                 (Ok(()), _) => {}
                 (Err(_), Some((place, reason))) => {
-                    return Err(Halt::Refused(problem("ingest", &stretch.flight_id, &place, &reason)));
+                    return Err(Halt::Refused(problem(
+                        "ingest",
+                        &stretch.flight_id,
+                        &place,
+                        &reason,
+                    )));
                 }
                 (Err(reason), None) => return Err(Halt::Store(reason)),
             }
@@ -383,9 +481,30 @@ mod tests {
     #[test]
     fn more_memory_is_more_flights_and_longer_pieces_up_to_the_threads() {
         let little = Shares::of(10.0, 100, 8);
-        assert_eq!(little, Shares { flights: 1, piece: LEAST_PIECE, batch: BATCH });
+        assert_eq!(
+            little,
+            Shares {
+                flights: 1,
+                piece: LEAST_PIECE,
+                batch: BATCH
+            }
+        );
         let usual = Shares::of(150.0, 41, 2);
-        assert_eq!(usual, Shares { flights: 1, piece: PIECE, batch: 2 * BATCH });
-        assert_eq!(Shares::of(10_000.0, 41, 8), Shares { flights: 8, piece: PIECE, batch: 8 * BATCH });
+        assert_eq!(
+            usual,
+            Shares {
+                flights: 1,
+                piece: PIECE,
+                batch: 2 * BATCH
+            }
+        );
+        assert_eq!(
+            Shares::of(10_000.0, 41, 8),
+            Shares {
+                flights: 8,
+                piece: PIECE,
+                batch: 8 * BATCH
+            }
+        );
     }
 }

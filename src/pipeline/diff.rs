@@ -23,24 +23,40 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     let nights = Nights::look(&config.reports);
     let unknown = |what: String| Error::store(&config.reports, &what);
     let named = |name: &str| -> Result<Night> {
-        let night = nights.night(name).or_else(|| nights.night(&format!("{name:0>4}")));
+        let night = nights
+            .night(name)
+            .or_else(|| nights.night(&format!("{name:0>4}")));
         let night = night.filter(Night::is_complete);
         night.ok_or_else(|| {
-            unknown(format!("there is no complete night `{name}` here; there are {}", nights.names().join(", ")))
+            unknown(format!(
+                "there is no complete night `{name}` here; there are {}",
+                nights.names().join(", ")
+            ))
         })
     };
     let night = match to {
         Some(name) => named(name)?,
-        None => nights
-            .complete()
-            .ok_or_else(|| unknown("no night has been published here yet; `harvest run` publishes one".to_owned()))?,
+        None => nights.complete().ok_or_else(|| {
+            unknown("no night has been published here yet; `harvest run` publishes one".to_owned())
+        })?,
     };
     let before = match since.or(night.since.as_deref()) {
         Some(name) => named(name)?,
-        None => return Ok(Diff { night: night.name, changes: Changes::default() }),
+        None => {
+            return Ok(Diff {
+                night: night.name,
+                changes: Changes::default(),
+            });
+        }
     };
-    let (a, b) = (Published::read(&nights, &before)?, Published::read(&nights, &night)?);
-    Ok(Diff { changes: overnight::between(&before.name, &a.tables(), &b.tables()), night: night.name })
+    let (a, b) = (
+        Published::read(&nights, &before)?,
+        Published::read(&nights, &night)?,
+    );
+    Ok(Diff {
+        changes: overnight::between(&before.name, &a.tables(), &b.tables()),
+        night: night.name,
+    })
 }
 
 /// Whether the changes of a night have been told already; from now on they have.

@@ -27,7 +27,12 @@ pub struct Exported {
 ///
 /// # Errors
 /// What stops a run.
-pub fn export(config: &Config, folder: &Path, wait: Duration, progress: &dyn Progress) -> Result<Exported> {
+pub fn export(
+    config: &Config,
+    folder: &Path,
+    wait: Duration,
+    progress: &dyn Progress,
+) -> Result<Exported> {
     let (run, files) = super::begin(config, wait, progress)?;
     let campaign = run.results(&files, Stage::Compare)?;
     let estimates = comparison::converged(config, &campaign);
@@ -42,24 +47,45 @@ pub fn export(config: &Config, folder: &Path, wait: Duration, progress: &dyn Pro
         groups: &config.trend,
         settings: &config.export,
     };
-    write(&contents, &campaign, folder, &run.shelf_in(folder, Stage::Compare))
+    write(
+        &contents,
+        &campaign,
+        folder,
+        &run.shelf_in(folder, Stage::Compare),
+    )
 }
 
-fn write(contents: &Contents, campaign: &Campaign, folder: &Path, shelf: &Shelf) -> Result<Exported> {
+fn write(
+    contents: &Contents,
+    campaign: &Campaign,
+    folder: &Path,
+    shelf: &Shelf,
+) -> Result<Exported> {
     let tables = export::tables(contents);
     let rows = export::rows(&tables);
-    let third = contents.tunnel.settings().third.as_ref().map(|third| third.name.as_str());
+    let third = contents
+        .tunnel
+        .settings()
+        .third
+        .as_ref()
+        .map(|third| third.name.as_str());
     table::publish_export(shelf, &rows, third)?;
-    let (dml, section) = (folder.join("flight_updated.dml"), folder.join("flight_updated_jsbsim.xml"));
+    let (dml, section) = (
+        folder.join("flight_updated.dml"),
+        folder.join("flight_updated_jsbsim.xml"),
+    );
     atomic::place(&dml, daveml::document(contents, &tables).as_bytes())?;
     atomic::place(&section, jsbsim::section(contents, &tables).as_bytes())?;
-    let tables_of_rows = ["flight_updated.csv", "flight_updated.parquet"].map(|name| folder.join(name));
+    let tables_of_rows =
+        ["flight_updated.csv", "flight_updated.parquet"].map(|name| folder.join(name));
     let names = contents.buildup.derivatives.iter().map(|d| d.name.clone());
     Ok(Exported {
         files: tables_of_rows.into_iter().chain([dml, section]).collect(),
         flight: rows.iter().filter(|r| r.is_flight == 1).count(),
         values: rows.len(),
-        missing: names.filter(|name| !tables.iter().any(|t| t.derivative == *name)).collect(),
+        missing: names
+            .filter(|name| !tables.iter().any(|t| t.derivative == *name))
+            .collect(),
         problems: campaign.problems.clone(),
     })
 }

@@ -39,26 +39,55 @@ pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Litter> {
         );
         return Err(Error::store(&config.store, &what));
     }
-    let open = |reports: &PathBuf| if remove { Nights::open(reports, wait) } else { Ok(Nights::look(reports)) };
-    let opened: Vec<(&PathBuf, Nights)> = served.iter().map(|r| Ok((r, open(r)?))).collect::<Result<_>>()?;
+    let open = |reports: &PathBuf| {
+        if remove {
+            Nights::open(reports, wait)
+        } else {
+            Ok(Nights::look(reports))
+        }
+    };
+    let opened: Vec<(&PathBuf, Nights)> = served
+        .iter()
+        .map(|r| Ok((r, open(r)?)))
+        .collect::<Result<_>>()?;
     let mut litter = Litter::default();
     let mut needed: BTreeMap<String, u64> = BTreeMap::new();
     for (reports, nights) in &opened {
-        let superfluous = if own.as_ref() == Some(*reports) { nights.superfluous(keep) } else { Vec::new() };
-        for name in nights.names().iter().filter(|name| !superfluous.contains(name)) {
+        let superfluous = if own.as_ref() == Some(*reports) {
+            nights.superfluous(keep)
+        } else {
+            Vec::new()
+        };
+        for name in nights
+            .names()
+            .iter()
+            .filter(|name| !superfluous.contains(name))
+        {
             needed.extend(manifest(nights, name)?.artefacts);
         }
         litter.nights.extend(superfluous);
     }
     let artefacts = store.artefacts();
-    litter.kept = artefacts.keys().filter(|name| needed.contains_key(*name)).count();
-    litter.artefacts = artefacts.into_iter().filter(|(name, _)| !needed.contains_key(name)).collect();
+    litter.kept = artefacts
+        .keys()
+        .filter(|name| needed.contains_key(*name))
+        .count();
+    litter.artefacts = artefacts
+        .into_iter()
+        .filter(|(name, _)| !needed.contains_key(name))
+        .collect();
     if remove {
         // Nights first: one without its artefacts would be made of nothing.
-        for (_, nights) in opened.iter().filter(|(reports, _)| own.as_ref() == Some(*reports)) {
+        for (_, nights) in opened
+            .iter()
+            .filter(|(reports, _)| own.as_ref() == Some(*reports))
+        {
             nights.prune(keep)?;
         }
-        litter.artefacts.keys().try_for_each(|name| store.remove(name))?;
+        litter
+            .artefacts
+            .keys()
+            .try_for_each(|name| store.remove(name))?;
     }
     Ok(litter)
 }

@@ -8,8 +8,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{
-    COMPARE_VERSION, ESTIMATE_VERSION, INGEST_VERSION, JOINT_VERSION, PREDICT_VERSION, Progress, Run, SEGMENT_VERSION,
-    Shares, TREND_VERSION, comparison, problem,
+    COMPARE_VERSION, ESTIMATE_VERSION, INGEST_VERSION, JOINT_VERSION, PREDICT_VERSION, Progress,
+    Run, SEGMENT_VERSION, Shares, TREND_VERSION, comparison, problem,
 };
 use crate::compare::against::Earlier;
 use crate::config::Config;
@@ -43,7 +43,13 @@ impl Inputs {
         progress.end();
         let mut inputs = Inputs::default();
         let contents = contents.into_iter().zip(files).map(|(digests, flight)| {
-            inputs.sources.extend(flight.files.iter().zip(digests.iter().flatten()).map(|(f, d)| source_file(f, d)));
+            inputs.sources.extend(
+                flight
+                    .files
+                    .iter()
+                    .zip(digests.iter().flatten())
+                    .map(|(f, d)| source_file(f, d)),
+            );
             digests.map(|digests| Fingerprint::of("flight", 1).with(&digests).finish())
         });
         let contents: Vec<std::result::Result<String, String>> = contents.collect();
@@ -51,7 +57,9 @@ impl Inputs {
         for (flight, content) in files.iter().zip(contents) {
             let id = flight.flight_id.as_str();
             let content = content.and_then(|content| match first.get(&content) {
-                Some(other) => Err(format!("the same bytes as flight `{other}`, and counted once: remove one of them")),
+                Some(other) => Err(format!(
+                    "the same bytes as flight `{other}`, and counted once: remove one of them"
+                )),
                 None => Ok(content),
             });
             let content = content.and_then(|content| inputs.among_rivals(flight, content, known));
@@ -71,7 +79,11 @@ impl Inputs {
         content: String,
         known: &Contents,
     ) -> std::result::Result<String, String> {
-        let own: Vec<Digest> = flight.files.iter().filter_map(|file| known.of(file).ok()).collect();
+        let own: Vec<Digest> = flight
+            .files
+            .iter()
+            .filter_map(|file| known.of(file).ok())
+            .collect();
         for rival in &flight.rivals {
             if !known.of(rival).is_ok_and(|content| own.contains(&content)) {
                 return Err(format!(
@@ -80,8 +92,16 @@ impl Inputs {
                     rival.display()
                 ));
             }
-            let reason = format!("a copy of a file of flight `{}`, left out", flight.flight_id);
-            self.problems.push(problem("ingest", &flight.flight_id, &rival.display().to_string(), &reason));
+            let reason = format!(
+                "a copy of a file of flight `{}`, left out",
+                flight.flight_id
+            );
+            self.problems.push(problem(
+                "ingest",
+                &flight.flight_id,
+                &rival.display().to_string(),
+                &reason,
+            ));
         }
         Ok(content)
     }
@@ -101,22 +121,34 @@ impl Inputs {
 
 /// The file of a flight that a problem names: the first, of several the folder.
 pub(super) fn place(flight: &FlightFiles) -> String {
-    flight.files.first().map_or_else(String::new, |file| file.display().to_string())
+    flight
+        .files
+        .first()
+        .map_or_else(String::new, |file| file.display().to_string())
 }
 
 /// What a flight's files hold, in their order.
 fn content(flight: &FlightFiles, known: &Contents) -> std::result::Result<Vec<Digest>, String> {
     // Reasons name no folder: they are among what tells nights apart.
-    let of_file = |file: &PathBuf| known.of(file).map_err(|why| format!("the file {} {why}", name(file)));
+    let of_file = |file: &PathBuf| {
+        known
+            .of(file)
+            .map_err(|why| format!("the file {} {why}", name(file)))
+    };
     flight.files.iter().map(of_file).collect()
 }
 
 fn name(file: &Path) -> String {
-    file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+    file.file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 fn source_file(file: &Path, digest: &Digest) -> SourceFile {
-    SourceFile { name: name(file), bytes: digest.bytes, blake3: digest.blake3.clone() }
+    SourceFile {
+        name: name(file),
+        bytes: digest.bytes,
+        blake3: digest.blake3.clone(),
+    }
 }
 
 impl<'a> Run<'a> {
@@ -140,12 +172,31 @@ impl<'a> Run<'a> {
     ) -> Result<Run<'a>> {
         let earlier = comparison::earlier(config)?;
         let mut inputs = Inputs::gather(files, &contents, progress);
-        let tunnel = contents.of(&config.wind_tunnel).map_err(|why| Error::config(&config.wind_tunnel, None, why))?;
-        inputs.sources.push(source_file(&config.wind_tunnel, &tunnel));
+        let tunnel = contents
+            .of(&config.wind_tunnel)
+            .map_err(|why| Error::config(&config.wind_tunnel, None, why))?;
+        inputs
+            .sources
+            .push(source_file(&config.wind_tunnel, &tunnel));
         let lineage = lineage(config, &inputs, &earlier);
-        let shares = Shares::of(config.ingest.memory_mb, config.channels.len(), rayon::current_num_threads());
+        let shares = Shares::of(
+            config.ingest.memory_mb,
+            config.channels.len(),
+            rayon::current_num_threads(),
+        );
         let (shelves, tonight) = (BTreeMap::new(), None);
-        Ok(Run { config, store, progress, shares, contents, inputs, earlier, lineage, shelves, tonight })
+        Ok(Run {
+            config,
+            store,
+            progress,
+            shares,
+            contents,
+            inputs,
+            earlier,
+            lineage,
+            shelves,
+            tonight,
+        })
     }
 }
 
@@ -155,7 +206,10 @@ fn value(part: &impl Serialize) -> Value {
 }
 
 fn parts<const N: usize>(parts: [(&str, Value); N]) -> BTreeMap<String, Value> {
-    parts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    parts
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), value))
+        .collect()
 }
 
 fn fingerprint(table: &impl Serialize) -> String {
@@ -178,22 +232,40 @@ fn lineage(config: &Config, inputs: &Inputs, earlier: &[Earlier]) -> Lineage {
         (id.clone(), content)
     });
     // Copies that were left out are in no table but `problems`, which a night must not pass over either.
-    let copies = inputs.problems.iter().map(|p| (p.place.clone(), refused(&p.reason)));
+    let copies = inputs
+        .problems
+        .iter()
+        .map(|p| (p.place.clone(), refused(&p.reason)));
     Lineage {
         code: Code {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             source: env!("HARVEST_SOURCE").to_owned(),
-            methods: methods.map(|(name, version)| (name.to_owned(), version)).into(),
+            methods: methods
+                .map(|(name, version)| (name.to_owned(), version))
+                .into(),
         },
         configuration: configuration(config),
         flights: flights.chain(copies).collect(),
         tables: [
             (
                 Stage::Compare,
-                earlier.iter().map(|e| (format!("trends in {}", e.name), fingerprint(&e.trends))).collect(),
+                earlier
+                    .iter()
+                    .map(|e| (format!("trends in {}", e.name), fingerprint(&e.trends)))
+                    .collect(),
             ),
-            (Stage::Segment, [("analyst's list of events".to_owned(), fingerprint(&config.events))].into()),
-            (Stage::Estimate, [("wind-tunnel table".to_owned(), fingerprint(&config.tunnel))].into()),
+            (
+                Stage::Segment,
+                [(
+                    "analyst's list of events".to_owned(),
+                    fingerprint(&config.events),
+                )]
+                .into(),
+            ),
+            (
+                Stage::Estimate,
+                [("wind-tunnel table".to_owned(), fingerprint(&config.tunnel))].into(),
+            ),
         ]
         .into(),
     }
@@ -205,17 +277,22 @@ pub(super) fn refused(reason: &str) -> String {
 }
 
 fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
-    let recognition: Value =
-        config.classes.iter().map(|c| (c.name.clone(), json!({"axis": c.axis, "by": c.recognition}))).collect();
+    let recognition: Value = config
+        .classes
+        .iter()
+        .map(|c| (c.name.clone(), json!({"axis": c.axis, "by": c.recognition})))
+        .collect();
     let class = |c: &crate::maneuver::Class| {
-        let settings =
-            json!({"title": c.title, "statuses": c.statuses, "weights": c.weights, "overrides": c.overrides});
+        let settings = json!({"title": c.title, "statuses": c.statuses, "weights": c.weights, "overrides": c.overrides});
         (c.name.clone(), settings)
     };
     let classes: Value = config.classes.iter().map(class).collect();
     let estimate = &config.estimate;
     let template = config.template.as_ref().map(fingerprint);
-    let (at, pages) = (config.report.histories_at_alpha_deg, config.report.maneuver_pages);
+    let (at, pages) = (
+        config.report.histories_at_alpha_deg,
+        config.report.maneuver_pages,
+    );
     [
         (
             Stage::Ingest,
@@ -226,7 +303,13 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
                 ("ingest", value(&config.ingest)),
             ]),
         ),
-        (Stage::Segment, parts([("recognition", recognition), ("segment", value(&config.segment))])),
+        (
+            Stage::Segment,
+            parts([
+                ("recognition", recognition),
+                ("segment", value(&config.segment)),
+            ]),
+        ),
         (
             Stage::Estimate,
             parts([

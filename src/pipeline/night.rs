@@ -117,14 +117,22 @@ fn provenance(lineage: &Lineage, stage: Stage) -> Vec<(String, String)> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file, and what is not there.
 pub fn stated(path: &Path) -> Result<(Stage, Lineage)> {
-    fn part<T: serde::de::DeserializeOwned>(path: &Path, pairs: &BTreeMap<String, String>, key: &str) -> Result<T> {
-        let text = pairs.get(key).ok_or_else(|| Error::store(path, &format!("its metadata has no `{key}`")))?;
-        serde_json::from_str(text).map_err(|e| Error::store(path, &format!("its metadata `{key}`: {e}")))
+    fn part<T: serde::de::DeserializeOwned>(
+        path: &Path,
+        pairs: &BTreeMap<String, String>,
+        key: &str,
+    ) -> Result<T> {
+        let text = pairs
+            .get(key)
+            .ok_or_else(|| Error::store(path, &format!("its metadata has no `{key}`")))?;
+        serde_json::from_str(text)
+            .map_err(|e| Error::store(path, &format!("its metadata `{key}`: {e}")))
     }
     let pairs = table::provenance(path)?;
     let stage = pairs.get(STAGE).map(String::as_str).unwrap_or_default();
     let stage = Stage::ALL.into_iter().find(|s| s.name() == stage);
-    let stage = stage.ok_or_else(|| Error::store(path, &format!("its metadata has no `{STAGE}`")))?;
+    let stage =
+        stage.ok_or_else(|| Error::store(path, &format!("its metadata has no `{STAGE}`")))?;
     let lineage = Lineage {
         code: part(path, &pairs, CODE)?,
         configuration: part(path, &pairs, CONFIGURATION)?,
@@ -136,9 +144,14 @@ pub fn stated(path: &Path) -> Result<(Stage, Lineage)> {
 
 /// What the report prints beside numbers.
 fn shown(config: &Config) -> BTreeMap<String, String> {
-    let named = [("archive", config.archive.clone()), ("wind tunnel", config.wind_tunnel.display().to_string())];
+    let named = [
+        ("archive", config.archive.clone()),
+        ("wind tunnel", config.wind_tunnel.display().to_string()),
+    ];
     let named = named.map(|(what, name)| (what.to_owned(), name));
-    let text = |(name, text): &(String, String)| (name.clone(), Fingerprint::of("text", 1).with(text).finish());
+    let text = |(name, text): &(String, String)| {
+        (name.clone(), Fingerprint::of("text", 1).with(text).finish())
+    };
     config.files.iter().map(text).chain(named).collect()
 }
 
@@ -171,16 +184,21 @@ impl Run<'_> {
     }
 
     pub(super) fn place_tonight(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        self.tonight.as_ref().map_or(Ok(()), |folder| atomic::place(&folder.join(name), bytes))
+        self.tonight
+            .as_ref()
+            .map_or(Ok(()), |folder| atomic::place(&folder.join(name), bytes))
     }
 
     /// The night that holds, if it was made of what this run would be made of, reaches as far, and is whole with all its
     /// artefacts: then there is nothing to do.
     pub(super) fn is_published(&self, nights: &Nights, until: Stage) -> Option<Done> {
-        let night = nights.current().filter(|night| self.is_of_the_same(night) && night.until >= until)?;
+        let night = nights
+            .current()
+            .filter(|night| self.is_of_the_same(night) && night.until >= until)?;
         let there = self.store.artefacts();
         let is_there = |(name, size): (&String, &u64)| there.get(name) == Some(size);
-        (night.artefacts.iter().all(is_there) && nights.is_whole(&night)).then(|| self.done(night, false))
+        (night.artefacts.iter().all(is_there) && nights.is_whole(&night))
+            .then(|| self.done(night, false))
     }
 
     /// Whether a night was made of what this run is made of.
@@ -189,28 +207,47 @@ impl Run<'_> {
     }
 
     fn done(&self, night: Night, is_new: bool) -> Done {
-        let report = night.is_complete().then(|| self.config.reports.join(REPORT));
-        Done { night: night.name, is_new, summary: night.summary, made: self.store.made(), report }
+        let report = night
+            .is_complete()
+            .then(|| self.config.reports.join(REPORT));
+        Done {
+            night: night.name,
+            is_new,
+            summary: night.summary,
+            made: self.store.made(),
+            report,
+        }
     }
 
     /// The complete night that tonight's is held against.
     fn before(&self, nights: &Nights) -> Option<Night> {
         let last = nights.complete()?;
         // A night that is repaired keeps the one before it.
-        let before = if self.is_of_the_same(&last) { nights.night(last.since.as_ref()?)? } else { last };
+        let before = if self.is_of_the_same(&last) {
+            nights.night(last.since.as_ref()?)?
+        } else {
+            last
+        };
         nights.is_whole(&before).then_some(before)
     }
 
     /// What changed since the last complete night; also placed for machines to read.
     pub(super) fn changes(&self, nights: &Nights, campaign: &Campaign) -> Result<Changes> {
         // Tables that an older program wrote may lack what this one reads: then there is nothing to compare with.
-        let before = self.before(nights).and_then(|night| Some((Published::read(nights, &night).ok()?, night)));
+        let before = self
+            .before(nights)
+            .and_then(|night| Some((Published::read(nights, &night).ok()?, night)));
         let changes = match before {
             None => Changes::default(),
             Some((before, night)) => {
                 let windows: Vec<Window> = campaign.maneuvers.iter().map(window).collect();
-                let trends: Vec<PublishedTrend> = campaign.trends.iter().map(PublishedTrend::from).collect();
-                let verdicts: Vec<PublishedVerdict> = campaign.comparison.iter().map(PublishedVerdict::from).collect();
+                let trends: Vec<PublishedTrend> =
+                    campaign.trends.iter().map(PublishedTrend::from).collect();
+                let verdicts: Vec<PublishedVerdict> = campaign
+                    .comparison
+                    .iter()
+                    .map(PublishedVerdict::from)
+                    .collect();
                 let now = overnight::Tables {
                     lineage: &self.lineage,
                     maneuvers: &windows,
@@ -222,14 +259,25 @@ impl Run<'_> {
                 overnight::between(&night.name, &before.tables(), &now)
             }
         };
-        self.place_tonight(ALERT, &serde_json::to_vec_pretty(&changes).unwrap_or_default())?;
+        self.place_tonight(
+            ALERT,
+            &serde_json::to_vec_pretty(&changes).unwrap_or_default(),
+        )?;
         Ok(changes)
     }
 
     /// Publishes what lies in tonight's folder.
-    pub(super) fn publish(&self, nights: &Nights, campaign: &Campaign, until: Stage) -> Result<Done> {
+    pub(super) fn publish(
+        &self,
+        nights: &Nights,
+        campaign: &Campaign,
+        until: Stage,
+    ) -> Result<Done> {
         let mut lineage = self.lineage.clone();
-        let unread = campaign.unread.iter().map(|(flight, why)| (flight.clone(), inputs::refused(why)));
+        let unread = campaign
+            .unread
+            .iter()
+            .map(|(flight, why)| (flight.clone(), inputs::refused(why)));
         lineage.flights.extend(unread);
         let summary = Summary {
             flights: campaign.flights.len(),
@@ -255,8 +303,13 @@ impl Run<'_> {
                 nights.forget_tonight();
                 self.done(night, false)
             }
-            Some(night) if night.until == until => self.done(nights.repair(&night, tonight)?, false),
-            _ => self.done(nights.publish(tonight, self.config.report.keep_nights)?, true),
+            Some(night) if night.until == until => {
+                self.done(nights.repair(&night, tonight)?, false)
+            }
+            _ => self.done(
+                nights.publish(tonight, self.config.report.keep_nights)?,
+                true,
+            ),
         };
         Ok(done)
     }

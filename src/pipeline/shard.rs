@@ -31,7 +31,13 @@ pub fn read(file: &Path) -> Result<Plan> {
 ///
 /// # Errors
 /// No archive, a store in use; for maneuvers, flights that are not yet ingested and segmented.
-pub fn plan(config: &Config, of: Of, shards: usize, file: &Path, progress: &dyn Progress) -> Result<Plan> {
+pub fn plan(
+    config: &Config,
+    of: Of,
+    shards: usize,
+    file: &Path,
+    progress: &dyn Progress,
+) -> Result<Plan> {
     let files = archive::find(&config.archive)?;
     let run = join(config, &files, Duration::ZERO, progress)?;
     run.store.remember(&run.contents)?;
@@ -61,7 +67,10 @@ pub fn work(
         return Err(Error::config(
             &config.store,
             None,
-            format!("the plan deals to {} shards, not {}: give --shard i/{0}", plan.shards, shard.of),
+            format!(
+                "the plan deals to {} shards, not {}: give --shard i/{0}",
+                plan.shards, shard.of
+            ),
         ));
     }
     let items: Vec<&Item> = plan.share(shard.number).collect();
@@ -73,7 +82,10 @@ pub fn work(
     let mut campaign = Campaign::default();
     run.ingest(&files, &mut campaign)?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {
-        return Err(Error::store(Path::new(flight), &format!("the flight could not be read: {why}")));
+        return Err(Error::store(
+            Path::new(flight),
+            &format!("the flight could not be read: {why}"),
+        ));
     }
     if until >= Stage::Segment {
         run.segment(&mut campaign)?;
@@ -103,7 +115,12 @@ pub fn missing(config: &Config, plan: &Plan, progress: &dyn Progress) -> Result<
 ///
 /// # Errors
 /// Something is missing, named by shard; or as [`super::run`].
-pub fn merge(config: &Config, plan: &Plan, wait: Duration, progress: &dyn Progress) -> Result<night::Done> {
+pub fn merge(
+    config: &Config,
+    plan: &Plan,
+    wait: Duration,
+    progress: &dyn Progress,
+) -> Result<night::Done> {
     if plan.of != Of::Maneuvers {
         return Err(Error::config(
             &config.store,
@@ -115,15 +132,22 @@ pub fn merge(config: &Config, plan: &Plan, wait: Duration, progress: &dyn Progre
     if !missing.is_empty() {
         let shards = plan::array(&plan.shards_of(&missing));
         let count = missing.len();
-        let what =
-            format!("{count} of {} maneuvers are missing, of shards {shards}: run these shards", plan.items.len());
+        let what = format!(
+            "{count} of {} maneuvers are missing, of shards {shards}: run these shards",
+            plan.items.len()
+        );
         return Err(Error::config(&config.store, None, what));
     }
     super::run(config, Stage::Report, wait, progress)
 }
 
 /// A run that adds to the store beside others and publishes nothing.
-fn join<'a>(config: &'a Config, files: &[FlightFiles], wait: Duration, progress: &'a dyn Progress) -> Result<Run<'a>> {
+fn join<'a>(
+    config: &'a Config,
+    files: &[FlightFiles],
+    wait: Duration,
+    progress: &'a dyn Progress,
+) -> Result<Run<'a>> {
     let store = Store::join(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
     Run::of_store(config, store, files, progress)
 }
@@ -133,48 +157,77 @@ impl Run<'_> {
     fn is_of(&self, plan: &Plan, flights: Option<&BTreeSet<&str>>) -> Result<()> {
         let mut planned = plan.lineage.clone();
         if let Some(flights) = flights {
-            planned.flights.retain(|id, _| flights.contains(id.as_str()));
+            planned
+                .flights
+                .retain(|id, _| flights.contains(id.as_str()));
         }
         let mut now = self.lineage.until(plan.of.stage());
         if flights.is_some() {
             // Copies that were left out are the whole archive's affair.
             now.flights.retain(|id, _| planned.flights.contains_key(id));
         }
-        let differences: Vec<String> = now.differences(&planned).into_iter().map(|cause| cause.words).collect();
+        let differences: Vec<String> = now
+            .differences(&planned)
+            .into_iter()
+            .map(|cause| cause.words)
+            .collect();
         if differences.is_empty() {
             return Ok(());
         }
-        let what = format!("the plan is of something else: since then {}; plan again", differences.join("; "));
+        let what = format!(
+            "the plan is of something else: since then {}; plan again",
+            differences.join("; ")
+        );
         Err(Error::config(&self.config.store, None, what))
     }
 
     /// Every flight whose files can be read, at the cost of its bytes.
     fn flights(&self, files: &[FlightFiles]) -> Vec<(String, String, f64)> {
         let bytes = |file: &FlightFiles| -> f64 {
-            file.files.iter().map(|path| self.contents.of(path).map_or(0.0, |content| content.bytes as f64)).sum()
+            file.files
+                .iter()
+                .map(|path| {
+                    self.contents
+                        .of(path)
+                        .map_or(0.0, |content| content.bytes as f64)
+                })
+                .sum()
         };
-        let readable = files.iter().filter(|file| self.inputs.content(&file.flight_id).is_ok());
-        readable.map(|file| (file.flight_id.clone(), file.flight_id.clone(), bytes(file))).collect()
+        let readable = files
+            .iter()
+            .filter(|file| self.inputs.content(&file.flight_id).is_ok());
+        readable
+            .map(|file| (file.flight_id.clone(), file.flight_id.clone(), bytes(file)))
+            .collect()
     }
 
     /// Every maneuver of the campaign: a pass costs samples times the square of the parameters.
     fn maneuvers(&self, files: &[FlightFiles]) -> Result<Vec<(String, String, f64)>> {
         let (campaign, [ingest, segment]) = self.looked(files);
-        let stale: BTreeSet<&String> = [&ingest, &segment].iter().flat_map(|s| s.stale.values().flatten()).collect();
+        let stale: BTreeSet<&String> = [&ingest, &segment]
+            .iter()
+            .flat_map(|s| s.stale.values().flatten())
+            .collect();
         if let Some(first) = stale.first() {
-            let what =
-                format!("{} flights are not ingested and segmented, {first} first: run their shards", stale.len());
+            let what = format!(
+                "{} flights are not ingested and segmented, {first} first: run their shards",
+                stale.len()
+            );
             return Err(Error::config(&self.config.store, None, what));
         }
         let cost = |m: &Maneuver| {
-            let free = self
-                .config
-                .class(&m.class)
-                .map_or(0, |c| c.statuses.values().filter(|s| **s == Status::Estimated).count());
+            let free = self.config.class(&m.class).map_or(0, |c| {
+                c.statuses
+                    .values()
+                    .filter(|s| **s == Status::Estimated)
+                    .count()
+            });
             m.samples as f64 * (1.0 + free as f64).powi(2)
         };
         let item = |m: &Maneuver| {
-            let file = files.iter().find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
+            let file = files
+                .iter()
+                .find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
             Some((m.maneuver_id.clone(), file.flight_id.clone(), cost(m)))
         };
         Ok(campaign.maneuvers.iter().filter_map(item).collect())
@@ -190,32 +243,65 @@ impl Run<'_> {
 
     fn missing(&self, plan: &Plan, files: &[FlightFiles]) -> BTreeSet<String> {
         let (campaign, looked) = self.looked(files);
-        let stale = |status: &status::StageStatus| status.stale.values().flatten().cloned().collect::<Vec<String>>();
+        let stale = |status: &status::StageStatus| {
+            status
+                .stale
+                .values()
+                .flatten()
+                .cloned()
+                .collect::<Vec<String>>()
+        };
         let unfinished: Vec<String> = looked.iter().flat_map(stale).collect();
         let unestimated: BTreeSet<String> = match plan.of {
             Of::Flights => BTreeSet::new(),
-            Of::Maneuvers => stale(&self.estimate_status(&campaign, None)).into_iter().collect(),
+            Of::Maneuvers => stale(&self.estimate_status(&campaign, None))
+                .into_iter()
+                .collect(),
         };
         let is_missing = |item: &&Item| {
-            unestimated.contains(&item.id) || unfinished.iter().any(|stretch| is_stretch(stretch, &item.flight_id))
+            unestimated.contains(&item.id)
+                || unfinished
+                    .iter()
+                    .any(|stretch| is_stretch(stretch, &item.flight_id))
         };
-        plan.items.iter().filter(is_missing).map(|item| item.id.clone()).collect()
+        plan.items
+            .iter()
+            .filter(is_missing)
+            .map(|item| item.id.clone())
+            .collect()
     }
 
     /// Estimates the maneuvers of a shard.
     fn share(&self, campaign: &Campaign, items: &[&Item]) -> Result<()> {
-        let found: BTreeMap<&str, &Maneuver> = campaign.maneuvers.iter().map(|m| (m.maneuver_id.as_str(), m)).collect();
-        if let Some(lost) = items.iter().find(|item| !found.contains_key(item.id.as_str())) {
-            let what = format!("the plan's maneuver `{}` is not found in its flight: plan again", lost.id);
+        let found: BTreeMap<&str, &Maneuver> = campaign
+            .maneuvers
+            .iter()
+            .map(|m| (m.maneuver_id.as_str(), m))
+            .collect();
+        if let Some(lost) = items
+            .iter()
+            .find(|item| !found.contains_key(item.id.as_str()))
+        {
+            let what = format!(
+                "the plan's maneuver `{}` is not found in its flight: plan again",
+                lost.id
+            );
             return Err(Error::config(&self.config.store, None, what));
         }
         let mine: BTreeSet<&str> = items.iter().map(|item| item.id.as_str()).collect();
         let of_flight = |flight: &Flight| -> Vec<&Maneuver> {
-            let own = campaign.maneuvers.iter().filter(|m| m.flight_id == flight.flight_id);
-            own.filter(|m| mine.contains(m.maneuver_id.as_str())).collect()
+            let own = campaign
+                .maneuvers
+                .iter()
+                .filter(|m| m.flight_id == flight.flight_id);
+            own.filter(|m| mine.contains(m.maneuver_id.as_str()))
+                .collect()
         };
         self.progress.begin("estimate", items.len());
-        let done = campaign.flights.par_iter().try_for_each(|f| self.estimate_flight(f, &of_flight(f)).map(|_| ()));
+        let done = campaign
+            .flights
+            .par_iter()
+            .try_for_each(|f| self.estimate_flight(f, &of_flight(f)).map(|_| ()));
         self.progress.end();
         done
     }

@@ -43,7 +43,12 @@ pub struct Picture {
 ///
 /// # Errors
 /// What stops a run, and a flight or maneuver that does not exist or was refused, with what was probably meant.
-pub fn show(config: &Config, subject: &Subject, out: Option<&Path>, progress: &dyn Progress) -> Result<Picture> {
+pub fn show(
+    config: &Config,
+    subject: &Subject,
+    out: Option<&Path>,
+    progress: &dyn Progress,
+) -> Result<Picture> {
     let (run, files) = begin(config, Duration::ZERO, progress)?;
     let mut campaign = Campaign::default();
     if let Subject::Flight(id) = subject {
@@ -52,30 +57,55 @@ pub fn show(config: &Config, subject: &Subject, out: Option<&Path>, progress: &d
     run.ingest(&files, &mut campaign)?;
     run.segment(&mut campaign)?;
     let (id, svg, problems) = match subject {
-        Subject::Flight(id) => (id, run.draw_flight(&campaign, id)?, about(&campaign, |p| p.flight_id == *id)),
+        Subject::Flight(id) => (
+            id,
+            run.draw_flight(&campaign, id)?,
+            about(&campaign, |p| p.flight_id == *id),
+        ),
         Subject::Maneuver(id) => {
             known_maneuver(config, id, &campaign)?;
             run.estimate(&mut campaign)?;
             let of_it = |p: &Problem| p.place == *id;
-            (id, run.draw_maneuver(&campaign, id)?, about(&campaign, of_it))
+            (
+                id,
+                run.draw_maneuver(&campaign, id)?,
+                about(&campaign, of_it),
+            )
         }
     };
-    let path = out.map_or_else(|| config.reports.join("show").join(file_name(id)), Path::to_path_buf);
+    let path = out.map_or_else(
+        || config.reports.join("show").join(file_name(id)),
+        Path::to_path_buf,
+    );
     atomic::place(&path, svg.as_bytes())?;
     Ok(Picture { path, problems })
 }
 
 fn about(campaign: &Campaign, is_it: impl Fn(&Problem) -> bool) -> Vec<Problem> {
-    campaign.problems.iter().filter(|p| is_it(p)).cloned().collect()
+    campaign
+        .problems
+        .iter()
+        .filter(|p| is_it(p))
+        .cloned()
+        .collect()
 }
 
 fn file_name(id: &str) -> String {
-    let safe = |c: char| if c.is_alphanumeric() || "-_=.".contains(c) { c } else { '_' };
+    let safe = |c: char| {
+        if c.is_alphanumeric() || "-_=.".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
     format!("{}.svg", id.chars().map(safe).collect::<String>())
 }
 
 fn unknown(config: &Config, what: String) -> Error {
-    Error::Archive { place: PathBuf::from(&config.archive), what }
+    Error::Archive {
+        place: PathBuf::from(&config.archive),
+        what,
+    }
 }
 
 fn known_flight(config: &Config, id: &str, files: &[FlightFiles]) -> Result<()> {
@@ -91,34 +121,66 @@ fn known_maneuver(config: &Config, id: &str, campaign: &Campaign) -> Result<()> 
         return Ok(());
     }
     if campaign.flights.iter().any(|f| f.flight_id == id) {
-        return Err(unknown(config, format!("`{id}` is a flight; `harvest show flight {id}` shows it")));
+        return Err(unknown(
+            config,
+            format!("`{id}` is a flight; `harvest show flight {id}` shows it"),
+        ));
     }
-    let near = did_you_mean(id, campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str()));
+    let near = did_you_mean(
+        id,
+        campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str()),
+    );
     let list = config.reports.join("maneuvers.csv");
-    Err(unknown(config, format!("there is no maneuver `{id}`{near} (all of them: {})", list.display())))
+    Err(unknown(
+        config,
+        format!(
+            "there is no maneuver `{id}`{near} (all of them: {})",
+            list.display()
+        ),
+    ))
 }
 
 impl Run<'_> {
     fn draw_flight(&self, campaign: &Campaign, id: &str) -> Result<String> {
         let file = self.flight(campaign, id)?.open(&self.store)?;
-        let (record, recorded) = (file.outline(DRAWN)?, (file.about.samples, file.about.step_s));
-        let events: Vec<_> = campaign.events.iter().filter(|e| e.flight_id == id).cloned().collect();
+        let (record, recorded) = (
+            file.outline(DRAWN)?,
+            (file.about.samples, file.about.step_s),
+        );
+        let events: Vec<_> = campaign
+            .events
+            .iter()
+            .filter(|e| e.flight_id == id)
+            .cloned()
+            .collect();
         Ok(chart::flight(&FlightView {
             aircraft: &self.config.aircraft.name,
             record: &record,
             recorded,
             groups: &groups(self.config),
             maneuvers: &of_flight(campaign, id),
-            unknown: &campaign.unknown.iter().filter(|u| u.flight_id == id).cloned().collect::<Vec<_>>(),
+            unknown: &campaign
+                .unknown
+                .iter()
+                .filter(|u| u.flight_id == id)
+                .cloned()
+                .collect::<Vec<_>>(),
             events: &events,
             problems: &about(campaign, |p| p.flight_id == id),
         }))
     }
 
     fn draw_maneuver(&self, campaign: &Campaign, id: &str) -> Result<String> {
-        let of_both = campaign.maneuvers.iter().zip(&campaign.fits).find(|(m, _)| m.maneuver_id == id);
-        let (maneuver, fit) = of_both.ok_or_else(|| unknown(self.config, format!("there is no maneuver `{id}`")))?;
-        let file = self.flight(campaign, &maneuver.flight_id)?.open(&self.store)?;
+        let of_both = campaign
+            .maneuvers
+            .iter()
+            .zip(&campaign.fits)
+            .find(|(m, _)| m.maneuver_id == id);
+        let (maneuver, fit) =
+            of_both.ok_or_else(|| unknown(self.config, format!("there is no maneuver `{id}`")))?;
+        let file = self
+            .flight(campaign, &maneuver.flight_id)?
+            .open(&self.store)?;
         let record = file.part(None, maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S)?;
         // Computed again rather than stored, as for the report.
         let history = if fit.outcome == Outcome::Rejected.name() {
@@ -141,21 +203,34 @@ impl Run<'_> {
     /// A flight that has a record.
     fn flight<'c>(&self, campaign: &'c Campaign, id: &str) -> Result<&'c Flight> {
         let flight = campaign.flights.iter().find(|f| f.flight_id == id);
-        let flight = flight.ok_or_else(|| unknown(self.config, format!("there is no flight `{id}`")))?;
+        let flight =
+            flight.ok_or_else(|| unknown(self.config, format!("there is no flight `{id}`")))?;
         if flight.ingested.accepted {
             return Ok(flight);
         }
-        let reasons: Vec<String> =
-            flight.ingested.problems.iter().map(|p| format!("{}: {}", p.place, p.reason)).collect();
+        let reasons: Vec<String> = flight
+            .ingested
+            .problems
+            .iter()
+            .map(|p| format!("{}: {}", p.place, p.reason))
+            .collect();
         Err(unknown(
             self.config,
-            format!("flight `{id}` was refused, so there is no record to show: {}", reasons.join("; ")),
+            format!(
+                "flight `{id}` was refused, so there is no record to show: {}",
+                reasons.join("; ")
+            ),
         ))
     }
 }
 
 fn of_flight(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
-    campaign.maneuvers.iter().filter(|m| m.flight_id == id).cloned().collect()
+    campaign
+        .maneuvers
+        .iter()
+        .filter(|m| m.flight_id == id)
+        .cloned()
+        .collect()
 }
 
 /// What the configuration says of the signals that it names: surfaces have derivatives, pilot controls have steps that
@@ -166,10 +241,23 @@ fn groups(config: &Config) -> Groups {
         _ => None,
     };
     let surfaces = unique(config.buildup.derivatives.iter().filter_map(surface));
-    let stepping = config.segment.steps.keys().filter(|name| !surfaces.contains(name)).cloned();
-    let in_classes = config.classes.iter().flat_map(|c| c.recognition.flags.keys().cloned());
+    let stepping = config
+        .segment
+        .steps
+        .keys()
+        .filter(|name| !surfaces.contains(name))
+        .cloned();
+    let in_classes = config
+        .classes
+        .iter()
+        .flat_map(|c| c.recognition.flags.keys().cloned());
     let flags = unique(std::iter::once(config.segment.excitation_flag.clone()).chain(in_classes));
-    Groups { controls: stepping.collect(), flags, surfaces, steps: config.segment.steps.clone() }
+    Groups {
+        controls: stepping.collect(),
+        flags,
+        surfaces,
+        steps: config.segment.steps.clone(),
+    }
 }
 
 fn unique(names: impl Iterator<Item = String>) -> Vec<String> {

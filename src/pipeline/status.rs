@@ -25,11 +25,19 @@ pub struct StageStatus {
 
 impl StageStatus {
     fn new(stage: Stage) -> StageStatus {
-        StageStatus { stage, fresh: 0, failed: Vec::new(), stale: BTreeMap::new() }
+        StageStatus {
+            stage,
+            fresh: 0,
+            failed: Vec::new(),
+            stale: BTreeMap::new(),
+        }
     }
 
     fn stale(&mut self, why: &str, item: &str) {
-        self.stale.entry(why.to_owned()).or_default().push(item.to_owned());
+        self.stale
+            .entry(why.to_owned())
+            .or_default()
+            .push(item.to_owned());
     }
 }
 
@@ -78,7 +86,11 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         let mut status = StageStatus::new(stage);
         let upstream = stages.iter().any(|s: &StageStatus| !s.stale.is_empty());
         let held = current.as_ref().filter(|night| night.until >= stage);
-        let changed = held.map(|night| run.lineage.until(stage).differences(&night.lineage.until(stage)));
+        let changed = held.map(|night| {
+            run.lineage
+                .until(stage)
+                .differences(&night.lineage.until(stage))
+        });
         match changed {
             None => status.stale("no night with it has been published", &config.name),
             Some(causes) if !causes.is_empty() => {
@@ -91,13 +103,24 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         }
         stages.push(status);
     }
-    Ok(Status { night: current.map(|night| night.name), stages })
+    Ok(Status {
+        night: current.map(|night| night.name),
+        stages,
+    })
 }
 
 impl Run<'_> {
     /// Why something of a flight is not in the store.
-    fn why(&self, stage: Stage, flight_id: &str, class: Option<&str>, before: Option<&Lineage>) -> String {
-        let Some(before) = before else { return "not made yet".to_owned() };
+    fn why(
+        &self,
+        stage: Stage,
+        flight_id: &str,
+        class: Option<&str>,
+        before: Option<&Lineage>,
+    ) -> String {
+        let Some(before) = before else {
+            return "not made yet".to_owned();
+        };
         let counts = |c: &&crate::lineage::Cause| {
             if c.origin == Origin::Flight {
                 return is_stretch(flight_id, &c.subject);
@@ -107,8 +130,16 @@ impl Run<'_> {
             c.stage <= stage && (!of_class || class.is_none_or(|class| path.next() == Some(class)))
         };
         let causes = self.lineage.differences(before);
-        let words: Vec<&str> = causes.iter().filter(counts).map(|c| c.words.as_str()).collect();
-        if words.is_empty() { "its artefact is missing or damaged".to_owned() } else { words.join("; ") }
+        let words: Vec<&str> = causes
+            .iter()
+            .filter(counts)
+            .map(|c| c.words.as_str())
+            .collect();
+        if words.is_empty() {
+            "its artefact is missing or damaged".to_owned()
+        } else {
+            words.join("; ")
+        }
     }
 
     pub(super) fn ingest_status(
@@ -120,8 +151,14 @@ impl Run<'_> {
         let mut status = StageStatus::new(Stage::Ingest);
         for file in files {
             let id = &file.flight_id;
-            match self.inputs.content(id).map(|content| self.ingested(id, content)) {
-                Err(reason) => status.failed.push((id.clone(), format!("{}: {reason}", inputs::place(file)))),
+            match self
+                .inputs
+                .content(id)
+                .map(|content| self.ingested(id, content))
+            {
+                Err(reason) => status
+                    .failed
+                    .push((id.clone(), format!("{}: {reason}", inputs::place(file)))),
                 Ok(Some(conditioned)) => {
                     status.fresh += 1;
                     campaign.flights.extend(conditioned.stretches);
@@ -131,8 +168,15 @@ impl Run<'_> {
         }
         stretches::same_rows(campaign);
         for flight in campaign.flights.iter().filter(|f| !f.ingested.accepted) {
-            let reasons = flight.ingested.problems.iter().map(|p| format!("{}: {}", p.place, p.reason));
-            status.failed.push((flight.flight_id.clone(), reasons.collect::<Vec<_>>().join("; ")));
+            let reasons = flight
+                .ingested
+                .problems
+                .iter()
+                .map(|p| format!("{}: {}", p.place, p.reason));
+            status.failed.push((
+                flight.flight_id.clone(),
+                reasons.collect::<Vec<_>>().join("; "),
+            ));
         }
         status
     }
@@ -155,7 +199,10 @@ impl Run<'_> {
                 continue;
             };
             status.fresh += 1;
-            let failed = found.problems.into_iter().map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason)));
+            let failed = found
+                .problems
+                .into_iter()
+                .map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason)));
             status.failed.extend(failed);
             maneuvers.extend(found.maneuvers);
         }
@@ -164,19 +211,36 @@ impl Run<'_> {
         status
     }
 
-    pub(super) fn estimate_status(&self, campaign: &Campaign, before: Option<&Lineage>) -> StageStatus {
+    pub(super) fn estimate_status(
+        &self,
+        campaign: &Campaign,
+        before: Option<&Lineage>,
+    ) -> StageStatus {
         let mut status = StageStatus::new(Stage::Estimate);
         for maneuver in &campaign.maneuvers {
             let id = &maneuver.maneuver_id;
-            let flight = campaign.flights.iter().find(|f| f.flight_id == maneuver.flight_id);
-            let estimated = flight.and_then(|f| self.store.load::<Estimated>(&self.estimate_path(f, maneuver)));
+            let flight = campaign
+                .flights
+                .iter()
+                .find(|f| f.flight_id == maneuver.flight_id);
+            let estimated = flight.and_then(|f| {
+                self.store
+                    .load::<Estimated>(&self.estimate_path(f, maneuver))
+            });
             if let Some(Estimated { fit, .. }) = estimated {
                 status.fresh += 1;
                 if fit.outcome != Outcome::Converged.name() {
-                    status.failed.push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
+                    status
+                        .failed
+                        .push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
                 }
             } else {
-                let why = self.why(Stage::Estimate, &maneuver.flight_id, Some(&maneuver.class), before);
+                let why = self.why(
+                    Stage::Estimate,
+                    &maneuver.flight_id,
+                    Some(&maneuver.class),
+                    before,
+                );
                 status.stale(&why, id);
             }
         }

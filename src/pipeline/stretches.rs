@@ -44,8 +44,12 @@ impl Flight {
     pub(super) fn events(&self, events: &[Event], about: &About) -> Vec<Event> {
         let end_s = about.start_s + about.samples as f64 * about.step_s;
         let inside = |e: &Event| e.start_s < end_s && e.end_s > about.start_s;
-        let own = |e: &&Event| e.flight_id == self.flight_id || (self.is_of(&e.flight_id) && inside(e));
-        let named = |e: &Event| Event { flight_id: self.flight_id.clone(), ..e.clone() };
+        let own =
+            |e: &&Event| e.flight_id == self.flight_id || (self.is_of(&e.flight_id) && inside(e));
+        let named = |e: &Event| Event {
+            flight_id: self.flight_id.clone(),
+            ..e.clone()
+        };
         events.iter().filter(own).map(named).collect()
     }
 }
@@ -54,14 +58,21 @@ impl Flight {
 pub(super) fn same_rows(campaign: &mut Campaign) {
     for later in 1..campaign.flights.len() {
         let (before, rest) = campaign.flights.split_at_mut(later);
-        let Some(flight) = rest.first_mut().filter(|f| f.ingested.accepted) else { continue };
+        let Some(flight) = rest.first_mut().filter(|f| f.ingested.accepted) else {
+            continue;
+        };
         for other in before.iter().filter(|f| f.ingested.accepted) {
-            let Some((from_s, to_s, share)) = flight.ingested.signature.common(&other.ingested.signature) else {
+            let Some((from_s, to_s, share)) =
+                flight.ingested.signature.common(&other.ingested.signature)
+            else {
                 continue;
             };
             let id = flight.flight_id.clone();
             if share >= COPY {
-                let reason = format!("it holds the rows of flight `{}` again; it is left out", other.flight_id);
+                let reason = format!(
+                    "it holds the rows of flight `{}` again; it is left out",
+                    other.flight_id
+                );
                 flight.ingested = super::Ingested::refused(problem("ingest", &id, &id, &reason));
                 break;
             }
@@ -70,7 +81,10 @@ pub(super) fn same_rows(campaign: &mut Campaign) {
                  taken from that one",
                 other.flight_id
             );
-            flight.ingested.problems.push(problem("ingest", &id, &id, &reason));
+            flight
+                .ingested
+                .problems
+                .push(problem("ingest", &id, &id, &reason));
             campaign.again.push((id, from_s, to_s));
         }
     }
@@ -80,7 +94,12 @@ pub(super) fn same_rows(campaign: &mut Campaign) {
 pub(super) fn leave_out_same(campaign: &mut Campaign) {
     // What lies between two full ten seconds, and its surroundings, is the same as well.
     let beyond_s = 10.0;
-    let Campaign { maneuvers, again, problems, .. } = campaign;
+    let Campaign {
+        maneuvers,
+        again,
+        problems,
+        ..
+    } = campaign;
     let is_again = |m: &Maneuver| {
         let inside = |(id, from_s, to_s): &(String, f64, f64)| {
             *id == m.flight_id && m.start_s >= from_s - beyond_s && m.end_s <= to_s + beyond_s
@@ -99,7 +118,10 @@ pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) ->
     let ends = window_ends(&file.about, surroundings(&file.about), events);
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let windows: Vec<Range<usize>> = starts.zip(&ends).map(|(from, to)| from..*to).collect();
-    let found: Result<Vec<Found>> = windows.into_par_iter().map(|own| in_window(config, file, events, own)).collect();
+    let found: Result<Vec<Found>> = windows
+        .into_par_iter()
+        .map(|own| in_window(config, file, events, own))
+        .collect();
     let mut all = Found::default();
     for found in found? {
         all.maneuvers.extend(found.maneuvers);
@@ -109,16 +131,25 @@ pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) ->
     }
     // What concerns the whole record is said in every window.
     let mut said = BTreeSet::new();
-    all.problems.retain(|p| said.insert((p.place.clone(), p.reason.clone())));
+    all.problems
+        .retain(|p| said.insert((p.place.clone(), p.reason.clone())));
     Ok(all)
 }
 
 /// The maneuvers that begin in a range of a record's samples.
-fn in_window(config: &Config, file: &RecordFile, events: &[Event], samples: Range<usize>) -> Result<Found> {
+fn in_window(
+    config: &Config,
+    file: &RecordFile,
+    events: &[Event],
+    samples: Range<usize>,
+) -> Result<Found> {
     let about = &file.about;
     let signals = segment::signals(&config.classes, &config.segment);
     let beyond = surroundings(about);
-    let record = file.window(Some(&signals), samples.start.saturating_sub(beyond)..samples.end + beyond)?;
+    let record = file.window(
+        Some(&signals),
+        samples.start.saturating_sub(beyond)..samples.end + beyond,
+    )?;
     let time_s = |sample: usize| about.start_s + sample as f64 * about.step_s;
     let (first, last) = (samples.start == 0, samples.end >= about.samples);
     let own = |t: f64| (first || t >= time_s(samples.start)) && (last || t < time_s(samples.end));
@@ -128,9 +159,25 @@ fn in_window(config: &Config, file: &RecordFile, events: &[Event], samples: Rang
     found.problems.retain(|p| said_at(p).is_none_or(own));
     let events: Vec<Event> = events.iter().filter(|e| own(e.start_s)).cloned().collect();
     let limits = &config.segment.quality;
-    let (found, events) = segment::with_events(found, &record, &events, &config.classes, &config.aircraft, limits);
-    let Segmented { maneuvers, unknown, problems } = found;
-    Ok(Found { maneuvers, unknown, events, problems })
+    let (found, events) = segment::with_events(
+        found,
+        &record,
+        &events,
+        &config.classes,
+        &config.aircraft,
+        limits,
+    );
+    let Segmented {
+        maneuvers,
+        unknown,
+        problems,
+    } = found;
+    Ok(Found {
+        maneuvers,
+        unknown,
+        events,
+        problems,
+    })
 }
 
 /// The samples that a window sees beyond its own on either side.
@@ -139,7 +186,11 @@ fn surroundings(about: &About) -> usize {
 }
 
 fn samples(time_s: f64, step_s: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a length of time, not negative")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a length of time, not negative"
+    )]
     let samples = (time_s / step_s).ceil().max(1.0) as usize;
     samples
 }
@@ -165,7 +216,12 @@ fn window_ends(about: &About, beyond: usize, events: &[Event]) -> Vec<usize> {
 
 /// The time that a problem of segment names, s.
 fn said_at(problem: &Problem) -> Option<f64> {
-    problem.place.strip_prefix("t = ")?.strip_suffix(" s")?.parse().ok()
+    problem
+        .place
+        .strip_prefix("t = ")?
+        .strip_suffix(" s")?
+        .parse()
+        .ok()
 }
 
 #[cfg(test)]
@@ -173,11 +229,22 @@ mod tests {
     use super::*;
 
     fn about(samples: usize) -> About {
-        About { flight_id: "f".to_owned(), start_s: 5.0, step_s: 0.025, samples, ..About::default() }
+        About {
+            flight_id: "f".to_owned(),
+            start_s: 5.0,
+            step_s: 0.025,
+            samples,
+            ..About::default()
+        }
     }
 
     fn event(start_s: f64, end_s: f64) -> Event {
-        Event { flight_id: "f".to_owned(), class: "C".to_owned(), start_s, end_s }
+        Event {
+            flight_id: "f".to_owned(),
+            class: "C".to_owned(),
+            start_s,
+            end_s,
+        }
     }
 
     #[test]
@@ -185,7 +252,10 @@ mod tests {
         let beyond = samples(SURROUNDINGS_S, 0.025);
         assert_eq!(window_ends(&about(144_000), beyond, &[]), [144_000]);
         let ends = window_ends(&about(1_440_000), beyond, &[]);
-        assert_eq!((ends.len(), ends[0], *ends.last().unwrap()), (11, WINDOW, 1_440_000));
+        assert_eq!(
+            (ends.len(), ends[0], *ends.last().unwrap()),
+            (11, WINDOW, 1_440_000)
+        );
     }
 
     #[test]
@@ -205,8 +275,16 @@ mod tests {
             ingested: super::super::Ingested::refused(problem("", "", "", "")),
         };
         assert!(flight("f").is_of("f") && flight("f.2").is_of("f"));
-        assert!(!flight("f.nav").is_of("f") && !flight("f2").is_of("f") && !flight("f").is_of("f.2"));
-        let events = [event(10.0, 20.0), Event { flight_id: "f.2".to_owned(), ..event(10.0, 20.0) }];
+        assert!(
+            !flight("f.nav").is_of("f") && !flight("f2").is_of("f") && !flight("f").is_of("f.2")
+        );
+        let events = [
+            event(10.0, 20.0),
+            Event {
+                flight_id: "f.2".to_owned(),
+                ..event(10.0, 20.0)
+            },
+        ];
         assert_eq!(flight("f").events(&events, &about(4000)).len(), 1);
         assert_eq!(flight("f.2").events(&events, &about(4000)).len(), 2);
         assert_eq!(flight("f.2").events(&events, &about(40)).len(), 1);

@@ -42,24 +42,44 @@ impl Verified {
 ///
 /// # Errors
 /// No night, no archive, or a table without a name among the files.
-pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress: &dyn Progress) -> Result<Verified> {
+pub fn verify(
+    config: &Config,
+    night: Option<&str>,
+    tables: &[String],
+    progress: &dyn Progress,
+) -> Result<Verified> {
     let nights = Nights::look(&config.reports);
     let night = match night {
-        Some(name) => nights.night(name).or_else(|| nights.night(&format!("{name:0>4}"))),
+        Some(name) => nights
+            .night(name)
+            .or_else(|| nights.night(&format!("{name:0>4}"))),
         None => nights.current(),
     };
     let night = night.ok_or_else(|| {
-        Error::store(&config.reports, &format!("there is no such night here; there are {}", nights.names().join(", ")))
+        Error::store(
+            &config.reports,
+            &format!(
+                "there is no such night here; there are {}",
+                nights.names().join(", ")
+            ),
+        )
     })?;
     let files = archive::find(&config.archive)?;
     let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
     let run = Run::new(config, store, Contents::forgetful(), &files, progress)?;
     let damaged = nights.damaged(&night);
     let stem = |file: &str| file.split('.').next().unwrap_or_default().to_owned();
-    if let Some(unknown) = tables.iter().find(|t| !night.files.keys().any(|f| stem(f) == **t || f == *t)) {
-        return Err(Error::store(&nights.folder(&night.name), &format!("there is no table `{unknown}`")));
+    if let Some(unknown) = tables
+        .iter()
+        .find(|t| !night.files.keys().any(|f| stem(f) == **t || f == *t))
+    {
+        return Err(Error::store(
+            &nights.folder(&night.name),
+            &format!("there is no table `{unknown}`"),
+        ));
     }
-    let asked = |file: &&String| tables.is_empty() || tables.iter().any(|t| stem(file) == *t || *file == t);
+    let asked =
+        |file: &&String| tables.is_empty() || tables.iter().any(|t| stem(file) == *t || *file == t);
     let finding = |file: &String| {
         let mut reasons = Vec::new();
         if damaged.contains(file) {
@@ -69,13 +89,20 @@ pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress:
             // A CSV and the report state nothing themselves: what the table beside, or the night, states holds for them.
             let beside = path.with_extension("parquet");
             let of_the_night = (night.until, night.lineage.clone());
-            let stated = if beside.is_file() { stated(&beside) } else { Ok(of_the_night) };
+            let stated = if beside.is_file() {
+                stated(&beside)
+            } else {
+                Ok(of_the_night)
+            };
             match stated {
                 Ok((stage, lineage)) => reasons.extend(differences(&run.lineage, &lineage, stage)),
                 Err(error) => reasons.push(error.to_string()),
             }
         }
-        Finding { file: file.clone(), reasons }
+        Finding {
+            file: file.clone(),
+            reasons,
+        }
     };
     Ok(Verified {
         files: night.files.keys().filter(asked).map(finding).collect(),
@@ -87,21 +114,37 @@ pub fn verify(config: &Config, night: Option<&str>, tables: &[String], progress:
 impl Run<'_> {
     /// The artefacts of a night that are not as they were written; a record is held against its flight's artefact.
     fn damaged(&self, night: &Night) -> Vec<String> {
-        let records: BTreeMap<PathBuf, Digest> = night.artefacts.keys().flat_map(|name| self.recorded(name)).collect();
+        let records: BTreeMap<PathBuf, Digest> = night
+            .artefacts
+            .keys()
+            .flat_map(|name| self.recorded(name))
+            .collect();
         let is_whole = |name: &String| {
             if !name.starts_with("records/") {
                 return self.store.is_whole(name);
             }
             let path = self.store.folder().join(name);
             let fetched = |digest: &Digest| self.store.fetch(&path, Some(digest)).is_ok();
-            let holds = |digest: &Digest| fetched(digest) && Digest::of_file(&path).is_ok_and(|f| f == *digest);
+            let holds = |digest: &Digest| {
+                fetched(digest) && Digest::of_file(&path).is_ok_and(|f| f == *digest)
+            };
             records.get(Path::new(name)).is_some_and(holds)
         };
-        night.artefacts.par_iter().map(|(name, _)| name).filter(|name| !is_whole(name)).cloned().collect()
+        night
+            .artefacts
+            .par_iter()
+            .map(|(name, _)| name)
+            .filter(|name| !is_whole(name))
+            .cloned()
+            .collect()
     }
 }
 
 /// What is no longer as a table of a stage states.
 fn differences(now: &Lineage, stated: &Lineage, stage: Stage) -> Vec<String> {
-    now.until(stage).differences(&stated.until(stage)).into_iter().map(|cause| cause.words).collect()
+    now.until(stage)
+        .differences(&stated.until(stage))
+        .into_iter()
+        .map(|cause| cause.words)
+        .collect()
 }

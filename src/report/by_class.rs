@@ -48,19 +48,36 @@ const LINES: [(&str, &str, f64); MOST_TOGETHER] = [
 #[must_use]
 pub fn inputs(contents: &Contents) -> Vec<ClassFigure> {
     let marks = gallery::marks(contents);
-    histories::typical(contents).into_iter().enumerate().map(|(i, h)| input_figure(h, i, &marks)).collect()
+    histories::typical(contents)
+        .into_iter()
+        .enumerate()
+        .map(|(i, h)| input_figure(h, i, &marks))
+        .collect()
 }
 
 fn input_figure(history: &History, number: usize, marks: &[(&str, Mark)]) -> ClassFigure {
-    let strips: Vec<Strip> =
-        histories::inputs(history).into_iter().map(|strip| Strip { height: STRIP, ..strip }).collect();
+    let strips: Vec<Strip> = histories::inputs(history)
+        .into_iter()
+        .map(|strip| Strip {
+            height: STRIP,
+            ..strip
+        })
+        .collect();
     let names: Vec<String> = strips.iter().map(|s| s.name.clone()).collect();
     let anchor = format!("inputs-{}", number + 1);
-    let caption = if names.is_empty() { "No input moved.".to_owned() } else { format!("Inputs {}.", names.join(", ")) };
+    let caption = if names.is_empty() {
+        "No input moved.".to_owned()
+    } else {
+        format!("Inputs {}.", names.join(", "))
+    };
     let svg = stack::draw(&Stack {
         id: anchor.clone(),
         title: format!("Inputs of {}", history.class),
-        description: format!("{} at alpha {}: {caption}", history.class, angle(history.alpha_deg)),
+        description: format!(
+            "{} at alpha {}: {caption}",
+            history.class,
+            angle(history.alpha_deg)
+        ),
         width: WIDTH,
         time: histories::time_scale(history),
         columns: vec![strips],
@@ -84,7 +101,11 @@ fn of_one(
         class,
         svg,
         legend,
-        caption: format!("α {}, {}. {caption}", angle(history.alpha_deg), history.maneuver_id),
+        caption: format!(
+            "α {}, {}. {caption}",
+            angle(history.alpha_deg),
+            history.maneuver_id
+        ),
         anchor,
     }
 }
@@ -96,8 +117,13 @@ pub fn together(contents: &Contents) -> Vec<ClassFigure> {
     let of_maneuver = by_name(contents.correlations, |r| &r.maneuver_id);
     let mut figures = Vec::new();
     for history in histories::typical(contents) {
-        let mut pairs = of_maneuver.get(history.maneuver_id.as_str()).cloned().unwrap_or_default();
-        pairs.retain(|p| p.kind == "regressors" && p.correlation.abs() > contents.limits.correlation);
+        let mut pairs = of_maneuver
+            .get(history.maneuver_id.as_str())
+            .cloned()
+            .unwrap_or_default();
+        pairs.retain(|p| {
+            p.kind == "regressors" && p.correlation.abs() > contents.limits.correlation
+        });
         pairs.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
         let mut names: Vec<&str> = Vec::new();
         let mut said = Vec::new();
@@ -107,11 +133,16 @@ pub fn together(contents: &Contents) -> Vec<ClassFigure> {
             if names.len() + new.len() <= MOST_TOGETHER {
                 names.extend(new);
                 let [first, second] = both.map(without_unit);
-                said.push(format!("{first} and {second} {}", fixed(pair.correlation, 2)));
+                said.push(format!(
+                    "{first} and {second} {}",
+                    fixed(pair.correlation, 2)
+                ));
             }
         }
-        let signals: Vec<(&str, Vec<(f64, f64)>)> =
-            names.iter().filter_map(|name| Some((*name, changes(history, name)?))).collect();
+        let signals: Vec<(&str, Vec<(f64, f64)>)> = names
+            .iter()
+            .filter_map(|name| Some((*name, changes(history, name)?)))
+            .collect();
         if !signals.is_empty() {
             let anchor = format!("together-{}", figures.len() + 1);
             figures.push(together_figure(history, anchor, signals, &said, &marks));
@@ -128,25 +159,45 @@ fn together_figure(
     marks: &[(&str, Mark)],
 ) -> ClassFigure {
     let label = |name: &str| without_unit(name).to_owned();
-    let legend = signals.iter().zip(LINES).map(|((name, _), (colour, dash, width))| LegendView {
-        key: key(24, &line(colour, dash, width)),
-        label: label(name),
-    });
+    let legend = signals
+        .iter()
+        .zip(LINES)
+        .map(|((name, _), (colour, dash, width))| LegendView {
+            key: key(24, &line(colour, dash, width)),
+            label: label(name),
+        });
     let legend: Vec<LegendView> = legend.collect();
     let caption = format!("Correlations: {}.", said.join("; "));
     let lines: Vec<StripLine> = signals
         .into_iter()
         .zip(LINES)
-        .map(|((_, points), (colour, dash, width))| StripLine { points, colour, width, dash })
+        .map(|((_, points), (colour, dash, width))| StripLine {
+            points,
+            colour,
+            width,
+            dash,
+        })
         .collect();
     let all: Vec<&[(f64, f64)]> = lines.iter().map(|l| l.points.as_slice()).collect();
     let scale = histories::scale_of(&all, 5.0);
     let (name, unit) = ("change".to_owned(), "over rms".to_owned());
-    let strip = Strip { name, unit, height: 150.0, scale, lines, dots: vec![], class: String::new() };
+    let strip = Strip {
+        name,
+        unit,
+        height: 150.0,
+        scale,
+        lines,
+        dots: vec![],
+        class: String::new(),
+    };
     let svg = stack::draw(&Stack {
         id: anchor.clone(),
         title: format!("What moved together in {}", history.class),
-        description: format!("{} at alpha {}. {caption}", history.class, angle(history.alpha_deg)),
+        description: format!(
+            "{} at alpha {}. {caption}",
+            history.class,
+            angle(history.alpha_deg)
+        ),
         width: WIDTH,
         time: histories::time_scale(history),
         columns: vec![vec![strip]],
@@ -159,15 +210,29 @@ fn together_figure(
 fn changes(history: &History, name: &str) -> Option<Vec<(f64, f64)>> {
     let is_output = |label: &str| {
         let bare = without_unit(label);
-        bare == without_unit(name) || bare.strip_prefix(name).is_some_and(|rest| rest.starts_with('_'))
+        bare == without_unit(name)
+            || bare
+                .strip_prefix(name)
+                .is_some_and(|rest| rest.starts_with('_'))
     };
     let control = history.controls.iter().find(|c| c.0 == name).map(|c| &c.1);
-    let output = || history.outputs.iter().find(|o| is_output(&o.label)).map(|o| &o.measured);
+    let output = || {
+        history
+            .outputs
+            .iter()
+            .find(|o| is_output(&o.label))
+            .map(|o| &o.measured)
+    };
     let points = histories::points(history, control.or_else(output)?);
     let count = points.len() as f64;
     let mean = points.iter().map(|p| p.1).sum::<f64>() / count;
     let rms = (points.iter().map(|p| (p.1 - mean).powi(2)).sum::<f64>() / count).sqrt();
-    (rms > 0.0).then(|| points.into_iter().map(|(t, v)| (t, (v - mean) / rms)).collect())
+    (rms > 0.0).then(|| {
+        points
+            .into_iter()
+            .map(|(t, v)| (t, (v - mean) / rms))
+            .collect()
+    })
 }
 
 /// How the classes of an axis excite each of its rates, all on one scale.
@@ -177,7 +242,12 @@ pub fn rates(contents: &Contents) -> Vec<ClassFigure> {
     let marks = gallery::marks(contents);
     let mut figures = Vec::new();
     for axis in [Axis::Longitudinal, Axis::Lateral] {
-        let of_axis = |h: &&&History| contents.classes.iter().any(|c| c.0 == h.class && c.2 == axis);
+        let of_axis = |h: &&&History| {
+            contents
+                .classes
+                .iter()
+                .any(|c| c.0 == h.class && c.2 == axis)
+        };
         let own: Vec<&History> = typical.iter().filter(of_axis).copied().collect();
         let mut rates: BTreeMap<usize, &str> = BTreeMap::new();
         for (i, output) in own.iter().flat_map(|h| h.outputs.iter().enumerate()) {
@@ -193,21 +263,33 @@ pub fn rates(contents: &Contents) -> Vec<ClassFigure> {
     figures
 }
 
-fn rate_figure(label: &str, histories: &[&History], anchor: String, marks: &[(&str, Mark)]) -> ClassFigure {
+fn rate_figure(
+    label: &str,
+    histories: &[&History],
+    anchor: String,
+    marks: &[(&str, Mark)],
+) -> ClassFigure {
     let name = without_unit(label);
     let rate = |h: &History| {
         let output = h.outputs.iter().find(|o| o.label == label)?;
         Some(histories::points(h, &output.measured))
     };
-    let found: Vec<(&History, Vec<(f64, f64)>)> = histories.iter().filter_map(|h| Some((*h, rate(h)?))).collect();
+    let found: Vec<(&History, Vec<(f64, f64)>)> = histories
+        .iter()
+        .filter_map(|h| Some((*h, rate(h)?)))
+        .collect();
     let all: Vec<&[(f64, f64)]> = found.iter().map(|f| f.1.as_slice()).collect();
     let scale = histories::scale_of(&all, 2.4);
     let longest = extent(found.iter().map(|f| histories::time_scale(f.0).max)).map_or(1.0, |e| e.1);
-    let time = Scale { max: longest, ..Scale::covering(0.0, longest) };
+    let time = Scale {
+        max: longest,
+        ..Scale::covering(0.0, longest)
+    };
     let mut said = Vec::new();
     let mut strips = Vec::new();
     for (history, points) in found {
-        let rms = (points.iter().map(|p| p.1 * p.1).sum::<f64>() / points.len().max(1) as f64).sqrt();
+        let rms =
+            (points.iter().map(|p| p.1 * p.1).sum::<f64>() / points.len().max(1) as f64).sqrt();
         said.push(format!("{} {}", history.class, fixed(rms, 1)));
         strips.push(Strip {
             name: history.class.clone(),
@@ -224,12 +306,22 @@ fn rate_figure(label: &str, histories: &[&History], anchor: String, marks: &[(&s
     let svg = stack::draw(&Stack {
         id: anchor.clone(),
         title: title.clone(),
-        description: format!("Measured {name} of a typical maneuver of each class, on one scale. {caption}"),
+        description: format!(
+            "Measured {name} of a typical maneuver of each class, on one scale. {caption}"
+        ),
         width: WIDTH,
         time,
         columns: vec![strips],
     });
-    ClassFigure { anchor, title, mark: String::new(), class: String::new(), svg, legend: vec![], caption }
+    ClassFigure {
+        anchor,
+        title,
+        mark: String::new(),
+        class: String::new(),
+        svg,
+        legend: vec![],
+        caption,
+    }
 }
 
 #[cfg(test)]
@@ -242,8 +334,15 @@ mod tests {
     fn every_class_has_a_figure_of_its_inputs() {
         let campaign = campaign();
         let figures = inputs(&campaign.contents());
-        assert_eq!(figures.iter().map(|f| f.title.as_str()).collect::<Vec<_>>(), ["OLON", "3211", "OLAT", "PYRS"]);
-        assert!(figures.iter().all(|f| f.caption.ends_with("Inputs de.") && !f.mark.is_empty()));
+        assert_eq!(
+            figures.iter().map(|f| f.title.as_str()).collect::<Vec<_>>(),
+            ["OLON", "3211", "OLAT", "PYRS"]
+        );
+        assert!(
+            figures
+                .iter()
+                .all(|f| f.caption.ends_with("Inputs de.") && !f.mark.is_empty())
+        );
     }
 
     #[test]
@@ -260,7 +359,11 @@ mod tests {
         });
         let figures = together(&campaign.contents());
         assert_eq!(figures.len(), 1);
-        assert!(figures[0].caption.contains("alpha and de \u{2212}0.95"), "{}", figures[0].caption);
+        assert!(
+            figures[0].caption.contains("alpha and de \u{2212}0.95"),
+            "{}",
+            figures[0].caption
+        );
         assert_eq!(figures[0].legend.len(), 2, "alpha is the vane's");
     }
 
@@ -280,6 +383,10 @@ mod tests {
         }
         let figures = rates(&campaign.contents());
         assert_eq!(figures.len(), 2, "one of each axis");
-        assert!(figures[0].caption.contains("OLON 2.0, 3211 2.0"), "{}", figures[0].caption);
+        assert!(
+            figures[0].caption.contains("OLON 2.0, 3211 2.0"),
+            "{}",
+            figures[0].caption
+        );
     }
 }

@@ -28,13 +28,37 @@ struct Look {
     width: f64,
 }
 
-const OF_FLIGHT: Look = Look { height: 50.0, steps: 2.0, colour: INK, width: 0.9 };
-const INPUT: Look = Look { width: 1.1, ..OF_FLIGHT };
-const FLAG: Look = Look { height: 20.0, ..INPUT };
-const ALONE: Look = Look { height: 72.0, steps: 3.0, ..INPUT };
+const OF_FLIGHT: Look = Look {
+    height: 50.0,
+    steps: 2.0,
+    colour: INK,
+    width: 0.9,
+};
+const INPUT: Look = Look {
+    width: 1.1,
+    ..OF_FLIGHT
+};
+const FLAG: Look = Look {
+    height: 20.0,
+    ..INPUT
+};
+const ALONE: Look = Look {
+    height: 72.0,
+    steps: 3.0,
+    ..INPUT
+};
 /// Wide, so that it is seen behind what was computed.
-const MEASURED: Look = Look { colour: MEASURED_COLOUR, width: 2.6, ..ALONE };
-const RESIDUAL: Look = Look { height: 40.0, steps: 1.6, colour: INK, width: 0.8 };
+const MEASURED: Look = Look {
+    colour: MEASURED_COLOUR,
+    width: 2.6,
+    ..ALONE
+};
+const RESIDUAL: Look = Look {
+    height: 40.0,
+    steps: 1.6,
+    colour: INK,
+    width: 0.8,
+};
 /// By what share of its range within the maneuver a scale grows for what lies before, after and in what was computed: the
 /// recovery from a maneuver, and a response that diverges, would flatten it.
 const STRETCH: f64 = 0.5;
@@ -94,12 +118,24 @@ pub struct ManeuverView<'a> {
 #[must_use]
 pub fn flight(view: &FlightView) -> String {
     let record = view.record;
-    let (from_s, to_s) = (record.time_s(0), record.time_s(record.samples.saturating_sub(1)));
+    let (from_s, to_s) = (
+        record.time_s(0),
+        record.time_s(record.samples.saturating_sub(1)),
+    );
     let room = PITCH * (view.maneuvers.len() + view.unknown.len()) as f64;
-    let pen = Pen::new(record, (from_s, to_s), (from_s, to_s), room.clamp(COLUMNS.0, COLUMNS.1));
-    let (recorded, lacking): (Vec<_>, Vec<_>) =
-        flight_signals(view.groups).into_iter().partition(|(name, _)| record.values(name).is_some());
-    let strips: Vec<Strip> = recorded.iter().filter_map(|(name, look)| pen.strip(name, *look, &[])).collect();
+    let pen = Pen::new(
+        record,
+        (from_s, to_s),
+        (from_s, to_s),
+        room.clamp(COLUMNS.0, COLUMNS.1),
+    );
+    let (recorded, lacking): (Vec<_>, Vec<_>) = flight_signals(view.groups)
+        .into_iter()
+        .partition(|(name, _)| record.values(name).is_some());
+    let strips: Vec<Strip> = recorded
+        .iter()
+        .filter_map(|(name, look)| pen.strip(name, *look, &[]))
+        .collect();
     let lacking: Vec<&str> = lacking.iter().map(|l| l.0).collect();
     let mut notes = notes(&lacking, &[], &strips);
     notes.extend(rejected(view.maneuvers));
@@ -108,13 +144,21 @@ pub fn flight(view: &FlightView) -> String {
     let lasting = format!("{} to {} s", fixed(from_s, 1), fixed(to_s, 1));
     strips::draw(&Chart {
         title: format!("{}: {}", record.flight_id, view.aircraft),
-        description: format!("Strip chart of flight {}, {lasting}, with {maneuvers} shaded.", record.flight_id),
+        description: format!(
+            "Strip chart of flight {}, {lasting}, with {maneuvers} shaded.",
+            record.flight_id
+        ),
         heading: vec![format!(
             "{lasting}, {} samples of {} s, {maneuvers}",
             view.recorded.0,
             number(Some(view.recorded.1), 3)
         )],
-        legend: legend(&strips, !view.maneuvers.is_empty(), !view.events.is_empty(), false),
+        legend: legend(
+            &strips,
+            !view.maneuvers.is_empty(),
+            !view.events.is_empty(),
+            false,
+        ),
         time: pen.time,
         width: room.max(pen.columns.count as f64),
         windows: windows(view),
@@ -128,19 +172,39 @@ pub fn flight(view: &FlightView) -> String {
 #[must_use]
 pub fn maneuver(view: &ManeuverView) -> String {
     let maneuver = view.maneuver;
-    let part = view.record.part(maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S);
+    let part = view
+        .record
+        .part(maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S);
     let first_s = (maneuver.start_s - AROUND_S).max(part.start_s);
     let last_s = (maneuver.end_s + AROUND_S).min(part.time_s(part.samples.saturating_sub(1)));
-    let pen = Pen::new(&part, (first_s, last_s), (maneuver.start_s, maneuver.end_s), COLUMNS.0);
+    let pen = Pen::new(
+        &part,
+        (first_s, last_s),
+        (maneuver.start_s, maneuver.end_s),
+        COLUMNS.0,
+    );
     let (moved, still) = moved(&pen, view.groups);
-    let mut strips: Vec<Strip> = moved.iter().filter_map(|name| pen.strip(name, INPUT, &[])).collect();
+    let mut strips: Vec<Strip> = moved
+        .iter()
+        .filter_map(|name| pen.strip(name, INPUT, &[]))
+        .collect();
     for output in maneuver.axis.outputs() {
-        let computed = view.history.and_then(|h| Some((h, h.outputs.iter().find(|o| o.label == output.signal())?)));
+        let computed = view
+            .history
+            .and_then(|h| Some((h, h.outputs.iter().find(|o| o.label == output.signal())?)));
         strips.extend(pen.output(output.signal(), computed));
     }
-    strips.extend(view.groups.flags.iter().filter_map(|name| pen.strip(name, FLAG, &[])));
+    strips.extend(
+        view.groups
+            .flags
+            .iter()
+            .filter_map(|name| pen.strip(name, FLAG, &[])),
+    );
     let mut notes = notes(&[], &still, &strips);
-    notes.push("Scales fit the maneuver: a line that leaves its strip before or after it is cut there.".to_owned());
+    notes.push(
+        "Scales fit the maneuver: a line that leaves its strip before or after it is cut there."
+            .to_owned(),
+    );
     let inside = |m: &&Maneuver| m.start_s < last_s && m.end_s > first_s;
     let windows = view.flight.iter().filter(inside).map(|m| window(m, &[]));
     strips::draw(&Chart {
@@ -168,7 +232,9 @@ pub fn maneuver(view: &ManeuverView) -> String {
 
 fn title(view: &ManeuverView) -> String {
     let m = view.maneuver;
-    let class = view.class.map_or_else(String::new, |c| format!(", {}", c.title));
+    let class = view
+        .class
+        .map_or_else(String::new, |c| format!(", {}", c.title));
     format!("{}: {}{class}", m.maneuver_id, m.class)
 }
 
@@ -191,21 +257,42 @@ fn heading(view: &ManeuverView) -> Vec<String> {
     if let (Some(first), Some(last)) = (fit.initial_cost, fit.final_cost) {
         let (first, last) = (number(Some(first), 4), number(Some(last), 4));
         // Writing into a String cannot fail.
-        let _ = write!(outcome, "; {} iterations, J from {first} to {last}", fit.iterations);
+        let _ = write!(
+            outcome,
+            "; {} iterations, J from {first} to {last}",
+            fit.iterations
+        );
     }
     if let Some(share) = fit.left_out {
-        let _ = write!(outcome, "; {} % of the output samples left out", fixed(100.0 * share, 2));
+        let _ = write!(
+            outcome,
+            "; {} % of the output samples left out",
+            fixed(100.0 * share, 2)
+        );
     }
     vec![condition, outcome]
 }
 
 /// The signals of a flight in the order of the chart, each with its look.
 fn flight_signals(groups: &Groups) -> Vec<(&str, Look)> {
-    use signal::{ALPHA_VANE, ALTITUDE, AN, AX, AY, BETA_VANE, MACH, P, PHI, PSI, Q, R, THETA, VELOCITY};
-    let motion = [ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, PSI, AN, AX, AY];
-    let named = groups.surfaces.iter().chain(&groups.controls).map(String::as_str);
-    let strips = motion.into_iter().chain(named).map(|name| (name, OF_FLIGHT));
-    strips.chain(groups.flags.iter().map(|name| (name.as_str(), FLAG))).collect()
+    use signal::{
+        ALPHA_VANE, ALTITUDE, AN, AX, AY, BETA_VANE, MACH, P, PHI, PSI, Q, R, THETA, VELOCITY,
+    };
+    let motion = [
+        ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, PSI, AN, AX, AY,
+    ];
+    let named = groups
+        .surfaces
+        .iter()
+        .chain(&groups.controls)
+        .map(String::as_str);
+    let strips = motion
+        .into_iter()
+        .chain(named)
+        .map(|name| (name, OF_FLIGHT));
+    strips
+        .chain(groups.flags.iter().map(|name| (name.as_str(), FLAG)))
+        .collect()
 }
 
 /// Draws signals of one record over one time axis.
@@ -218,25 +305,54 @@ struct Pen<'a> {
 }
 
 impl Pen<'_> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between the limits of COLUMNS")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between the limits of COLUMNS"
+    )]
     fn new(record: &Record, (from_s, to_s): (f64, f64), core: (f64, f64), columns: f64) -> Pen<'_> {
         let to_s = to_s.max(from_s + record.step_s);
-        let time = Scale { min: from_s, max: to_s, ..Scale::in_steps(from_s, to_s, 10.0) };
-        Pen { record, time, columns: Columns { from_s, to_s, count: columns as usize }, core }
+        let time = Scale {
+            min: from_s,
+            max: to_s,
+            ..Scale::in_steps(from_s, to_s, 10.0)
+        };
+        Pen {
+            record,
+            time,
+            columns: Columns {
+                from_s,
+                to_s,
+                count: columns as usize,
+            },
+            core,
+        }
     }
 
     /// The values of a signal from one time to another.
     fn between(&self, name: &str, (from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
-        let values = self.record.values(name).unwrap_or_default().iter().enumerate();
+        let values = self
+            .record
+            .values(name)
+            .unwrap_or_default()
+            .iter()
+            .enumerate();
         let slack = 0.5 * self.record.step_s;
-        values.filter(move |(k, _)| (from_s - slack..=to_s + slack).contains(&self.record.time_s(*k))).map(|(_, v)| *v)
+        values
+            .filter(move |(k, _)| (from_s - slack..=to_s + slack).contains(&self.record.time_s(*k)))
+            .map(|(_, v)| *v)
     }
 
     /// What a signal's scale covers: all of its core, and of the rest and of `more` what does not flatten that.
     fn limits(&self, name: &str, more: &[f64]) -> (f64, f64) {
-        let all = || self.between(name, (self.columns.from_s, self.columns.to_s)).chain(more.iter().copied());
+        let all = || {
+            self.between(name, (self.columns.from_s, self.columns.to_s))
+                .chain(more.iter().copied())
+        };
         let core = extent(self.between(name, self.core)).or_else(|| extent(all()));
-        let Some((low, high)) = core else { return (0.0, 1.0) };
+        let Some((low, high)) = core else {
+            return (0.0, 1.0);
+        };
         let room = STRETCH * (high - low);
         let near = all().filter(|v| (low - room..=high + room).contains(v));
         extent(near.chain([low, high])).unwrap_or((low, high))
@@ -249,11 +365,24 @@ impl Pen<'_> {
         let of = |mark| runs(series, record.start_s, record.step_s, mark, self.columns);
         let (low, high) = self.limits(name, more);
         let is_flag = look.height <= FLAG.height;
-        let flag = Scale { min: -0.25, max: high.max(1.0) + 0.25, step: high.max(1.0) };
-        let scale = if is_flag { flag } else { scale(low, high, look.steps) };
+        let flag = Scale {
+            min: -0.25,
+            max: high.max(1.0) + 0.25,
+            step: high.max(1.0),
+        };
+        let scale = if is_flag {
+            flag
+        } else {
+            scale(low, high, look.steps)
+        };
         Some(Strip {
             name: without_unit(name).to_owned(),
-            unit: if is_flag { "0/1" } else { Unit::of_signal(name).name }.to_owned(),
+            unit: if is_flag {
+                "0/1"
+            } else {
+                Unit::of_signal(name).name
+            }
+            .to_owned(),
             height: look.height,
             scale,
             traces: vec![self.trace(record.start_s, &series.values, scale, look)],
@@ -268,9 +397,20 @@ impl Pen<'_> {
 
     /// The line through values from a time on, cut where it leaves the scale.
     fn trace(&self, start_s: f64, values: &[f64], scale: Scale, look: Look) -> Trace {
-        let inside: Vec<f64> = values.iter().map(|v| if scale.contains(*v) { *v } else { f64::NAN }).collect();
-        let shown = Shown { start_s, step_s: self.record.step_s, values: &inside };
-        Trace { pieces: envelope(shown, self.columns), colour: look.colour, width: look.width }
+        let inside: Vec<f64> = values
+            .iter()
+            .map(|v| if scale.contains(*v) { *v } else { f64::NAN })
+            .collect();
+        let shown = Shown {
+            start_s,
+            step_s: self.record.step_s,
+            values: &inside,
+        };
+        Trace {
+            pieces: envelope(shown, self.columns),
+            colour: look.colour,
+            width: look.width,
+        }
     }
 
     /// An output as measured, with what was computed over it and their difference under it.
@@ -278,15 +418,29 @@ impl Pen<'_> {
         let Some((history, output)) = computed else {
             return self.strip(name, ALONE, &[]).into_iter().collect();
         };
-        let Some(mut measured) = self.strip(name, MEASURED, &output.computed) else { return vec![] };
+        let Some(mut measured) = self.strip(name, MEASURED, &output.computed) else {
+            return vec![];
+        };
         let start_s = self.core.0 + history.time_s.first().copied().unwrap_or(0.0);
-        measured.traces.push(self.trace(start_s, &output.computed, measured.scale, INPUT));
+        measured
+            .traces
+            .push(self.trace(start_s, &output.computed, measured.scale, INPUT));
         // What was left out of the cost may be no measurement at all: it has a place in time and no residual.
-        let samples = output.measured.iter().zip(&output.computed).zip(&output.marked);
-        let residuals: Vec<f64> = samples.map(|((z, y), marked)| if *marked { f64::NAN } else { z - y }).collect();
+        let samples = output
+            .measured
+            .iter()
+            .zip(&output.computed)
+            .zip(&output.marked);
+        let residuals: Vec<f64> = samples
+            .map(|((z, y), marked)| if *marked { f64::NAN } else { z - y })
+            .collect();
         let (low, high) = extent(residuals.iter().copied()).unwrap_or((-1.0, 1.0));
         let scale = scale(low.min(0.0), high.max(0.0), RESIDUAL.steps);
-        let left_out = output.marked.iter().enumerate().filter(|(_, marked)| **marked);
+        let left_out = output
+            .marked
+            .iter()
+            .enumerate()
+            .filter(|(_, marked)| **marked);
         let dots = left_out.map(|(k, _)| (start_s + k as f64 * self.record.step_s, 0.0));
         let below = Strip {
             name: "residual".to_owned(),
@@ -305,19 +459,42 @@ impl Pen<'_> {
 fn scale(low: f64, high: f64, steps: f64) -> Scale {
     let scale = Scale::in_steps(low, high, steps);
     let ticks = (scale.max / scale.step).floor() - (scale.min / scale.step).ceil() + 1.0;
-    if ticks < 2.0 { Scale::with_step(low, high, scale.step, scale.step) } else { scale }
+    if ticks < 2.0 {
+        Scale::with_step(low, high, scale.step, scale.step)
+    } else {
+        scale
+    }
 }
 
 /// Surfaces and pilot controls that moved during the maneuver, and those that hardly did.
 fn moved<'a>(pen: &Pen, groups: &'a Groups) -> (Vec<&'a str>, Vec<&'a str>) {
-    let range = |name: &str| extent(pen.between(name, pen.core)).map_or(0.0, |(low, high)| high - low);
-    let inputs = groups.controls.iter().chain(&groups.surfaces).map(String::as_str);
+    let range =
+        |name: &str| extent(pen.between(name, pen.core)).map_or(0.0, |(low, high)| high - low);
+    let inputs = groups
+        .controls
+        .iter()
+        .chain(&groups.surfaces)
+        .map(String::as_str);
     let recorded = inputs.filter(|name| pen.record.values(name).is_some());
     let ranges: Vec<(&str, f64)> = recorded.map(|name| (name, range(name))).collect();
     let alike = |name: &str, other: &str| Unit::of_signal(name) == Unit::of_signal(other);
-    let most = |name: &str| ranges.iter().filter(|(o, _)| alike(name, o)).map(|r| r.1).fold(0.0, f64::max);
-    let least = |name: &str| groups.steps.get(name).map_or_else(|| HARDLY_BESIDE * most(name), |step| HARDLY * step);
-    let (moved, still): (Vec<_>, Vec<_>) = ranges.iter().copied().partition(|(name, range)| *range > least(name));
+    let most = |name: &str| {
+        ranges
+            .iter()
+            .filter(|(o, _)| alike(name, o))
+            .map(|r| r.1)
+            .fold(0.0, f64::max)
+    };
+    let least = |name: &str| {
+        groups
+            .steps
+            .get(name)
+            .map_or_else(|| HARDLY_BESIDE * most(name), |step| HARDLY * step)
+    };
+    let (moved, still): (Vec<_>, Vec<_>) = ranges
+        .iter()
+        .copied()
+        .partition(|(name, range)| *range > least(name));
     let names = |of: Vec<(&'a str, f64)>| of.into_iter().map(|m| m.0).collect();
     (names(moved), names(still))
 }
@@ -326,10 +503,19 @@ fn moved<'a>(pen: &Pen, groups: &'a Groups) -> (Vec<&'a str>, Vec<&'a str>) {
 fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
     let same = |e: &&EventRow| {
         e.given_class.as_ref() == Some(&maneuver.class)
-            && e.given_start_s.is_some_and(|s| (s - maneuver.start_s).abs() < 1.0)
+            && e.given_start_s
+                .is_some_and(|s| (s - maneuver.start_s).abs() < 1.0)
     };
-    let verdict = events.iter().find(same).map(|e| e.verdict.as_str()).filter(|v| *v != "agrees");
-    let rejected = if maneuver.is_rejected() { ", rejected" } else { "" };
+    let verdict = events
+        .iter()
+        .find(same)
+        .map(|e| e.verdict.as_str())
+        .filter(|v| *v != "agrees");
+    let rejected = if maneuver.is_rejected() {
+        ", rejected"
+    } else {
+        ""
+    };
     let label = format!("{} {}{rejected}", maneuver.class, maneuver.maneuver_id);
     Window {
         maneuver_id: maneuver.maneuver_id.clone(),
@@ -349,7 +535,12 @@ fn windows(view: &FlightView) -> Vec<Window> {
         start_s: u.start_s,
         end_s: u.end_s,
     });
-    let mut windows: Vec<Window> = view.maneuvers.iter().map(|m| window(m, view.events)).chain(unknown).collect();
+    let mut windows: Vec<Window> = view
+        .maneuvers
+        .iter()
+        .map(|m| window(m, view.events))
+        .chain(unknown)
+        .collect();
     windows.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     windows
 }
@@ -357,10 +548,18 @@ fn windows(view: &FlightView) -> Vec<Window> {
 /// Why maneuvers were rejected before they were estimated.
 fn rejected(maneuvers: &[Maneuver]) -> Vec<String> {
     let rejected: Vec<&Maneuver> = maneuvers.iter().filter(|m| m.is_rejected()).collect();
-    let line = |m: &&Maneuver| format!("{} {} is rejected: {}", m.class, m.maneuver_id, m.quality.reason);
+    let line = |m: &&Maneuver| {
+        format!(
+            "{} {} is rejected: {}",
+            m.class, m.maneuver_id, m.quality.reason
+        )
+    };
     let mut lines: Vec<String> = rejected.iter().take(MOST_PROBLEMS).map(line).collect();
     if rejected.len() > MOST_PROBLEMS {
-        lines.push(format!("and {} more in the table `maneuvers`", rejected.len() - MOST_PROBLEMS));
+        lines.push(format!(
+            "and {} more in the table `maneuvers`",
+            rejected.len() - MOST_PROBLEMS
+        ));
     }
     lines
 }
@@ -371,11 +570,30 @@ fn lanes(events: &[EventRow]) -> Vec<Lane> {
         return vec![];
     }
     let item = |class: &Option<String>, start: Option<f64>, end: Option<f64>| {
-        Some(LaneBox { label: class.clone()?, start_s: start?, end_s: end? })
+        Some(LaneBox {
+            label: class.clone()?,
+            start_s: start?,
+            end_s: end?,
+        })
     };
-    let given = events.iter().filter_map(|e| item(&e.given_class, e.given_start_s, e.given_end_s)).collect();
-    let found = events.iter().filter_map(|e| item(&e.found_class, e.found_start_s, e.found_end_s)).collect();
-    vec![Lane { name: "given".to_owned(), boxes: given }, Lane { name: "found".to_owned(), boxes: found }]
+    let given = events
+        .iter()
+        .filter_map(|e| item(&e.given_class, e.given_start_s, e.given_end_s))
+        .collect();
+    let found = events
+        .iter()
+        .filter_map(|e| item(&e.found_class, e.found_start_s, e.found_end_s))
+        .collect();
+    vec![
+        Lane {
+            name: "given".to_owned(),
+            boxes: given,
+        },
+        Lane {
+            name: "found".to_owned(),
+            boxes: found,
+        },
+    ]
 }
 
 /// Only what occurs.
@@ -386,12 +604,20 @@ fn legend(strips: &[Strip], windows: bool, events: bool, computed: bool) -> Vec<
         (events, Key::Given, "the analyst's event, or what was found"),
         (computed, Key::Line(MEASURED_COLOUR, 2.6), "measured"),
         (computed, Key::Line(INK, 1.1), "computed; residual"),
-        (strips.iter().any(|s| !s.dots.is_empty()), Key::Dot, "left out of the cost"),
+        (
+            strips.iter().any(|s| !s.dots.is_empty()),
+            Key::Dot,
+            "left out of the cost",
+        ),
         (any(|m| &m.bridged), Key::Bridged, "bridged"),
         (any(|m| &m.despiked), Key::Despiked, "spike replaced"),
         (any(|m| &m.missing), Key::Missing, "missing"),
     ];
-    entries.into_iter().filter(|e| e.0).map(|(_, key, word)| (key, word.to_owned())).collect()
+    entries
+        .into_iter()
+        .filter(|e| e.0)
+        .map(|(_, key, word)| (key, word.to_owned()))
+        .collect()
 }
 
 /// What the reader must know to read the chart.
@@ -407,10 +633,16 @@ fn notes(lacking: &[&str], still: &[&str], strips: &[Strip]) -> Vec<String> {
     }
     if !still.is_empty() {
         let names: Vec<&str> = still.iter().map(|name| without_unit(name)).collect();
-        notes.push(format!("Not drawn, for they hardly moved: {}.", names.join(", ")));
+        notes.push(format!(
+            "Not drawn, for they hardly moved: {}.",
+            names.join(", ")
+        ));
     }
-    let empty: Vec<&str> =
-        strips.iter().filter(|s| s.traces.iter().all(|t| t.pieces.is_empty())).map(|s| s.name.as_str()).collect();
+    let empty: Vec<&str> = strips
+        .iter()
+        .filter(|s| s.traces.iter().all(|t| t.pieces.is_empty()))
+        .map(|s| s.name.as_str())
+        .collect();
     if !empty.is_empty() {
         notes.push(format!("Without a sample: {}.", empty.join(", ")));
     }
@@ -421,7 +653,10 @@ fn problems(problems: &[Problem]) -> Vec<String> {
     let line = |p: &Problem| format!("{}, {}: {}", p.stage, p.place, p.reason);
     let mut lines: Vec<String> = problems.iter().take(MOST_PROBLEMS).map(line).collect();
     if problems.len() > MOST_PROBLEMS {
-        lines.push(format!("and {} more in the table `problems`", problems.len() - MOST_PROBLEMS));
+        lines.push(format!(
+            "and {} more in the table `problems`",
+            problems.len() - MOST_PROBLEMS
+        ));
     }
     lines
 }

@@ -72,10 +72,21 @@ pub struct ClassEstimates {
 /// The figure of a derivative.
 #[must_use]
 pub fn derivative(figure: &DerivativeFigure) -> String {
-    let layout = || layout("α, deg", &figure.y_label, HEIGHT, figure.alpha, figure.scale);
+    let layout = || {
+        layout(
+            "α, deg",
+            &figure.y_label,
+            HEIGHT,
+            figure.alpha,
+            figure.scale,
+        )
+    };
     let mut scene = render_multiple(curves(figure), layout());
     let place = ComputedLayout::from_layout(&layout());
-    let pen = Pen { place: &place, scale: figure.scale };
+    let pen = Pen {
+        place: &place,
+        scale: figure.scale,
+    };
     for class in &figure.classes {
         scene.add(Primitive::GroupStart {
             transform: None,
@@ -85,7 +96,12 @@ pub fn derivative(figure: &DerivativeFigure) -> String {
         pen.estimates(&mut scene, class.mark, &class.estimates);
         scene.add(Primitive::GroupEnd);
     }
-    inline(&SvgBackend::new().render_scene(&scene), figure.id, figure.title, figure.description)
+    inline(
+        &SvgBackend::new().render_scene(&scene),
+        figure.id,
+        figure.title,
+        figure.description,
+    )
 }
 
 fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layout {
@@ -109,7 +125,11 @@ fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layo
         .with_grid_line_width(0.5)
         .with_font_family(FONT);
     let crosses_zero = y.min < 0.0 && y.max > 0.0;
-    if crosses_zero { layout.with_reference_line(zero_line()) } else { layout }
+    if crosses_zero {
+        layout.with_reference_line(zero_line())
+    } else {
+        layout
+    }
 }
 
 /// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper minus.
@@ -122,7 +142,10 @@ fn ticks(scale: Scale) -> TickFormat {
 }
 
 fn zero_line() -> ReferenceLine {
-    ReferenceLine::horizontal(0.0).with_color("#777777").with_stroke_width(0.8).with_dasharray("none")
+    ReferenceLine::horizontal(0.0)
+        .with_color("#777777")
+        .with_stroke_width(0.8)
+        .with_dasharray("none")
 }
 
 /// A plot without points: the crate draws no axes where there is no plot at all.
@@ -134,16 +157,25 @@ fn nothing() -> Plot {
 fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
     let mut plots = vec![nothing()];
     if figure.band.len() > 1 {
-        let (alpha, ends): (Vec<f64>, Vec<(f64, f64)>) = figure.band.iter().map(|&(a, l, u)| (a, (l, u))).unzip();
+        let (alpha, ends): (Vec<f64>, Vec<(f64, f64)>) =
+            figure.band.iter().map(|&(a, l, u)| (a, (l, u))).unzip();
         let (lower, upper): (Vec<f64>, Vec<f64>) = ends.into_iter().unzip();
-        plots.push(Plot::Band(BandPlot::new(alpha, lower, upper).with_color("#5f6670").with_opacity(0.25)));
+        plots.push(Plot::Band(
+            BandPlot::new(alpha, lower, upper)
+                .with_color("#5f6670")
+                .with_opacity(0.25),
+        ));
     }
     if !figure.tunnel.is_empty() {
         plots.push(Plot::Line(curve(&figure.tunnel, TUNNEL_COLOUR, 1.6, "6 4")));
     }
     if !figure.tunnel.is_empty() && figure.tunnel.len() <= MOST_TUNNEL_MARKS {
-        let marks = ScatterPlot::new().with_data(figure.tunnel.clone()).with_color(TUNNEL_COLOUR);
-        plots.push(Plot::Scatter(marks.with_marker(MarkerShape::Cross).with_size(4.0)));
+        let marks = ScatterPlot::new()
+            .with_data(figure.tunnel.clone())
+            .with_color(TUNNEL_COLOUR);
+        plots.push(Plot::Scatter(
+            marks.with_marker(MarkerShape::Cross).with_size(4.0),
+        ));
     }
     if !figure.trend.is_empty() {
         plots.push(Plot::Line(curve(&figure.trend, INK, 1.8, "")));
@@ -152,8 +184,15 @@ fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
 }
 
 fn curve(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> LinePlot {
-    let line = LinePlot::new().with_data(points.to_vec()).with_color(colour).with_stroke_width(width);
-    if dash.is_empty() { line } else { line.with_line_style(kuva::plot::LineStyle::Custom(dash.to_owned())) }
+    let line = LinePlot::new()
+        .with_data(points.to_vec())
+        .with_color(colour)
+        .with_stroke_width(width);
+    if dash.is_empty() {
+        line
+    } else {
+        line.with_line_style(kuva::plot::LineStyle::Custom(dash.to_owned()))
+    }
 }
 
 /// Draws into the plot area what the crate does not draw well itself.
@@ -186,14 +225,23 @@ impl Pen<'_> {
         let y = |v: f64| self.place.map_y(v.clamp(self.scale.min, self.scale.max));
         // Writing into a String cannot fail.
         let _ = write!(path, "M{x:.1} {:.1}V{:.1}", y(low), y(high));
-        for end in [low, high].into_iter().filter(|end| self.scale.contains(*end)) {
+        for end in [low, high]
+            .into_iter()
+            .filter(|end| self.scale.contains(*end))
+        {
             let _ = write!(path, "M{:.1} {:.1}h5", x - 2.5, y(end));
         }
     }
 
     fn arrow(&self, path: &mut String, x: f64, value: f64) {
-        let (tip, tail) = if value > self.scale.max { (2.0, 8.0) } else { (-2.0, -8.0) };
-        let edge = self.place.map_y(value.clamp(self.scale.min, self.scale.max));
+        let (tip, tail) = if value > self.scale.max {
+            (2.0, 8.0)
+        } else {
+            (-2.0, -8.0)
+        };
+        let edge = self
+            .place
+            .map_y(value.clamp(self.scale.min, self.scale.max));
         let _ = write!(
             path,
             "M{:.1} {:.1}L{x:.1} {:.1}L{:.1} {:.1}",
@@ -227,7 +275,10 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
 /// who do not see it, has ids of its own, and no digits beyond a hundredth.
 fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);
-    let height = svg.split_once(" height=\"").and_then(|(_, rest)| rest.split_once('"')).map_or("0", |(h, _)| h);
+    let height = svg
+        .split_once(" height=\"")
+        .and_then(|(_, rest)| rest.split_once('"'))
+        .map_or("0", |(h, _)| h);
     let head = format!(
         r#"<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-labelledby="{id}-t {id}-d" font-family="{FONT}"><title id="{id}-t">{}</title><desc id="{id}-d">{}</desc>"#,
         escaped(title),
@@ -242,7 +293,11 @@ fn own_clips(svg: &str, id: &str) -> String {
     let mut parts = svg.split(COUNTED);
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let _ = write!(out, "clip-{id}{}", part.trim_start_matches(|c: char| c.is_ascii_digit()));
+        let _ = write!(
+            out,
+            "clip-{id}{}",
+            part.trim_start_matches(|c: char| c.is_ascii_digit())
+        );
     }
     out
 }
@@ -254,7 +309,11 @@ fn shortened(svg: &str) -> String {
     for part in parts {
         let digits = part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len();
         out.push('.');
-        out.push_str(if digits > 9 { &part[..2] } else { &part[..digits] });
+        out.push_str(if digits > 9 {
+            &part[..2]
+        } else {
+            &part[..digits]
+        });
         out.push_str(&part[digits..]);
     }
     out
@@ -270,8 +329,16 @@ mod tests {
             title: "CN_alpha <flight>",
             description: "two estimates",
             y_label: "CN_alpha, per deg".into(),
-            alpha: Scale { min: 0.0, max: 60.0, step: 10.0 },
-            scale: Scale { min: 0.0, max: 0.1, step: 0.02 },
+            alpha: Scale {
+                min: 0.0,
+                max: 60.0,
+                step: 10.0,
+            },
+            scale: Scale {
+                min: 0.0,
+                max: 0.1,
+                step: 0.02,
+            },
             band: vec![(5.0, 0.04, 0.06), (60.0, 0.01, 0.05)],
             trend: vec![(5.0, 0.05), (60.0, 0.03)],
             tunnel: vec![(5.0, 0.055), (60.0, 0.02)],
@@ -281,7 +348,11 @@ mod tests {
                     token: "c1".into(),
                     estimates: vec![(10.0, 0.05, 0.01), (20.0, 3.0, 0.2)],
                 },
-                ClassEstimates { mark: Mark::nth(1), token: "c2".into(), estimates: vec![] },
+                ClassEstimates {
+                    mark: Mark::nth(1),
+                    token: "c2".into(),
+                    estimates: vec![],
+                },
             ],
         }
     }
@@ -296,15 +367,29 @@ mod tests {
     #[test]
     fn estimates_have_marks_and_bars_and_those_outside_an_arrowhead() {
         let svg = derivative(&figure());
-        let without = derivative(&DerivativeFigure { classes: vec![], ..figure() });
-        assert_eq!(svg.matches("<path").count(), without.matches("<path").count() + 3);
+        let without = derivative(&DerivativeFigure {
+            classes: vec![],
+            ..figure()
+        });
+        assert_eq!(
+            svg.matches("<path").count(),
+            without.matches("<path").count() + 3
+        );
     }
 
     #[test]
     fn a_figure_without_curves_has_axes_all_the_same() {
         let (band, trend, tunnel) = (vec![], vec![], vec![]);
-        let svg = derivative(&DerivativeFigure { band, trend, tunnel, ..figure() });
-        assert!(svg.contains(">0.04</text>") && svg.contains(">60</text>"), "{svg}");
+        let svg = derivative(&DerivativeFigure {
+            band,
+            trend,
+            tunnel,
+            ..figure()
+        });
+        assert!(
+            svg.contains(">0.04</text>") && svg.contains(">60</text>"),
+            "{svg}"
+        );
     }
 
     #[test]
@@ -314,6 +399,9 @@ mod tests {
 
     #[test]
     fn only_digits_of_binary_fractions_are_cut() {
-        assert_eq!(shortened("a 12.340000000000002 0.0025 .5\""), "a 12.34 0.0025 .5\"");
+        assert_eq!(
+            shortened("a 12.340000000000002 0.0025 .5\""),
+            "a 12.34 0.0025 .5\""
+        );
     }
 }

@@ -40,16 +40,28 @@ pub struct FigureGroup {
 /// Where the figure of each derivative is. Numbered, because names may differ by case alone.
 #[must_use]
 pub fn anchors<'a>(subjects: &[Subject<'a>]) -> BTreeMap<&'a str, String> {
-    subjects.iter().enumerate().map(|(i, s)| (s.name, format!("d{}", i + 1))).collect()
+    subjects
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (s.name, format!("d{}", i + 1)))
+        .collect()
 }
 
 /// The classes with their marks, in the order of the configuration, axis by axis: one mark per class throughout.
 pub fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
     let mut marks: Vec<(&str, Mark)> = Vec::new();
     for axis in [Axis::Longitudinal, Axis::Lateral] {
-        let configured = contents.classes.iter().filter(|c| c.2 == axis).map(|c| c.0.as_str());
-        let flown: BTreeSet<&str> =
-            contents.maneuvers.iter().filter(|m| m.axis == axis).map(|m| m.class.as_str()).collect();
+        let configured = contents
+            .classes
+            .iter()
+            .filter(|c| c.2 == axis)
+            .map(|c| c.0.as_str());
+        let flown: BTreeSet<&str> = contents
+            .maneuvers
+            .iter()
+            .filter(|m| m.axis == axis)
+            .map(|m| m.class.as_str())
+            .collect();
         for class in configured.chain(flown) {
             if marks.iter().all(|(known, _)| *known != class) {
                 marks.push((class, Mark::nth(marks.len())));
@@ -62,20 +74,31 @@ pub fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
 /// What a class is called in the page where it is hidden: a word that needs no escaping; nothing for an unknown class.
 #[must_use]
 pub fn token(marks: &[(&str, Mark)], class: &str) -> String {
-    marks.iter().position(|m| m.0 == class).map_or_else(String::new, |i| format!("c{}", i + 1))
+    marks
+        .iter()
+        .position(|m| m.0 == class)
+        .map_or_else(String::new, |i| format!("c{}", i + 1))
 }
 
 /// The scale over angle of attack that all figures share, so that they can be laid side by side.
 fn alpha_scale(subjects: &[Subject]) -> Scale {
-    let points = subjects.iter().flat_map(|s| s.points.iter().map(|p| p.alpha_deg));
-    let rows = subjects.iter().flat_map(|s| s.trend.iter().map(|t| t.alpha_deg));
+    let points = subjects
+        .iter()
+        .flat_map(|s| s.points.iter().map(|p| p.alpha_deg));
+    let rows = subjects
+        .iter()
+        .flat_map(|s| s.trend.iter().map(|t| t.alpha_deg));
     let (low, high) = extent(points.chain(rows)).unwrap_or((0.0, 60.0));
     Scale::with_step(low, high, 5.0, 10.0)
 }
 
 /// The figures by coefficient.
 #[must_use]
-pub fn groups(contents: &Contents, subjects: &[Subject], anchors: &BTreeMap<&str, String>) -> Vec<FigureGroup> {
+pub fn groups(
+    contents: &Contents,
+    subjects: &[Subject],
+    anchors: &BTreeMap<&str, String>,
+) -> Vec<FigureGroup> {
     let marks = marks(contents);
     let alpha = alpha_scale(subjects);
     let mut groups: Vec<FigureGroup> = Vec::new();
@@ -87,7 +110,11 @@ pub fn groups(contents: &Contents, subjects: &[Subject], anchors: &BTreeMap<&str
             Some(group) if group.title == title => group.figures.push(view),
             _ => {
                 let anchor = format!("figures-{}", groups.len() + 1);
-                groups.push(FigureGroup { anchor, title: title.to_owned(), figures: vec![view] });
+                groups.push(FigureGroup {
+                    anchor,
+                    title: title.to_owned(),
+                    figures: vec![view],
+                });
             }
         }
     }
@@ -105,7 +132,13 @@ fn title(coefficient: Coefficient) -> &'static str {
     }
 }
 
-fn figure_view(subject: &Subject, anchor: String, number: usize, alpha: Scale, marks: &[(&str, Mark)]) -> FigureView {
+fn figure_view(
+    subject: &Subject,
+    anchor: String,
+    number: usize,
+    alpha: Scale,
+    marks: &[(&str, Mark)],
+) -> FigureView {
     let drawn = drawn(subject, marks);
     let scale = shown(subject).scale();
     let svg = figure::derivative(&DerivativeFigure {
@@ -117,10 +150,18 @@ fn figure_view(subject: &Subject, anchor: String, number: usize, alpha: Scale, m
         scale,
         band: finite_band(subject),
         trend: finite(subject.trend.iter().map(|t| (t.alpha_deg, t.value))),
-        tunnel: subject.tunnel.iter().copied().filter(|(a, _)| alpha.contains(*a)).collect(),
+        tunnel: subject
+            .tunnel
+            .iter()
+            .copied()
+            .filter(|(a, _)| alpha.contains(*a))
+            .collect(),
         classes: drawn.iter().map(|class| class.estimates.clone()).collect(),
     });
-    let classes = drawn.iter().map(|c| LegendView { key: c.estimates.mark.key(), label: c.name.to_owned() });
+    let classes = drawn.iter().map(|c| LegendView {
+        key: c.estimates.mark.key(),
+        label: c.name.to_owned(),
+    });
     FigureView {
         number,
         name: subject.name.to_owned(),
@@ -147,8 +188,13 @@ struct Drawn<'a> {
 /// The classes that a figure shows, in the order of the configuration; one that is not known there comes last.
 fn drawn<'a>(subject: &'a Subject, marks: &[(&'a str, Mark)]) -> Vec<Drawn<'a>> {
     let by_class = by_name(&subject.points, |p| p.class);
-    let unknown = by_class.keys().copied().filter(|class| marks.iter().all(|(known, _)| known != class));
-    let unknown = unknown.enumerate().map(|(i, class)| (class, Mark::nth(marks.len() + i)));
+    let unknown = by_class
+        .keys()
+        .copied()
+        .filter(|class| marks.iter().all(|(known, _)| known != class));
+    let unknown = unknown
+        .enumerate()
+        .map(|(i, class)| (class, Mark::nth(marks.len() + i)));
     marks
         .iter()
         .copied()
@@ -156,7 +202,14 @@ fn drawn<'a>(subject: &'a Subject, marks: &[(&'a str, Mark)]) -> Vec<Drawn<'a>> 
         .filter_map(|(name, mark)| {
             let points = by_class.get(name)?.iter();
             let estimates = points.map(|p| (p.alpha_deg, p.value, p.bound)).collect();
-            Some(Drawn { name, estimates: ClassEstimates { mark, token: token(marks, name), estimates } })
+            Some(Drawn {
+                name,
+                estimates: ClassEstimates {
+                    mark,
+                    token: token(marks, name),
+                    estimates,
+                },
+            })
         })
         .collect()
 }
@@ -165,7 +218,11 @@ fn drawn<'a>(subject: &'a Subject, marks: &[(&'a str, Mark)]) -> Vec<Drawn<'a>> 
 fn description(subject: &Subject) -> String {
     let classes: BTreeSet<&str> = subject.points.iter().map(|p| p.class).collect();
     let classes: Vec<&str> = classes.into_iter().collect();
-    let mut said = vec![format!("{} of {}", count(subject.points.len(), "estimate"), classes.join(", "))];
+    let mut said = vec![format!(
+        "{} of {}",
+        count(subject.points.len(), "estimate"),
+        classes.join(", ")
+    )];
     let ends = |name: &str, first: Option<(f64, f64)>, last: Option<(f64, f64)>| {
         let ((a, from), (b, to)) = (first?, last?);
         let value = |v: f64| notation::number(Some(v), 3);
@@ -178,14 +235,26 @@ fn description(subject: &Subject) -> String {
         ))
     };
     let trend = |row: &&&crate::tables::TrendRow| (row.alpha_deg, row.value);
-    said.extend(ends("trend", subject.trend.first().as_ref().map(trend), subject.trend.last().as_ref().map(trend)));
-    said.extend(ends("wind tunnel", subject.tunnel.first().copied(), subject.tunnel.last().copied()));
+    said.extend(ends(
+        "trend",
+        subject.trend.first().as_ref().map(trend),
+        subject.trend.last().as_ref().map(trend),
+    ));
+    said.extend(ends(
+        "wind tunnel",
+        subject.tunnel.first().copied(),
+        subject.tunnel.last().copied(),
+    ));
     said.join("; ") + "."
 }
 
 /// The label of an axis.
 pub fn label(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
+    if unit.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name}, {unit}")
+    }
 }
 
 fn shown(subject: &Subject) -> Shown {
@@ -193,18 +262,28 @@ fn shown(subject: &Subject) -> Shown {
     Shown {
         lines: trend.chain(subject.tunnel.iter().map(|t| t.1)).collect(),
         estimates: subject.points.iter().map(|p| (p.value, p.bound)).collect(),
-        band: subject.trend.iter().flat_map(|t| [t.lower_95, t.upper_95]).collect(),
+        band: subject
+            .trend
+            .iter()
+            .flat_map(|t| [t.lower_95, t.upper_95])
+            .collect(),
     }
 }
 
 /// The points of which both coordinates are numbers.
 pub fn finite(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    points.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
+    points
+        .filter(|(x, y)| x.is_finite() && y.is_finite())
+        .collect()
 }
 
 fn finite_band(subject: &Subject) -> Vec<(f64, f64, f64)> {
-    let ends = subject.trend.iter().map(|t| (t.alpha_deg, t.lower_95, t.upper_95));
-    ends.filter(|(_, low, high)| low.is_finite() && high.is_finite()).collect()
+    let ends = subject
+        .trend
+        .iter()
+        .map(|t| (t.alpha_deg, t.lower_95, t.upper_95));
+    ends.filter(|(_, low, high)| low.is_finite() && high.is_finite())
+        .collect()
 }
 
 fn lines_legend(subject: &Subject) -> Vec<LegendView> {
@@ -212,13 +291,29 @@ fn lines_legend(subject: &Subject) -> Vec<LegendView> {
     if !subject.trend.is_empty() {
         let band = r##"<rect y="1" width="24" height="10" fill="#5f6670" fill-opacity=".25"/>"##;
         let key = key(24, &format!("{band}{}", line(figure::INK, "", 1.8)));
-        let group = if subject.group.is_empty() { String::new() } else { format!(" ({})", subject.group) };
-        legend.push(LegendView { key, label: format!("trend{group}, 95 % band") });
+        let group = if subject.group.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", subject.group)
+        };
+        legend.push(LegendView {
+            key,
+            label: format!("trend{group}, 95 % band"),
+        });
     }
     if !subject.tunnel.is_empty() {
-        let cross = format!(r#"<path d="M9 3l6 6m0-6l-6 6" stroke="{}" stroke-width="1.5"/>"#, figure::TUNNEL_COLOUR);
-        let key = key(24, &format!("{}{cross}", line(figure::TUNNEL_COLOUR, "6 4", 1.6)));
-        legend.push(LegendView { key, label: "wind tunnel".to_owned() });
+        let cross = format!(
+            r#"<path d="M9 3l6 6m0-6l-6 6" stroke="{}" stroke-width="1.5"/>"#,
+            figure::TUNNEL_COLOUR
+        );
+        let key = key(
+            24,
+            &format!("{}{cross}", line(figure::TUNNEL_COLOUR, "6 4", 1.6)),
+        );
+        legend.push(LegendView {
+            key,
+            label: "wind tunnel".to_owned(),
+        });
     }
     legend
 }
@@ -236,13 +331,25 @@ fn caption(subject: &Subject, scale: Scale) -> String {
     if subject.tunnel.is_empty() && subject.coefficient.is_some() {
         parts.push("no wind-tunnel value".to_owned());
     }
-    let outside = subject.points.iter().filter(|p| !scale.contains(p.value)).count();
+    let outside = subject
+        .points
+        .iter()
+        .filter(|p| !scale.contains(p.value))
+        .count();
     let unseen = [
         (outside, "outside the axes (arrowheads)"),
-        (subject.undetermined, "not drawn: not determined by the data"),
+        (
+            subject.undetermined,
+            "not drawn: not determined by the data",
+        ),
         (subject.unconverged, "not drawn: fit not converged"),
     ];
-    parts.extend(unseen.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")));
+    parts.extend(
+        unseen
+            .into_iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{n} {what}")),
+    );
     parts.join("; ") + "."
 }
 
@@ -273,7 +380,12 @@ mod tests {
         }
         let contents = campaign.contents();
         let subjects = subject::gather(&contents);
-        assert!(subjects.iter().filter(|s| !s.comparison.is_empty()).all(|s| s.tunnel.is_empty()));
+        assert!(
+            subjects
+                .iter()
+                .filter(|s| !s.comparison.is_empty())
+                .all(|s| s.tunnel.is_empty())
+        );
     }
 
     #[test]
@@ -281,11 +393,19 @@ mod tests {
         let mut campaign = samples::campaign();
         let name = campaign.comparison[0].derivative.clone();
         // The last one: the first belongs to the fit that did not converge.
-        let last = campaign.estimates.iter_mut().rev().find(|e| e.derivative == name).expect("an estimate");
+        let last = campaign
+            .estimates
+            .iter_mut()
+            .rev()
+            .find(|e| e.derivative == name)
+            .expect("an estimate");
         (last.bound, last.bound_corrected) = (None, None);
         let contents = campaign.contents();
         let subjects = subject::gather(&contents);
-        let subject = subjects.iter().find(|s| s.name == name).expect("the subject");
+        let subject = subjects
+            .iter()
+            .find(|s| s.name == name)
+            .expect("the subject");
         let text = caption(subject, shown(subject).scale());
         assert!(text.contains("1 not drawn: not determined"), "{text}");
         assert!(text.contains("1 not drawn: fit not converged"), "{text}");

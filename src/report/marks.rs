@@ -22,10 +22,18 @@ enum Shape {
     TriangleDown,
 }
 
-const SHAPES: [Shape; 5] = [Shape::Circle, Shape::Square, Shape::Triangle, Shape::Diamond, Shape::TriangleDown];
+const SHAPES: [Shape; 5] = [
+    Shape::Circle,
+    Shape::Square,
+    Shape::Triangle,
+    Shape::Diamond,
+    Shape::TriangleDown,
+];
 
 /// Dark enough on white paper, and apart from each other in lightness too.
-const COLOURS: [&str; 6] = ["#111111", "#0060a8", "#b34700", "#6a2c91", "#00664b", "#7a5200"];
+const COLOURS: [&str; 6] = [
+    "#111111", "#0060a8", "#b34700", "#6a2c91", "#00664b", "#7a5200",
+];
 
 /// How one class is marked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +48,11 @@ impl Mark {
     #[must_use]
     pub fn nth(n: usize) -> Mark {
         let shape = SHAPES[n % SHAPES.len()];
-        Mark { shape, hollow: n % 2 == 1, colour: COLOURS[(n % 10 + n / 10) % COLOURS.len()] }
+        Mark {
+            shape,
+            hollow: n % 2 == 1,
+            colour: COLOURS[(n % 10 + n / 10) % COLOURS.len()],
+        }
     }
 
     /// What it is filled with.
@@ -80,7 +92,14 @@ impl Mark {
     pub fn key(self) -> String {
         let mut path = String::new();
         self.outline(&mut path, 6.0, 6.0, 4.0);
-        key(12, &format!(r#"<path d="{path}" fill="{}" stroke="{}" stroke-width="1.3"/>"#, self.fill(), self.colour))
+        key(
+            12,
+            &format!(
+                r#"<path d="{path}" fill="{}" stroke="{}" stroke-width="1.3"/>"#,
+                self.fill(),
+                self.colour
+            ),
+        )
     }
 }
 
@@ -96,7 +115,9 @@ pub fn key(width: u32, content: &str) -> String {
 #[must_use]
 pub fn line(colour: &str, dash: &str, width: f64) -> String {
     let dash = if dash.is_empty() { "none" } else { dash };
-    format!(r#"<path d="M0 6h24" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}" fill="none"/>"#)
+    format!(
+        r#"<path d="M0 6h24" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}" fill="none"/>"#
+    )
 }
 
 #[cfg(test)]
@@ -107,7 +128,10 @@ mod tests {
     fn thirty_classes_of_one_axis_have_marks_of_their_own() {
         let marks: Vec<Mark> = (0..30).map(Mark::nth).collect();
         for (i, mark) in marks.iter().enumerate() {
-            assert!(!marks[..i].contains(mark), "class {i} looks like an earlier one: {mark:?}");
+            assert!(
+                !marks[..i].contains(mark),
+                "class {i} looks like an earlier one: {mark:?}"
+            );
         }
     }
 

@@ -40,8 +40,8 @@ use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::overnight::Changes;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, InstrumentRow,
-    PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
+    InstrumentRow, PredictionRow, TrendRow,
 };
 use by_class::ClassFigure;
 use failures::TableView;
@@ -127,7 +127,11 @@ pub fn html(contents: &Contents, template: Option<&str>) -> Result<String, Strin
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment
-        .render_named_str("report.html", template.unwrap_or(include_str!("report.html")), Serde(&page))
+        .render_named_str(
+            "report.html",
+            template.unwrap_or(include_str!("report.html")),
+            Serde(&page),
+        )
         .map_err(|error| format!("the report's template: {error:#}"))
 }
 
@@ -179,13 +183,21 @@ fn counts(contents: &Contents, subjects: &[Subject]) -> String {
 /// Derivatives of the model that no maneuver estimates: they stand nowhere else in the page.
 fn never_estimated<'a>(contents: &Contents<'a>, subjects: &[Subject]) -> Vec<&'a str> {
     let shown: BTreeSet<&str> = subjects.iter().map(|s| s.name).collect();
-    contents.order.iter().map(String::as_str).filter(|name| !shown.contains(name)).collect()
+    contents
+        .order
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !shown.contains(name))
+        .collect()
 }
 
 /// Flight against tunnel for one derivative, a row per angle of attack.
 fn comparison(subject: &Subject) -> TableView {
     let rows = &subject.comparison;
-    let values = rows.iter().flat_map(|c| [Some(c.flight), c.wind_tunnel]).flatten();
+    let values = rows
+        .iter()
+        .flat_map(|c| [Some(c.flight), c.wind_tunnel])
+        .flatten();
     let digits = Digits::of(values, 4);
     let row = |c: &&crate::tables::ComparisonRow| {
         vec![
@@ -194,22 +206,41 @@ fn comparison(subject: &Subject) -> TableView {
             digits.write(Some(c.standard_error)),
             digits.write(c.wind_tunnel),
             digits.write(c.difference),
-            c.difference_pct.map_or_else(|| NOTHING.to_owned(), |p| fixed(p, 1)),
+            c.difference_pct
+                .map_or_else(|| NOTHING.to_owned(), |p| fixed(p, 1)),
             c.z.map_or_else(|| NOTHING.to_owned(), |z| fixed(z, 1)),
             c.verdict.clone(),
         ]
     };
-    let heads = ["α", "flight", "standard error", "wind tunnel", "difference", "%", "z", "verdict"];
-    let note = subject.trend.first().map_or_else(String::new, |t| trend_in_words(t));
+    let heads = [
+        "α",
+        "flight",
+        "standard error",
+        "wind tunnel",
+        "difference",
+        "%",
+        "z",
+        "verdict",
+    ];
+    let note = subject
+        .trend
+        .first()
+        .map_or_else(String::new, |t| trend_in_words(t));
     let title = "Flight against wind tunnel".to_owned();
-    TableView { title, ..TableView::new("", &note, &heads, rows.iter().map(row).collect()) }
+    TableView {
+        title,
+        ..TableView::new("", &note, &heads, rows.iter().map(row).collect())
+    }
 }
 
 /// What the trend that speaks for flight was fitted through, and how.
 fn trend_in_words(trend: &TrendRow) -> String {
     let maneuvers = notation::count(trend.maneuvers, "maneuver");
     let scatter = number(Some(trend.scatter), 2);
-    format!("trend of {}: {maneuvers}, order {}, scatter {scatter}", trend.group, trend.order)
+    format!(
+        "trend of {}: {maneuvers}, order {}, scatter {scatter}",
+        trend.group, trend.order
+    )
 }
 
 /// That not every maneuver has a page, where that is so.
@@ -238,14 +269,17 @@ fn maneuvers(contents: &Contents) -> TableView {
             fixed(m.alpha_deg, 1),
             fixed(m.mach, 3),
             fixed(m.qbar_psf, 1),
-            fit.map_or("no fit", |f| summary::outcome_in_words(&f.outcome)).to_owned(),
+            fit.map_or("no fit", |f| summary::outcome_in_words(&f.outcome))
+                .to_owned(),
             fit.map_or_else(|| NOTHING.to_owned(), |f| f.iterations.to_string()),
             of_fit(|f| f.initial_cost),
             of_fit(|f| f.final_cost),
             of_fit(|f| f.condition_number),
-            fit.and_then(|f| f.left_out).map_or_else(|| NOTHING.to_owned(), |share| fixed(100.0 * share, 2)),
+            fit.and_then(|f| f.left_out)
+                .map_or_else(|| NOTHING.to_owned(), |share| fixed(100.0 * share, 2)),
             // That a fit converged needs no reason; for the others the reader wants it beside the flight condition.
-            fit.filter(|f| f.outcome != "converged").map_or_else(String::new, |f| f.reason.clone()),
+            fit.filter(|f| f.outcome != "converged")
+                .map_or_else(String::new, |f| f.reason.clone()),
         ]
     };
     let heads = [
@@ -264,11 +298,24 @@ fn maneuvers(contents: &Contents) -> TableView {
         "left out, %",
         "reason",
     ];
-    let mut table =
-        TableView::new("Maneuvers", &without_page(contents), &heads, contents.maneuvers.iter().map(row).collect());
+    let mut table = TableView::new(
+        "Maneuvers",
+        &without_page(contents),
+        &heads,
+        contents.maneuvers.iter().map(row).collect(),
+    );
     let (marks, anchors) = (gallery::marks(contents), sheets::anchors(contents));
-    let anchor = |m: &Maneuver| anchors.get(m.maneuver_id.as_str()).cloned().unwrap_or_default();
+    let anchor = |m: &Maneuver| {
+        anchors
+            .get(m.maneuver_id.as_str())
+            .cloned()
+            .unwrap_or_default()
+    };
     table.links = contents.maneuvers.iter().map(anchor).collect();
-    table.classes = contents.maneuvers.iter().map(|m| gallery::token(&marks, &m.class)).collect();
+    table.classes = contents
+        .maneuvers
+        .iter()
+        .map(|m| gallery::token(&marks, &m.class))
+        .collect();
     table
 }

@@ -26,7 +26,11 @@ pub fn symbol(name: &str) -> String {
         return escaped(name);
     };
     let coefficient = prefix.strip_prefix('C').unwrap_or(prefix);
-    format!("C<sub>{}{}</sub>", escaped(coefficient), escaped(&regressor_symbol(regressor)))
+    format!(
+        "C<sub>{}{}</sub>",
+        escaped(coefficient),
+        escaped(&regressor_symbol(regressor))
+    )
 }
 
 fn regressor_symbol(regressor: &str) -> String {
@@ -64,13 +68,18 @@ pub fn unit(name: &str) -> String {
 /// A signal's name without the unit at its end, where that is said elsewhere or there is none.
 #[must_use]
 pub fn without_unit(signal: &str) -> &str {
-    Unit::of_signal(signal).suffix.and_then(|suffix| signal.strip_suffix(suffix)).unwrap_or(signal)
+    Unit::of_signal(signal)
+        .suffix
+        .and_then(|suffix| signal.strip_suffix(suffix))
+        .unwrap_or(signal)
 }
 
 /// A number with so many significant digits, a proper minus, and a dash where it is missing or not finite.
 #[must_use]
 pub fn number(value: Option<f64>, significant: usize) -> String {
-    let Some(value) = value.filter(|v| v.is_finite()) else { return NOTHING.to_owned() };
+    let Some(value) = value.filter(|v| v.is_finite()) else {
+        return NOTHING.to_owned();
+    };
     Digits::of([value], significant).write(Some(value))
 }
 
@@ -90,7 +99,11 @@ pub fn angle(alpha_deg: f64) -> String {
 /// `1 maneuver`, `2 maneuvers`.
 #[must_use]
 pub fn count(n: usize, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{n} {noun}s")
+    }
 }
 
 /// One form for all the numbers of a column, so that their decimal points stand under each other.
@@ -104,7 +117,10 @@ impl Digits {
     /// The form in which the largest of the values shows so many significant digits.
     #[must_use]
     pub fn of(values: impl IntoIterator<Item = f64>, significant: usize) -> Digits {
-        let largest = values.into_iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+        let largest = values
+            .into_iter()
+            .filter(|v| v.is_finite())
+            .fold(0.0_f64, |m, v| m.max(v.abs()));
         if largest == 0.0 {
             return Digits::Decimals(0);
         }
@@ -121,18 +137,30 @@ impl Digits {
     /// The number in this form; a dash where it is missing or not finite.
     #[must_use]
     pub fn write(self, value: Option<f64>) -> String {
-        let Some(value) = value.filter(|v| v.is_finite()) else { return NOTHING.to_owned() };
+        let Some(value) = value.filter(|v| v.is_finite()) else {
+            return NOTHING.to_owned();
+        };
         let text = match self {
             Digits::Decimals(decimals) => format!("{value:.decimals$}"),
             Digits::Scientific(decimals) => format!("{value:.decimals$e}"),
         };
-        let zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
-        if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "\u{2212}") }
+        let zero = text
+            .trim_start_matches('-')
+            .chars()
+            .all(|c| matches!(c, '0' | '.'));
+        if zero {
+            text.trim_start_matches('-').to_owned()
+        } else {
+            text.replace('-', "\u{2212}")
+        }
     }
 }
 
 /// The power of ten of a positive finite number's first digit.
-#[expect(clippy::cast_possible_truncation, reason = "the logarithm of a finite number is within ±324")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the logarithm of a finite number is within ±324"
+)]
 #[must_use]
 pub fn power_of_ten(value: f64) -> i32 {
     value.log10().floor() as i32

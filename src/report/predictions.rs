@@ -24,31 +24,64 @@ pub fn table(contents: &Contents) -> Option<TableView> {
         }
     }
     let of = |class: &str, output: &str| {
-        contents.predictions.iter().filter(|p| p.class == class && p.output == output).collect::<Vec<_>>()
+        contents
+            .predictions
+            .iter()
+            .filter(|p| p.class == class && p.output == output)
+            .collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<String>> = kinds.iter().map(|(class, output)| row(&of(class, output))).collect();
-    let heads = ["class", "output", "maneuvers", "median U", "bias", "variance", "median R²", "largest U", "by"];
+    let rows: Vec<Vec<String>> = kinds
+        .iter()
+        .map(|(class, output)| row(&of(class, output)))
+        .collect();
+    let heads = [
+        "class",
+        "output",
+        "maneuvers",
+        "median U",
+        "bias",
+        "variance",
+        "median R²",
+        "largest U",
+        "by",
+    ];
     (!rows.is_empty()).then(|| TableView::new("Class and output", NOTE, &heads, rows))
 }
 
 fn row(predictions: &[&PredictionRow]) -> Vec<String> {
     let median = |value: fn(&PredictionRow) -> Option<f64>| {
-        quantile(&predictions.iter().filter_map(|p| value(p)).collect::<Vec<_>>(), 0.5)
+        quantile(
+            &predictions
+                .iter()
+                .filter_map(|p| value(p))
+                .collect::<Vec<_>>(),
+            0.5,
+        )
     };
-    let percent =
-        |share: Option<f64>| share.map_or_else(|| NOTHING.to_owned(), |s| format!("{} %", fixed(100.0 * s, 0)));
+    let percent = |share: Option<f64>| {
+        share.map_or_else(
+            || NOTHING.to_owned(),
+            |s| format!("{} %", fixed(100.0 * s, 0)),
+        )
+    };
     let with_theil = predictions.iter().filter_map(|p| Some((p.theil?, p)));
     let worst = with_theil.max_by(|a, b| a.0.total_cmp(&b.0));
     vec![
-        predictions.first().map_or_else(String::new, |p| p.class.clone()),
-        predictions.first().map_or_else(String::new, |p| p.output.clone()),
+        predictions
+            .first()
+            .map_or_else(String::new, |p| p.class.clone()),
+        predictions
+            .first()
+            .map_or_else(String::new, |p| p.output.clone()),
         predictions.len().to_string(),
         number(median(|p| p.theil), 2),
         percent(median(|p| p.theil_bias)),
         percent(median(|p| p.theil_variance)),
         median(|p| p.r_squared).map_or_else(|| NOTHING.to_owned(), |r| fixed(r, 3)),
         number(worst.map(|(u, _)| u), 2),
-        worst.map_or_else(String::new, |(_, p)| format!("{} (α {}°)", p.maneuver_id, fixed(p.alpha_deg, 0))),
+        worst.map_or_else(String::new, |(_, p)| {
+            format!("{} (α {}°)", p.maneuver_id, fixed(p.alpha_deg, 0))
+        }),
     ]
 }
 
@@ -82,7 +115,17 @@ mod tests {
             campaign.predictions.push(prediction(maneuver, theil, r));
         }
         let table = table(&campaign.contents()).unwrap();
-        let expected = ["OLON", "q", "3", "0.040", "10 %", "20 %", "0.980", "0.30", "m2 (α 20°)"];
+        let expected = [
+            "OLON",
+            "q",
+            "3",
+            "0.040",
+            "10 %",
+            "20 %",
+            "0.980",
+            "0.30",
+            "m2 (α 20°)",
+        ];
         assert_eq!(table.rows, [expected.map(str::to_owned).to_vec()]);
         let page = super::super::html(&campaign.contents(), None).unwrap();
         assert!(page.contains("Prediction of data not used") && page.contains("m2 (α 20°)"));

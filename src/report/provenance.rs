@@ -32,6 +32,11 @@ impl Provenance {
     pub fn table(&self) -> TableView {
         let row = |f: &SourceFile| vec![f.name.clone(), f.bytes.to_string(), f.blake3.clone()];
         let note = "BLAKE3 of each file's content: the same digits are the same data.";
-        TableView::new("Data", note, &["file", "bytes", "BLAKE3"], self.data.iter().map(row).collect())
+        TableView::new(
+            "Data",
+            note,
+            &["file", "bytes", "BLAKE3"],
+            self.data.iter().map(row).collect(),
+        )
     }
 }

@@ -23,11 +23,17 @@ pub struct Columns {
 
 impl Columns {
     /// The column of a time; none outside the axis.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of columns")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and the number of columns"
+    )]
     fn of(self, time_s: f64) -> Option<usize> {
         let share = (time_s - self.from_s) / (self.to_s - self.from_s);
         let last = self.count.checked_sub(1)?;
-        (0.0..=1.0).contains(&share).then(|| ((share * self.count as f64).floor() as usize).min(last))
+        (0.0..=1.0)
+            .contains(&share)
+            .then(|| ((share * self.count as f64).floor() as usize).min(last))
     }
 
     /// The width of one, s.
@@ -47,14 +53,26 @@ struct Extremes {
 
 impl Extremes {
     fn with(self, point: (f64, f64)) -> Extremes {
-        let low = if point.1 < self.low.1 { point } else { self.low };
-        let high = if point.1 > self.high.1 { point } else { self.high };
+        let low = if point.1 < self.low.1 {
+            point
+        } else {
+            self.low
+        };
+        let high = if point.1 > self.high.1 {
+            point
+        } else {
+            self.high
+        };
         Extremes { low, high, ..self }
     }
 
     /// In the order of time; one point where both are the same sample.
     fn put(self, piece: &mut Vec<(f64, f64)>) {
-        let (first, second) = if self.low.0 <= self.high.0 { (self.low, self.high) } else { (self.high, self.low) };
+        let (first, second) = if self.low.0 <= self.high.0 {
+            (self.low, self.high)
+        } else {
+            (self.high, self.low)
+        };
         piece.push(first);
         if second.0 > first.0 {
             piece.push(second);
@@ -71,7 +89,9 @@ pub fn envelope(shown: Shown, columns: Columns) -> Vec<Vec<(f64, f64)>> {
     let mut gap = false;
     for (k, &value) in shown.values.iter().enumerate() {
         let time_s = shown.start_s + k as f64 * shown.step_s;
-        let Some(column) = columns.of(time_s) else { continue };
+        let Some(column) = columns.of(time_s) else {
+            continue;
+        };
         if !value.is_finite() {
             gap = true;
             continue;
@@ -86,7 +106,11 @@ pub fn envelope(shown: Shown, columns: Columns) -> Vec<Vec<(f64, f64)>> {
                 if gap && !piece.is_empty() {
                     pieces.push(std::mem::take(&mut piece));
                 }
-                Some(Extremes { column, low: point, high: point })
+                Some(Extremes {
+                    column,
+                    low: point,
+                    high: point,
+                })
             }
         };
         gap = false;
@@ -102,10 +126,18 @@ pub fn envelope(shown: Shown, columns: Columns) -> Vec<Vec<(f64, f64)>> {
 
 /// From when to when samples bear a mark, s; runs that no column separates are one.
 #[must_use]
-pub fn runs(series: &Series, start_s: f64, step_s: f64, mark: Mark, columns: Columns) -> Vec<(f64, f64)> {
+pub fn runs(
+    series: &Series,
+    start_s: f64,
+    step_s: f64,
+    mark: Mark,
+    columns: Columns,
+) -> Vec<(f64, f64)> {
     let half = 0.5 * step_s;
     let marked = series.marks.iter().enumerate().filter(|(_, m)| **m == mark);
-    let times = marked.map(|(k, _)| start_s + k as f64 * step_s).filter(|t| columns.of(*t).is_some());
+    let times = marked
+        .map(|(k, _)| start_s + k as f64 * step_s)
+        .filter(|t| columns.of(*t).is_some());
     let mut runs: Vec<(f64, f64)> = Vec::new();
     for time_s in times {
         match runs.last_mut() {
@@ -122,10 +154,18 @@ mod tests {
     use crate::report::scale::extent;
     use proptest::prelude::*;
 
-    const COLUMNS: Columns = Columns { from_s: 0.0, to_s: 1000.0, count: 50 };
+    const COLUMNS: Columns = Columns {
+        from_s: 0.0,
+        to_s: 1000.0,
+        count: 50,
+    };
 
     fn shown(values: &[f64]) -> Shown<'_> {
-        Shown { start_s: 0.0, step_s: 1000.0 / values.len() as f64, values }
+        Shown {
+            start_s: 0.0,
+            step_s: 1000.0 / values.len() as f64,
+            values,
+        }
     }
 
     #[test]
@@ -133,7 +173,11 @@ mod tests {
         let mut values = vec![1.0; 1_440_000];
         values[777_777] = -42.0;
         let pieces = envelope(shown(&values), COLUMNS);
-        let drawn = pieces.iter().flatten().find(|p| p.1 < 0.0).expect("the spike");
+        let drawn = pieces
+            .iter()
+            .flatten()
+            .find(|p| p.1 < 0.0)
+            .expect("the spike");
         assert_eq!(*drawn, (777_777.0 * (1000.0 / 1_440_000.0), -42.0));
         assert_eq!(pieces.len(), 1);
     }
@@ -141,7 +185,11 @@ mod tests {
     #[test]
     fn a_few_samples_are_all_drawn_as_they_are() {
         let values = [1.0, 3.0, 2.0, 5.0, 4.0];
-        let points: Vec<f64> = envelope(shown(&values), COLUMNS).concat().iter().map(|p| p.1).collect();
+        let points: Vec<f64> = envelope(shown(&values), COLUMNS)
+            .concat()
+            .iter()
+            .map(|p| p.1)
+            .collect();
         assert_eq!(points, values);
     }
 
@@ -163,9 +211,18 @@ mod tests {
             marks[k] = Mark::Bridged;
         }
         marks[900] = Mark::Missing;
-        let series = Series { values: vec![0.0; 1000], marks };
-        assert_eq!(runs(&series, 0.0, 1.0, Mark::Bridged, COLUMNS), [(99.5, 109.5), (499.5, 598.5)]);
-        assert_eq!(runs(&series, 0.0, 1.0, Mark::Missing, COLUMNS), [(899.5, 900.5)]);
+        let series = Series {
+            values: vec![0.0; 1000],
+            marks,
+        };
+        assert_eq!(
+            runs(&series, 0.0, 1.0, Mark::Bridged, COLUMNS),
+            [(99.5, 109.5), (499.5, 598.5)]
+        );
+        assert_eq!(
+            runs(&series, 0.0, 1.0, Mark::Missing, COLUMNS),
+            [(899.5, 900.5)]
+        );
         assert!(runs(&series, 0.0, 1.0, Mark::Despiked, COLUMNS).is_empty());
     }
 

@@ -9,8 +9,8 @@ use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
 use crate::overnight::Changes;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History, HistoryOutput,
-    InstrumentRow, PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
+    HistoryOutput, InstrumentRow, PredictionRow, TrendRow,
 };
 
 /// Owns what [`Contents`] borrows.
@@ -68,18 +68,31 @@ impl Campaign {
     }
 }
 
-const LONGITUDINAL: [(&str, &str); 4] =
-    [("CN_0", "-"), ("CN_alpha", "per_deg"), ("Cm_de", "per_deg"), ("an_bias", "g")];
-const LATERAL: [(&str, &str); 4] =
-    [("CY_beta", "per_deg"), ("Cn_0", "-"), ("Cn_alpha", "per_deg"), ("Cn_dyv", "ftlbf_per_deg")];
+const LONGITUDINAL: [(&str, &str); 4] = [
+    ("CN_0", "-"),
+    ("CN_alpha", "per_deg"),
+    ("Cm_de", "per_deg"),
+    ("an_bias", "g"),
+];
+const LATERAL: [(&str, &str); 4] = [
+    ("CY_beta", "per_deg"),
+    ("Cn_0", "-"),
+    ("Cn_alpha", "per_deg"),
+    ("Cn_dyv", "ftlbf_per_deg"),
+];
 
 /// Two classes of each axis at α 10° to 50°; names that differ by case alone, a wild estimate, one fit that failed.
 pub fn campaign() -> Campaign {
     let mut campaign = Campaign::default();
-    for (class, axis) in
-        [("OLON", Axis::Longitudinal), ("3211", Axis::Longitudinal), ("OLAT", Axis::Lateral), ("PYRS", Axis::Lateral)]
-    {
-        campaign.classes.push((class.into(), format!("{class} steps"), axis));
+    for (class, axis) in [
+        ("OLON", Axis::Longitudinal),
+        ("3211", Axis::Longitudinal),
+        ("OLAT", Axis::Lateral),
+        ("PYRS", Axis::Lateral),
+    ] {
+        campaign
+            .classes
+            .push((class.into(), format!("{class} steps"), axis));
         for alpha in [10.0, 20.0, 30.0, 40.0, 50.0] {
             fly(&mut campaign, class, axis, alpha);
         }
@@ -93,8 +106,15 @@ pub fn campaign() -> Campaign {
     campaign.provenance = Provenance {
         program: "harvest 0.0.0, ingest 1".into(),
         command: "harvest run mine".into(),
-        data: vec![SourceFile { name: "flight_001.parquet".into(), bytes: 123, blake3: "00ff".into() }],
-        configuration: vec![("pipeline.yaml".into(), "title: a campaign\n  deeper: 1\n".into())],
+        data: vec![SourceFile {
+            name: "flight_001.parquet".into(),
+            bytes: 123,
+            blake3: "00ff".into(),
+        }],
+        configuration: vec![(
+            "pipeline.yaml".into(),
+            "title: a campaign\n  deeper: 1\n".into(),
+        )],
     };
     campaign.fits[0].outcome = "not_converged".into();
     campaign.estimates[5].value = Some(1e6);
@@ -137,7 +157,12 @@ pub fn campaign() -> Campaign {
 }
 
 pub fn problem(reason: &str) -> Problem {
-    Problem { stage: "ingest".into(), flight_id: "7".into(), place: "flight_007.parquet".into(), reason: reason.into() }
+    Problem {
+        stage: "ingest".into(),
+        flight_id: "7".into(),
+        place: "flight_007.parquet".into(),
+        reason: reason.into(),
+    }
 }
 
 fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
@@ -175,7 +200,11 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         largest_condition_index: Some(12.2),
         confounded: None,
     });
-    for (name, unit) in if axis == Axis::Longitudinal { LONGITUDINAL } else { LATERAL } {
+    for (name, unit) in if axis == Axis::Longitudinal {
+        LONGITUDINAL
+    } else {
+        LATERAL
+    } {
         campaign.estimates.push(EstimateRow {
             maneuver_id: maneuver_id.clone(),
             flight_id: "1".into(),
@@ -199,7 +228,9 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         });
     }
     campaign.pages.insert(maneuver_id.clone());
-    campaign.histories.push(history(&maneuver_id, class, alpha_deg));
+    campaign
+        .histories
+        .push(history(&maneuver_id, class, alpha_deg));
 }
 
 fn history(maneuver_id: &str, class: &str, alpha_deg: f64) -> History {
@@ -212,9 +243,19 @@ fn history(maneuver_id: &str, class: &str, alpha_deg: f64) -> History {
         computed,
         marked: (0..600).map(|i| i == 300).collect(),
     };
-    let controls = vec![("de_deg".to_owned(), time_s.iter().map(|t| t.cos()).collect())];
+    let controls = vec![(
+        "de_deg".to_owned(),
+        time_s.iter().map(|t| t.cos()).collect(),
+    )];
     let (maneuver_id, class) = (maneuver_id.into(), class.into());
-    History { maneuver_id, class, alpha_deg, time_s, outputs: vec![output], controls }
+    History {
+        maneuver_id,
+        class,
+        alpha_deg,
+        time_s,
+        outputs: vec![output],
+        controls,
+    }
 }
 
 fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
@@ -249,6 +290,11 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         uncertainty: Some(0.001),
         difference_pct: Some(100.0 * (value - 0.05) / 0.05),
         z: Some(-3.0),
-        verdict: if alpha_deg < 25.0 { "agrees" } else { "flight lower" }.into(),
+        verdict: if alpha_deg < 25.0 {
+            "agrees"
+        } else {
+            "flight lower"
+        }
+        .into(),
     });
 }

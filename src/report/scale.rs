@@ -36,7 +36,11 @@ impl Scale {
     #[must_use]
     pub fn with_step(low: f64, high: f64, margin: f64, step: f64) -> Scale {
         let (low, high) = widened(low, high);
-        Scale { min: (low / margin).floor() * margin, max: (high / margin).ceil() * margin, step }
+        Scale {
+            min: (low / margin).floor() * margin,
+            max: (high / margin).ceil() * margin,
+            step,
+        }
     }
 
     #[must_use]
@@ -68,14 +72,33 @@ impl Shown {
     /// dwarf them.
     #[must_use]
     pub fn scale(&self) -> Scale {
-        let values: Vec<f64> = self.estimates.iter().map(|e| e.0).filter(|v| v.is_finite()).collect();
+        let values: Vec<f64> = self
+            .estimates
+            .iter()
+            .map(|e| e.0)
+            .filter(|v| v.is_finite())
+            .collect();
         let fence = fence(&values);
-        let near = values.into_iter().filter(|v| fence.is_none_or(|(low, high)| (low..=high).contains(v)));
-        let core = self.lines.iter().copied().filter(|v| v.is_finite()).chain(near);
-        let Some((low, high)) = extent(core) else { return Scale::covering(0.0, 1.0) };
+        let near = values
+            .into_iter()
+            .filter(|v| fence.is_none_or(|(low, high)| (low..=high).contains(v)));
+        let core = self
+            .lines
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .chain(near);
+        let Some((low, high)) = extent(core) else {
+            return Scale::covering(0.0, 1.0);
+        };
         let room = 0.35 * (high - low);
-        let ends = self.estimates.iter().flat_map(|(value, bound)| [value - bound, value + bound]);
-        let more = ends.chain(self.band.iter().copied()).filter(|v| (low - room..=high + room).contains(v));
+        let ends = self
+            .estimates
+            .iter()
+            .flat_map(|(value, bound)| [value - bound, value + bound]);
+        let more = ends
+            .chain(self.band.iter().copied())
+            .filter(|v| (low - room..=high + room).contains(v));
         let (low, high) = extent(more.chain([low, high])).unwrap_or((low, high));
         let margin = 0.03 * (high - low);
         Scale::covering(low - margin, high + margin)
@@ -94,7 +117,11 @@ fn fence(values: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// A quantile of the finite values, linear between them.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place within the list")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a place within the list"
+)]
 #[must_use]
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -108,10 +135,13 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
 /// The smallest and the largest of the finite values.
 #[must_use]
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values.into_iter().filter(|v| v.is_finite()).fold(None, |extent, v| match extent {
-        None => Some((v, v)),
-        Some((low, high)) => Some((low.min(v), high.max(v))),
-    })
+    values
+        .into_iter()
+        .filter(|v| v.is_finite())
+        .fold(None, |extent, v| match extent {
+            None => Some((v, v)),
+            Some((low, high)) => Some((low.min(v), high.max(v))),
+        })
 }
 
 /// An interval of some width, however narrow the given one: one value alone gets a tenth of itself to either side.
@@ -131,7 +161,10 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
 /// The smallest of 1, 2, 5 and 10 times a power of ten that is at least `step`.
 fn round_step(step: f64) -> f64 {
     let decade = 10_f64.powi(power_of_ten(step));
-    let multiple = [1.0, 2.0, 5.0].into_iter().find(|m| m * decade >= step * (1.0 - 1e-9)).unwrap_or(10.0);
+    let multiple = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|m| m * decade >= step * (1.0 - 1e-9))
+        .unwrap_or(10.0);
     multiple * decade
 }
 
@@ -142,13 +175,26 @@ mod tests {
 
     #[test]
     fn limits_are_round_and_cover_the_interval() {
-        for (low, high) in [(0.013, 0.087), (-3.0, 250.0), (1e-7, 3e-7), (-0.02, -0.018), (2.0, 2.0), (0.0, 0.0)] {
+        for (low, high) in [
+            (0.013, 0.087),
+            (-3.0, 250.0),
+            (1e-7, 3e-7),
+            (-0.02, -0.018),
+            (2.0, 2.0),
+            (0.0, 0.0),
+        ] {
             let scale = Scale::covering(low, high);
             let slack = 1e-9 * scale.step;
-            assert!(scale.min <= low + slack && scale.max >= high - slack && scale.max > scale.min, "{scale:?}");
+            assert!(
+                scale.min <= low + slack && scale.max >= high - slack && scale.max > scale.min,
+                "{scale:?}"
+            );
             let halves = 2.0 * (scale.max - scale.min) / scale.step;
             assert_relative_eq!(halves, halves.round(), epsilon = 1e-6);
-            assert!((4.0..=14.0).contains(&halves), "{low} {high}: {halves} half steps");
+            assert!(
+                (4.0..=14.0).contains(&halves),
+                "{low} {high}: {halves} half steps"
+            );
         }
     }
 
@@ -161,19 +207,33 @@ mod tests {
 
     #[test]
     fn a_wild_estimate_does_not_flatten_the_figure() {
-        let mut shown = Shown { lines: vec![0.04, 0.08], ..Shown::default() };
-        shown.estimates = (0..40).map(|i| (0.04 + 0.001 * f64::from(i), 0.001)).collect();
+        let mut shown = Shown {
+            lines: vec![0.04, 0.08],
+            ..Shown::default()
+        };
+        shown.estimates = (0..40)
+            .map(|i| (0.04 + 0.001 * f64::from(i), 0.001))
+            .collect();
         let calm = shown.scale();
-        shown.estimates.extend([(9.0, 30.0), (-4.0, 2.0), (f64::NAN, f64::INFINITY)]);
+        shown
+            .estimates
+            .extend([(9.0, 30.0), (-4.0, 2.0), (f64::NAN, f64::INFINITY)]);
         shown.band = vec![-2.0, 5.0, f64::INFINITY];
         let wild = shown.scale();
-        assert!(wild.max - wild.min < 2.0 * (calm.max - calm.min), "{wild:?} against {calm:?}");
+        assert!(
+            wild.max - wild.min < 2.0 * (calm.max - calm.min),
+            "{wild:?} against {calm:?}"
+        );
         assert!(wild.contains(0.04) && wild.contains(0.08));
     }
 
     #[test]
     fn nothing_to_show_and_what_is_not_finite_still_have_a_scale() {
-        let scale = Shown { lines: vec![f64::NAN, f64::INFINITY], ..Shown::default() }.scale();
+        let scale = Shown {
+            lines: vec![f64::NAN, f64::INFINITY],
+            ..Shown::default()
+        }
+        .scale();
         assert!(scale.min.is_finite() && scale.max > scale.min);
         assert!(Scale::covering(f64::NAN, 1.0).max > 0.0);
     }

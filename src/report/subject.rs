@@ -48,7 +48,9 @@ impl Subject<'_> {
     /// How many maneuvers speak for flight: those of the trend, or of the estimates where there is no trend.
     #[must_use]
     pub fn maneuvers(&self) -> usize {
-        self.trend.first().map_or(self.points.len(), |row| row.maneuvers)
+        self.trend
+            .first()
+            .map_or(self.points.len(), |row| row.maneuvers)
     }
 
     /// Where this derivative stands: the coefficients in the order of the equations, the biases last.
@@ -64,7 +66,11 @@ pub fn gather<'a>(contents: &Contents<'a>) -> Vec<Subject<'a>> {
     let estimates = by_name(contents.estimates, |row| &row.derivative);
     let trends = by_name(contents.trends, |row| &row.derivative);
     let comparisons = by_name(contents.comparison, |row| &row.derivative);
-    let axes: BTreeMap<&str, Axis> = contents.classes.iter().map(|(name, _, axis)| (name.as_str(), *axis)).collect();
+    let axes: BTreeMap<&str, Axis> = contents
+        .classes
+        .iter()
+        .map(|(name, _, axis)| (name.as_str(), *axis))
+        .collect();
     let mut subjects: Vec<Subject> = names(contents)
         .into_iter()
         .map(|name| {
@@ -82,22 +88,39 @@ pub fn gather<'a>(contents: &Contents<'a>) -> Vec<Subject<'a>> {
 
 /// The names of the subjects, in the order of the model; those it does not name come last, by the alphabet.
 fn names<'a>(contents: &Contents<'a>) -> Vec<&'a str> {
-    let estimated = contents.estimates.iter().filter(|e| e.status == "estimated").map(|e| e.derivative.as_str());
+    let estimated = contents
+        .estimates
+        .iter()
+        .filter(|e| e.status == "estimated")
+        .map(|e| e.derivative.as_str());
     let trends = contents.trends.iter().map(|t| t.derivative.as_str());
     let compared = contents.comparison.iter().map(|c| c.derivative.as_str());
     let mut left: BTreeSet<&str> = estimated.chain(trends).chain(compared).collect();
-    let mut names: Vec<&str> = contents.order.iter().map(String::as_str).filter(|name| left.remove(name)).collect();
+    let mut names: Vec<&str> = contents
+        .order
+        .iter()
+        .map(String::as_str)
+        .filter(|name| left.remove(name))
+        .collect();
     names.extend(left);
     names
 }
 
 fn failed_fits<'a>(contents: &Contents<'a>) -> BTreeSet<&'a str> {
     let failed = |outcome: &str| matches!(outcome, "not_converged" | "rejected");
-    contents.fits.iter().filter(|f| failed(&f.outcome)).map(|f| f.maneuver_id.as_str()).collect()
+    contents
+        .fits
+        .iter()
+        .filter(|f| failed(&f.outcome))
+        .map(|f| f.maneuver_id.as_str())
+        .collect()
 }
 
 /// The rows of each derivative, in their order.
-pub fn by_name<'a, T>(rows: &'a [T], name: impl Fn(&'a T) -> &'a str) -> BTreeMap<&'a str, Vec<&'a T>> {
+pub fn by_name<'a, T>(
+    rows: &'a [T],
+    name: impl Fn(&'a T) -> &'a str,
+) -> BTreeMap<&'a str, Vec<&'a T>> {
     let mut of: BTreeMap<&str, Vec<&T>> = BTreeMap::new();
     for row in rows {
         of.entry(name(row)).or_default().push(row);
@@ -111,18 +134,37 @@ struct Rows<'a, 'r> {
     comparison: &'r [&'a ComparisonRow],
 }
 
-fn subject<'a>(name: &'a str, of: &Rows<'a, '_>, failed: &BTreeSet<&str>, axes: &BTreeMap<&str, Axis>) -> Subject<'a> {
-    let estimated: Vec<&EstimateRow> =
-        of.estimates.iter().copied().filter(|e| e.status == "estimated" && e.value.is_some()).collect();
-    let (spoiled, sound): (Vec<&EstimateRow>, Vec<&EstimateRow>) =
-        estimated.iter().partition(|e| failed.contains(e.maneuver_id.as_str()));
+fn subject<'a>(
+    name: &'a str,
+    of: &Rows<'a, '_>,
+    failed: &BTreeSet<&str>,
+    axes: &BTreeMap<&str, Axis>,
+) -> Subject<'a> {
+    let estimated: Vec<&EstimateRow> = of
+        .estimates
+        .iter()
+        .copied()
+        .filter(|e| e.status == "estimated" && e.value.is_some())
+        .collect();
+    let (spoiled, sound): (Vec<&EstimateRow>, Vec<&EstimateRow>) = estimated
+        .iter()
+        .partition(|e| failed.contains(e.maneuver_id.as_str()));
     let points: Vec<Point> = sound.iter().filter_map(|e| point(e)).collect();
-    let group = of.comparison.first().map(|c| c.group.as_str()).or(of.trends.first().map(|t| t.group.as_str()));
+    let group = of
+        .comparison
+        .first()
+        .map(|c| c.group.as_str())
+        .or(of.trends.first().map(|t| t.group.as_str()));
     let coefficient = coefficient_of(name);
     let unit = (of.comparison.first().map(|c| c.unit.as_str()))
         .or(of.trends.first().map(|t| t.unit.as_str()))
         .or(of.estimates.first().map(|e| e.unit.as_str()));
-    let axis_of_class = || estimated.first().and_then(|e| axes.get(e.class.as_str())).copied();
+    let axis_of_class = || {
+        estimated
+            .first()
+            .and_then(|e| axes.get(e.class.as_str()))
+            .copied()
+    };
     Subject {
         name,
         unit: unit.unwrap_or("-"),
@@ -132,7 +174,13 @@ fn subject<'a>(name: &'a str, of: &Rows<'a, '_>, failed: &BTreeSet<&str>, axes: 
         unconverged: spoiled.len(),
         points,
         group: group.unwrap_or_default(),
-        trend: sorted(of.trends.iter().copied().filter(|t| Some(t.group.as_str()) == group), |t| t.alpha_deg),
+        trend: sorted(
+            of.trends
+                .iter()
+                .copied()
+                .filter(|t| Some(t.group.as_str()) == group),
+            |t| t.alpha_deg,
+        ),
         comparison: sorted(of.comparison.iter().copied(), |c| c.alpha_deg),
         tunnel: tunnel(of),
     }
@@ -144,14 +192,24 @@ fn point(row: &EstimateRow) -> Option<Point<'_>> {
     let bound = corrected.or(finite(row.bound))?;
     let value = finite(row.value)?;
     let alpha_deg = finite(Some(row.alpha_deg))?;
-    Some(Point { class: &row.class, alpha_deg, value, bound: bound.abs(), corrected: corrected.is_some() })
+    Some(Point {
+        class: &row.class,
+        alpha_deg,
+        value,
+        bound: bound.abs(),
+        corrected: corrected.is_some(),
+    })
 }
 
 /// The tunnel's values: those of the comparison, or where a derivative is not compared those that the estimation used.
 fn tunnel(of: &Rows) -> Vec<(f64, f64)> {
     let compared = of.comparison.iter().map(|c| (c.alpha_deg, c.wind_tunnel));
     let used = of.estimates.iter().map(|e| (e.alpha_deg, e.wind_tunnel));
-    let of_both: Vec<_> = if of.comparison.is_empty() { used.collect() } else { compared.collect() };
+    let of_both: Vec<_> = if of.comparison.is_empty() {
+        used.collect()
+    } else {
+        compared.collect()
+    };
     let mut values: Vec<(f64, f64)> = of_both
         .into_iter()
         .filter_map(|(alpha, value)| value.map(|v| (alpha, v)))

@@ -67,19 +67,30 @@ pub struct VerdictGroup {
 /// The fit of each maneuver, by its id.
 #[must_use]
 pub fn fits_by_maneuver<'a>(contents: &Contents<'a>) -> BTreeMap<&'a str, &'a FitRow> {
-    contents.fits.iter().map(|fit| (fit.maneuver_id.as_str(), fit)).collect()
+    contents
+        .fits
+        .iter()
+        .map(|fit| (fit.maneuver_id.as_str(), fit))
+        .collect()
 }
 
 /// The heads of the outcome columns.
 #[must_use]
 pub fn outcome_heads() -> Vec<&'static str> {
-    OUTCOMES.iter().map(|(_, head)| *head).chain(["no fit"]).collect()
+    OUTCOMES
+        .iter()
+        .map(|(_, head)| *head)
+        .chain(["no fit"])
+        .collect()
 }
 
 /// The outcome of a fit in words.
 #[must_use]
 pub fn outcome_in_words(outcome: &str) -> &str {
-    OUTCOMES.iter().find(|(name, _)| *name == outcome).map_or(outcome, |(_, head)| head)
+    OUTCOMES
+        .iter()
+        .find(|(name, _)| *name == outcome)
+        .map_or(outcome, |(_, head)| head)
 }
 
 /// Class × outcome: the classes as configured, then whatever else was flown.
@@ -87,62 +98,117 @@ pub fn outcome_in_words(outcome: &str) -> &str {
 pub fn classes(contents: &Contents) -> Vec<ClassView> {
     let fits = fits_by_maneuver(contents);
     let marks = gallery::marks(contents);
-    let configured = contents.classes.iter().map(|(name, title, axis)| (name.as_str(), title.as_str(), *axis));
+    let configured = contents
+        .classes
+        .iter()
+        .map(|(name, title, axis)| (name.as_str(), title.as_str(), *axis));
     let known: BTreeSet<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
-    let others: BTreeMap<&str, Axis> =
-        contents.maneuvers.iter().map(|m| (m.class.as_str(), m.axis)).filter(|(c, _)| !known.contains(c)).collect();
+    let others: BTreeMap<&str, Axis> = contents
+        .maneuvers
+        .iter()
+        .map(|m| (m.class.as_str(), m.axis))
+        .filter(|(c, _)| !known.contains(c))
+        .collect();
     configured
         .chain(others.into_iter().map(|(name, axis)| (name, "", axis)))
         .map(|(name, title, axis)| ClassView {
-            mark: marks.iter().find(|m| m.0 == name).map_or_else(String::new, |m| m.1.key()),
+            mark: marks
+                .iter()
+                .find(|m| m.0 == name)
+                .map_or_else(String::new, |m| m.1.key()),
             token: gallery::token(&marks, name),
             ..class(name, title, axis, contents.maneuvers, &fits)
         })
         .collect()
 }
 
-fn class(name: &str, title: &str, axis: Axis, flown: &[Maneuver], fits: &BTreeMap<&str, &FitRow>) -> ClassView {
+fn class(
+    name: &str,
+    title: &str,
+    axis: Axis,
+    flown: &[Maneuver],
+    fits: &BTreeMap<&str, &FitRow>,
+) -> ClassView {
     let mut outcomes = vec![0; OUTCOMES.len() + 1];
     let of_class: Vec<&Maneuver> = flown.iter().filter(|m| m.class == name).collect();
     for maneuver in &of_class {
-        let outcome = fits.get(maneuver.maneuver_id.as_str()).map(|f| f.outcome.as_str());
-        let place = OUTCOMES.iter().position(|(o, _)| Some(*o) == outcome).unwrap_or(OUTCOMES.len());
+        let outcome = fits
+            .get(maneuver.maneuver_id.as_str())
+            .map(|f| f.outcome.as_str());
+        let place = OUTCOMES
+            .iter()
+            .position(|(o, _)| Some(*o) == outcome)
+            .unwrap_or(OUTCOMES.len());
         outcomes[place] += 1;
     }
     let alpha = match extent(of_class.iter().map(|m| m.alpha_deg)) {
-        Some((low, high)) => format!("{}\u{2013}{}°", notation::fixed(low, 0), notation::fixed(high, 0)),
+        Some((low, high)) => format!(
+            "{}\u{2013}{}°",
+            notation::fixed(low, 0),
+            notation::fixed(high, 0)
+        ),
         None => NOTHING.to_owned(),
     };
     let (name, title) = (name.to_owned(), title.to_owned());
     let (mark, token) = (String::new(), String::new());
-    ClassView { name, title, axis: axis.name().to_owned(), found: of_class.len(), outcomes, alpha, mark, token }
+    ClassView {
+        name,
+        title,
+        axis: axis.name().to_owned(),
+        found: of_class.len(),
+        outcomes,
+        alpha,
+        mark,
+        token,
+    }
 }
 
 /// The verdict tables, one per axis. `anchors` says where each derivative's figure is.
 #[must_use]
 pub fn verdicts(subjects: &[Subject], anchors: &BTreeMap<&str, String>) -> Vec<VerdictGroup> {
-    let of_axis =
-        |axis: Axis| -> Vec<&Subject> { subjects.iter().filter(|s| s.axis == Some(axis) && s.is_compared()).collect() };
-    [(Axis::Longitudinal, "Longitudinal"), (Axis::Lateral, "Lateral-directional")]
-        .into_iter()
-        .map(|(axis, title)| (title, of_axis(axis)))
-        .filter(|(_, subjects)| !subjects.is_empty())
-        .map(|(title, subjects)| verdict_group(title, &subjects, anchors))
-        .collect()
+    let of_axis = |axis: Axis| -> Vec<&Subject> {
+        subjects
+            .iter()
+            .filter(|s| s.axis == Some(axis) && s.is_compared())
+            .collect()
+    };
+    [
+        (Axis::Longitudinal, "Longitudinal"),
+        (Axis::Lateral, "Lateral-directional"),
+    ]
+    .into_iter()
+    .map(|(axis, title)| (title, of_axis(axis)))
+    .filter(|(_, subjects)| !subjects.is_empty())
+    .map(|(title, subjects)| verdict_group(title, &subjects, anchors))
+    .collect()
 }
 
-fn verdict_group(title: &str, subjects: &[&Subject], anchors: &BTreeMap<&str, String>) -> VerdictGroup {
-    let alphas = subjects.iter().flat_map(|s| s.comparison.iter().map(|c| c.alpha_deg));
+fn verdict_group(
+    title: &str,
+    subjects: &[&Subject],
+    anchors: &BTreeMap<&str, String>,
+) -> VerdictGroup {
+    let alphas = subjects
+        .iter()
+        .flat_map(|s| s.comparison.iter().map(|c| c.alpha_deg));
     let (from, to) = extent(alphas).unwrap_or((0.0, 1.0));
     VerdictGroup {
         title: title.to_owned(),
         alpha_from: angle(from),
         alpha_to: angle(to),
-        rows: subjects.iter().map(|s| verdict_view(s, anchors, from, to)).collect(),
+        rows: subjects
+            .iter()
+            .map(|s| verdict_view(s, anchors, from, to))
+            .collect(),
     }
 }
 
-fn verdict_view(subject: &Subject, anchors: &BTreeMap<&str, String>, from: f64, to: f64) -> VerdictView {
+fn verdict_view(
+    subject: &Subject,
+    anchors: &BTreeMap<&str, String>,
+    from: f64,
+    to: f64,
+) -> VerdictView {
     let runs = verdict::runs(&subject.comparison);
     VerdictView {
         name: subject.name.to_owned(),
@@ -159,19 +225,30 @@ fn verdict_view(subject: &Subject, anchors: &BTreeMap<&str, String>, from: f64, 
 
 /// The largest difference between flight and tunnel, as a share of the tunnel's value there.
 fn largest_difference(subject: &Subject) -> String {
-    let rows = subject.comparison.iter().filter_map(|c| Some((c, c.difference.filter(|d| d.is_finite())?)));
+    let rows = subject
+        .comparison
+        .iter()
+        .filter_map(|c| Some((c, c.difference.filter(|d| d.is_finite())?)));
     let Some((row, difference)) = rows.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else {
         return NOTHING.to_owned();
     };
     let sign = if difference > 0.0 { "+" } else { "" };
     let share = match row.difference_pct.filter(|p| p.is_finite()) {
         Some(pct) if pct.abs() < 999.5 => {
-            format!(" ({}{} %)", if pct > 0.0 { "+" } else { "" }, notation::fixed(pct, 0))
+            format!(
+                " ({}{} %)",
+                if pct > 0.0 { "+" } else { "" },
+                notation::fixed(pct, 0)
+            )
         }
         // Where the tunnel's value is next to zero its share says nothing.
         _ => String::new(),
     };
-    format!("{sign}{}{share} at {}", number(Some(difference), 2), angle(row.alpha_deg))
+    format!(
+        "{sign}{}{share} at {}",
+        number(Some(difference), 2),
+        angle(row.alpha_deg)
+    )
 }
 
 /// The median bound, and what share it is of the median estimate.
@@ -182,7 +259,11 @@ fn typical_bound(subject: &Subject) -> String {
         return NOTHING.to_owned();
     };
     let share = 100.0 * bound / size;
-    let share = if share < 999.5 { format!(" ({} %)", number(Some(share), 2)) } else { String::new() };
+    let share = if share < 999.5 {
+        format!(" ({} %)", number(Some(share), 2))
+    } else {
+        String::new()
+    };
     format!("±{}{share}", number(Some(bound), 2))
 }
 
@@ -200,7 +281,11 @@ pub fn summary(contents: &Contents, subjects: &[Subject], classes: &[ClassView])
     let mut disagrees = compared(subjects);
     disagrees.extend(opposite_signs(subjects));
     disagrees.extend(largest(subjects));
-    Summary { flown: vec![flown(contents, classes)], failed: failed(contents), disagrees }
+    Summary {
+        flown: vec![flown(contents, classes)],
+        failed: failed(contents),
+        disagrees,
+    }
 }
 
 /// So many disagreements, and so many failures, are told in the summary.
@@ -222,9 +307,19 @@ fn largest(subjects: &[Subject]) -> Option<String> {
         .iter()
         .take(MOST_TOLD)
         .map(|(s, (z, row))| {
-            let share = row.difference_pct.filter(|p| p.is_finite() && p.abs() < 999.5);
-            let share = share.map_or_else(String::new, |p| format!(" by {} %", notation::fixed(p.abs(), 0)));
-            format!("{} {}{share} at {} (z {})", s.name, row.verdict, angle(row.alpha_deg), notation::fixed(*z, 0))
+            let share = row
+                .difference_pct
+                .filter(|p| p.is_finite() && p.abs() < 999.5);
+            let share = share.map_or_else(String::new, |p| {
+                format!(" by {} %", notation::fixed(p.abs(), 0))
+            });
+            format!(
+                "{} {}{share} at {} (z {})",
+                s.name,
+                row.verdict,
+                angle(row.alpha_deg),
+                notation::fixed(*z, 0)
+            )
         })
         .collect();
     (!told.is_empty()).then(|| format!("Largest beside their uncertainty: {}.", told.join("; ")))
@@ -232,22 +327,48 @@ fn largest(subjects: &[Subject]) -> Option<String> {
 
 fn flown(contents: &Contents, classes: &[ClassView]) -> String {
     if contents.maneuvers.is_empty() {
-        return "No maneuver was found: nothing was estimated, and there is nothing to compare.".to_owned();
+        return "No maneuver was found: nothing was estimated, and there is nothing to compare."
+            .to_owned();
     }
-    let flights: BTreeSet<&str> = contents.maneuvers.iter().map(|m| m.flight_id.as_str()).collect();
-    let total = |i: usize| classes.iter().filter_map(|c| c.outcomes.get(i)).sum::<usize>();
+    let flights: BTreeSet<&str> = contents
+        .maneuvers
+        .iter()
+        .map(|m| m.flight_id.as_str())
+        .collect();
+    let total = |i: usize| {
+        classes
+            .iter()
+            .filter_map(|c| c.outcomes.get(i))
+            .sum::<usize>()
+    };
     let of = |(i, head): (usize, &str)| (total(i) > 0).then(|| format!("{} {head}", total(i)));
-    let outcomes: Vec<String> = outcome_heads().into_iter().enumerate().filter_map(of).collect();
+    let outcomes: Vec<String> = outcome_heads()
+        .into_iter()
+        .enumerate()
+        .filter_map(of)
+        .collect();
     let maneuvers = count(contents.maneuvers.len(), "maneuver");
-    format!("{maneuvers} in {}: {}.", count(flights.len(), "flight"), outcomes.join(", "))
+    format!(
+        "{maneuvers} in {}: {}.",
+        count(flights.len(), "flight"),
+        outcomes.join(", ")
+    )
 }
 
 fn compared(subjects: &[Subject]) -> Vec<String> {
     let mut agreement: Vec<f64> = Vec::new();
     let mut without = 0;
     for subject in subjects.iter().filter(|s| s.is_compared()) {
-        let with_tunnel = subject.comparison.iter().filter(|c| c.wind_tunnel.is_some()).count();
-        let agreeing = subject.comparison.iter().filter(|c| c.verdict == "agrees").count();
+        let with_tunnel = subject
+            .comparison
+            .iter()
+            .filter(|c| c.wind_tunnel.is_some())
+            .count();
+        let agreeing = subject
+            .comparison
+            .iter()
+            .filter(|c| c.verdict == "agrees")
+            .count();
         match with_tunnel {
             0 => without += 1,
             n => agreement.push(agreeing as f64 / n as f64),
@@ -257,7 +378,10 @@ fn compared(subjects: &[Subject]) -> Vec<String> {
         return vec!["No derivative was compared with the wind tunnel.".to_owned()];
     }
     let everywhere = agreement.iter().filter(|share| **share >= 1.0).count();
-    let mostly = agreement.iter().filter(|share| (0.5..1.0).contains(*share)).count();
+    let mostly = agreement
+        .iter()
+        .filter(|share| (0.5..1.0).contains(*share))
+        .count();
     let rest = agreement.len() - everywhere - mostly;
     let others = match without {
         0 => String::new(),
@@ -276,33 +400,65 @@ fn opposite_signs(subjects: &[Subject]) -> Option<String> {
         .iter()
         .filter_map(|subject| {
             let runs = verdict::runs(&subject.comparison);
-            let ranges: Vec<String> = runs.iter().filter(|r| r.verdict == "sign differs").map(Run::range).collect();
+            let ranges: Vec<String> = runs
+                .iter()
+                .filter(|r| r.verdict == "sign differs")
+                .map(Run::range)
+                .collect();
             (!ranges.is_empty()).then(|| format!("{} ({})", subject.name, ranges.join(", ")))
         })
         .collect();
-    (!places.is_empty()).then(|| format!("Opposite sign in flight and tunnel: {}.", places.join(", ")))
+    (!places.is_empty())
+        .then(|| format!("Opposite sign in flight and tunnel: {}.", places.join(", ")))
 }
 
 /// What the fits, the checks of the records, the list of events and the problems say.
 fn failed(contents: &Contents) -> Vec<String> {
     let mut lines = Vec::new();
     let of = |f: &&FitRow| format!("{} ({})", f.maneuver_id, outcome_in_words(&f.outcome));
-    let unsound: Vec<String> = contents.fits.iter().filter(|f| f.outcome != "converged").map(|f| of(&f)).collect();
+    let unsound: Vec<String> = contents
+        .fits
+        .iter()
+        .filter(|f| f.outcome != "converged")
+        .map(|f| of(&f))
+        .collect();
     if !unsound.is_empty() {
         let more = unsound.len().saturating_sub(MOST_TOLD);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let told = unsound.get(..MOST_TOLD.min(unsound.len())).unwrap_or_default().join(", ");
-        lines.push(format!("{} without a sound fit: {told}{more}.", count(unsound.len(), "maneuver")));
+        let more = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
+        let told = unsound
+            .get(..MOST_TOLD.min(unsound.len()))
+            .unwrap_or_default()
+            .join(", ");
+        lines.push(format!(
+            "{} without a sound fit: {told}{more}.",
+            count(unsound.len(), "maneuver")
+        ));
     }
-    let failed = contents.checks.iter().filter(|c| !super::failures::is_check_passed(&c.verdict)).count();
+    let failed = contents
+        .checks
+        .iter()
+        .filter(|c| !super::failures::is_check_passed(&c.verdict))
+        .count();
     if !contents.checks.is_empty() {
         let checks = count(contents.checks.len(), "check");
-        lines.push(format!("Records: {checks} of units and signs between channels, {failed} failed."));
+        lines.push(format!(
+            "Records: {checks} of units and signs between channels, {failed} failed."
+        ));
     }
     if !contents.events.is_empty() {
-        let agreeing = contents.events.iter().filter(|e| e.verdict == "agrees").count();
+        let agreeing = contents
+            .events
+            .iter()
+            .filter(|e| e.verdict == "agrees")
+            .count();
         let events = count(contents.events.len(), "event");
-        lines.push(format!("The analyst's list against what was found: {events}, {agreeing} agree."));
+        lines.push(format!(
+            "The analyst's list against what was found: {events}, {agreeing} agree."
+        ));
     }
     if !contents.problems.is_empty() {
         lines.push(format!(
@@ -343,8 +499,18 @@ mod tests {
         let mut campaign = samples::campaign();
         campaign.comparison[0].verdict = "sign differs".into();
         let contents = campaign.contents();
-        let lines = summary(&contents, &super::super::subject::gather(&contents), &classes(&contents)).disagrees;
+        let lines = summary(
+            &contents,
+            &super::super::subject::gather(&contents),
+            &classes(&contents),
+        )
+        .disagrees;
         let name = &campaign.comparison[0].derivative;
-        assert!(lines.iter().any(|l| l.starts_with("Opposite sign") && l.contains(name.as_str())), "{lines:?}");
+        assert!(
+            lines
+                .iter()
+                .any(|l| l.starts_with("Opposite sign") && l.contains(name.as_str())),
+            "{lines:?}"
+        );
     }
 }

@@ -16,20 +16,30 @@ const PHRASING: [&str; 9] = ["a", "b", "i", "small", "sub", "span", "code", "svg
 
 /// The page as a strict reader sees it: well-formed, and nested as HTML allows.
 fn assert_valid(page: &str) {
-    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
-    let document = roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|e| panic!("{e}"));
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..Default::default()
+    };
+    let document =
+        roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|e| panic!("{e}"));
     for node in document.descendants().filter(roxmltree::Node::is_element) {
         let name = node.tag_name().name();
         let inside = |ancestor: &str| node.ancestors().skip(1).any(|a| a.has_tag_name(ancestor));
-        let children: Vec<&str> =
-            node.children().filter(roxmltree::Node::is_element).map(|c| c.tag_name().name()).collect();
+        let children: Vec<&str> = node
+            .children()
+            .filter(roxmltree::Node::is_element)
+            .map(|c| c.tag_name().name())
+            .collect();
         let only = |allowed: &[&str]| {
             let wrong = children.iter().find(|c| !allowed.contains(c));
             assert!(wrong.is_none(), "<{}> in <{name}>", wrong.unwrap_or(&""));
         };
         let source = &page[node.range()];
         let is_short = source.ends_with("/>") && !source[..source.len() - 2].contains('>');
-        assert!(!is_short || inside("svg") || name == "svg" || VOID.contains(&name), "HTML reads {source} as open");
+        assert!(
+            !is_short || inside("svg") || name == "svg" || VOID.contains(&name),
+            "HTML reads {source} as open"
+        );
         match name {
             "p" | "h1" | "h2" | "h3" | "h4" | "summary" | "figcaption" | "th" => only(&PHRASING),
             "ul" => only(&["li"]),
@@ -39,9 +49,15 @@ fn assert_valid(page: &str) {
             "tr" => only(&["td", "th"]),
             "svg" => {
                 let is_hidden = node.attribute("aria-hidden") == Some("true");
-                let says =
-                    |tag| node.children().any(|c| c.has_tag_name(tag) && c.text().is_some_and(|t| !t.is_empty()));
-                assert!(is_hidden || (says("title") && says("desc")), "a drawing says nothing: {}", &source[..120]);
+                let says = |tag| {
+                    node.children()
+                        .any(|c| c.has_tag_name(tag) && c.text().is_some_and(|t| !t.is_empty()))
+                };
+                assert!(
+                    is_hidden || (says("title") && says("desc")),
+                    "a drawing says nothing: {}",
+                    &source[..120]
+                );
             }
             _ => {}
         }
@@ -62,7 +78,10 @@ fn assert_valid(page: &str) {
 /// The values of an attribute through the page.
 fn values<'a>(page: &'a str, attribute: &str) -> Vec<&'a str> {
     let start = format!(" {attribute}=\"");
-    page.split(&start).skip(1).filter_map(|rest| rest.split_once('"').map(|(value, _)| value)).collect()
+    page.split(&start)
+        .skip(1)
+        .filter_map(|rest| rest.split_once('"').map(|(value, _)| value))
+        .collect()
 }
 
 #[test]
@@ -75,7 +94,10 @@ fn the_page_is_valid_and_its_numbers_are_numbers() {
 #[test]
 fn ids_are_unique_whatever_their_case_and_links_lead_somewhere() {
     let page = render(&campaign());
-    let ids: Vec<String> = values(&page, "id").iter().map(|id| id.to_lowercase()).collect();
+    let ids: Vec<String> = values(&page, "id")
+        .iter()
+        .map(|id| id.to_lowercase())
+        .collect();
     let unique: BTreeSet<&String> = ids.iter().collect();
     assert_eq!(ids.len(), unique.len());
     for link in values(&page, "href") {
@@ -90,24 +112,54 @@ fn every_derivative_of_the_comparison_is_linked_to_its_figure() {
     let page = render(&campaign);
     // A bias has a figure, but no tunnel to be compared with.
     let is_derivative = |name: &&String| notation::coefficient_of(name).is_some();
-    for name in campaign.comparison.iter().map(|c| &c.derivative).filter(is_derivative) {
-        assert!(page.contains(&format!("title=\"{name}\"")), "{name} is not in the verdict table");
-        assert!(page.contains(&format!("</sub>, {name} <a")), "{name} has no page");
+    for name in campaign
+        .comparison
+        .iter()
+        .map(|c| &c.derivative)
+        .filter(is_derivative)
+    {
+        assert!(
+            page.contains(&format!("title=\"{name}\"")),
+            "{name} is not in the verdict table"
+        );
+        assert!(
+            page.contains(&format!("</sub>, {name} <a")),
+            "{name} has no page"
+        );
     }
 }
 
 #[test]
 fn the_page_loads_nothing_and_needs_no_script() {
     let page = render(&campaign());
-    for forbidden in
-        ["http:", "https:", "<link", "<img", "@import", "url(//", "javascript:", " src=", " onclick", " onload"]
-    {
+    for forbidden in [
+        "http:",
+        "https:",
+        "<link",
+        "<img",
+        "@import",
+        "url(//",
+        "javascript:",
+        " src=",
+        " onclick",
+        " onload",
+    ] {
         assert!(!page.contains(forbidden), "{forbidden}");
     }
-    assert_eq!(page.matches("<script").count(), 1, "one that sorts and hides");
-    assert!(page.contains("default-src 'none'"), "a browser is told to load nothing");
+    assert_eq!(
+        page.matches("<script").count(),
+        1,
+        "one that sorts and hides"
+    );
+    assert!(
+        page.contains("default-src 'none'"),
+        "a browser is told to load nothing"
+    );
     let (before, _) = page.split_once("<script>").expect("the script");
-    assert!(before.ends_with("</main>\n"), "everything stands before the script");
+    assert!(
+        before.ends_with("</main>\n"),
+        "everything stands before the script"
+    );
 }
 
 #[test]
@@ -161,13 +213,32 @@ fn a_campaign_where_everything_failed_has_a_page_that_says_why() {
 #[test]
 fn numbers_that_are_none_do_not_break_the_page() {
     let mut campaign = campaign();
-    for (i, bad) in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().enumerate() {
+    for (i, bad) in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
+        .into_iter()
+        .enumerate()
+    {
         (campaign.maneuvers[i].alpha_deg, campaign.maneuvers[i].mach) = (bad, bad);
-        (campaign.estimates[i].value, campaign.estimates[i + 3].alpha_deg) = (Some(bad), bad);
-        (campaign.estimates[i + 8].bound, campaign.estimates[i + 8].bound_corrected) = (Some(bad), Some(bad));
-        (campaign.trends[i].value, campaign.trends[i + 3].alpha_deg, campaign.trends[i + 6].upper_95) = (bad, bad, bad);
-        (campaign.comparison[i].flight, campaign.comparison[i].difference) = (bad, Some(bad));
-        (campaign.comparison[i + 5].wind_tunnel, campaign.comparison[i + 10].alpha_deg) = (Some(bad), bad);
+        (
+            campaign.estimates[i].value,
+            campaign.estimates[i + 3].alpha_deg,
+        ) = (Some(bad), bad);
+        (
+            campaign.estimates[i + 8].bound,
+            campaign.estimates[i + 8].bound_corrected,
+        ) = (Some(bad), Some(bad));
+        (
+            campaign.trends[i].value,
+            campaign.trends[i + 3].alpha_deg,
+            campaign.trends[i + 6].upper_95,
+        ) = (bad, bad, bad);
+        (
+            campaign.comparison[i].flight,
+            campaign.comparison[i].difference,
+        ) = (bad, Some(bad));
+        (
+            campaign.comparison[i + 5].wind_tunnel,
+            campaign.comparison[i + 10].alpha_deg,
+        ) = (Some(bad), bad);
         campaign.comparison[i].difference_pct = Some(bad);
     }
     for history in &mut campaign.histories {
@@ -181,8 +252,11 @@ fn numbers_that_are_none_do_not_break_the_page() {
     let page = render(&campaign);
     assert_valid(&page);
     for bad in ["NaN", ">inf<", "\"inf\""] {
-        let around =
-            page.find(bad).map(|at| page.chars().skip(page[..at].chars().count().saturating_sub(80)).take(160));
+        let around = page.find(bad).map(|at| {
+            page.chars()
+                .skip(page[..at].chars().count().saturating_sub(80))
+                .take(160)
+        });
         assert_eq!(around.map(String::from_iter), None, "{bad}");
     }
 }
@@ -198,8 +272,14 @@ fn the_same_campaign_is_the_same_bytes() {
 fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
     let campaign = campaign();
     let page = render(&campaign);
-    assert_eq!(page.matches("class=\"maneuver sheet\"").count(), campaign.maneuvers.len());
-    assert_eq!(page.matches("class=\"derivative").count(), campaign.order.len());
+    assert_eq!(
+        page.matches("class=\"maneuver sheet\"").count(),
+        campaign.maneuvers.len()
+    );
+    assert_eq!(
+        page.matches("class=\"derivative").count(),
+        campaign.order.len()
+    );
 }
 
 #[test]
@@ -215,7 +295,13 @@ fn the_summary_says_what_is_new_what_failed_and_what_disagrees_before_anything_e
 fn the_report_ends_with_what_it_takes_to_do_it_again() {
     let page = render(&campaign());
     let (_, end) = page.split_once("id=\"provenance\"").expect("the section");
-    for words in ["harvest 0.0.0, ingest 1", "harvest run mine", "flight_001.parquet", "00ff", "  deeper: 1\n"] {
+    for words in [
+        "harvest 0.0.0, ingest 1",
+        "harvest run mine",
+        "flight_001.parquet",
+        "00ff",
+        "  deeper: 1\n",
+    ] {
         assert!(end.contains(words), "{words}");
     }
 }
@@ -223,7 +309,10 @@ fn the_report_ends_with_what_it_takes_to_do_it_again() {
 #[test]
 fn a_template_of_the_user_replaces_the_built_in_one_and_its_error_names_the_line() {
     let campaign = campaign();
-    let own = html(&campaign.contents(), Some("{{ title }}: {{ verdicts|length }}"));
+    let own = html(
+        &campaign.contents(),
+        Some("{{ title }}: {{ verdicts|length }}"),
+    );
     assert_eq!(own.expect("a page"), "A campaign: 2");
     let error = html(&campaign.contents(), Some("one\n{{ title")).expect_err("a broken template");
     assert!(error.contains("report.html:2"), "{error}");

@@ -22,7 +22,10 @@ pub fn runs<'a>(rows: &[&'a ComparisonRow]) -> Vec<Run<'a>> {
     let mut runs: Vec<Run> = Vec::new();
     for (i, row) in rows.iter().enumerate() {
         let alpha = row.alpha_deg;
-        let before = i.checked_sub(1).and_then(|j| rows.get(j)).map(|r| alpha - r.alpha_deg);
+        let before = i
+            .checked_sub(1)
+            .and_then(|j| rows.get(j))
+            .map(|r| alpha - r.alpha_deg);
         let after = rows.get(i + 1).map(|r| r.alpha_deg - alpha);
         let left_deg = alpha - 0.5 * before.or(after).unwrap_or(1.0);
         let right_deg = alpha + 0.5 * after.or(before).unwrap_or(1.0);
@@ -31,7 +34,13 @@ pub fn runs<'a>(rows: &[&'a ComparisonRow]) -> Vec<Run<'a>> {
                 run.to_deg = alpha;
                 run.right_deg = right_deg;
             }
-            _ => runs.push(Run { verdict: &row.verdict, from_deg: alpha, to_deg: alpha, left_deg, right_deg }),
+            _ => runs.push(Run {
+                verdict: &row.verdict,
+                from_deg: alpha,
+                to_deg: alpha,
+                left_deg,
+                right_deg,
+            }),
         }
     }
     runs
@@ -45,7 +54,10 @@ const MOST_RUNS: usize = 4;
 #[must_use]
 pub fn phrase(runs: &[Run]) -> String {
     if runs.len() <= MOST_RUNS {
-        let words: Vec<String> = runs.iter().map(|run| format!("{} {}", run.verdict, run.range())).collect();
+        let words: Vec<String> = runs
+            .iter()
+            .map(|run| format!("{} {}", run.verdict, run.range()))
+            .collect();
         return words.join(", ");
     }
     let mut verdicts: Vec<&str> = Vec::new();
@@ -54,8 +66,17 @@ pub fn phrase(runs: &[Run]) -> String {
             verdicts.push(run.verdict);
         }
     }
-    let of = |verdict: &str| runs.iter().filter(|run| run.verdict == verdict).collect::<Vec<_>>();
-    let extent = |verdict: &str| of(verdict).iter().map(|run| run.right_deg - run.left_deg).sum::<f64>();
+    let of = |verdict: &str| {
+        runs.iter()
+            .filter(|run| run.verdict == verdict)
+            .collect::<Vec<_>>()
+    };
+    let extent = |verdict: &str| {
+        of(verdict)
+            .iter()
+            .map(|run| run.right_deg - run.left_deg)
+            .sum::<f64>()
+    };
     verdicts.sort_by(|a, b| extent(b).total_cmp(&extent(a)));
     let words: Vec<String> = verdicts
         .iter()
@@ -72,7 +93,11 @@ impl Run<'_> {
     #[must_use]
     pub fn range(&self) -> String {
         let (from, to) = (angle(self.from_deg), angle(self.to_deg));
-        if from == to { from } else { format!("{from}\u{2013}{to}") }
+        if from == to {
+            from
+        } else {
+            format!("{from}\u{2013}{to}")
+        }
     }
 }
 
@@ -96,8 +121,9 @@ pub fn strip(runs: &[Run], alpha_from_deg: f64, alpha_to_deg: f64, width: u32) -
         return String::new();
     }
     let x = |alpha: f64| ((alpha - alpha_from_deg) * scale).clamp(0.0, f64::from(width));
-    let mut svg =
-        format!(r#"<svg class="strip" viewBox="0 0 {width} 14" width="{width}" height="14" aria-hidden="true">"#);
+    let mut svg = format!(
+        r#"<svg class="strip" viewBox="0 0 {width} 14" width="{width}" height="14" aria-hidden="true">"#
+    );
     for run in runs {
         let (top, bottom, colour) = bar(run.verdict);
         let (left, right) = (x(run.left_deg), x(run.right_deg));
@@ -147,21 +173,43 @@ mod tests {
             (30.5, "agrees"),
         ]);
         let runs = runs(&rows.iter().collect::<Vec<_>>());
-        assert_eq!(phrase(&runs), "agrees 5°\u{2013}10°, flight lower 15°, agrees 20°\u{2013}30.5°");
+        assert_eq!(
+            phrase(&runs),
+            "agrees 5°\u{2013}10°, flight lower 15°, agrees 20°\u{2013}30.5°"
+        );
     }
 
     #[test]
     fn many_runs_are_told_by_verdict_the_most_frequent_first() {
-        let verdicts = ["agrees", "flight lower", "flight lower", "agrees", "flight lower", "flight higher"];
-        let rows =
-            rows(&verdicts.iter().zip([5.0, 10.0, 15.0, 20.0, 25.0, 30.0]).map(|(v, a)| (a, *v)).collect::<Vec<_>>());
+        let verdicts = [
+            "agrees",
+            "flight lower",
+            "flight lower",
+            "agrees",
+            "flight lower",
+            "flight higher",
+        ];
+        let rows = rows(
+            &verdicts
+                .iter()
+                .zip([5.0, 10.0, 15.0, 20.0, 25.0, 30.0])
+                .map(|(v, a)| (a, *v))
+                .collect::<Vec<_>>(),
+        );
         let runs = runs(&rows.iter().collect::<Vec<_>>());
-        assert_eq!(phrase(&runs), "flight lower 10°\u{2013}15°, 25°; agrees 5°, 20°; flight higher 30°");
+        assert_eq!(
+            phrase(&runs),
+            "flight lower 10°\u{2013}15°, 25°; agrees 5°, 20°; flight higher 30°"
+        );
     }
 
     #[test]
     fn the_strip_has_a_bar_per_run_and_fills_its_width() {
-        let rows = rows(&[(10.0, "agrees"), (20.0, "flight higher"), (30.0, "flight higher")]);
+        let rows = rows(&[
+            (10.0, "agrees"),
+            (20.0, "flight higher"),
+            (30.0, "flight higher"),
+        ]);
         let svg = strip(&runs(&rows.iter().collect::<Vec<_>>()), 5.0, 35.0, 120);
         assert_eq!(svg.matches("<rect").count(), 2);
         assert!(svg.contains(r#"x="0.0" y="5" width="40.0""#), "{svg}");

@@ -41,7 +41,10 @@ pub(super) fn maneuver(
 ) -> Result<Maneuver, String> {
     let (first, last) = (record.sample_at(start_s), record.sample_at(end_s));
     if last <= first {
-        return Err(format!("the window of a maneuver like {} holds no samples", class.name));
+        return Err(format!(
+            "the window of a maneuver like {} holds no samples",
+            class.name
+        ));
     }
     let mean = |name: &str| mean(record, name, first..=last);
     let start_s = record.time_s(first);
@@ -53,7 +56,8 @@ pub(super) fn maneuver(
         axis: class.axis,
         start_s,
         end_s: record.time_s(last),
-        alpha_deg: mean_alpha_deg(record, aircraft, first..=last).ok_or("no sample has the signals that α takes")?,
+        alpha_deg: mean_alpha_deg(record, aircraft, first..=last)
+            .ok_or("no sample has the signals that α takes")?,
         mach: mean(signal::MACH)?,
         qbar_psf: mean(signal::QBAR)?,
         velocity_ft_s: mean(signal::VELOCITY)?,
@@ -70,26 +74,44 @@ pub(super) fn maneuver(
 }
 
 fn mean(record: &Record, name: &str, window: RangeInclusive<usize>) -> Result<f64, String> {
-    let values = record.values(name).and_then(|v| v.get(window)).unwrap_or_default();
-    finite_mean(values.iter().copied()).ok_or_else(|| format!("`{name}` has no sample in the maneuver"))
+    let values = record
+        .values(name)
+        .and_then(|v| v.get(window))
+        .unwrap_or_default();
+    finite_mean(values.iter().copied())
+        .ok_or_else(|| format!("`{name}` has no sample in the maneuver"))
 }
 
 fn finite_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (n, sum) = values.filter(|v| v.is_finite()).fold((0_usize, 0.0), |(n, sum), v| (n + 1, sum + v));
+    let (n, sum) = values
+        .filter(|v| v.is_finite())
+        .fold((0_usize, 0.0), |(n, sum), v| (n + 1, sum + v));
     (n > 0).then(|| sum / n as f64)
 }
 
 /// Mean angle of attack at the c.g., deg, from both vanes, the rates and the c.g.
-fn mean_alpha_deg(record: &Record, aircraft: &Aircraft, mut window: RangeInclusive<usize>) -> Option<f64> {
+fn mean_alpha_deg(
+    record: &Record,
+    aircraft: &Aircraft,
+    mut window: RangeInclusive<usize>,
+) -> Option<f64> {
     let alpha = |k: usize| -> Option<f64> {
         let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied();
         let read = Flow {
             alpha: at(signal::ALPHA_VANE)? / DEG,
             beta: at(signal::BETA_VANE)? / DEG,
             velocity: at(signal::VELOCITY)?,
-            rates: [at(signal::P)? / DEG, at(signal::Q)? / DEG, at(signal::R)? / DEG],
+            rates: [
+                at(signal::P)? / DEG,
+                at(signal::Q)? / DEG,
+                at(signal::R)? / DEG,
+            ],
         };
-        let cg = Position { x_ft: at(signal::X_CG)?, y_ft: at(signal::Y_CG)?, z_ft: at(signal::Z_CG)? };
+        let cg = Position {
+            x_ft: at(signal::X_CG)?,
+            y_ft: at(signal::Y_CG)?,
+            z_ft: at(signal::Z_CG)?,
+        };
         Some(aircraft.sensors.flow_at_cg(&read, cg).alpha * DEG)
     };
     let alphas: Option<Vec<f64>> = window.by_ref().map(alpha).collect();

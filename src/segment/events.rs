@@ -29,7 +29,11 @@ pub fn with_events(
     if events.is_empty() {
         return (found, Vec::new());
     }
-    let Segmented { maneuvers: found, unknown, mut problems } = found;
+    let Segmented {
+        maneuvers: found,
+        unknown,
+        mut problems,
+    } = found;
     let mut given = Vec::new();
     let mut rows = Vec::new();
     for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
@@ -43,7 +47,8 @@ pub fn with_events(
     }
     // Windows close together share what is between them: an event replaces what it covers by more than half of either.
     let shorter_s = |f: &Maneuver, g: &Maneuver| (f.end_s - f.start_s).min(g.end_s - g.start_s);
-    let covers = |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);
+    let covers =
+        |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);
     let is_replaced = |f: &Maneuver| given.iter().any(|g| covers(f, g));
     let kept: Vec<Maneuver> = found.into_iter().filter(|f| !is_replaced(f)).collect();
     rows.extend(kept.iter().map(|f| compared(None, Some(f))));
@@ -51,7 +56,14 @@ pub fn with_events(
     maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     let time = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-    (Segmented { maneuvers, unknown, problems }, rows)
+    (
+        Segmented {
+            maneuvers,
+            unknown,
+            problems,
+        },
+        rows,
+    )
 }
 
 /// The maneuver that an event names, or why there is none.
@@ -62,14 +74,22 @@ fn as_given(
     aircraft: &Aircraft,
     limits: &Limits,
 ) -> Result<Maneuver, String> {
-    let class = classes.iter().find(|c| c.name == event.class).ok_or_else(|| {
-        let near = did_you_mean(&event.class, classes.iter().map(|c| c.name.as_str()));
-        format!("an event is of the unknown class `{}`{near}", event.class)
-    })?;
-    let (first_s, last_s) = (record.time_s(0), record.time_s(record.samples.saturating_sub(1)));
+    let class = classes
+        .iter()
+        .find(|c| c.name == event.class)
+        .ok_or_else(|| {
+            let near = did_you_mean(&event.class, classes.iter().map(|c| c.name.as_str()));
+            format!("an event is of the unknown class `{}`{near}", event.class)
+        })?;
+    let (first_s, last_s) = (
+        record.time_s(0),
+        record.time_s(record.samples.saturating_sub(1)),
+    );
     // A half sample of rounding in the analyst's list is no mistake.
     let half = record.step_s / 2.0;
-    let inside = first_s - half <= event.start_s && event.start_s < event.end_s && event.end_s <= last_s + half;
+    let inside = first_s - half <= event.start_s
+        && event.start_s < event.end_s
+        && event.end_s <= last_s + half;
     if !inside {
         let (start, end) = (event.start_s, event.end_s);
         return Err(format!(
@@ -77,7 +97,14 @@ fn as_given(
             event.class
         ));
     }
-    condition::maneuver(record, aircraft, class, (event.start_s, event.end_s), None, limits)
+    condition::maneuver(
+        record,
+        aircraft,
+        class,
+        (event.start_s, event.end_s),
+        None,
+        limits,
+    )
 }
 
 fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {
@@ -86,7 +113,10 @@ fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {
 
 fn most_overlapping<'a>(event: &Event, found: &'a [Maneuver]) -> Option<&'a Maneuver> {
     let overlap = |m: &&Maneuver| overlap_s(m, event.start_s, event.end_s);
-    found.iter().filter(|m| overlap(m) > 0.0).max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
+    found
+        .iter()
+        .filter(|m| overlap(m) > 0.0)
+        .max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
 }
 
 fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
@@ -96,11 +126,19 @@ fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
         (Some(g), Some(f)) if g.class != f.class => "other class",
         (Some(g), Some(f)) => {
             let apart_s = (g.start_s - f.start_s).abs().max((g.end_s - f.end_s).abs());
-            if apart_s <= AGREEMENT_S { "agrees" } else { "other times" }
+            if apart_s <= AGREEMENT_S {
+                "agrees"
+            } else {
+                "other times"
+            }
         }
     };
     EventRow {
-        flight_id: given.map(|g| &g.flight_id).or(found.map(|f| &f.flight_id)).cloned().unwrap_or_default(),
+        flight_id: given
+            .map(|g| &g.flight_id)
+            .or(found.map(|f| &f.flight_id))
+            .cloned()
+            .unwrap_or_default(),
         given_class: given.map(|g| g.class.clone()),
         given_start_s: given.map(|g| g.start_s),
         given_end_s: given.map(|g| g.end_s),

@@ -146,7 +146,10 @@ impl Settings {
     #[must_use]
     pub fn without_smallest_step(&self, classes: &[Class]) -> BTreeSet<String> {
         let counted = classes.iter().flat_map(|c| c.recognition.counted());
-        counted.filter(|s| !self.steps.contains_key(*s)).cloned().collect()
+        counted
+            .filter(|s| !self.steps.contains_key(*s))
+            .cloned()
+            .collect()
     }
 }
 
@@ -162,11 +165,26 @@ pub struct Segmented {
 /// needs no others.
 #[must_use]
 pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
-    let named = classes.iter().flat_map(|c| c.recognition.signals()).map(str::to_owned);
-    let measured = classes.iter().flat_map(|c| c.axis.outputs()).map(|o| o.signal().to_owned());
-    let looked_at = settings.steps.keys().chain(&settings.pilot_controls).chain(settings.quality.actuators.keys());
+    let named = classes
+        .iter()
+        .flat_map(|c| c.recognition.signals())
+        .map(str::to_owned);
+    let measured = classes
+        .iter()
+        .flat_map(|c| c.axis.outputs())
+        .map(|o| o.signal().to_owned());
+    let looked_at = settings
+        .steps
+        .keys()
+        .chain(&settings.pilot_controls)
+        .chain(settings.quality.actuators.keys());
     let condition = condition::SIGNALS.iter().map(|s| (*s).to_owned());
-    named.chain(measured).chain(condition).chain(looked_at.cloned()).chain([settings.excitation_flag.clone()]).collect()
+    named
+        .chain(measured)
+        .chain(condition)
+        .chain(looked_at.cloned())
+        .chain([settings.excitation_flag.clone()])
+        .collect()
 }
 
 /// Finds the maneuvers of one record.
@@ -174,7 +192,12 @@ pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
 /// Excitation that fits no class or several is `unknown` and a problem; so are flags that cannot be right and signals that
 /// the record lacks. The rest of the record is segmented all the same.
 #[must_use]
-pub fn maneuvers(record: &Record, classes: &[Class], aircraft: &Aircraft, settings: &Settings) -> Segmented {
+pub fn maneuvers(
+    record: &Record,
+    classes: &[Class],
+    aircraft: &Aircraft,
+    settings: &Settings,
+) -> Segmented {
     let scene = Scene::of(record, settings);
     let trains = candidates::trains(&scene, classes);
     let mut recognition = recognise::all(&scene, classes, &trains);
@@ -187,22 +210,43 @@ pub fn maneuvers(record: &Record, classes: &[Class], aircraft: &Aircraft, settin
     let mut maneuvers = Vec::new();
     for (f, window) in found.into_iter().zip(windows) {
         let at_s = f.first_s;
-        match condition::maneuver(record, aircraft, f.class, window, Some(f.recognised), &settings.quality) {
+        match condition::maneuver(
+            record,
+            aircraft,
+            f.class,
+            window,
+            Some(f.recognised),
+            &settings.quality,
+        ) {
             Ok(m) => maneuvers.push(m),
             Err(reason) => problems.push(problem(record, at_s, reason)),
         }
     }
     problems.sort_by(|a, b| a.place.cmp(&b.place));
-    Segmented { maneuvers, unknown, problems }
+    Segmented {
+        maneuvers,
+        unknown,
+        problems,
+    }
 }
 
 /// Signals that some class is recognised by and that this record has not.
 fn lacking(record: &Record, classes: &[Class], settings: &Settings) -> Vec<Problem> {
-    let flags: BTreeSet<&String> =
-        classes.iter().flat_map(|c| c.recognition.flags.keys()).chain([&settings.excitation_flag]).collect();
+    let flags: BTreeSet<&String> = classes
+        .iter()
+        .flat_map(|c| c.recognition.flags.keys())
+        .chain([&settings.excitation_flag])
+        .collect();
     let counted = classes.iter().flat_map(|c| c.recognition.counted());
-    let wanted: BTreeSet<&String> = counted.chain(&settings.pilot_controls).chain(flags.iter().copied()).collect();
-    let lacks = |s: &&String| record.values(s).is_none_or(|v| v.iter().all(|v| !v.is_finite()));
+    let wanted: BTreeSet<&String> = counted
+        .chain(&settings.pilot_controls)
+        .chain(flags.iter().copied())
+        .collect();
+    let lacks = |s: &&String| {
+        record
+            .values(s)
+            .is_none_or(|v| v.iter().all(|v| !v.is_finite()))
+    };
     let reason = |signal: &String| {
         if flags.contains(signal) {
             "the record has no such flag; maneuvers are recognised by their inputs alone"
@@ -221,11 +265,21 @@ fn lacking(record: &Record, classes: &[Class], settings: &Settings) -> Vec<Probl
 
 /// Flags that never change though two maneuvers or more say that they should.
 fn stuck(record: &Record, found: &[recognise::Found]) -> Vec<Problem> {
-    let flags: BTreeSet<&String> = found.iter().flat_map(|f| f.class.recognition.flags.keys()).collect();
+    let flags: BTreeSet<&String> = found
+        .iter()
+        .flat_map(|f| f.class.recognition.flags.keys())
+        .collect();
     let of = |flag: &String| -> Option<Problem> {
-        let mut values = record.values(flag)?.iter().filter(|v| v.is_finite()).map(|v| *v > 0.5);
+        let mut values = record
+            .values(flag)?
+            .iter()
+            .filter(|v| v.is_finite())
+            .map(|v| *v > 0.5);
         let always = values.next()?;
-        let against = found.iter().filter(|f| f.class.recognition.flags.get(flag) == Some(&!always)).count();
+        let against = found
+            .iter()
+            .filter(|f| f.class.recognition.flags.get(flag) == Some(&!always))
+            .count();
         let reason = format!(
             "is {} throughout, and {against} maneuvers say otherwise: it is stuck",
             if always { "up" } else { "down" }
@@ -243,5 +297,10 @@ fn stuck(record: &Record, found: &[recognise::Found]) -> Vec<Problem> {
 
 /// A problem at a time of the record.
 fn problem(record: &Record, at_s: f64, reason: String) -> Problem {
-    Problem { stage: "segment".into(), flight_id: record.flight_id.clone(), place: format!("t = {at_s:.1} s"), reason }
+    Problem {
+        stage: "segment".into(),
+        flight_id: record.flight_id.clone(),
+        place: format!("t = {at_s:.1} s"),
+        reason,
+    }
 }

@@ -56,12 +56,16 @@ pub(super) fn all<'a>(scene: &Scene, classes: &'a [Class], trains: &[Train]) -> 
     // The train before, and what was recognised in it.
     let mut before: Option<(Train, Recognition)> = None;
     for train in trains {
-        let of_its_kind: Vec<&Class> =
-            classes.iter().filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind).collect();
+        let of_its_kind: Vec<&Class> = classes
+            .iter()
+            .filter(|c| c.recognition.sweep.is_empty() && kind_of(c, scene) == train.kind)
+            .collect();
         let alone = one_train(scene, &of_its_kind, train);
         let parted = before.as_ref().map_or(0, |b| b.1.found.len()) + alone.found.len();
         let joined = before.as_ref().and_then(|b| b.0.going_over(train, scene));
-        let joined = joined.map(|t| (one_train(scene, &of_its_kind, &t), t)).filter(|j| j.0.found.len() > parted);
+        let joined = joined
+            .map(|t| (one_train(scene, &of_its_kind, &t), t))
+            .filter(|j| j.0.found.len() > parted);
         before = if let Some((recognised, joined)) = joined {
             Some((joined, recognised))
         } else {
@@ -72,10 +76,17 @@ pub(super) fn all<'a>(scene: &Scene, classes: &'a [Class], trains: &[Train]) -> 
     recognition.add(before.map(|b| b.1).unwrap_or_default());
     for class in classes {
         for (signal, wanted) in &class.recognition.sweep {
-            let smallest = scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
+            let smallest = scene
+                .steps
+                .smallest
+                .get(signal)
+                .copied()
+                .unwrap_or(f64::INFINITY);
             let values = scene.record.values(signal).unwrap_or_default();
             for run in runs(scene, swings::of_signal(values, smallest)) {
-                recognition.found.extend(one_sweep(scene, class, &run, wanted));
+                recognition
+                    .found
+                    .extend(one_sweep(scene, class, &run, wanted));
             }
         }
     }
@@ -145,7 +156,10 @@ fn blocks(train: &Train, pause_s: f64) -> Vec<Block> {
         let pauses = k == 0 || pair.time_s - train.edges[k - 1].time_s >= pause_s;
         match blocks.last_mut().filter(|_| !pauses) {
             Some(block) => block.end = k + 1,
-            None => blocks.push(Block { first: k, end: k + 1 }),
+            None => blocks.push(Block {
+                first: k,
+                end: k + 1,
+            }),
         }
     }
     blocks
@@ -153,20 +167,37 @@ fn blocks(train: &Train, pause_s: f64) -> Vec<Block> {
 
 fn seen<'s>(scene: &'s Scene, train: &'s Train, (first, end): (usize, usize)) -> Seen<'s> {
     let at = |k: usize| train.edges.get(k).map_or(f64::NAN, |e| e.time_s);
-    Seen { scene, kind: &train.kind, from_s: at(first), to_s: at(end.saturating_sub(1)) }
+    Seen {
+        scene,
+        kind: &train.kind,
+        from_s: at(first),
+        to_s: at(end.saturating_sub(1)),
+    }
 }
 
 /// The train's stretches and what is between them, as ranges of blocks.
-fn cut(scene: &Scene, classes: &[&Class], train: &Train, blocks: &[Block]) -> Vec<(usize, usize, bool)> {
+fn cut(
+    scene: &Scene,
+    classes: &[&Class],
+    train: &Train,
+    blocks: &[Block],
+) -> Vec<(usize, usize, bool)> {
     let mut best: Vec<Cut> = vec![Cut::default()];
     for end in 1..=blocks.len() {
         let before = best[end - 1];
         let block = blocks[end - 1];
-        let mut chosen =
-            Cut { unexplained: before.unexplained + block.end - block.first, from: end - 1, class: None, ..before };
+        let mut chosen = Cut {
+            unexplained: before.unexplained + block.end - block.first,
+            from: end - 1,
+            class: None,
+            ..before
+        };
         for from in (end.saturating_sub(MOST_PAUSES)..end).rev() {
             let range = (blocks[from].first, block.end);
-            let Some(explained) = explained(&seen(scene, train, range), classes, train, range) else { continue };
+            let Some(explained) = explained(&seen(scene, train, range), classes, train, range)
+            else {
+                continue;
+            };
             let candidate = best[from].and(scene, train, blocks, (from, end), &explained);
             if candidate.is_better_than(&chosen) {
                 chosen = candidate;
@@ -207,11 +238,13 @@ impl<'a> Cut<'a> {
         };
         if let (Some(class), Some(block)) = (self.class, blocks.get(self.from)) {
             let (last_s, next_s) = (train.edges[range.0 - 1].time_s, train.edges[range.0].time_s);
-            let whole_s = class.recognition.decay_s + explained.class.recognition.lead_in_s - scene.settings.transit_s;
+            let whole_s = class.recognition.decay_s + explained.class.recognition.lead_in_s
+                - scene.settings.transit_s;
             cut.paused_s += next_s - last_s;
             cut.cramped += usize::from(next_s - last_s < whole_s);
             let own = (block.first, range.0);
-            let repeats = || repeated(scene, train, class, own) == repeated(scene, train, class, range);
+            let repeats =
+                || repeated(scene, train, class, own) == repeated(scene, train, class, range);
             cut.unlike += usize::from(class.name == explained.class.name && !repeats());
         }
         cut
@@ -219,7 +252,12 @@ impl<'a> Cut<'a> {
 }
 
 /// The steps of a class's inputs in a stretch: which signal steps how often before another does.
-fn repeated<'t>(scene: &Scene, train: &'t Train, class: &Class, range: (usize, usize)) -> Vec<(&'t str, usize)> {
+fn repeated<'t>(
+    scene: &Scene,
+    train: &'t Train,
+    class: &Class,
+    range: (usize, usize),
+) -> Vec<(&'t str, usize)> {
     let inputs = seen(scene, train, range).inputs(class);
     let own: Vec<&str> = train
         .edges
@@ -229,7 +267,9 @@ fn repeated<'t>(scene: &Scene, train: &'t Train, class: &Class, range: (usize, u
         .map(|e| e.signal)
         .filter(|s| inputs.contains(s))
         .collect();
-    own.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect()
+    own.chunk_by(|a, b| a == b)
+        .map(|run| (run[0], run.len()))
+        .collect()
 }
 
 /// How a class explains a stretch.
@@ -252,70 +292,120 @@ fn explained<'a>(
     let edges = train.edges.get(first..end)?;
     let of_class = |class: &&'a Class| {
         let inputs = seen.inputs(class);
-        let own =
-            |signal: &str| -> Vec<f64> { edges.iter().filter(|e| e.signal == signal).map(|e| e.change).collect() };
+        let own = |signal: &str| -> Vec<f64> {
+            edges
+                .iter()
+                .filter(|e| e.signal == signal)
+                .map(|e| e.change)
+                .collect()
+        };
         let share = seen.scene.settings.outstanding_share;
-        let returns = edges.chunk_by(|a, b| a.signal == b.signal).count().saturating_sub(inputs.len());
-        let away = inputs.iter().filter(|signal| is_away(&own(signal), share)).count();
+        let returns = edges
+            .chunk_by(|a, b| a.signal == b.signal)
+            .count()
+            .saturating_sub(inputs.len());
+        let away = inputs
+            .iter()
+            .filter(|signal| is_away(&own(signal), share))
+            .count();
         let pulses = &class.recognition.pulses;
         Explained {
             class,
             unexplained: edges.iter().filter(|e| !inputs.contains(e.signal)).count(),
-            in_pulses: pulses.iter().map(|(signal, p)| own(signal).len().min(p.widths.len() + 1)).sum(),
+            in_pulses: pulses
+                .iter()
+                .map(|(signal, p)| own(signal).len().min(p.widths.len() + 1))
+                .sum(),
             run_across: run_across(seen, class, edges),
             loose_ends: returns + away,
         }
     };
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
-    fitting.map(of_class).min_by_key(|e| (e.unexplained, usize::MAX - e.in_pulses))
+    fitting
+        .map(of_class)
+        .min_by_key(|e| (e.unexplained, usize::MAX - e.in_pulses))
 }
 
 /// How many rests of the excitation flag lie within a stretch of a class that it is up for. A flag that rests while there is
 /// more than a step of feedback is late, or wrong.
 fn run_across(seen: &Seen, class: &Class, edges: &[super::candidates::Edge]) -> usize {
     let scene = seen.scene;
-    if *seen.kind != Kind::Onboard || class.recognition.flags.get(&scene.settings.excitation_flag) != Some(&true) {
+    if *seen.kind != Kind::Onboard
+        || class.recognition.flags.get(&scene.settings.excitation_flag) != Some(&true)
+    {
         return 0;
     }
     let within = |(from_s, to_s): &&(f64, f64)| seen.from_s < *from_s && *to_s < seen.to_s;
-    let still =
-        |(from_s, to_s): &&(f64, f64)| edges.iter().filter(|e| (*from_s..=*to_s).contains(&e.time_s)).count() <= 1;
+    let still = |(from_s, to_s): &&(f64, f64)| {
+        edges
+            .iter()
+            .filter(|e| (*from_s..=*to_s).contains(&e.time_s))
+            .count()
+            <= 1
+    };
     scene.flag_rests.iter().filter(within).filter(still).count()
 }
 
 /// Whether a signal does not end near where it began, by those of its changes that are not feedback's.
 fn is_away(changes: &[f64], outstanding_share: f64) -> bool {
     let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);
-    let moved: f64 = changes.iter().filter(|c| c.abs() >= outstanding_share * largest).sum();
+    let moved: f64 = changes
+        .iter()
+        .filter(|c| c.abs() >= outstanding_share * largest)
+        .sum();
     moved.abs() > TRIM_SHARE * largest
 }
 
 fn verdict<'a>(seen: &Seen, classes: &[&'a Class]) -> Verdict<'a> {
     let fitting = classes.iter().filter(|c| seen.misses(c).is_empty());
     let worth = |c: &Class| (seen.explained(c), !c.recognition.pulses.is_empty());
-    let mut ranked: Vec<(&'a Class, (usize, bool), f64)> =
-        fitting.map(|c| (*c, worth(c), seen.confidence(c))).collect();
+    let mut ranked: Vec<(&'a Class, (usize, bool), f64)> = fitting
+        .map(|c| (*c, worth(c), seen.confidence(c)))
+        .collect();
     ranked.sort_by(|a, b| b.1.cmp(&a.1).then(b.2.total_cmp(&a.2)));
     match ranked[..] {
         [] => Verdict::None,
         [best, second, ..] if best.1 == second.1 && best.2 - second.2 < 0.01 => {
-            let alike = ranked.iter().filter(|r| r.1 == best.1 && best.2 - r.2 < 0.01);
-            Verdict::Alike(alike.map(|r| r.0.name.as_str()).collect::<Vec<_>>().join(", "))
+            let alike = ranked
+                .iter()
+                .filter(|r| r.1 == best.1 && best.2 - r.2 < 0.01);
+            Verdict::Alike(
+                alike
+                    .map(|r| r.0.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            )
         }
         [best, ..] => Verdict::Fits(best.0),
     }
 }
 
-fn stretch<'a>(scene: &Scene, classes: &[&'a Class], train: &Train, range: (usize, usize), into: &mut Recognition<'a>) {
+fn stretch<'a>(
+    scene: &Scene,
+    classes: &[&'a Class],
+    train: &Train,
+    range: (usize, usize),
+    into: &mut Recognition<'a>,
+) {
     let seen = seen(scene, train, range);
     match verdict(&seen, classes) {
         Verdict::Fits(class) => {
-            let Some((first_s, last_s)) = seen.excited_s(class) else { return };
-            let before =
-                range.0.checked_sub(1).and_then(|k| train.edges.get(k)).map_or(f64::NEG_INFINITY, |e| e.time_s);
+            let Some((first_s, last_s)) = seen.excited_s(class) else {
+                return;
+            };
+            let before = range
+                .0
+                .checked_sub(1)
+                .and_then(|k| train.edges.get(k))
+                .map_or(f64::NEG_INFINITY, |e| e.time_s);
             let first_s = opening(scene, &seen, (before, first_s));
             let recognised = seen.recognised(class, (first_s, last_s));
-            into.found.push(Found { class, first_s, last_s, recognised });
+            into.found.push(Found {
+                class,
+                first_s,
+                last_s,
+                recognised,
+            });
         }
         Verdict::Alike(names) => {
             let reason = format!("fits {names} alike; make their recognition exclude each other");
@@ -333,15 +423,29 @@ fn opening(scene: &Scene, seen: &Seen, (after_s, first_s): (f64, f64)) -> f64 {
     }
     let at_first = |s: &&super::Step| (s.time_s - first_s).abs() < scene.record.step_s / 2.0;
     let before = |signal: &String| -> Option<f64> {
-        let steps = scene.own.between(signal, first_s - scene.settings.longest_rest_s, first_s);
+        let steps = scene
+            .own
+            .between(signal, first_s - scene.settings.longest_rest_s, first_s);
         let first = steps.iter().find(at_first)?;
-        let opens =
-            |s: &&super::Step| after_s < s.time_s && s.time_s < first.time_s && s.change() * first.change() < 0.0;
-        let share =
-            |s: &&super::Step| s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs();
-        steps.iter().filter(opens).filter(share).map(|s| s.time_s).next_back()
+        let opens = |s: &&super::Step| {
+            after_s < s.time_s && s.time_s < first.time_s && s.change() * first.change() < 0.0
+        };
+        let share = |s: &&super::Step| {
+            s.change().abs() >= 0.5 * scene.settings.outstanding_share * first.change().abs()
+        };
+        steps
+            .iter()
+            .filter(opens)
+            .filter(share)
+            .map(|s| s.time_s)
+            .next_back()
     };
-    scene.own.of.keys().filter_map(before).fold(first_s, f64::min)
+    scene
+        .own
+        .of
+        .keys()
+        .filter_map(before)
+        .fold(first_s, f64::min)
 }
 
 /// What fits no class: worth a word where a signal goes to one side, to the other by more than ordinary flying does, and
@@ -357,17 +461,27 @@ fn leave<'a>(
     let seen = seen(scene, train, range);
     let misses = classes.iter().map(|c| (*c, seen.misses(c)));
     let nearest = misses.min_by_key(|(c, misses)| (usize::MAX - seen.explained(c), misses.len()));
-    let Some((class, misses)) = nearest else { return };
+    let Some((class, misses)) = nearest else {
+        return;
+    };
     let signals = train.edges.iter().map(|e| e.signal);
-    if !signals.collect::<std::collections::BTreeSet<_>>().into_iter().any(|s| seen.is_excitation(s)) {
+    if !signals
+        .collect::<std::collections::BTreeSet<_>>()
+        .into_iter()
+        .any(|s| seen.is_excitation(s))
+    {
         return;
     }
     // Pilots move their controls anyway: a few steps, or steps among which no class finds one of its inputs complete.
-    if train.kind != Kind::Onboard && misses.iter().filter(|m| m.too_little).count() > 0 && !is_series(&seen, class) {
+    if train.kind != Kind::Onboard
+        && misses.iter().filter(|m| m.too_little).count() > 0
+        && !is_series(&seen, class)
+    {
         return;
     }
     let reason = in_words(scene, class, &misses, &seen);
-    into.unknown.push(unknown(&seen, classes, class.name.clone(), reason));
+    into.unknown
+        .push(unknown(&seen, classes, class.name.clone(), reason));
 }
 
 /// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants of all its inputs
@@ -378,7 +492,10 @@ fn is_series(seen: &Seen, class: &Class) -> bool {
 }
 
 fn unknown(seen: &Seen, classes: &[&Class], nearest_class: String, reason: String) -> Unknown {
-    let counted = classes.iter().flat_map(|c| c.recognition.counted()).map(String::as_str);
+    let counted = classes
+        .iter()
+        .flat_map(|c| c.recognition.counted())
+        .map(String::as_str);
     Unknown {
         flight_id: seen.scene.record.flight_id.clone(),
         start_s: seen.from_s,
@@ -393,7 +510,8 @@ fn in_words(scene: &Scene, class: &Class, misses: &[Miss], seen: &Seen) -> Strin
     let reasons: Vec<&str> = misses.iter().map(|m| m.reason.as_str()).collect();
     let record = scene.record;
     let ends_s = record.time_s(record.samples.saturating_sub(1));
-    let cut = seen.to_s + scene.settings.longest_hold_s > ends_s || seen.from_s - 1.0 < record.start_s;
+    let cut =
+        seen.to_s + scene.settings.longest_hold_s > ends_s || seen.from_s - 1.0 < record.start_s;
     let broken_off = misses.iter().all(|m| m.too_little);
     let why = match (broken_off, cut) {
         (true, true) => "cut by the end of the record, or broken off: ",
@@ -409,7 +527,10 @@ fn runs(scene: &Scene, swings: Vec<Swing>) -> Vec<Vec<Swing>> {
     let at = |k: f64| record.start_s + k * record.step_s;
     let mut runs: Vec<Vec<Swing>> = Vec::new();
     for swing in swings {
-        let swing = Swing { from_s: at(swing.from_s), to_s: at(swing.to_s) };
+        let swing = Swing {
+            from_s: at(swing.from_s),
+            to_s: at(swing.to_s),
+        };
         let goes_on = |run: &Vec<Swing>| {
             let middles: Vec<f64> = run.iter().rev().take(2).map(Swing::middle_s).collect();
             let apart_s = swing.middle_s() - middles[0];
@@ -424,19 +545,37 @@ fn runs(scene: &Scene, swings: Vec<Swing>) -> Vec<Vec<Swing>> {
     runs
 }
 
-fn one_sweep<'a>(scene: &Scene, class: &'a Class, run: &[Swing], wanted: &crate::maneuver::Sweep) -> Option<Found<'a>> {
+fn one_sweep<'a>(
+    scene: &Scene,
+    class: &'a Class,
+    run: &[Swing],
+    wanted: &crate::maneuver::Sweep,
+) -> Option<Found<'a>> {
     let ratio = patterns::sweep(run, wanted).ok()?;
     let kind = kind_of(class, scene);
     let (first_s, last_s) = (run.first()?.from_s, run.last()?.to_s);
-    let seen = Seen { scene, kind: &kind, from_s: first_s, to_s: last_s };
+    let seen = Seen {
+        scene,
+        kind: &kind,
+        from_s: first_s,
+        to_s: last_s,
+    };
     if !seen.misses(class).is_empty() {
         return None;
     }
     let mut recognised = seen.recognised(class, (first_s, last_s));
     let evidence = format!("{} swings that become {ratio:.1} times as fast", run.len());
-    recognised.evidence =
-        if recognised.evidence.is_empty() { evidence } else { format!("{evidence}; {}", recognised.evidence) };
-    Some(Found { class, first_s, last_s, recognised })
+    recognised.evidence = if recognised.evidence.is_empty() {
+        evidence
+    } else {
+        format!("{evidence}; {}", recognised.evidence)
+    };
+    Some(Found {
+        class,
+        first_s,
+        last_s,
+        recognised,
+    })
 }
 
 /// Puts the maneuvers in order of time and keeps their inputs from overlapping: where they do, the longer excitation stands.
@@ -446,7 +585,10 @@ pub(super) fn keep_apart(recognition: &mut Recognition) {
     found.sort_by(|a, b| (b.last_s - b.first_s).total_cmp(&(a.last_s - a.first_s)));
     let mut kept: Vec<Found> = Vec::new();
     for f in found.drain(..) {
-        if kept.iter().all(|k| f.first_s > k.last_s || f.last_s < k.first_s) {
+        if kept
+            .iter()
+            .all(|k| f.first_s > k.last_s || f.last_s < k.first_s)
+        {
             kept.push(f);
         }
     }
@@ -454,8 +596,14 @@ pub(super) fn keep_apart(recognition: &mut Recognition) {
     unknown.sort_by(|a, b| (b.end_s - b.start_s).total_cmp(&(a.end_s - a.start_s)));
     let mut left: Vec<Unknown> = Vec::new();
     for u in unknown.drain(..) {
-        let inside = kept.iter().any(|k| u.start_s <= k.last_s && u.end_s >= k.first_s);
-        if !inside && left.iter().all(|l| u.start_s > l.end_s || u.end_s < l.start_s) {
+        let inside = kept
+            .iter()
+            .any(|k| u.start_s <= k.last_s && u.end_s >= k.first_s);
+        if !inside
+            && left
+                .iter()
+                .all(|l| u.start_s > l.end_s || u.end_s < l.start_s)
+        {
             left.push(u);
         }
     }
@@ -470,14 +618,19 @@ pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     let of = |f: &Found| {
         let rule = &f.class.recognition;
         let end_s = f.last_s + rule.decay_s;
-        (f.first_s - rule.lead_in_s, end_s.min(taken_over_s(scene, f.last_s, end_s)))
+        (
+            f.first_s - rule.lead_in_s,
+            end_s.min(taken_over_s(scene, f.last_s, end_s)),
+        )
     };
     let mut windows: Vec<(f64, f64)> = found.iter().map(of).collect();
     for k in 1..windows.len() {
         let (last_s, next_s) = (found[k - 1].last_s, found[k].first_s);
         let share = scene.settings.shared_lead_in;
         windows[k].0 = windows[k].0.max(last_s + share * (next_s - last_s));
-        windows[k - 1].1 = windows[k - 1].1.min(windows[k].0 + share * (next_s - windows[k].0));
+        windows[k - 1].1 = windows[k - 1]
+            .1
+            .min(windows[k].0 + share * (next_s - windows[k].0));
     }
     windows
 }
@@ -486,17 +639,23 @@ pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
 fn taken_over_s(scene: &Scene, last_s: f64, end_s: f64) -> f64 {
     let settings = scene.settings;
     let clear_s = last_s + settings.transit_s + 2.0 * settings.level_s;
-    let steps =
-        settings.pilot_controls.iter().flat_map(|c| scene.steps.between(c, clear_s, end_s + settings.transit_s));
-    steps.map(|s| s.time_s - settings.transit_s).fold(f64::INFINITY, f64::min)
+    let steps = settings
+        .pilot_controls
+        .iter()
+        .flat_map(|c| scene.steps.between(c, clear_s, end_s + settings.transit_s));
+    steps
+        .map(|s| s.time_s - settings.transit_s)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// One row of `problems` for everything unknown.
 pub(super) fn problems(scene: &Scene, unknown: &[Unknown]) -> Vec<Problem> {
     let of = |u: &Unknown| {
         let lasting_s = u.end_s - u.start_s;
-        let reason =
-            format!("excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}", u.reason, u.inputs);
+        let reason = format!(
+            "excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}",
+            u.reason, u.inputs
+        );
         problem(scene.record, u.start_s, reason)
     };
     unknown.iter().map(of).collect()

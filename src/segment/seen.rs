@@ -44,23 +44,48 @@ impl<'a> Seen<'a> {
         let scene = self.scene;
         let own = *self.kind == Kind::Onboard && !scene.is_pilot_s(signal);
         let steps = if own { &scene.own } else { &scene.steps };
-        let inside = steps.between(signal, self.from_s - self.slack_s(), self.to_s + self.slack_s());
+        let inside = steps.between(
+            signal,
+            self.from_s - self.slack_s(),
+            self.to_s + self.slack_s(),
+        );
         let largest = inside.iter().map(|s| s.change().abs()).fold(0.0, f64::max);
         let taken = scene.steps.noise.get(signal).copied().unwrap_or_default();
         let least = scene.settings.outstanding_share * largest - taken;
-        inside.iter().filter(|s| s.change().abs() >= least).collect()
+        inside
+            .iter()
+            .filter(|s| s.change().abs() >= least)
+            .collect()
     }
 
     /// How often a signal steps to count against a class: of a surface that hardly moves beside the others, feedback, not at
     /// all.
     fn against(&self, signal: &str) -> usize {
         let relative = |signal: &str| {
-            let smallest = self.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
-            self.steps_of(signal).iter().map(|s| s.change().abs() / smallest).fold(0.0, f64::max)
+            let smallest = self
+                .scene
+                .steps
+                .smallest
+                .get(signal)
+                .copied()
+                .unwrap_or(f64::INFINITY);
+            self.steps_of(signal)
+                .iter()
+                .map(|s| s.change().abs() / smallest)
+                .fold(0.0, f64::max)
         };
-        let others = self.scene.steps.of.keys().filter(|s| self.scene.is_pilot_s(s) == self.scene.is_pilot_s(signal));
+        let others = self
+            .scene
+            .steps
+            .of
+            .keys()
+            .filter(|s| self.scene.is_pilot_s(s) == self.scene.is_pilot_s(signal));
         let largest = others.map(|s| relative(s)).fold(0.0, f64::max);
-        if relative(signal) < self.scene.settings.outstanding_share * largest { 0 } else { self.steps_of(signal).len() }
+        if relative(signal) < self.scene.settings.outstanding_share * largest {
+            0
+        } else {
+            self.steps_of(signal).len()
+        }
     }
 
     /// What of a class's recognition fails here; nothing where it fits.
@@ -71,9 +96,18 @@ impl<'a> Seen<'a> {
         for (signal, count) in &rule.steps {
             let n = self.steps_of(signal).len();
             if n < count.at_least {
-                miss(true, format!("{signal} steps {n} times, at least {} wanted", count.at_least));
+                miss(
+                    true,
+                    format!(
+                        "{signal} steps {n} times, at least {} wanted",
+                        count.at_least
+                    ),
+                );
             } else if n > count.at_most && self.against(signal) > count.at_most {
-                miss(false, format!("{signal} steps {n} times, at most {} wanted", count.at_most));
+                miss(
+                    false,
+                    format!("{signal} steps {n} times, at most {} wanted", count.at_most),
+                );
             }
         }
         for (signal, pulses) in &rule.pulses {
@@ -83,11 +117,19 @@ impl<'a> Seen<'a> {
         }
         for (signal, wanted) in &rule.moves {
             if self.moves(signal) == Some(!wanted) {
-                miss(false, format!("{signal} {}", if *wanted { "does not move" } else { "moves" }));
+                miss(
+                    false,
+                    format!(
+                        "{signal} {}",
+                        if *wanted { "does not move" } else { "moves" }
+                    ),
+                );
             }
         }
         if *self.kind == Kind::Onboard {
-            self.pilot_s_hand(class).into_iter().for_each(|reason| miss(false, reason));
+            self.pilot_s_hand(class)
+                .into_iter()
+                .for_each(|reason| miss(false, reason));
         }
         misses
     }
@@ -95,7 +137,13 @@ impl<'a> Seen<'a> {
     /// Why a train of surfaces is not the on-board system's.
     fn pilot_s_hand(&self, class: &Class) -> Option<String> {
         let scene = self.scene;
-        if !scene.sees_pilot && !class.recognition.flags.iter().any(|(f, up)| *up && self.flag(f) == Some(true)) {
+        if !scene.sees_pilot
+            && !class
+                .recognition
+                .flags
+                .iter()
+                .any(|(f, up)| *up && self.flag(f) == Some(true))
+        {
             return Some("no pilot control is recorded and no flag says that the surfaces moved by themselves".into());
         }
         // One correction is a step there and one back; more is flying.
@@ -132,18 +180,39 @@ impl<'a> Seen<'a> {
     /// Three steps to alternating sides, one of them a reversal: twice the smallest.
     pub fn is_excitation(&self, signal: &str) -> bool {
         let steps = self.steps_of(signal);
-        let turns = steps.windows(2).filter(|s| s[0].change() * s[1].change() < 0.0).count();
-        let smallest = self.scene.steps.smallest.get(signal).copied().unwrap_or(f64::INFINITY);
-        turns + 1 >= self.scene.settings.fewest_steps && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
+        let turns = steps
+            .windows(2)
+            .filter(|s| s[0].change() * s[1].change() < 0.0)
+            .count();
+        let smallest = self
+            .scene
+            .steps
+            .smallest
+            .get(signal)
+            .copied()
+            .unwrap_or(f64::INFINITY);
+        turns + 1 >= self.scene.settings.fewest_steps
+            && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
     }
 
     /// The signals that make a maneuver of a class here: those that must, and of those that may step as often as a doublet
     /// does the ones that are excited. Fewer steps of these are feedback's.
     pub fn inputs<'c>(&self, class: &'c Class) -> BTreeSet<&'c str> {
         let fewest = self.scene.settings.fewest_steps;
-        let may = class.recognition.steps.iter().filter(|(_, count)| count.at_least == 0 && count.at_most >= fewest);
-        let excited = may.map(|(signal, _)| signal.as_str()).filter(|signal| self.is_excitation(signal));
-        class.recognition.inputs().into_iter().chain(excited).collect()
+        let may = class
+            .recognition
+            .steps
+            .iter()
+            .filter(|(_, count)| count.at_least == 0 && count.at_most >= fewest);
+        let excited = may
+            .map(|(signal, _)| signal.as_str())
+            .filter(|signal| self.is_excitation(signal));
+        class
+            .recognition
+            .inputs()
+            .into_iter()
+            .chain(excited)
+            .collect()
     }
 
     /// First and last step of the class's inputs; of the pilot's controls, first and last deflection.
@@ -152,20 +221,34 @@ impl<'a> Seen<'a> {
             return Some((self.from_s, self.to_s));
         }
         let inputs = self.inputs(class);
-        let times = || inputs.iter().flat_map(|s| self.steps_of(s)).map(|s| s.time_s);
-        Some((times().min_by(f64::total_cmp)?, times().max_by(f64::total_cmp)?))
+        let times = || {
+            inputs
+                .iter()
+                .flat_map(|s| self.steps_of(s))
+                .map(|s| s.time_s)
+        };
+        Some((
+            times().min_by(f64::total_cmp)?,
+            times().max_by(f64::total_cmp)?,
+        ))
     }
 
     /// How many steps the class's inputs make.
     pub fn explained(&self, class: &Class) -> usize {
-        self.inputs(class).iter().map(|s| self.steps_of(s).len()).sum()
+        self.inputs(class)
+            .iter()
+            .map(|s| self.steps_of(s).len())
+            .sum()
     }
 
     /// How often each of some signals steps, in words: `de_deg 5, dpv_deg 1`.
     pub fn count_all<'b>(&self, signals: impl Iterator<Item = &'b str>) -> String {
         let counted: BTreeMap<&str, usize> = signals.map(|s| (s, self.steps_of(s).len())).collect();
-        let words: Vec<String> =
-            counted.iter().filter(|(_, n)| **n > 0).map(|(signal, n)| format!("{signal} {n}")).collect();
+        let words: Vec<String> = counted
+            .iter()
+            .filter(|(_, n)| **n > 0)
+            .map(|(signal, n)| format!("{signal} {n}"))
+            .collect();
         words.join(", ")
     }
 
@@ -174,7 +257,11 @@ impl<'a> Seen<'a> {
         let inputs = self.inputs(class);
         let voices = self.voices(class);
         let confidence = voices.iter().map(|v| v.weight).product::<f64>();
-        let evidence: Vec<&str> = voices.iter().map(|v| v.words.as_str()).filter(|w| !w.is_empty()).collect();
+        let evidence: Vec<&str> = voices
+            .iter()
+            .map(|v| v.words.as_str())
+            .filter(|w| !w.is_empty())
+            .collect();
         Recognised {
             first_input_s: Some(first_s),
             last_input_s: Some(last_s),
@@ -193,9 +280,18 @@ impl<'a> Seen<'a> {
     /// Signals other than the inputs that step during the maneuver: by gearing or feedback.
     fn followed(&self, inputs: &BTreeSet<&str>) -> String {
         let scene = self.scene;
-        let steps =
-            |s: &&String| !scene.steps.between(s, self.from_s - self.slack_s(), self.to_s + self.slack_s()).is_empty();
-        let others = scene.steps.of.keys().filter(|s| !inputs.contains(s.as_str())).filter(steps);
+        let steps = |s: &&String| {
+            !scene
+                .steps
+                .between(s, self.from_s - self.slack_s(), self.to_s + self.slack_s())
+                .is_empty()
+        };
+        let others = scene
+            .steps
+            .of
+            .keys()
+            .filter(|s| !inputs.contains(s.as_str()))
+            .filter(steps);
         others.map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 
@@ -215,7 +311,10 @@ impl<'a> Seen<'a> {
         }
         for (signal, wanted) in &rule.moves {
             match self.moves(signal) {
-                Some(_) => say(1.0, format!("{signal} {}", if *wanted { "moves" } else { "rests" })),
+                Some(_) => say(
+                    1.0,
+                    format!("{signal} {}", if *wanted { "moves" } else { "rests" }),
+                ),
                 None => say(0.9, format!("{signal} says nothing")),
             }
         }

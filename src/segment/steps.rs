@@ -58,12 +58,17 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
     for (signal, set) in &settings.steps {
-        let Some(values) = record.values(signal) else { continue };
+        let Some(values) = record.values(signal) else {
+            continue;
+        };
         let levels = levels(values, window.level);
         let noise = noise(&levels, window);
         let smallest = set.max(settings.steps_over_noise * noise);
         let raised = if smallest > *set { noise } else { 0.0 };
-        for (kept, size) in [(&mut steps, smallest), (&mut deflections, settings.deflection_share * smallest)] {
+        for (kept, size) in [
+            (&mut steps, smallest),
+            (&mut deflections, settings.deflection_share * smallest),
+        ] {
             let mut found = of_levels(&levels, size, window);
             for step in &mut found {
                 step.time_s = record.start_s + step.time_s * record.step_s;
@@ -77,18 +82,30 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
 }
 
 /// The largest change of a signal, between levels as those of a step, from one time to another; 0 where nothing is known.
-pub(super) fn largest_change(record: &Record, signal: &str, settings: &Settings, (from_s, to_s): (f64, f64)) -> f64 {
+pub(super) fn largest_change(
+    record: &Record,
+    signal: &str,
+    settings: &Settings,
+    (from_s, to_s): (f64, f64),
+) -> f64 {
     let window = Window::of(record, settings);
     let reach = window.half_transit + window.level;
     let first = record.sample_at(from_s).saturating_sub(reach);
     let end = (record.sample_at(to_s) + reach).min(record.samples);
-    let values = record.values(signal).and_then(|v| v.get(first..end)).unwrap_or_default();
-    changes(&levels(values, window.level), window).map(|change| change.size()).fold(0.0, f64::max)
+    let values = record
+        .values(signal)
+        .and_then(|v| v.get(first..end))
+        .unwrap_or_default();
+    changes(&levels(values, window.level), window)
+        .map(|change| change.size())
+        .fold(0.0, f64::max)
 }
 
 /// The standard deviation of changes that nobody commanded: from the median of all, of which steps are few.
 fn noise(levels: &[f64], window: Window) -> f64 {
-    let mut sizes: Vec<f64> = changes(levels, window).map(|change| change.size()).collect();
+    let mut sizes: Vec<f64> = changes(levels, window)
+        .map(|change| change.size())
+        .collect();
     let middle = sizes.len() / 2;
     if middle == 0 {
         return 0.0;
@@ -99,7 +116,11 @@ fn noise(levels: &[f64], window: Window) -> f64 {
 
 /// A time in whole samples, at least one.
 fn samples(time_s: f64, step_s: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and at least one")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounded and at least one"
+    )]
     let n = (time_s / step_s).round().max(1.0) as usize;
     n
 }
@@ -137,10 +158,20 @@ impl Change {
 /// The changes between levels at each time at which both exist.
 fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = Change> {
     let reach = window.half_transit + window.level;
-    let after = levels.get(reach + window.half_transit..).unwrap_or_default();
-    let change =
-        move |(k, (before, after)): (usize, (&f64, &f64))| Change { at: k + reach, before: *before, after: *after };
-    levels.iter().zip(after).enumerate().map(change).filter(|change| change.size().is_finite())
+    let after = levels
+        .get(reach + window.half_transit..)
+        .unwrap_or_default();
+    let change = move |(k, (before, after)): (usize, (&f64, &f64))| Change {
+        at: k + reach,
+        before: *before,
+        after: *after,
+    };
+    levels
+        .iter()
+        .zip(after)
+        .enumerate()
+        .map(change)
+        .filter(|change| change.size().is_finite())
 }
 
 /// The steps among the changes between levels, their times in samples (a step between samples 9 and 10 is at 9.5).
@@ -152,7 +183,8 @@ fn of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
     for change in changes(levels, window) {
         let big = change.size() >= smallest;
         let goes_on = |last: &Change| {
-            big && (change.after - change.before) * (last.after - last.before) > 0.0 && change.at - last.at <= reach
+            big && (change.after - change.before) * (last.after - last.before) > 0.0
+                && change.at - last.at <= reach
         };
         if !run.last().is_none_or(goes_on) {
             steps.extend(peak(&run));
@@ -168,12 +200,24 @@ fn of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
 
 /// The one step of a run: where the change is within 5% of its maximum, in the middle.
 fn peak(run: &[Change]) -> Option<Step> {
-    let (top, largest) = run.iter().enumerate().max_by(|a, b| a.1.size().total_cmp(&b.1.size()))?;
+    let (top, largest) = run
+        .iter()
+        .enumerate()
+        .max_by(|a, b| a.1.size().total_cmp(&b.1.size()))?;
     let near = |c: &&Change| c.size() >= 0.95 * largest.size();
-    let first = run[..top].iter().rev().take_while(near).last().unwrap_or(largest);
+    let first = run[..top]
+        .iter()
+        .rev()
+        .take_while(near)
+        .last()
+        .unwrap_or(largest);
     let last = run[top..].iter().take_while(near).last().unwrap_or(largest);
     let between_samples = (first.at + last.at) as f64 / 2.0 - 0.5;
-    Some(Step { time_s: between_samples, before: largest.before, after: largest.after })
+    Some(Step {
+        time_s: between_samples,
+        before: largest.before,
+        after: largest.after,
+    })
 }
 
 /// Levels that are averaged side by side, in the processor's vectors.
@@ -184,7 +228,11 @@ const SIDE: usize = 64;
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
     let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
     let side_by_side = pulp::Arch::new();
-    for (from, levels) in levels.chunks_mut(SIDE).enumerate().map(|(i, levels)| (i * SIDE, levels)) {
+    for (from, levels) in levels
+        .chunks_mut(SIDE)
+        .enumerate()
+        .map(|(i, levels)| (i * SIDE, levels))
+    {
         let samples = &values[from..from + levels.len() + length - 1];
         side_by_side.dispatch(|| level_each(samples, length, levels));
     }
@@ -197,7 +245,10 @@ fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
     let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
     let (mut low, mut high) = ([f64::INFINITY; SIDE], [f64::NEG_INFINITY; SIDE]);
     for later in samples.windows(levels.len()).take(length) {
-        let of_level = known.iter_mut().zip(&mut sum).zip(low.iter_mut().zip(&mut high));
+        let of_level = known
+            .iter_mut()
+            .zip(&mut sum)
+            .zip(low.iter_mut().zip(&mut high));
         for (v, ((known, sum), (low, high))) in later.iter().zip(of_level) {
             let finite = v.is_finite();
             *known += if finite { 1.0 } else { 0.0 };
@@ -210,7 +261,11 @@ fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
     for (level, ((known, sum), (low, high))) in levels.iter_mut().zip(of_level) {
         let inner = (sum - low - high) / (known - 2.0);
         let mean = if *known >= 4.0 { inner } else { sum / known };
-        *level = if 2.0 * known < length as f64 { f64::NAN } else { mean };
+        *level = if 2.0 * known < length as f64 {
+            f64::NAN
+        } else {
+            mean
+        };
     }
 }
 
@@ -219,7 +274,10 @@ mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
 
-    const WINDOW: Window = Window { half_transit: 3, level: 5 };
+    const WINDOW: Window = Window {
+        half_transit: 3,
+        level: 5,
+    };
 
     fn steps(values: &[f64]) -> Vec<Step> {
         of_levels(&levels(values, WINDOW.level), 2.0, WINDOW)
@@ -227,7 +285,9 @@ mod tests {
 
     /// A level that jumps at the given samples.
     fn jumping(n: usize, jumps: &[(usize, f64)]) -> Vec<f64> {
-        (0..n).map(|k| jumps.iter().filter(|j| k >= j.0).map(|j| j.1).sum()).collect()
+        (0..n)
+            .map(|k| jumps.iter().filter(|j| k >= j.0).map(|j| j.1).sum())
+            .collect()
     }
 
     #[test]
@@ -254,8 +314,12 @@ mod tests {
 
     #[test]
     fn chatter_slow_motion_and_a_leftover_spike_are_no_steps() {
-        let chatter: Vec<f64> = (0..200).map(|k| if k % 2 == 0 { 1.5 } else { -1.5 }).collect();
-        let slow: Vec<f64> = (0..200).map(|k| 4.0 * (f64::from(k) / 40.0 * 1.5).sin()).collect();
+        let chatter: Vec<f64> = (0..200)
+            .map(|k| if k % 2 == 0 { 1.5 } else { -1.5 })
+            .collect();
+        let slow: Vec<f64> = (0..200)
+            .map(|k| 4.0 * (f64::from(k) / 40.0 * 1.5).sin())
+            .collect();
         let mut spike = vec![0.0; 200];
         spike[100] = 30.0;
         for values in [chatter, slow, spike] {
@@ -272,13 +336,25 @@ mod tests {
         let found = levels(&values, 5);
         assert_eq!(found.len(), 146);
         for (k, level) in found.iter().enumerate() {
-            let mut known: Vec<f64> = values[k..k + 5].iter().copied().filter(|v| v.is_finite()).collect();
+            let mut known: Vec<f64> = values[k..k + 5]
+                .iter()
+                .copied()
+                .filter(|v| v.is_finite())
+                .collect();
             known.sort_by(f64::total_cmp);
-            let inner = if known.len() >= 4 { &known[1..known.len() - 1] } else { &known[..] };
+            let inner = if known.len() >= 4 {
+                &known[1..known.len() - 1]
+            } else {
+                &known[..]
+            };
             if known.len() < 3 {
                 assert!(level.is_nan());
             } else {
-                assert_abs_diff_eq!(*level, inner.iter().sum::<f64>() / inner.len() as f64, epsilon = 1e-12);
+                assert_abs_diff_eq!(
+                    *level,
+                    inner.iter().sum::<f64>() / inner.len() as f64,
+                    epsilon = 1e-12
+                );
             }
         }
     }

@@ -13,8 +13,17 @@ use crate::maneuver::{Event, Pulses, Recognition, StepCount, Sweep};
 const STEP_S: f64 = 0.025;
 
 fn aircraft() -> Aircraft {
-    let p = Position { x_ft: 31.4, y_ft: 0.0, z_ft: 7.0 };
-    let vane = Vane { x_ft: 38.0, y_ft: 0.0, z_ft: 8.0, factor: 1.0 };
+    let p = Position {
+        x_ft: 31.4,
+        y_ft: 0.0,
+        z_ft: 7.0,
+    };
+    let vane = Vane {
+        x_ft: 38.0,
+        y_ft: 0.0,
+        z_ft: 8.0,
+        factor: 1.0,
+    };
     Aircraft {
         name: "test".into(),
         wing_area_ft2: 400.0,
@@ -26,7 +35,10 @@ fn aircraft() -> Aircraft {
             an: p,
             ax: p,
             ay: p,
-            alpha_vane: Vane { factor: 1.25, ..vane },
+            alpha_vane: Vane {
+                factor: 1.25,
+                ..vane
+            },
             beta_vane: vane,
             vane_model: VaneModel::Exact,
             thrust_in_ax: true,
@@ -43,8 +55,22 @@ fn settings() -> Settings {
 }
 
 /// A class from its flags and its step counts (signal, at least, at most).
-fn class(name: &str, axis: Axis, flags: &[(&str, bool)], steps: &[(&str, usize, usize)], decay_s: f64) -> Class {
-    let count = |s: &(&str, usize, usize)| (s.0.to_owned(), StepCount { at_least: s.1, at_most: s.2 });
+fn class(
+    name: &str,
+    axis: Axis,
+    flags: &[(&str, bool)],
+    steps: &[(&str, usize, usize)],
+    decay_s: f64,
+) -> Class {
+    let count = |s: &(&str, usize, usize)| {
+        (
+            s.0.to_owned(),
+            StepCount {
+                at_least: s.1,
+                at_most: s.2,
+            },
+        )
+    };
     Class {
         name: name.into(),
         title: String::new(),
@@ -71,14 +97,27 @@ fn classes() -> Vec<Class> {
     let doublets = [("dsa_deg", 3, 8), ("de_deg", 3, 8)];
     let mut classes = vec![
         class("DOUBLETS", Axis::Longitudinal, &obes, &doublets, 1.5),
-        class("SERIES", Axis::Longitudinal, &obes, &[("de_deg", 10, 19), ("dsa_deg", 0, 2), ("dpv_deg", 0, 9)], 1.5),
+        class(
+            "SERIES",
+            Axis::Longitudinal,
+            &obes,
+            &[("de_deg", 10, 19), ("dsa_deg", 0, 2), ("dpv_deg", 0, 9)],
+            1.5,
+        ),
         class("3211", Axis::Longitudinal, &obes, &[("dsa_deg", 0, 2)], 4.5),
         class("PITCH", Axis::Longitudinal, &free, &pitch, 2.5),
         class("PITCH_TV", Axis::Longitudinal, &vectored, &pitch, 2.5),
         class("YAW_ROLL", Axis::Lateral, &free, &yaw_roll, 2.5),
     ];
-    let pulses = Pulses { widths: vec![3.0, 2.0, 1.0, 1.0], unit_s: (0.2, 2.0), tolerance: 0.5 };
-    classes[2].recognition.pulses.insert("de_deg".into(), pulses);
+    let pulses = Pulses {
+        widths: vec![3.0, 2.0, 1.0, 1.0],
+        unit_s: (0.2, 2.0),
+        tolerance: 0.5,
+    };
+    classes[2]
+        .recognition
+        .pulses
+        .insert("de_deg".into(), pulses);
     classes[3].recognition.moves.insert("dpv_deg".into(), false);
     classes[4].recognition.moves.insert("dpv_deg".into(), true);
     classes
@@ -87,7 +126,13 @@ fn classes() -> Vec<Class> {
 /// A record of trimmed flight with smooth motion and chatter on every control.
 fn flight(length_s: u32) -> Record {
     let samples = length_s as usize * 40 + 1;
-    let mut record = Record { flight_id: "f1".into(), start_s: 0.0, step_s: STEP_S, samples, signals: BTreeMap::new() };
+    let mut record = Record {
+        flight_id: "f1".into(),
+        start_s: 0.0,
+        step_s: STEP_S,
+        samples,
+        signals: BTreeMap::new(),
+    };
     let constants = [
         (signal::ALPHA_VANE, 25.0),
         (signal::BETA_VANE, 0.0),
@@ -109,46 +154,81 @@ fn flight(length_s: u32) -> Record {
         put(&mut record, name, |_| value);
     }
     for (name, trim) in [("de_deg", -9.0), ("dsa_deg", 0.1)] {
-        put(&mut record, name, |t| trim + 0.4 * (2.0 * t).sin() + 0.3 * (125.0 * t).sin());
+        put(&mut record, name, |t| {
+            trim + 0.4 * (2.0 * t).sin() + 0.3 * (125.0 * t).sin()
+        });
     }
     put(&mut record, "dpv_deg", |t| 0.03 * (125.0 * t).sin());
-    for (name, trim) in [("stick_pitch_in", 0.4), ("stick_lat_in", 0.0), ("pedal_in", 0.0)] {
-        put(&mut record, name, |t| trim + 0.2 * (2.0 * t).sin() + 0.1 * (125.0 * t).sin());
+    for (name, trim) in [
+        ("stick_pitch_in", 0.4),
+        ("stick_lat_in", 0.0),
+        ("pedal_in", 0.0),
+    ] {
+        put(&mut record, name, |t| {
+            trim + 0.2 * (2.0 * t).sin() + 0.1 * (125.0 * t).sin()
+        });
     }
     record
 }
 
 fn put(record: &mut Record, name: &str, value: impl Fn(f64) -> f64) {
-    let values: Vec<f64> = (0..record.samples).map(|k| value(record.time_s(k))).collect();
+    let values: Vec<f64> = (0..record.samples)
+        .map(|k| value(record.time_s(k)))
+        .collect();
     let marks = vec![Mark::Measured; values.len()];
     record.signals.insert(name.into(), Series { values, marks });
 }
 
 fn add(record: &mut Record, name: &str, value: impl Fn(f64) -> f64) {
-    let old = record.values(name).expect("a signal of the record").to_vec();
+    let old = record
+        .values(name)
+        .expect("a signal of the record")
+        .to_vec();
     let start_s = record.start_s;
     put(record, name, |t| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sample of the record")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a sample of the record"
+        )]
         let k = ((t - start_s) / STEP_S).round() as usize;
         old[k] + value(t)
     });
 }
 
 fn up(record: &mut Record, flag: &str, from_s: f64, to_s: f64) {
-    add(record, flag, |t| f64::from(u8::from(t >= from_s && t < to_s)));
+    add(record, flag, |t| {
+        f64::from(u8::from(t >= from_s && t < to_s))
+    });
 }
 
 /// Edges at given times, each crossed within 0.15 s: the level changes by the given amount.
 fn edges(record: &mut Record, name: &str, edges: &[(f64, f64)]) {
-    add(record, name, |t| edges.iter().map(|(at, change)| change * ((t - at) / 0.15).clamp(0.0, 1.0)).sum());
+    add(record, name, |t| {
+        edges
+            .iter()
+            .map(|(at, change)| change * ((t - at) / 0.15).clamp(0.0, 1.0))
+            .sum()
+    });
 }
 
 fn doublet(record: &mut Record, name: &str, at_s: f64, size: f64) {
-    edges(record, name, &[(at_s, size), (at_s + 1.0, -2.0 * size), (at_s + 2.0, size)]);
+    edges(
+        record,
+        name,
+        &[(at_s, size), (at_s + 1.0, -2.0 * size), (at_s + 2.0, size)],
+    );
 }
 
 /// Alternating steps: to one side, from side to side `reversals` times, back to trim.
-fn pilot_steps(record: &mut Record, name: &str, at_s: f64, size: f64, reversals: u32, half_period_s: f64) -> f64 {
+fn pilot_steps(
+    record: &mut Record,
+    name: &str,
+    at_s: f64,
+    size: f64,
+    reversals: u32,
+    half_period_s: f64,
+) -> f64 {
     let mut all = vec![(at_s, size)];
     let mut sign = -1.0;
     for i in 1..=reversals {
@@ -166,7 +246,13 @@ fn three_two_one_one(record: &mut Record, at_s: f64) {
     edges(
         record,
         "de_deg",
-        &[(at_s, 6.0), (at_s + 3.0, -12.0), (at_s + 5.0, 12.0), (at_s + 6.0, -12.0), (at_s + 7.0, 6.0)],
+        &[
+            (at_s, 6.0),
+            (at_s + 3.0, -12.0),
+            (at_s + 5.0, 12.0),
+            (at_s + 6.0, -12.0),
+            (at_s + 7.0, 6.0),
+        ],
     );
 }
 
@@ -175,7 +261,11 @@ fn found(record: &Record) -> Segmented {
 }
 
 fn classes_of(segmented: &Segmented) -> Vec<&str> {
-    segmented.maneuvers.iter().map(|m| m.class.as_str()).collect()
+    segmented
+        .maneuvers
+        .iter()
+        .map(|m| m.class.as_str())
+        .collect()
 }
 
 fn assert_window(m: &Maneuver, class: &str, start_s: f64, end_s: f64) {
@@ -186,7 +276,10 @@ fn assert_window(m: &Maneuver, class: &str, start_s: f64, end_s: f64) {
 
 fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
     let segmented = found(record);
-    assert_eq!((&segmented.problems[..], &segmented.unknown[..]), (&[][..], &[][..]));
+    assert_eq!(
+        (&segmented.problems[..], &segmented.unknown[..]),
+        (&[][..], &[][..])
+    );
     assert_eq!(classes_of(&segmented), [class]);
     assert_window(&segmented.maneuvers[0], class, start_s, end_s);
 }
@@ -195,7 +288,9 @@ fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
 fn turbulence(record: &mut Record, name: &str, seed: u64, deviation: f64) {
     let mut state = seed;
     let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     let keep = (-STEP_S / 0.15).exp();
@@ -209,7 +304,11 @@ fn turbulence(record: &mut Record, name: &str, seed: u64, deviation: f64) {
     let size = (noise.iter().map(|v| v * v).sum::<f64>() / noise.len() as f64).sqrt();
     let start_s = record.start_s;
     add(record, name, |t| {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sample of the record")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a sample of the record"
+        )]
         let k = ((t - start_s) / STEP_S).round() as usize;
         noise[k] * deviation / size
     });
@@ -223,13 +322,23 @@ fn doublets_of_surfaces_are_found_with_their_window_and_condition() {
     doublet(&mut r, "de_deg", 26.0, -4.0);
     assert_one(&r, "DOUBLETS", 20.0, 29.5);
     let m = &found(&r).maneuvers[0];
-    assert_eq!((m.maneuver_id.as_str(), m.origin.as_str()), ("f1_t00020", "found"));
-    assert_abs_diff_eq!(m.samples as f64, 1.0 + (m.end_s - m.start_s) / STEP_S, epsilon = 1e-6);
+    assert_eq!(
+        (m.maneuver_id.as_str(), m.origin.as_str()),
+        ("f1_t00020", "found")
+    );
+    assert_abs_diff_eq!(
+        m.samples as f64,
+        1.0 + (m.end_s - m.start_s) / STEP_S,
+        epsilon = 1e-6
+    );
     // The vane reads 1.25 times the angle at the c.g.
     assert_abs_diff_eq!(m.alpha_deg, 20.0, epsilon = 1e-9);
     assert_abs_diff_eq!(m.mass_slug, 1050.0, epsilon = 1e-9);
     let by = &m.recognised;
-    assert_eq!((by.inputs.as_str(), by.followed.as_str()), ("de_deg 3, dsa_deg 3", ""));
+    assert_eq!(
+        (by.inputs.as_str(), by.followed.as_str()),
+        ("de_deg 3, dsa_deg 3", "")
+    );
     assert_abs_diff_eq!(by.first_input_s.unwrap(), 21.0, epsilon = 0.1);
     assert_abs_diff_eq!(by.last_input_s.unwrap(), 28.0, epsilon = 0.1);
     assert_abs_diff_eq!(by.confidence.unwrap(), 1.0, epsilon = 1e-9);
@@ -278,7 +387,11 @@ fn a_flag_that_is_right_missing_late_or_stuck_changes_nothing_but_the_confidence
     for missing in [&absent, &empty] {
         assert_eq!(missing.problems.len(), 1);
         assert_eq!(missing.problems[0].place, "obes");
-        assert!(missing.problems[0].reason.contains("recognised by their inputs alone"));
+        assert!(
+            missing.problems[0]
+                .reason
+                .contains("recognised by their inputs alone")
+        );
         assert!(confidence(missing) < confidence(&right));
     }
     let late = with_flag(|r| {
@@ -287,7 +400,11 @@ fn a_flag_that_is_right_missing_late_or_stuck_changes_nothing_but_the_confidence
     });
     assert_eq!(late.problems, []);
     let down = with_flag(|_| {});
-    assert!(down.problems[0].reason.contains("stuck"), "{:?}", down.problems);
+    assert!(
+        down.problems[0].reason.contains("stuck"),
+        "{:?}",
+        down.problems
+    );
     assert!(confidence(&down) < confidence(&absent));
     let up = with_flag(|r| put(r, "obes", |_| 1.0));
     assert_eq!(up.problems, [], "two maneuvers want it up and none down");
@@ -301,14 +418,20 @@ fn a_flag_that_is_stuck_up_makes_no_maneuver_of_ordinary_flying() {
     let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.8);
     assert_one(&r, "PITCH", 19.0, last_s + 2.5);
     let evidence = &found(&r).maneuvers[0].recognised.evidence;
-    assert!(evidence.contains("although obes is up; although tvcs is up; dpv_deg rests"), "{evidence}");
+    assert!(
+        evidence.contains("although obes is up; although tvcs is up; dpv_deg rests"),
+        "{evidence}"
+    );
 }
 
 #[test]
 fn vanes_that_move_tell_the_class_whatever_the_flag_says() {
-    for (tvcs, moves, class) in
-        [(0.0, false, "PITCH"), (1.0, true, "PITCH_TV"), (1.0, false, "PITCH"), (0.0, true, "PITCH_TV")]
-    {
+    for (tvcs, moves, class) in [
+        (0.0, false, "PITCH"),
+        (1.0, true, "PITCH_TV"),
+        (1.0, false, "PITCH"),
+        (0.0, true, "PITCH_TV"),
+    ] {
         let mut r = flight(60);
         put(&mut r, "tvcs", |_| tvcs);
         let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.0, 8, 1.8);
@@ -333,7 +456,13 @@ fn where_no_vane_is_recorded_the_flag_decides_and_without_both_nothing_does() {
         r.signals.remove("tvcs");
         let neither = found(&r);
         assert_eq!(neither.maneuvers, []);
-        assert!(neither.unknown[0].reason.contains("fits PITCH, PITCH_TV alike"), "{:?}", neither.unknown);
+        assert!(
+            neither.unknown[0]
+                .reason
+                .contains("fits PITCH, PITCH_TV alike"),
+            "{:?}",
+            neither.unknown
+        );
     }
 }
 
@@ -342,7 +471,11 @@ fn pedal_then_stick_is_one_maneuver_and_the_recovery_is_left_out() {
     let mut r = flight(60);
     let pedal_s = pilot_steps(&mut r, "pedal_in", 20.0, 1.5, 3, 1.5);
     let last_s = pilot_steps(&mut r, "stick_lat_in", pedal_s + 1.5, -1.5, 3, 1.5);
-    edges(&mut r, "stick_lat_in", &[(last_s + 2.5, 1.7), (last_s + 4.0, -1.7)]);
+    edges(
+        &mut r,
+        "stick_lat_in",
+        &[(last_s + 2.5, 1.7), (last_s + 4.0, -1.7)],
+    );
     assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.4);
 }
 
@@ -363,8 +496,16 @@ fn surfaces_that_follow_the_stick_and_ordinary_flying_are_no_maneuvers() {
     up(&mut r, "tvcs", 30.0, 35.0);
     for at in [22.0, 50.0, 58.0, 80.0, 83.0, 86.0, 89.0, 92.0] {
         edges(&mut r, "stick_lat_in", &[(at, 1.6), (at + 2.0, -1.6)]);
-        edges(&mut r, "stick_pitch_in", &[(at + 0.5, 2.0), (at + 1.0, -2.0)]);
-        edges(&mut r, "de_deg", &[(at + 0.6, -6.0), (at + 1.1, 9.0), (at + 1.6, -3.0)]);
+        edges(
+            &mut r,
+            "stick_pitch_in",
+            &[(at + 0.5, 2.0), (at + 1.0, -2.0)],
+        );
+        edges(
+            &mut r,
+            "de_deg",
+            &[(at + 0.6, -6.0), (at + 1.1, 9.0), (at + 1.6, -3.0)],
+        );
     }
     assert_eq!(found(&r), Segmented::default());
 }
@@ -374,16 +515,35 @@ fn excitation_that_fits_no_class_is_unknown_with_its_times_and_the_reason() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 30.0);
     doublet(&mut r, "de_deg", 21.0, 5.0);
-    let Segmented { maneuvers, unknown, problems } = found(&r);
+    let Segmented {
+        maneuvers,
+        unknown,
+        problems,
+    } = found(&r);
     assert_eq!(maneuvers, []);
     assert_eq!(unknown.len(), 1);
     assert_abs_diff_eq!(unknown[0].start_s, 21.0, epsilon = 0.1);
     assert_abs_diff_eq!(unknown[0].end_s, 23.0, epsilon = 0.1);
-    assert_eq!((unknown[0].inputs.as_str(), unknown[0].nearest_class.as_str()), ("de_deg 3", "DOUBLETS"));
-    assert!(unknown[0].reason.contains("dsa_deg steps 0 times, at least 3 wanted"), "{unknown:?}");
+    assert_eq!(
+        (
+            unknown[0].inputs.as_str(),
+            unknown[0].nearest_class.as_str()
+        ),
+        ("de_deg 3", "DOUBLETS")
+    );
+    assert!(
+        unknown[0]
+            .reason
+            .contains("dsa_deg steps 0 times, at least 3 wanted"),
+        "{unknown:?}"
+    );
     assert_eq!(problems.len(), 1);
     assert_eq!(problems[0].place, "t = 21.1 s");
-    assert!(problems[0].reason.contains("de_deg 3"), "{}", problems[0].reason);
+    assert!(
+        problems[0].reason.contains("de_deg 3"),
+        "{}",
+        problems[0].reason
+    );
 }
 
 #[test]
@@ -392,19 +552,32 @@ fn a_maneuver_broken_off_is_unknown_and_not_of_a_shorter_class() {
     let mut series = flight(60);
     pilot_steps(&mut series, "de_deg", 21.0, 4.0, 4, 0.9);
     let mut pulses = flight(60);
-    edges(&mut pulses, "de_deg", &[(21.0, 6.0), (24.0, -12.0), (26.0, 6.0)]);
+    edges(
+        &mut pulses,
+        "de_deg",
+        &[(21.0, 6.0), (24.0, -12.0), (26.0, 6.0)],
+    );
     for (r, nearest) in [(series, "SERIES"), (pulses, "3211")] {
         let segmented = found(&r);
         assert_eq!(segmented.maneuvers, []);
         let unknown = &segmented.unknown[..];
         assert_eq!(unknown.len(), 1);
-        assert!(unknown[0].reason.contains("broken off?") || unknown[0].nearest_class == nearest, "{unknown:?}");
+        assert!(
+            unknown[0].reason.contains("broken off?") || unknown[0].nearest_class == nearest,
+            "{unknown:?}"
+        );
     }
     let mut pilot = flight(60);
     pilot_steps(&mut pilot, "stick_pitch_in", 20.0, 1.5, 3, 1.5);
     let segmented = found(&pilot);
     assert_eq!(segmented.maneuvers, []);
-    assert!(segmented.unknown[0].reason.contains("broken off? stick_pitch_in steps"), "{:?}", segmented.unknown);
+    assert!(
+        segmented.unknown[0]
+            .reason
+            .contains("broken off? stick_pitch_in steps"),
+        "{:?}",
+        segmented.unknown
+    );
 }
 
 #[test]
@@ -413,8 +586,13 @@ fn a_maneuver_that_fits_two_classes_names_them() {
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
     let mut both = classes();
-    both.push(Class { name: "TWIN".into(), ..both[2].clone() });
-    let Segmented { maneuvers, unknown, .. } = maneuvers(&r, &both, &aircraft(), &settings());
+    both.push(Class {
+        name: "TWIN".into(),
+        ..both[2].clone()
+    });
+    let Segmented {
+        maneuvers, unknown, ..
+    } = maneuvers(&r, &both, &aircraft(), &settings());
     assert_eq!(maneuvers, []);
     assert!(unknown[0].reason.contains("3211, TWIN"), "{unknown:?}");
 }
@@ -447,14 +625,28 @@ fn maneuvers_that_follow_each_other_within_two_seconds_are_two_whether_flags_par
             up(&mut r, "obes", 20.0, 70.0);
         }
         let segmented = found(&r);
-        assert_eq!(classes_of(&segmented), ["3211", "3211", "SERIES", "DOUBLETS"]);
+        assert_eq!(
+            classes_of(&segmented),
+            ["3211", "3211", "SERIES", "DOUBLETS"]
+        );
         assert_eq!(segmented.unknown, []);
         for pair in segmented.maneuvers.windows(2) {
-            assert!(pair[1].start_s < pair[0].end_s, "what is between them serves both");
-            let (last_s, next_s) =
-                (pair[0].recognised.last_input_s.unwrap(), pair[1].recognised.first_input_s.unwrap());
-            assert!(pair[0].end_s < next_s, "no input of the next is in the window");
-            assert!(pair[0].end_s - last_s > 0.4 * (next_s - last_s), "some decay is kept");
+            assert!(
+                pair[1].start_s < pair[0].end_s,
+                "what is between them serves both"
+            );
+            let (last_s, next_s) = (
+                pair[0].recognised.last_input_s.unwrap(),
+                pair[1].recognised.first_input_s.unwrap(),
+            );
+            assert!(
+                pair[0].end_s < next_s,
+                "no input of the next is in the window"
+            );
+            assert!(
+                pair[0].end_s - last_s > 0.4 * (next_s - last_s),
+                "some decay is kept"
+            );
             let lead_in = next_s - pair[1].start_s;
             assert!(lead_in > 0.4 * (next_s - last_s), "some lead-in is kept");
         }
@@ -469,12 +661,20 @@ fn pilot_steps_repeated_at_once_are_two_maneuvers() {
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["PITCH", "PITCH"]);
     assert_abs_diff_eq!(segmented.maneuvers[0].end_s, first_s + 2.5, epsilon = 0.2);
-    assert_window(&segmented.maneuvers[1], "PITCH", first_s + 2.5, second_s + 2.5);
+    assert_window(
+        &segmented.maneuvers[1],
+        "PITCH",
+        first_s + 2.5,
+        second_s + 2.5,
+    );
 }
 
 #[test]
 fn doublets_of_one_surface_after_another_are_one_maneuver_in_one_round_or_in_two() {
-    for order in [["dsa_deg", "dsa_deg", "de_deg", "de_deg"], ["dsa_deg", "de_deg", "dsa_deg", "de_deg"]] {
+    for order in [
+        ["dsa_deg", "dsa_deg", "de_deg", "de_deg"],
+        ["dsa_deg", "de_deg", "dsa_deg", "de_deg"],
+    ] {
         let mut r = flight(60);
         for (at, name) in [20.0, 23.2, 26.4, 29.6].into_iter().zip(order) {
             doublet(&mut r, name, at, 5.0);
@@ -484,10 +684,14 @@ fn doublets_of_one_surface_after_another_are_one_maneuver_in_one_round_or_in_two
 }
 
 #[test]
-fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_and_a_late_one_does_not() {
+fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_and_a_late_one_does_not()
+ {
     for (late_s, classes) in [(0.0, &["DOUBLETS", "DOUBLETS"][..]), (3.0, &["DOUBLETS"])] {
         let mut r = flight(60);
-        for (at, name) in [20.0, 23.2, 28.6, 31.8].into_iter().zip(["dsa_deg", "de_deg", "dsa_deg", "de_deg"]) {
+        for (at, name) in [20.0, 23.2, 28.6, 31.8]
+            .into_iter()
+            .zip(["dsa_deg", "de_deg", "dsa_deg", "de_deg"])
+        {
             doublet(&mut r, name, at, 5.0);
         }
         up(&mut r, "obes", 19.5 + late_s, 26.0 + late_s);
@@ -511,12 +715,21 @@ fn a_series_flown_again_after_its_decay_is_cut_there_and_not_where_its_surface_p
     edges(&mut r, "de_deg", &[series(20.0), series(33.0)].concat());
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["SERIES", "SERIES"]);
-    assert_abs_diff_eq!(segmented.maneuvers[0].recognised.last_input_s.unwrap(), 29.0, epsilon = 0.2);
-    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), 33.0, epsilon = 0.2);
+    assert_abs_diff_eq!(
+        segmented.maneuvers[0].recognised.last_input_s.unwrap(),
+        29.0,
+        epsilon = 0.2
+    );
+    assert_abs_diff_eq!(
+        segmented.maneuvers[1].recognised.first_input_s.unwrap(),
+        33.0,
+        epsilon = 0.2
+    );
 }
 
 #[test]
-fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_control_is_at_trim() {
+fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_control_is_at_trim()
+{
     let mut r = flight(90);
     let first_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.4);
     let second_s = pilot_steps(&mut r, "stick_pitch_in", first_s + 1.0, 1.5, 7, 1.4);
@@ -528,8 +741,16 @@ fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_
     }
     let segmented = maneuvers(&r, &classes, &aircraft(), &settings());
     assert_eq!(classes_of(&segmented), ["PITCH", "PITCH"]);
-    assert_abs_diff_eq!(segmented.maneuvers[0].recognised.last_input_s.unwrap(), first_s, epsilon = 0.1);
-    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), first_s + 1.0, epsilon = 0.1);
+    assert_abs_diff_eq!(
+        segmented.maneuvers[0].recognised.last_input_s.unwrap(),
+        first_s,
+        epsilon = 0.1
+    );
+    assert_abs_diff_eq!(
+        segmented.maneuvers[1].recognised.first_input_s.unwrap(),
+        first_s + 1.0,
+        epsilon = 0.1
+    );
     assert_abs_diff_eq!(segmented.maneuvers[1].end_s, second_s + 2.5, epsilon = 0.2);
 }
 
@@ -566,15 +787,26 @@ fn the_flag_tells_the_system_s_first_input_from_an_answer_to_the_pilot_s_last() 
     up(&mut r, "obes", last_s + 0.6, last_s + 8.5);
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["PITCH", "3211"]);
-    assert_abs_diff_eq!(segmented.maneuvers[1].recognised.first_input_s.unwrap(), last_s + 0.8, epsilon = 0.1);
+    assert_abs_diff_eq!(
+        segmented.maneuvers[1].recognised.first_input_s.unwrap(),
+        last_s + 0.8,
+        epsilon = 0.1
+    );
     assert_eq!(segmented.unknown, []);
 }
 
 #[test]
 fn a_maneuver_against_a_turn_has_the_same_window() {
     let mut r = flight(60);
-    for (name, size) in [("de_deg", 3.0), ("dsa_deg", 2.0), ("stick_pitch_in", 1.0), ("stick_lat_in", 1.5)] {
-        add(&mut r, name, |t| size * (std::f64::consts::TAU * t / 30.0).sin());
+    for (name, size) in [
+        ("de_deg", 3.0),
+        ("dsa_deg", 2.0),
+        ("stick_pitch_in", 1.0),
+        ("stick_lat_in", 1.5),
+    ] {
+        add(&mut r, name, |t| {
+            size * (std::f64::consts::TAU * t / 30.0).sin()
+        });
     }
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
@@ -589,7 +821,9 @@ fn a_maneuver_against_a_turn_has_the_same_window() {
 fn steps_back_to_a_trim_that_drifted_in_a_turn_belong_to_the_maneuver() {
     let mut r = flight(60);
     // Half an inch in the time between two reversals.
-    add(&mut r, "stick_pitch_in", |t| 0.15 * (t - 20.0).clamp(0.0, 15.0));
+    add(&mut r, "stick_pitch_in", |t| {
+        0.15 * (t - 20.0).clamp(0.0, 15.0)
+    });
     let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.5);
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["PITCH"]);
@@ -619,7 +853,12 @@ fn turbulence_makes_no_maneuver_and_hides_none() {
         up(&mut r, "obes", 20.0, 33.0);
         up(&mut r, "obes", 59.0, 70.0);
         let segmented = found(&r);
-        assert_eq!(classes_of(&segmented), ["3211", "DOUBLETS"], "seed {seed}: {:?}", segmented.unknown);
+        assert_eq!(
+            classes_of(&segmented),
+            ["3211", "DOUBLETS"],
+            "seed {seed}: {:?}",
+            segmented.unknown
+        );
         assert_window(&segmented.maneuvers[0], "3211", 20.0, 32.5);
         assert_window(&segmented.maneuvers[1], "DOUBLETS", 59.0, 68.5);
     }
@@ -630,9 +869,14 @@ fn a_maneuver_that_the_record_cuts_is_unknown() {
     let mut r = flight(27);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    let Segmented { maneuvers, unknown, .. } = found(&r);
+    let Segmented {
+        maneuvers, unknown, ..
+    } = found(&r);
     assert_eq!(maneuvers, []);
-    assert!(unknown[0].reason.contains("cut by the end of the record"), "{unknown:?}");
+    assert!(
+        unknown[0].reason.contains("cut by the end of the record"),
+        "{unknown:?}"
+    );
 }
 
 #[test]
@@ -640,9 +884,19 @@ fn a_record_without_a_signal_says_which_classes_suffer_and_segments_the_rest() {
     let mut r = flight(60);
     pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.5);
     r.signals.remove("dsa_deg");
-    let Segmented { maneuvers, problems, .. } = found(&r);
+    let Segmented {
+        maneuvers,
+        problems,
+        ..
+    } = found(&r);
     assert_eq!(maneuvers.len(), 1);
-    assert_eq!(problems.iter().map(|p| p.place.as_str()).collect::<Vec<_>>(), ["dsa_deg"]);
+    assert_eq!(
+        problems
+            .iter()
+            .map(|p| p.place.as_str())
+            .collect::<Vec<_>>(),
+        ["dsa_deg"]
+    );
 }
 
 #[test]
@@ -658,24 +912,49 @@ fn without_pilot_controls_only_a_flag_tells_who_moved_the_surfaces() {
 }
 
 /// A sine whose frequency rises evenly, its size as given, from one time to another.
-fn sweep(record: &mut Record, name: &str, (from_s, to_s): (f64, f64), (from_hz, to_hz): (f64, f64), size: f64) {
+fn sweep(
+    record: &mut Record,
+    name: &str,
+    (from_s, to_s): (f64, f64),
+    (from_hz, to_hz): (f64, f64),
+    size: f64,
+) {
     add(record, name, |t| {
         let (s, length_s) = (t - from_s, to_s - from_s);
         let turns = from_hz * s + 0.5 * (to_hz - from_hz) * s * s / length_s;
-        if (0.0..=length_s).contains(&s) { size * (std::f64::consts::TAU * turns).sin() } else { 0.0 }
+        if (0.0..=length_s).contains(&s) {
+            size * (std::f64::consts::TAU * turns).sin()
+        } else {
+            0.0
+        }
     });
 }
 
 #[test]
 fn a_sweep_is_recognised_by_its_rising_frequency() {
-    let mut swept = class("SWEEP", Axis::Longitudinal, &[("obes", true)], &[("dsa_deg", 0, 2)], 2.0);
-    swept.recognition.sweep.insert("de_deg".into(), Sweep { at_least: 10, ratio: 2.0 });
+    let mut swept = class(
+        "SWEEP",
+        Axis::Longitudinal,
+        &[("obes", true)],
+        &[("dsa_deg", 0, 2)],
+        2.0,
+    );
+    swept.recognition.sweep.insert(
+        "de_deg".into(),
+        Sweep {
+            at_least: 10,
+            ratio: 2.0,
+        },
+    );
     let with_sweep: Vec<Class> = classes().into_iter().chain([swept]).collect();
     let find = |r: &Record| maneuvers(r, &with_sweep, &aircraft(), &settings());
     let mut rising = flight(90);
     sweep(&mut rising, "de_deg", (20.0, 50.0), (0.15, 1.65), 4.0);
     let segmented = find(&rising);
-    assert_eq!((classes_of(&segmented), &segmented.unknown[..]), (vec!["SWEEP"], &[][..]));
+    assert_eq!(
+        (classes_of(&segmented), &segmented.unknown[..]),
+        (vec!["SWEEP"], &[][..])
+    );
     assert_abs_diff_eq!(segmented.maneuvers[0].start_s, 19.0, epsilon = 0.5);
     assert_abs_diff_eq!(segmented.maneuvers[0].end_s, 52.0, epsilon = 0.5);
     let evidence = &segmented.maneuvers[0].recognised.evidence;
@@ -695,7 +974,13 @@ fn quality(spoil: impl Fn(&mut Record)) -> Quality {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    let answer = |t: f64| if (21.0..32.0).contains(&t) { 5.0 * (1.2 * (t - 21.0)).sin() } else { 0.0 };
+    let answer = |t: f64| {
+        if (21.0..32.0).contains(&t) {
+            5.0 * (1.2 * (t - 21.0)).sin()
+        } else {
+            0.0
+        }
+    };
     put(&mut r, signal::Q, |t| answer(t) + 0.05 * (125.0 * t).sin());
     spoil(&mut r);
     let segmented = found(&r);
@@ -706,27 +991,53 @@ fn quality(spoil: impl Fn(&mut Record)) -> Quality {
 #[test]
 fn a_sound_maneuver_is_accepted() {
     let sound = quality(|_| {});
-    assert_eq!((sound.verdict.as_str(), sound.reason.as_str()), ("accepted", ""));
+    assert_eq!(
+        (sound.verdict.as_str(), sound.reason.as_str()),
+        ("accepted", "")
+    );
     assert!(sound.signal_to_noise.is_some_and(|v| v > 20.0), "{sound:?}");
     assert!(sound.lead_in_motion.is_some_and(|v| v < 0.1), "{sound:?}");
-    assert_eq!((sound.other_axis, sound.marked_share), (Some(0.0), Some(0.0)));
+    assert_eq!(
+        (sound.other_axis, sound.marked_share),
+        (Some(0.0), Some(0.0))
+    );
 }
 
 fn is_rejected(spoil: impl Fn(&mut Record), because: &str) {
     let spoiled = quality(spoil);
     assert_eq!(spoiled.verdict, "rejected", "{spoiled:?}");
-    assert!(spoiled.reason.contains(because) && !spoiled.reason.contains(';'), "{spoiled:?}");
+    assert!(
+        spoiled.reason.contains(because) && !spoiled.reason.contains(';'),
+        "{spoiled:?}"
+    );
 }
 
 #[test]
 fn each_limit_rejects_with_its_own_reason() {
     is_rejected(
-        |r| add(r, signal::Q, |t| if (19.5..20.9).contains(&t) { 8.0 * (5.0 * t).sin() } else { 0.0 }),
+        |r| {
+            add(r, signal::Q, |t| {
+                if (19.5..20.9).contains(&t) {
+                    8.0 * (5.0 * t).sin()
+                } else {
+                    0.0
+                }
+            })
+        },
         "not trimmed at the start",
     );
-    is_rejected(|r| add(r, signal::ALPHA_VANE, |t| 8.0 * (0.8 * t).sin()), "α strays by");
-    is_rejected(|r| add(r, signal::P, |t| 9.0 * (1.1 * t).sin()), "the other axis moves");
-    is_rejected(|r| add(r, signal::Q, |t| 1.0 * (125.0 * t).sin()), "times its noise");
+    is_rejected(
+        |r| add(r, signal::ALPHA_VANE, |t| 8.0 * (0.8 * t).sin()),
+        "α strays by",
+    );
+    is_rejected(
+        |r| add(r, signal::P, |t| 9.0 * (1.1 * t).sin()),
+        "the other axis moves",
+    );
+    is_rejected(
+        |r| add(r, signal::Q, |t| 1.0 * (125.0 * t).sin()),
+        "times its noise",
+    );
     is_rejected(
         |r| {
             for name in ["de_deg", signal::Q, signal::AN, signal::ALPHA_VANE] {
@@ -744,11 +1055,19 @@ fn samples_between_those_of_a_slow_channel_are_no_fault() {
     let slow = quality(|r| {
         for name in ["de_deg", signal::Q, signal::AN, signal::ALPHA_VANE] {
             if let Some(series) = r.signals.get_mut(name) {
-                series.marks.iter_mut().step_by(2).for_each(|mark| *mark = Mark::Between);
+                series
+                    .marks
+                    .iter_mut()
+                    .step_by(2)
+                    .for_each(|mark| *mark = Mark::Between);
             }
         }
     });
-    assert_eq!((slow.verdict.as_str(), slow.marked_share), ("accepted", Some(0.0)), "{slow:?}");
+    assert_eq!(
+        (slow.verdict.as_str(), slow.marked_share),
+        ("accepted", Some(0.0)),
+        "{slow:?}"
+    );
 }
 
 #[test]
@@ -763,22 +1082,43 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
     let mut limited = settings();
-    let of = |lower_deg, rate_deg_s| quality::Actuator { lower_deg, upper_deg: 40.0, rate_deg_s };
-    limited.quality.actuators.insert("de_deg".into(), of(-14.4, 1000.0));
+    let of = |lower_deg, rate_deg_s| quality::Actuator {
+        lower_deg,
+        upper_deg: 40.0,
+        rate_deg_s,
+    };
+    limited
+        .quality
+        .actuators
+        .insert("de_deg".into(), of(-14.4, 1000.0));
     let measured = |limited: &Settings| {
         let segmented = maneuvers(&r, &classes(), &aircraft(), limited);
         segmented.maneuvers[0].quality.clone()
     };
     // Three of seven seconds to the lower side.
     let at_stop = measured(&limited);
-    assert!(at_stop.saturated_share.is_some_and(|v| (0.2..0.5).contains(&v)), "{at_stop:?}");
-    assert_eq!((at_stop.rate_limited_share, at_stop.verdict.as_str()), (Some(0.0), "accepted"));
+    assert!(
+        at_stop
+            .saturated_share
+            .is_some_and(|v| (0.2..0.5).contains(&v)),
+        "{at_stop:?}"
+    );
+    assert_eq!(
+        (at_stop.rate_limited_share, at_stop.verdict.as_str()),
+        (Some(0.0), "accepted")
+    );
     limited.quality.saturated_share = 0.1;
     assert!(measured(&limited).reason.contains("rests at its stop"));
     limited.quality = quality::Limits::default();
-    limited.quality.actuators.insert("de_deg".into(), of(-40.0, 40.0));
+    limited
+        .quality
+        .actuators
+        .insert("de_deg".into(), of(-40.0, 40.0));
     let fast = measured(&limited);
-    assert!(fast.rate_limited_share.is_some_and(|v| v > 0.02), "{fast:?}");
+    assert!(
+        fast.rate_limited_share.is_some_and(|v| v > 0.02),
+        "{fast:?}"
+    );
     limited.quality.rate_limited_share = 0.01;
     assert!(measured(&limited).reason.contains("full rate"));
 }
@@ -792,23 +1132,41 @@ fn what_the_analyst_gave_is_measured_and_never_rejected() {
     put(&mut r, signal::P, |t| 5.0 * (1.1 * t).sin());
     assert!(found(&r).maneuvers[0].is_rejected());
     let events = [event("3211", 20.0, 32.0)];
-    let (given, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
+    let (given, rows) = with_events(
+        found(&r),
+        &r,
+        &events,
+        &classes(),
+        &aircraft(),
+        &settings().quality,
+    );
     assert_eq!(rows[0].verdict, "agrees");
     let quality = &given.maneuvers[0].quality;
     assert_eq!(quality.verdict, "accepted");
-    assert!(quality.reason.contains("the other axis moves"), "{quality:?}");
+    assert!(
+        quality.reason.contains("the other axis moves"),
+        "{quality:?}"
+    );
 }
 
 #[test]
 fn a_class_whose_signal_has_no_smallest_step_is_named() {
     let mut short = settings();
     short.steps.remove("pedal_in");
-    assert_eq!(short.without_smallest_step(&classes()), ["pedal_in".to_owned()].into());
+    assert_eq!(
+        short.without_smallest_step(&classes()),
+        ["pedal_in".to_owned()].into()
+    );
     assert!(settings().without_smallest_step(&classes()).is_empty());
 }
 
 fn event(class: &str, start_s: f64, end_s: f64) -> Event {
-    Event { flight_id: "f1".into(), class: class.into(), start_s, end_s }
+    Event {
+        flight_id: "f1".into(),
+        class: class.into(),
+        start_s,
+        end_s,
+    }
 }
 
 #[test]
@@ -820,15 +1178,45 @@ fn events_replace_what_overlaps_and_are_compared_with_it() {
     three_two_one_one(&mut r, 51.0);
     up(&mut r, "obes", 90.0, 103.0);
     three_two_one_one(&mut r, 91.0);
-    let other_flight = Event { flight_id: "f2".into(), ..event("3211", 1.0, 2.0) };
-    let events = [event("3211", 20.2, 33.0), event("SERIES", 48.0, 64.0), event("PITCH", 70.0, 80.0), other_flight];
-    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
+    let other_flight = Event {
+        flight_id: "f2".into(),
+        ..event("3211", 1.0, 2.0)
+    };
+    let events = [
+        event("3211", 20.2, 33.0),
+        event("SERIES", 48.0, 64.0),
+        event("PITCH", 70.0, 80.0),
+        other_flight,
+    ];
+    let (segmented, rows) = with_events(
+        found(&r),
+        &r,
+        &events,
+        &classes(),
+        &aircraft(),
+        &settings().quality,
+    );
     assert_eq!(segmented.problems, []);
-    let said: Vec<(&str, &str)> = segmented.maneuvers.iter().map(|m| (m.class.as_str(), m.origin.as_str())).collect();
-    assert_eq!(said, [("3211", "given"), ("SERIES", "given"), ("PITCH", "given"), ("3211", "found")]);
+    let said: Vec<(&str, &str)> = segmented
+        .maneuvers
+        .iter()
+        .map(|m| (m.class.as_str(), m.origin.as_str()))
+        .collect();
+    assert_eq!(
+        said,
+        [
+            ("3211", "given"),
+            ("SERIES", "given"),
+            ("PITCH", "given"),
+            ("3211", "found")
+        ]
+    );
     assert_abs_diff_eq!(segmented.maneuvers[0].start_s, 20.2, epsilon = 1e-9);
     let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.as_str()).collect();
-    assert_eq!(verdicts, ["agrees", "other class", "not found", "not given"]);
+    assert_eq!(
+        verdicts,
+        ["agrees", "other class", "not found", "not given"]
+    );
 }
 
 #[test]
@@ -836,19 +1224,46 @@ fn events_of_unknown_class_or_outside_the_record_become_problems() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    let events = [event("PICH", 20.0, 34.0), event("3211", 50.0, 70.0), event("3211", 30.0, 25.0)];
-    let (segmented, rows) = with_events(found(&r), &r, &events, &classes(), &aircraft(), &settings().quality);
+    let events = [
+        event("PICH", 20.0, 34.0),
+        event("3211", 50.0, 70.0),
+        event("3211", 30.0, 25.0),
+    ];
+    let (segmented, rows) = with_events(
+        found(&r),
+        &r,
+        &events,
+        &classes(),
+        &aircraft(),
+        &settings().quality,
+    );
     assert_eq!(segmented.problems.len(), 3);
-    assert!(segmented.problems[0].reason.contains("did you mean `PITCH`?"), "{}", segmented.problems[0].reason);
+    assert!(
+        segmented.problems[0]
+            .reason
+            .contains("did you mean `PITCH`?"),
+        "{}",
+        segmented.problems[0].reason
+    );
     assert_eq!(segmented.maneuvers.len(), 1);
-    assert_eq!(rows.iter().map(|r| r.verdict.as_str()).collect::<Vec<_>>(), ["not given"]);
+    assert_eq!(
+        rows.iter().map(|r| r.verdict.as_str()).collect::<Vec<_>>(),
+        ["not given"]
+    );
 }
 
 #[test]
 fn without_events_nothing_is_compared() {
     let r = flight(10);
     assert_eq!(
-        with_events(found(&r), &r, &[], &classes(), &aircraft(), &settings().quality),
+        with_events(
+            found(&r),
+            &r,
+            &[],
+            &classes(),
+            &aircraft(),
+            &settings().quality
+        ),
         (Segmented::default(), Vec::new())
     );
 }

@@ -32,16 +32,24 @@ impl Actuator {
         let command = command_deg.clamp(self.lower_deg, self.upper_deg);
         let h = time_s / f64::from(PARTS);
         let pull = |s: &Surface| {
-            self.frequency_rad_s * (self.frequency_rad_s * (command - s.deg) - 2.0 * self.damping * s.deg_s)
+            self.frequency_rad_s
+                * (self.frequency_rad_s * (command - s.deg) - 2.0 * self.damping * s.deg_s)
         };
         let mut now = surface;
         for _ in 0..PARTS {
-            let half = Surface { deg: now.deg + 0.5 * h * now.deg_s, deg_s: now.deg_s + 0.5 * h * pull(&now) };
+            let half = Surface {
+                deg: now.deg + 0.5 * h * now.deg_s,
+                deg_s: now.deg_s + 0.5 * h * pull(&now),
+            };
             let rate = (now.deg_s + h * pull(&half)).clamp(-self.rate_deg_s, self.rate_deg_s);
             let between = half.deg_s.clamp(-self.rate_deg_s, self.rate_deg_s);
             let deg = now.deg + h * between;
-            now = Surface { deg: deg.clamp(self.lower_deg, self.upper_deg), deg_s: rate };
-            let at_stop = (now.deg <= self.lower_deg && rate < 0.0) || (now.deg >= self.upper_deg && rate > 0.0);
+            now = Surface {
+                deg: deg.clamp(self.lower_deg, self.upper_deg),
+                deg_s: rate,
+            };
+            let at_stop = (now.deg <= self.lower_deg && rate < 0.0)
+                || (now.deg >= self.upper_deg && rate > 0.0);
             if at_stop {
                 now.deg_s = 0.0;
             }
@@ -55,8 +63,13 @@ mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
 
-    const STABILATOR: Actuator =
-        Actuator { lower_deg: -24.0, upper_deg: 10.5, rate_deg_s: 40.0, frequency_rad_s: 30.74, damping: 0.509 };
+    const STABILATOR: Actuator = Actuator {
+        lower_deg: -24.0,
+        upper_deg: 10.5,
+        rate_deg_s: 40.0,
+        frequency_rad_s: 30.74,
+        damping: 0.509,
+    };
 
     fn history(command: f64, steps: usize) -> Vec<Surface> {
         let mut surface = Surface::default();
@@ -75,7 +88,9 @@ mod tests {
         let damped = w * (1.0 - z * z).sqrt();
         for (k, surface) in history(0.5, 40).iter().enumerate() {
             let t = 0.0125 * (k + 1) as f64;
-            let exact = 1.0 - (-z * w * t).exp() * ((damped * t).cos() + z / (1.0 - z * z).sqrt() * (damped * t).sin());
+            let exact = 1.0
+                - (-z * w * t).exp()
+                    * ((damped * t).cos() + z / (1.0 - z * z).sqrt() * (damped * t).sin());
             assert_abs_diff_eq!(surface.deg, 0.5 * exact, epsilon = 5e-3);
         }
     }

@@ -25,17 +25,33 @@ pub struct Aerodynamics {
 impl Aerodynamics {
     /// # Errors
     /// A derivative without a true value, or one of a surface that is not simulated.
-    pub fn new(buildup: &Buildup, truth: WindTunnel, surfaces: &[String]) -> Result<Aerodynamics, String> {
+    pub fn new(
+        buildup: &Buildup,
+        truth: WindTunnel,
+        surfaces: &[String],
+    ) -> Result<Aerodynamics, String> {
         let place = |d: &Derivative| {
-            let Some(name) = d.regressor.surface() else { return Ok(None) };
+            let Some(name) = d.regressor.surface() else {
+                return Ok(None);
+            };
             let place = surfaces.iter().position(|s| s == name);
-            place.map(Some).ok_or_else(|| format!("{}: `surfaces` has no `{name}`", d.name))
+            place
+                .map(Some)
+                .ok_or_else(|| format!("{}: `surfaces` has no `{name}`", d.name))
         };
         if let Some(d) = buildup.derivatives.iter().find(|d| !truth.has(&d.name)) {
             return Err(format!("the truth has no value of {}", d.name));
         }
-        let surfaces = buildup.derivatives.iter().map(place).collect::<Result<_, _>>()?;
-        Ok(Aerodynamics { buildup: buildup.clone(), surfaces, truth })
+        let surfaces = buildup
+            .derivatives
+            .iter()
+            .map(place)
+            .collect::<Result<_, _>>()?;
+        Ok(Aerodynamics {
+            buildup: buildup.clone(),
+            surfaces,
+            truth,
+        })
     }
 
     /// The derivatives in the order of their values.
@@ -47,7 +63,11 @@ impl Aerodynamics {
     /// The tables read at an angle of attack, deg, and a Mach number.
     #[must_use]
     pub fn values(&self, alpha_deg: f64, mach: f64) -> Values {
-        let value = |d: &Derivative| self.truth.value(&d.name, alpha_deg, mach).map_or(0.0, |v| v.value);
+        let value = |d: &Derivative| {
+            self.truth
+                .value(&d.name, alpha_deg, mach)
+                .map_or(0.0, |v| v.value)
+        };
         self.buildup.derivatives.iter().map(value).collect()
     }
 
@@ -65,8 +85,17 @@ impl Aerodynamics {
         let area = air.qbar_psf * aircraft.wing_area_ft2;
         let (span, chord) = (aircraft.span_ft, aircraft.chord_ft);
         let per_speed = 0.5 / air.velocity_ft_s;
-        for ((derivative, value), surface) in self.buildup.derivatives.iter().zip(values).zip(&self.surfaces) {
-            let deflection = surface.and_then(|i| surfaces.get(i)).copied().unwrap_or(0.0);
+        for ((derivative, value), surface) in self
+            .buildup
+            .derivatives
+            .iter()
+            .zip(values)
+            .zip(&self.surfaces)
+        {
+            let deflection = surface
+                .and_then(|i| surfaces.get(i))
+                .copied()
+                .unwrap_or(0.0);
             let (regressor, vane) = match derivative.regressor {
                 Regressor::Constant => (1.0, false),
                 Regressor::Alpha => (air.alpha * DEG, false),

@@ -34,6 +34,10 @@ impl AirData {
     /// The velocity relative to the air in body axes that has this speed and these angles, rad.
     #[must_use]
     pub fn velocity(speed_ft_s: f64, alpha: f64, beta: f64) -> Vector3<f64> {
-        Vector3::new(alpha.cos() * beta.cos(), beta.sin(), alpha.sin() * beta.cos()) * speed_ft_s
+        Vector3::new(
+            alpha.cos() * beta.cos(),
+            beta.sin(),
+            alpha.sin() * beta.cos(),
+        ) * speed_ft_s
     }
 }

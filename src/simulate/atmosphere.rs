@@ -41,10 +41,16 @@ mod tests {
 
     #[test]
     fn density_and_sound_are_those_of_the_published_tables() {
-        for (altitude_ft, density, sound) in
-            [(0.0, 2.3769e-3, 1116.45), (25_000.0, 1.0663e-3, 1016.1), (45_000.0, 4.6227e-4, 968.08)]
-        {
-            assert_relative_eq!(air(altitude_ft).density_slug_ft3, density, max_relative = 3e-4);
+        for (altitude_ft, density, sound) in [
+            (0.0, 2.3769e-3, 1116.45),
+            (25_000.0, 1.0663e-3, 1016.1),
+            (45_000.0, 4.6227e-4, 968.08),
+        ] {
+            assert_relative_eq!(
+                air(altitude_ft).density_slug_ft3,
+                density,
+                max_relative = 3e-4
+            );
             assert_relative_eq!(air(altitude_ft).sound_ft_s, sound, max_relative = 2e-4);
         }
     }

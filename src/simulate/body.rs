@@ -52,19 +52,25 @@ impl State {
     /// The state with its attitude brought back to length one, from which rounding takes it.
     #[must_use]
     pub fn normalised(self) -> State {
-        State { attitude: self.attitude.normalize(), ..self }
+        State {
+            attitude: self.attitude.normalize(),
+            ..self
+        }
     }
 
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        let values: SVector<f64, 6> = SVector::from_iterator(self.velocity.iter().chain(&self.rates).copied());
+        let values: SVector<f64, 6> =
+            SVector::from_iterator(self.velocity.iter().chain(&self.rates).copied());
         values.iter().all(|v| v.is_finite()) && self.attitude.norm().is_finite()
     }
 
     /// The rotation from body to earth axes.
     #[must_use]
     pub fn to_earth(&self) -> Matrix3<f64> {
-        UnitQuaternion::from_quaternion(self.attitude).to_rotation_matrix().into_inner()
+        UnitQuaternion::from_quaternion(self.attitude)
+            .to_rotation_matrix()
+            .into_inner()
     }
 
     /// Angles of attitude; ψ between −π and π.
@@ -82,11 +88,20 @@ impl State {
     #[must_use]
     pub fn euler_rates(&self, slope: &Slope) -> (f64, f64) {
         let (a, d) = (self.attitude, slope.attitude);
-        let (up, up_dot) = (2.0 * (a.w * a.j - a.k * a.i), 2.0 * (d.w * a.j + a.w * d.j - d.k * a.i - a.k * d.i));
-        let (y, x) = (2.0 * (a.w * a.i + a.j * a.k), 1.0 - 2.0 * (a.i * a.i + a.j * a.j));
+        let (up, up_dot) = (
+            2.0 * (a.w * a.j - a.k * a.i),
+            2.0 * (d.w * a.j + a.w * d.j - d.k * a.i - a.k * d.i),
+        );
+        let (y, x) = (
+            2.0 * (a.w * a.i + a.j * a.k),
+            1.0 - 2.0 * (a.i * a.i + a.j * a.j),
+        );
         let y_dot = 2.0 * (d.w * a.i + a.w * d.i + d.j * a.k + a.j * d.k);
         let x_dot = -4.0 * (a.i * d.i + a.j * d.j);
-        ((x * y_dot - y * x_dot) / (x * x + y * y), up_dot / (1.0 - up * up).sqrt())
+        (
+            (x * y_dot - y * x_dot) / (x * x + y * y),
+            up_dot / (1.0 - up * up).sqrt(),
+        )
     }
 }
 
@@ -125,7 +140,12 @@ pub fn step(state: &State, step_s: f64, at: impl Fn(&State, f64) -> Slope) -> St
     let k2 = at(&state.plus(&k1, step_s / 2.0), 0.5);
     let k3 = at(&state.plus(&k2, step_s / 2.0), 0.5);
     let k4 = at(&state.plus(&k3, step_s), 1.0);
-    state.plus(&k1, step_s / 6.0).plus(&k2, step_s / 3.0).plus(&k3, step_s / 3.0).plus(&k4, step_s / 6.0).normalised()
+    state
+        .plus(&k1, step_s / 6.0)
+        .plus(&k2, step_s / 3.0)
+        .plus(&k3, step_s / 3.0)
+        .plus(&k4, step_s / 6.0)
+        .normalised()
 }
 
 #[cfg(test)]
@@ -154,13 +174,20 @@ mod tests {
         State {
             velocity: Vector3::new(250.0, 10.0, 120.0),
             rates: Vector3::new(1.2, 0.4, -0.3),
-            attitude: Euler { phi: 0.3, theta: -0.2, psi: 1.0 }.attitude(),
+            attitude: Euler {
+                phi: 0.3,
+                theta: -0.2,
+                psi: 1.0,
+            }
+            .attitude(),
             position: Vector3::new(0.0, 0.0, 25_000.0),
         }
     }
 
     fn after(state: State, time_s: u32, action: &Action) -> State {
-        (0..time_s * 400).fold(state, |s, _| step(&s, 1.0 / 400.0, |at, _| slope(at, &LOADING, action)))
+        (0..time_s * 400).fold(state, |s, _| {
+            step(&s, 1.0 / 400.0, |at, _| slope(at, &LOADING, action))
+        })
     }
 
     #[test]
@@ -178,7 +205,10 @@ mod tests {
 
     #[test]
     fn falling_trades_height_for_speed() {
-        let action = Action { gravity_ft_s2: 32.1, ..FREE };
+        let action = Action {
+            gravity_ft_s2: 32.1,
+            ..FREE
+        };
         let energy = |s: &State| 0.5 * s.velocity.norm_squared() + 32.1 * s.position.z;
         let (start, end) = (tumbling(), after(tumbling(), 5, &action));
         assert!(end.position.z < start.position.z);
@@ -187,13 +217,26 @@ mod tests {
 
     #[test]
     fn engines_turning_with_their_momentum_forward_push_the_nose_down_in_a_right_turn() {
-        let action = Action { engine_momentum: 7500.0, ..FREE };
-        let state = State { rates: Vector3::new(0.0, 0.0, 0.2), ..tumbling() };
+        let action = Action {
+            engine_momentum: 7500.0,
+            ..FREE
+        };
+        let state = State {
+            rates: Vector3::new(0.0, 0.0, 0.2),
+            ..tumbling()
+        };
         let with = slope(&state, &LOADING, &action).rates;
         let without = slope(&state, &LOADING, &FREE).rates;
-        assert_relative_eq!((with - without).y, -0.2 * 7500.0 / LOADING.iy_slug_ft2, max_relative = 1e-9);
+        assert_relative_eq!(
+            (with - without).y,
+            -0.2 * 7500.0 / LOADING.iy_slug_ft2,
+            max_relative = 1e-9
+        );
         // And a pitch up turns it right.
-        let state = State { rates: Vector3::new(0.0, 0.2, 0.0), ..tumbling() };
+        let state = State {
+            rates: Vector3::new(0.0, 0.2, 0.0),
+            ..tumbling()
+        };
         assert!(slope(&state, &LOADING, &action).rates.z > 0.0);
     }
 
@@ -204,7 +247,11 @@ mod tests {
         let (phi_dot, theta_dot) = state.euler_rates(&s);
         let (up, down) = (state.plus(&s, h).euler(), state.plus(&s, -h).euler());
         assert_abs_diff_eq!(phi_dot, (up.phi - down.phi) / (2.0 * h), epsilon = 1e-8);
-        assert_abs_diff_eq!(theta_dot, (up.theta - down.theta) / (2.0 * h), epsilon = 1e-8);
+        assert_abs_diff_eq!(
+            theta_dot,
+            (up.theta - down.theta) / (2.0 * h),
+            epsilon = 1e-8
+        );
         let angles = state.euler();
         for (angle, expected) in [(angles.phi, 0.3), (angles.theta, -0.2), (angles.psi, 1.0)] {
             assert_abs_diff_eq!(angle, expected, epsilon = 1e-12);

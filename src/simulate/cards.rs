@@ -47,7 +47,11 @@ pub struct Study {
 
 impl Default for Study {
     fn default() -> Self {
-        Study { realisations: 200, points: 3, coloured_time_s: 0.5 }
+        Study {
+            realisations: 200,
+            points: 3,
+            coloured_time_s: 0.5,
+        }
     }
 }
 
@@ -98,7 +102,13 @@ impl Program {
     /// The program with its inputs this many times as large.
     #[must_use]
     pub fn scaled(&self, scale: f64) -> Program {
-        let input = |i: &Input| Input { size: scale * i.size, ..i.clone() };
-        Program { inputs: self.inputs.iter().map(input).collect(), ..self.clone() }
+        let input = |i: &Input| Input {
+            size: scale * i.size,
+            ..i.clone()
+        };
+        Program {
+            inputs: self.inputs.iter().map(input).collect(),
+            ..self.clone()
+        }
     }
 }

@@ -85,21 +85,44 @@ pub struct Feedback {
 fn motion(state: &State, air: &AirData) -> [Deviation; 2] {
     let Euler { phi, theta, .. } = state.euler();
     let w = state.rates;
-    [[air.velocity_ft_s, air.alpha * DEG, w.y * DEG, theta * DEG], [air.beta * DEG, w.x * DEG, w.z * DEG, phi * DEG]]
+    [
+        [air.velocity_ft_s, air.alpha * DEG, w.y * DEG, theta * DEG],
+        [air.beta * DEG, w.x * DEG, w.z * DEG, phi * DEG],
+    ]
 }
 
 impl Feedback {
     /// # Errors
     /// A sentence: a surface that is not simulated, or a motion that these surfaces cannot hold.
-    pub fn new(plant: &Plant, settings: &Settings, law: &Law, trim: &Trim, frozen: &[f64]) -> Result<Feedback, String> {
+    pub fn new(
+        plant: &Plant,
+        settings: &Settings,
+        law: &Law,
+        trim: &Trim,
+        frozen: &[f64],
+    ) -> Result<Feedback, String> {
         let h = &law.hold;
         let axes = [
-            (Motion::Pitch, &law.pitch, [h.velocity_ft_s, h.alpha_deg, h.q_deg_s, h.theta_deg]),
-            (Motion::Lateral, &law.lateral, [h.beta_deg, h.p_deg_s, h.r_deg_s, h.phi_deg]),
+            (
+                Motion::Pitch,
+                &law.pitch,
+                [h.velocity_ft_s, h.alpha_deg, h.q_deg_s, h.theta_deg],
+            ),
+            (
+                Motion::Lateral,
+                &law.lateral,
+                [h.beta_deg, h.p_deg_s, h.r_deg_s, h.phi_deg],
+            ),
         ];
         let mut gains = Vec::new();
-        for (axis, surfaces, allowed) in axes.into_iter().filter(|(_, surfaces, _)| !surfaces.is_empty()) {
-            let places = surfaces.keys().map(|name| settings.place(name)).collect::<Result<Vec<usize>, String>>()?;
+        for (axis, surfaces, allowed) in axes
+            .into_iter()
+            .filter(|(_, surfaces, _)| !surfaces.is_empty())
+        {
+            let places = surfaces
+                .keys()
+                .map(|name| settings.place(name))
+                .collect::<Result<Vec<usize>, String>>()?;
             let (a, b) = linear(plant, trim, frozen, axis, &places);
             let authority: Vec<f64> = surfaces.values().copied().collect();
             let k = regulator(&a, &b, &allowed, &authority, 1.0 / settings.control_hz)
@@ -108,7 +131,10 @@ impl Feedback {
                 gains.push((place, axis, [0, 1, 2, 3].map(|j| k[(row, j)])));
             }
         }
-        Ok(Feedback { gains, trim: motion(&trim.state, &trim.air) })
+        Ok(Feedback {
+            gains,
+            trim: motion(&trim.state, &trim.air),
+        })
     }
 
     /// Adds to the commands, deg, what brings the motion back to trim.
@@ -116,7 +142,12 @@ impl Feedback {
         let now = motion(state, air);
         for (place, axis, gains) in &self.gains {
             let (now, trim) = (now[*axis as usize], self.trim[*axis as usize]);
-            let back: f64 = gains.iter().zip(now).zip(trim).map(|((k, x), x0)| k * (x - x0)).sum();
+            let back: f64 = gains
+                .iter()
+                .zip(now)
+                .zip(trim)
+                .map(|((k, x), x0)| k * (x - x0))
+                .sum();
             if let Some(command) = commands.get_mut(*place) {
                 *command -= back;
             }
@@ -125,15 +156,30 @@ impl Feedback {
 }
 
 /// Rates of an axis's deviations at a trim with the deviations and some surfaces moved.
-fn rates(plant: &Plant, trim: &Trim, frozen: &[f64], axis: Motion, x: Deviation, moved: &[(usize, f64)]) -> Deviation {
+fn rates(
+    plant: &Plant,
+    trim: &Trim,
+    frozen: &[f64],
+    axis: Motion,
+    x: Deviation,
+    moved: &[(usize, f64)],
+) -> Deviation {
     let mut both = motion(&trim.state, &trim.air);
-    both[axis as usize].iter_mut().zip(x).for_each(|(value, d)| *value += d);
+    both[axis as usize]
+        .iter_mut()
+        .zip(x)
+        .for_each(|(value, d)| *value += d);
     let [[speed, alpha, q, theta], [beta, p, r, phi]] = both;
     let psi = trim.state.euler().psi;
     let state = State {
         velocity: AirData::velocity(speed, alpha / DEG, beta / DEG),
         rates: nalgebra::Vector3::new(p, q, r) / DEG,
-        attitude: Euler { phi: phi / DEG, theta: theta / DEG, psi }.attitude(),
+        attitude: Euler {
+            phi: phi / DEG,
+            theta: theta / DEG,
+            psi,
+        }
+        .attitude(),
         ..trim.state
     };
     let mut given = trim.given.clone();
@@ -156,7 +202,13 @@ fn rates(plant: &Plant, trim: &Trim, frozen: &[f64], axis: Motion, x: Deviation,
 }
 
 /// ẋ = A x + B δ at the trim.
-fn linear(plant: &Plant, trim: &Trim, frozen: &[f64], axis: Motion, places: &[usize]) -> (DMatrix<f64>, DMatrix<f64>) {
+fn linear(
+    plant: &Plant,
+    trim: &Trim,
+    frozen: &[f64],
+    axis: Motion,
+    places: &[usize],
+) -> (DMatrix<f64>, DMatrix<f64>) {
     let slope = |at: &dyn Fn(f64) -> Deviation| {
         let h = 0.01;
         let (up, down) = (at(h), at(-h));
@@ -180,7 +232,13 @@ fn linear(plant: &Plant, trim: &Trim, frozen: &[f64], axis: Motion, places: &[us
 }
 
 /// Gains K of δ = −K x that minimise Σ xᵀQx + δᵀRδ of the sampled motion, from the Riccati recursion run until it settles.
-fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, allowed: &[f64], used: &[f64], step_s: f64) -> Option<DMatrix<f64>> {
+fn regulator(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    allowed: &[f64],
+    used: &[f64],
+    step_s: f64,
+) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     // Σ (A t)^k / k!, and the same for the input: exact to rounding for a control step.
     let (mut phi, mut gamma) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
@@ -191,7 +249,12 @@ fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, allowed: &[f64], used: &[f64], 
     }
     phi += a * &gamma;
     let gamma = gamma * b;
-    let square = |x: &[f64]| DMatrix::from_diagonal(&DVector::from_iterator(x.len(), x.iter().map(|v| 1.0 / (v * v))));
+    let square = |x: &[f64]| {
+        DMatrix::from_diagonal(&DVector::from_iterator(
+            x.len(),
+            x.iter().map(|v| 1.0 / (v * v)),
+        ))
+    };
     let (q, r) = (square(allowed) * step_s, square(used) * step_s);
     let mut p = q.clone();
     let mut gains = DMatrix::zeros(b.ncols(), n);
@@ -206,7 +269,10 @@ fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, allowed: &[f64], used: &[f64], 
         p = &q + phi.transpose() * &p * (&phi - &gamma * &gains);
         p = (&p + p.transpose()) * 0.5;
     }
-    let stable = (phi - gamma * &gains).complex_eigenvalues().iter().all(|z| z.norm() < 1.0);
+    let stable = (phi - gamma * &gains)
+        .complex_eigenvalues()
+        .iter()
+        .all(|z| z.norm() < 1.0);
     stable.then_some(gains)
 }
 

@@ -45,7 +45,8 @@ impl Engine {
     /// The speed of each engine.
     #[must_use]
     pub fn rpm(&self, thrust_lbf: f64) -> f64 {
-        self.idle_rpm + (self.max_rpm - self.idle_rpm) * (thrust_lbf / self.max_thrust_lbf).clamp(0.0, 1.0)
+        self.idle_rpm
+            + (self.max_rpm - self.idle_rpm) * (thrust_lbf / self.max_thrust_lbf).clamp(0.0, 1.0)
     }
 }
 

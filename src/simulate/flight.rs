@@ -68,7 +68,11 @@ pub(super) fn fly(simulator: &Simulator, card: &Card) -> Result<Flown, String> {
 
 /// A whole number of steps from a number that is one but for rounding.
 fn count(steps: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and not negative")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "rounded and not negative"
+    )]
     let steps = steps.round().max(0.0) as usize;
     steps
 }
@@ -85,7 +89,11 @@ fn unwrap(heading: &mut [f64]) {
     for value in heading {
         let jump = *value - before;
         before = *value;
-        turns -= if jump.abs() > 180.0 { 360.0 * jump.signum() } else { 0.0 };
+        turns -= if jump.abs() > 180.0 {
+            360.0 * jump.signum()
+        } else {
+            0.0
+        };
         *value += turns;
     }
 }
@@ -94,29 +102,57 @@ impl<'a> Flight<'a> {
     fn new(simulator: &'a Simulator, card: &'a Card) -> Result<Flight<'a>, String> {
         let (plant, settings) = (&simulator.plant, &simulator.settings);
         let law = settings.laws.get(&card.program.law).ok_or_else(|| {
-            let near = crate::error::did_you_mean(&card.program.law, settings.laws.keys().map(String::as_str));
+            let near = crate::error::did_you_mean(
+                &card.program.law,
+                settings.laws.keys().map(String::as_str),
+            );
             format!("no law `{}`{near}", card.program.law)
         })?;
         let trim = simulator.trim(card)?;
         let at_trim = plant.aerodynamics.values(card.alpha_deg, trim.air.mach);
         let feedback = Feedback::new(plant, settings, law, &trim, &at_trim)?;
         let step_s = 1.0 / settings.control_hz;
-        let steps = (count(card.program.duration_s * settings.rate_hz) + 2) * settings.steps_per_sample();
+        let steps =
+            (count(card.program.duration_s * settings.rate_hz) + 2) * settings.steps_per_sample();
         let gusts = card.turbulence.as_ref().map_or_else(
             || vec![Vector3::zeros(); steps],
             |t| turbulence::gusts(t, trim.air.velocity_ft_s, step_s, steps, card.seed),
         );
         let frozen = (card.tables == Tables::Frozen).then_some(at_trim);
-        Ok(Flight { simulator, card, law, trim, feedback, frozen, gusts, step_s })
+        Ok(Flight {
+            simulator,
+            card,
+            law,
+            trim,
+            feedback,
+            frozen,
+            gusts,
+            step_s,
+        })
     }
 
     fn begin(&self) -> Moment {
         let mut given = self.trim.given.clone();
         given.gust = self.gust(0);
         // The aircraft meets the first gust at its trimmed speed through the air.
-        let state = State { velocity: self.trim.state.velocity + given.gust, ..self.trim.state };
-        let surfaces = given.surfaces.iter().map(|deg| Surface { deg: *deg, deg_s: 0.0 }).collect();
-        Moment { state, surfaces, followed: vec![self.card.alpha_deg; given.surfaces.len()], given }
+        let state = State {
+            velocity: self.trim.state.velocity + given.gust,
+            ..self.trim.state
+        };
+        let surfaces = given
+            .surfaces
+            .iter()
+            .map(|deg| Surface {
+                deg: *deg,
+                deg_s: 0.0,
+            })
+            .collect();
+        Moment {
+            state,
+            surfaces,
+            followed: vec![self.card.alpha_deg; given.surfaces.len()],
+            given,
+        }
     }
 
     fn gust(&self, k: usize) -> Vector3<f64> {
@@ -124,29 +160,44 @@ impl<'a> Flight<'a> {
     }
 
     fn instant(&self, moment: &Moment) -> Instant {
-        self.simulator.plant.instant(&moment.state, &moment.given, self.frozen.as_deref())
+        self.simulator
+            .plant
+            .instant(&moment.state, &moment.given, self.frozen.as_deref())
     }
 
     /// The sum of the inputs on a signal at a control step.
     fn input(&self, name: &str, k: usize) -> f64 {
         let time_s = k as f64 * self.step_s;
-        self.card.program.inputs.iter().filter(|i| i.signal == name).map(|i| i.at(time_s)).sum()
+        self.card
+            .program
+            .inputs
+            .iter()
+            .filter(|i| i.signal == name)
+            .map(|i| i.at(time_s))
+            .sum()
     }
 
     /// What the surfaces are told at a control step, deg.
     fn commands(&self, moment: &Moment, instant: &Instant, k: usize) -> Vec<f64> {
         let settings = &self.simulator.settings;
         let mut commands = self.trim.given.surfaces.clone();
-        for ((command, name), followed) in commands.iter_mut().zip(&settings.surface_names).zip(&moment.followed) {
+        for ((command, name), followed) in commands
+            .iter_mut()
+            .zip(&settings.surface_names)
+            .zip(&moment.followed)
+        {
             if let Some(schedule) = settings.schedules.get(name) {
                 *command = schedule.at(*followed);
             }
             *command += self.input(name, k);
             for (stick, gears) in &self.law.gearing {
-                *command += gears.get(name).map_or(0.0, |gear| gear * self.input(stick, k));
+                *command += gears
+                    .get(name)
+                    .map_or(0.0, |gear| gear * self.input(stick, k));
             }
         }
-        self.feedback.add(&moment.state, &instant.air, &mut commands);
+        self.feedback
+            .add(&moment.state, &instant.air, &mut commands);
         commands
     }
 
@@ -163,14 +214,24 @@ impl<'a> Flight<'a> {
         let alpha_deg = instant.air.alpha * DEG;
         let follow = |(name, before): (&String, &f64)| {
             let lag_s = settings.schedules.get(name).map_or(0.0, |s| s.lag_s);
-            let keep = if lag_s > 0.0 { (-self.step_s / lag_s).exp() } else { 0.0 };
+            let keep = if lag_s > 0.0 {
+                (-self.step_s / lag_s).exp()
+            } else {
+                0.0
+            };
             alpha_deg + keep * (before - alpha_deg)
         };
-        let followed = settings.surface_names.iter().zip(&moment.followed).map(follow).collect();
+        let followed = settings
+            .surface_names
+            .iter()
+            .zip(&moment.followed)
+            .map(follow)
+            .collect();
         let engine = &settings.engine;
         let throttle = self.trim.given.thrust_lbf + self.input(signal::THRUST, k);
         let altitude_ft = moment.state.position.z;
-        let thrust_lbf = engine.advance(moment.given.thrust_lbf, throttle, altitude_ft, self.step_s);
+        let thrust_lbf =
+            engine.advance(moment.given.thrust_lbf, throttle, altitude_ft, self.step_s);
         let burnt = engine.fuel_slug_per_lbf_s * moment.given.thrust_lbf * self.step_s;
         let given = Given {
             surfaces: surfaces.iter().map(|s| s.deg).collect(),
@@ -185,7 +246,12 @@ impl<'a> Flight<'a> {
             self.frozen.as_deref(),
             (self.step_s, settings.parts),
         );
-        Moment { state, given, surfaces, followed }
+        Moment {
+            state,
+            given,
+            surfaces,
+            followed,
+        }
     }
 
     /// Every signal at a control step.
@@ -193,36 +259,74 @@ impl<'a> Flight<'a> {
         let settings = &self.simulator.settings;
         let time_s = k as f64 * self.step_s;
         let program = &self.card.program;
-        let read = sensors::read(&self.simulator.plant.aircraft, &moment.state, &moment.given, instant);
-        let surfaces = settings.surface_names.iter().zip(&moment.given.surfaces).map(|(n, v)| (n.clone(), *v));
-        let controls: std::collections::BTreeSet<&String> =
-            settings.laws.values().flat_map(|law| law.gearing.keys()).collect();
-        let controls = controls.into_iter().map(|name| (name.clone(), self.input(name, k)));
-        let flags = program
-            .flags
+        let read = sensors::read(
+            &self.simulator.plant.aircraft,
+            &moment.state,
+            &moment.given,
+            instant,
+        );
+        let surfaces = settings
+            .surface_names
             .iter()
-            .map(|(name, (from, to))| (name.clone(), f64::from(u8::from((*from..*to).contains(&time_s)))));
-        read.into_iter().map(|(n, v)| (n.to_owned(), v)).chain(surfaces).chain(controls).chain(flags).collect()
+            .zip(&moment.given.surfaces)
+            .map(|(n, v)| (n.clone(), *v));
+        let controls: std::collections::BTreeSet<&String> = settings
+            .laws
+            .values()
+            .flat_map(|law| law.gearing.keys())
+            .collect();
+        let controls = controls
+            .into_iter()
+            .map(|name| (name.clone(), self.input(name, k)));
+        let flags = program.flags.iter().map(|(name, (from, to))| {
+            (
+                name.clone(),
+                f64::from(u8::from((*from..*to).contains(&time_s))),
+            )
+        });
+        read.into_iter()
+            .map(|(n, v)| (n.to_owned(), v))
+            .chain(surfaces)
+            .chain(controls)
+            .chain(flags)
+            .collect()
     }
 
     fn flown(&self, signals: BTreeMap<String, Vec<f64>>, alphas: &[f64]) -> Flown {
-        let series = |values: Vec<f64>| Series { marks: vec![Mark::Measured; values.len()], values };
+        let series = |values: Vec<f64>| Series {
+            marks: vec![Mark::Measured; values.len()],
+            values,
+        };
         let record = Record {
             flight_id: self.card.flight_id.clone(),
             start_s: self.card.start_s,
             step_s: 1.0 / self.simulator.settings.rate_hz,
             samples: alphas.len(),
-            signals: signals.into_iter().map(|(name, values)| (name, series(values))).collect(),
+            signals: signals
+                .into_iter()
+                .map(|(name, values)| (name, series(values)))
+                .collect(),
         };
         let maneuver = self.maneuver(&record, alphas);
         let aerodynamics = &self.simulator.plant.aerodynamics;
-        let values = self.frozen.clone().unwrap_or_else(|| aerodynamics.values(maneuver.alpha_deg, maneuver.mach));
-        let truth = aerodynamics.derivatives().iter().zip(values).map(|(d, value)| TrueDerivative {
-            derivative: d.name.clone(),
-            unit: d.unit().name(),
-            value,
-        });
-        Flown { truth: truth.collect(), record, maneuver }
+        let values = self
+            .frozen
+            .clone()
+            .unwrap_or_else(|| aerodynamics.values(maneuver.alpha_deg, maneuver.mach));
+        let truth = aerodynamics
+            .derivatives()
+            .iter()
+            .zip(values)
+            .map(|(d, value)| TrueDerivative {
+                derivative: d.name.clone(),
+                unit: d.unit().name(),
+                value,
+            });
+        Flown {
+            truth: truth.collect(),
+            record,
+            maneuver,
+        }
     }
 
     fn maneuver(&self, record: &Record, alphas: &[f64]) -> Maneuver {
@@ -230,7 +334,14 @@ impl<'a> Flight<'a> {
         let first = record.sample_at(record.start_s + from_s);
         let last = record.sample_at(record.start_s + to_s).max(first);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let of = |name: &str| mean(record.values(name).and_then(|v| v.get(first..=last)).unwrap_or_default());
+        let of = |name: &str| {
+            mean(
+                record
+                    .values(name)
+                    .and_then(|v| v.get(first..=last))
+                    .unwrap_or_default(),
+            )
+        };
         let start_s = record.time_s(first);
         Maneuver {
             maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),

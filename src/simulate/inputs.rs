@@ -56,9 +56,21 @@ mod tests {
 
     #[test]
     fn pulses_alternate_and_end_at_trim() {
-        let mut input =
-            Input { signal: String::new(), size: 4.0, start_s: 2.0, widths_s: vec![1.5, 1.0, 0.5, 0.5], rise_s: 0.0 };
-        for (time_s, value) in [(1.9, 0.0), (2.1, 4.0), (3.6, -4.0), (4.6, 4.0), (5.1, -4.0), (5.6, 0.0)] {
+        let mut input = Input {
+            signal: String::new(),
+            size: 4.0,
+            start_s: 2.0,
+            widths_s: vec![1.5, 1.0, 0.5, 0.5],
+            rise_s: 0.0,
+        };
+        for (time_s, value) in [
+            (1.9, 0.0),
+            (2.1, 4.0),
+            (3.6, -4.0),
+            (4.6, 4.0),
+            (5.1, -4.0),
+            (5.6, 0.0),
+        ] {
             assert_abs_diff_eq!(input.at(time_s), value);
         }
         input.rise_s = 0.2;

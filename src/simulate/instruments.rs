@@ -51,7 +51,16 @@ impl Instruments {
             let mut noise = Noise::new(seed, &format!("instrument of {signal}"));
             let bias = i.bias + i.bias_spread * noise.normal();
             let scale = i.scale + i.scale_spread * noise.normal();
-            (signal.clone(), Instrument { bias, bias_spread: 0.0, scale, scale_spread: 0.0, ..*i })
+            (
+                signal.clone(),
+                Instrument {
+                    bias,
+                    bias_spread: 0.0,
+                    scale,
+                    scale_spread: 0.0,
+                    ..*i
+                },
+            )
         };
         Instruments(self.0.iter().map(draw).collect())
     }
@@ -62,19 +71,32 @@ impl Instruments {
         let drawn = self.drawn(seed);
         let read = |(name, series): (&String, &Series)| {
             let series = match drawn.0.get(name) {
-                Some(instrument) => instrument.read(&series.values, exact.step_s, &mut Noise::new(seed, name)),
+                Some(instrument) => {
+                    instrument.read(&series.values, exact.step_s, &mut Noise::new(seed, name))
+                }
                 None => series.clone(),
             };
             (name.clone(), series)
         };
-        Record { signals: exact.signals.iter().map(read).collect(), ..exact.clone() }
+        Record {
+            signals: exact.signals.iter().map(read).collect(),
+            ..exact.clone()
+        }
     }
 }
 
 impl Instrument {
     fn read(&self, exact: &[f64], step_s: f64, noise: &mut Noise) -> Series {
-        let lag = if self.lag_s > 0.0 { (-step_s / self.lag_s).exp() } else { 0.0 };
-        let keep = if self.coloured_time_s > 0.0 { (-step_s / self.coloured_time_s).exp() } else { 0.0 };
+        let lag = if self.lag_s > 0.0 {
+            (-step_s / self.lag_s).exp()
+        } else {
+            0.0
+        };
+        let keep = if self.coloured_time_s > 0.0 {
+            (-step_s / self.coloured_time_s).exp()
+        } else {
+            0.0
+        };
         let fresh = (1.0 - keep * keep).sqrt();
         let mut lagged = exact.first().copied().unwrap_or(0.0);
         let mut colour = noise.normal();
@@ -82,15 +104,26 @@ impl Instrument {
         let mut values = Vec::with_capacity(exact.len());
         for &x in exact {
             // The exact answer of a lag to a signal that is linear between samples.
-            let ramp = if lag > 0.0 { self.lag_s / step_s * (1.0 - lag) } else { 1.0 };
+            let ramp = if lag > 0.0 {
+                self.lag_s / step_s * (1.0 - lag)
+            } else {
+                1.0
+            };
             lagged = lag * lagged + (ramp - lag) * before + (1.0 - ramp) * x;
             if lag == 0.0 {
                 lagged = x;
             }
             before = x;
-            let value = (1.0 + self.scale) * lagged + self.bias + self.noise * noise.normal() + self.coloured * colour;
+            let value = (1.0 + self.scale) * lagged
+                + self.bias
+                + self.noise * noise.normal()
+                + self.coloured * colour;
             colour = keep * colour + fresh * noise.normal();
-            values.push(if self.quantum > 0.0 { (value / self.quantum).round() * self.quantum } else { value });
+            values.push(if self.quantum > 0.0 {
+                (value / self.quantum).round() * self.quantum
+            } else {
+                value
+            });
         }
         self.spoil(values, step_s, noise)
     }
@@ -101,7 +134,11 @@ impl Instrument {
         let mut lost = 0.0;
         for (value, mark) in values.iter_mut().zip(&mut marks) {
             if self.spikes_per_s > 0.0 && noise.uniform() < self.spikes_per_s * step_s {
-                *value += if noise.uniform() < 0.5 { self.spike } else { -self.spike };
+                *value += if noise.uniform() < 0.5 {
+                    self.spike
+                } else {
+                    -self.spike
+                };
             }
             if self.dropouts_per_s > 0.0 && noise.uniform() < self.dropouts_per_s * step_s {
                 lost = self.dropout_s.max(step_s);
@@ -132,13 +169,27 @@ mod tests {
     /// Covariance of a series with itself at a lag, about its mean.
     fn covariance(values: &[f64], lag: usize) -> f64 {
         let m = mean(values);
-        mean(&values.iter().zip(&values[lag..]).map(|(a, b)| (a - m) * (b - m)).collect::<Vec<_>>())
+        mean(
+            &values
+                .iter()
+                .zip(&values[lag..])
+                .map(|(a, b)| (a - m) * (b - m))
+                .collect::<Vec<_>>(),
+        )
     }
 
     #[test]
     fn white_noise_bias_and_scale_have_their_sizes() {
-        let values =
-            read(Instrument { noise: 0.2, bias: 0.5, scale: 0.1, ..Instrument::default() }, &vec![3.0; 40_000]).values;
+        let values = read(
+            Instrument {
+                noise: 0.2,
+                bias: 0.5,
+                scale: 0.1,
+                ..Instrument::default()
+            },
+            &vec![3.0; 40_000],
+        )
+        .values;
         assert_abs_diff_eq!(mean(&values), 3.8, epsilon = 0.005);
         assert_relative_eq!(covariance(&values, 0), 0.04, max_relative = 0.03);
         assert_abs_diff_eq!(covariance(&values, 1), 0.0, epsilon = 0.001);
@@ -146,16 +197,31 @@ mod tests {
 
     #[test]
     fn coloured_noise_decays_with_its_time_constant() {
-        let instrument = Instrument { coloured: 0.3, coloured_time_s: 0.25, ..Instrument::default() };
+        let instrument = Instrument {
+            coloured: 0.3,
+            coloured_time_s: 0.25,
+            ..Instrument::default()
+        };
         let values = read(instrument, &vec![0.0; 200_000]).values;
         assert_relative_eq!(covariance(&values, 0), 0.09, max_relative = 0.04);
-        assert_relative_eq!(covariance(&values, 10) / covariance(&values, 0), (-1.0_f64).exp(), max_relative = 0.05);
+        assert_relative_eq!(
+            covariance(&values, 10) / covariance(&values, 0),
+            (-1.0_f64).exp(),
+            max_relative = 0.05
+        );
     }
 
     #[test]
     fn a_quantum_leaves_its_multiples_and_an_error_under_half_of_it() {
         let exact: Vec<f64> = (0..1000).map(|k| 0.0137 * f64::from(k)).collect();
-        let values = read(Instrument { quantum: 0.1, ..Instrument::default() }, &exact).values;
+        let values = read(
+            Instrument {
+                quantum: 0.1,
+                ..Instrument::default()
+            },
+            &exact,
+        )
+        .values;
         for (value, x) in values.iter().zip(&exact) {
             assert!((value - x).abs() <= 0.05 + 1e-12);
             assert_abs_diff_eq!((value / 0.1).round() * 0.1, *value, epsilon = 1e-12);
@@ -165,18 +231,32 @@ mod tests {
     #[test]
     fn a_lag_follows_a_ramp_by_its_time_constant() {
         let exact: Vec<f64> = (0..400).map(|k| 0.025 * f64::from(k)).collect();
-        let values = read(Instrument { lag_s: 0.1, ..Instrument::default() }, &exact).values;
+        let values = read(
+            Instrument {
+                lag_s: 0.1,
+                ..Instrument::default()
+            },
+            &exact,
+        )
+        .values;
         assert_abs_diff_eq!(exact[399] - values[399], 0.1, epsilon = 1e-9);
     }
 
     #[test]
     fn dropouts_are_missing_and_as_many_as_said() {
-        let instrument = Instrument { dropouts_per_s: 0.2, dropout_s: 0.1, ..Instrument::default() };
+        let instrument = Instrument {
+            dropouts_per_s: 0.2,
+            dropout_s: 0.1,
+            ..Instrument::default()
+        };
         let series = read(instrument, &vec![1.0; 40_000]);
         let lost = series.values.iter().filter(|v| v.is_nan()).count();
         // 200 dropouts of 4 samples in 1000 s, a few of them overlapping.
         assert!((650..950).contains(&lost), "{lost}");
-        assert_eq!(lost, series.marks.iter().filter(|m| **m == Mark::Missing).count());
+        assert_eq!(
+            lost,
+            series.marks.iter().filter(|m| **m == Mark::Missing).count()
+        );
     }
 
     #[test]

@@ -25,9 +25,14 @@ impl Loading {
     /// without any: the simulator refuses that.
     #[must_use]
     pub fn at_mass(loadings: &[Loading], mass_slug: f64) -> Loading {
-        let upper = loadings.partition_point(|l| l.mass_slug < mass_slug).clamp(1, loadings.len().max(2) - 1);
+        let upper = loadings
+            .partition_point(|l| l.mass_slug < mass_slug)
+            .clamp(1, loadings.len().max(2) - 1);
         let (Some(a), Some(b)) = (loadings.get(upper - 1), loadings.get(upper)) else {
-            return Loading { mass_slug, ..loadings.first().copied().unwrap_or_default() };
+            return Loading {
+                mass_slug,
+                ..loadings.first().copied().unwrap_or_default()
+            };
         };
         let f = (mass_slug - a.mass_slug) / (b.mass_slug - a.mass_slug);
         let mix = |x: f64, y: f64| x + f * (y - x);
@@ -45,14 +50,28 @@ impl Loading {
 
     #[must_use]
     pub fn cg(&self) -> Position {
-        Position { x_ft: self.x_cg_ft, y_ft: self.y_cg_ft, z_ft: self.z_cg_ft }
+        Position {
+            x_ft: self.x_cg_ft,
+            y_ft: self.y_cg_ft,
+            z_ft: self.z_cg_ft,
+        }
     }
 
     /// The inertia matrix of an airframe that is symmetric about its xz plane.
     #[must_use]
     pub fn inertia(&self) -> Matrix3<f64> {
         let product = -self.ixz_slug_ft2;
-        Matrix3::new(self.ix_slug_ft2, 0.0, product, 0.0, self.iy_slug_ft2, 0.0, product, 0.0, self.iz_slug_ft2)
+        Matrix3::new(
+            self.ix_slug_ft2,
+            0.0,
+            product,
+            0.0,
+            self.iy_slug_ft2,
+            0.0,
+            product,
+            0.0,
+            self.iz_slug_ft2,
+        )
     }
 
     #[must_use]
@@ -80,11 +99,19 @@ mod tests {
 
     #[test]
     fn mass_properties_are_linear_in_mass() {
-        let heavy = Loading { mass_slug: 1080.0, iy_slug_ft2: 182_237.0, x_cg_ft: 38.0, ..LIGHT };
+        let heavy = Loading {
+            mass_slug: 1080.0,
+            iy_slug_ft2: 182_237.0,
+            x_cg_ft: 38.0,
+            ..LIGHT
+        };
         let between = Loading::at_mass(&[LIGHT, heavy], 1005.0);
         assert_relative_eq!(between.iy_slug_ft2, 174_737.0);
         assert_relative_eq!(between.x_cg_ft, 38.3);
-        assert_relative_eq!(Loading::at_mass(&[LIGHT, heavy], 960.0).iy_slug_ft2, 170_237.0);
+        assert_relative_eq!(
+            Loading::at_mass(&[LIGHT, heavy], 960.0).iy_slug_ft2,
+            170_237.0
+        );
         assert_relative_eq!(Loading::at_mass(&[LIGHT], 1005.0).mass_slug, 1005.0);
     }
 }

@@ -125,9 +125,17 @@ impl Simulator {
         settings: Settings,
     ) -> Result<Simulator, String> {
         let settings = settings.checked()?;
-        let aerodynamics = aerodynamics::Aerodynamics::new(buildup, truth, &settings.surface_names)?;
+        let aerodynamics =
+            aerodynamics::Aerodynamics::new(buildup, truth, &settings.surface_names)?;
         let loadings = settings.loadings.clone();
-        Ok(Simulator { plant: plant::Plant { aircraft: aircraft.clone(), aerodynamics, loadings }, settings })
+        Ok(Simulator {
+            plant: plant::Plant {
+                aircraft: aircraft.clone(),
+                aerodynamics,
+                loadings,
+            },
+            settings,
+        })
     }
 
     /// Flies a card from trim.

@@ -20,10 +20,12 @@ impl Noise {
     #[must_use]
     pub fn new(seed: u64, name: &str) -> Noise {
         // FNV-1a of the name, so that the streams of a seed start far from each other.
-        let hash = name
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
-        let mut noise = Noise { state: seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ hash };
+        let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| {
+            (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
+        });
+        let mut noise = Noise {
+            state: seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ hash,
+        };
         noise.state = noise.bits();
         noise
     }
@@ -74,7 +76,8 @@ mod tests {
         let first = draw(1, "p_deg_s");
         assert_eq!(first, draw(1, "p_deg_s"));
         for other in [draw(2, "p_deg_s"), draw(1, "q_deg_s")] {
-            let correlation: f64 = first.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / 20_000.0;
+            let correlation: f64 =
+                first.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / 20_000.0;
             assert_abs_diff_eq!(correlation, 0.0, epsilon = 0.03);
         }
     }

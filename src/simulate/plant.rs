@@ -26,7 +26,12 @@ impl Given {
     fn towards(&self, end: &Given, part: f64) -> Given {
         let mix = |a: f64, b: f64| a + part * (b - a);
         Given {
-            surfaces: self.surfaces.iter().zip(&end.surfaces).map(|(a, b)| mix(*a, *b)).collect(),
+            surfaces: self
+                .surfaces
+                .iter()
+                .zip(&end.surfaces)
+                .map(|(a, b)| mix(*a, *b))
+                .collect(),
             thrust_lbf: mix(self.thrust_lbf, end.thrust_lbf),
             rpm: mix(self.rpm, end.rpm),
             gust: self.gust.lerp(&end.gust, part),
@@ -64,11 +69,14 @@ impl Plant {
         let values = if let Some(values) = frozen {
             values
         } else {
-            read = self.aerodynamics.values(air.alpha * crate::units::DEG, air.mach);
+            read = self
+                .aerodynamics
+                .values(air.alpha * crate::units::DEG, air.mach);
             &read
         };
         let (aerodynamic, moment) =
-            self.aerodynamics.loads(&self.aircraft, values, &air, &state.rates, &given.surfaces);
+            self.aerodynamics
+                .loads(&self.aircraft, values, &air, &state.rates, &given.surfaces);
         let force = aerodynamic + Vector3::new(given.thrust_lbf, 0.0, 0.0);
         let per_minute = 2.0 * std::f64::consts::PI / 60.0;
         let action = Action {
@@ -78,7 +86,12 @@ impl Plant {
             gravity_ft_s2: gravity_ft_s2(self.aircraft.latitude_deg, state.position.z),
         };
         let slope = body::slope(state, &loading, &action);
-        Instant { air, loading, specific_force: force / loading.mass_slug, slope }
+        Instant {
+            air,
+            loading,
+            specific_force: force / loading.mass_slug,
+            slope,
+        }
     }
 
     /// The state after `step_s`, in `parts` Runge-Kutta steps, with everything given linear in time between `start` and

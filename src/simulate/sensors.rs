@@ -12,21 +12,41 @@ use crate::units::{DEG, G0_FT_S2};
 
 /// The signals of an instant but for surfaces and the pilot's controls.
 #[must_use]
-pub fn read(aircraft: &Aircraft, state: &State, given: &Given, instant: &Instant) -> Vec<(&'static str, f64)> {
+pub fn read(
+    aircraft: &Aircraft,
+    state: &State,
+    given: &Given,
+    instant: &Instant,
+) -> Vec<(&'static str, f64)> {
     let (air, loading, sensors) = (&instant.air, &instant.loading, &aircraft.sensors);
     let w = state.rates;
-    let flow = Flow { alpha: air.alpha, beta: air.beta, velocity: air.velocity_ft_s, rates: [w.x, w.y, w.z] };
+    let flow = Flow {
+        alpha: air.alpha,
+        beta: air.beta,
+        velocity: air.velocity_ft_s,
+        rates: [w.x, w.y, w.z],
+    };
     let cg = loading.cg();
     let felt = |at: Position, axis: usize| {
         let arm = Vector3::from(at.arm(cg));
         let turning = instant.slope.rates.cross(&arm) + w.cross(&w.cross(&arm));
         (instant.specific_force + turning)[axis] / G0_FT_S2
     };
-    let thrust = if sensors.thrust_in_ax { 0.0 } else { given.thrust_lbf / loading.mass_slug / G0_FT_S2 };
+    let thrust = if sensors.thrust_in_ax {
+        0.0
+    } else {
+        given.thrust_lbf / loading.mass_slug / G0_FT_S2
+    };
     let angles = state.euler();
     vec![
-        (signal::ALPHA_VANE, DEG * sensors.alpha_reading(&flow, cg).angle),
-        (signal::BETA_VANE, DEG * sensors.beta_reading(&flow, cg).angle),
+        (
+            signal::ALPHA_VANE,
+            DEG * sensors.alpha_reading(&flow, cg).angle,
+        ),
+        (
+            signal::BETA_VANE,
+            DEG * sensors.beta_reading(&flow, cg).angle,
+        ),
         (signal::VELOCITY, air.velocity_ft_s),
         (signal::MACH, air.mach),
         (signal::ALTITUDE, state.position.z),

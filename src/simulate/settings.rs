@@ -67,13 +67,22 @@ impl Schedule {
     /// The deflection at an angle of attack.
     #[must_use]
     pub fn at(&self, alpha_deg: f64) -> f64 {
-        let points: Vec<(f64, f64)> = self.alpha_deg.iter().copied().zip(self.deflection_deg.iter().copied()).collect();
-        let (Some(first), Some(last)) = (points.first(), points.last()) else { return 0.0 };
+        let points: Vec<(f64, f64)> = self
+            .alpha_deg
+            .iter()
+            .copied()
+            .zip(self.deflection_deg.iter().copied())
+            .collect();
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return 0.0;
+        };
         if alpha_deg <= first.0 {
             return first.1;
         }
         let segment = points.windows(2).find(|w| alpha_deg < w[1].0);
-        segment.map_or(last.1, |w| w[0].1 + (alpha_deg - w[0].0) / (w[1].0 - w[0].0) * (w[1].1 - w[0].1))
+        segment.map_or(last.1, |w| {
+            w[0].1 + (alpha_deg - w[0].0) / (w[1].0 - w[0].0) * (w[1].1 - w[0].1)
+        })
     }
 }
 
@@ -85,7 +94,8 @@ impl Settings {
     pub fn place(&self, surface: &str) -> Result<usize, String> {
         let place = self.surface_names.iter().position(|s| s == surface);
         place.ok_or_else(|| {
-            let near = crate::error::did_you_mean(surface, self.surface_names.iter().map(String::as_str));
+            let near =
+                crate::error::did_you_mean(surface, self.surface_names.iter().map(String::as_str));
             format!("`surfaces` has no `{surface}`{near}")
         })
     }
@@ -100,7 +110,11 @@ impl Settings {
     /// Control steps per sample.
     #[must_use]
     pub fn steps_per_sample(&self) -> usize {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and at least one")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded and at least one"
+        )]
         let steps = (self.control_hz / self.rate_hz).round().max(1.0) as usize;
         steps
     }
@@ -109,7 +123,10 @@ impl Settings {
     pub(super) fn checked(mut self) -> Result<Settings, String> {
         self.surface_names = self.surfaces.keys().cloned().collect();
         let per_sample = self.control_hz / self.rate_hz;
-        if !(self.rate_hz > 0.0 && per_sample >= 1.0 && (per_sample - per_sample.round()).abs() < 1e-9) {
+        if !(self.rate_hz > 0.0
+            && per_sample >= 1.0
+            && (per_sample - per_sample.round()).abs() < 1e-9)
+        {
             return Err("`control_hz` must be a multiple of `rate_hz`".into());
         }
         if self.parts == 0 {
@@ -119,19 +136,33 @@ impl Settings {
         if self.loadings.is_empty() || !self.loadings.iter().all(sound) {
             return Err("`loadings` needs at least one, with positive mass and inertias that a body can have".into());
         }
-        if !self.loadings.windows(2).all(|w| w[0].mass_slug < w[1].mass_slug) {
+        if !self
+            .loadings
+            .windows(2)
+            .all(|w| w[0].mass_slug < w[1].mass_slug)
+        {
             return Err("`loadings` must stand by ascending `mass_slug`".into());
         }
         let schedules = self.schedules.iter();
         for (name, schedule) in schedules {
             let ascending = schedule.alpha_deg.windows(2).all(|w| w[0] < w[1]);
             if schedule.alpha_deg.len() != schedule.deflection_deg.len() || !ascending {
-                return Err(format!("schedule of `{name}`: as many deflections as angles, these ascending"));
+                return Err(format!(
+                    "schedule of `{name}`: as many deflections as angles, these ascending"
+                ));
             }
         }
-        let trimmers = self.trim.pitch.iter().map(|t| &t.signal).chain([&self.trim.roll, &self.trim.yaw]);
+        let trimmers = self
+            .trim
+            .pitch
+            .iter()
+            .map(|t| &t.signal)
+            .chain([&self.trim.roll, &self.trim.yaw]);
         let in_laws = self.laws.values().flat_map(|law| {
-            law.pitch.keys().chain(law.lateral.keys()).chain(law.gearing.values().flat_map(BTreeMap::keys))
+            law.pitch
+                .keys()
+                .chain(law.lateral.keys())
+                .chain(law.gearing.values().flat_map(BTreeMap::keys))
         });
         for name in trimmers.chain(in_laws).chain(self.schedules.keys()) {
             self.place(name)?;

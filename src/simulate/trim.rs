@@ -82,7 +82,14 @@ pub fn trim(plant: &Plant, settings: &Settings, point: Point) -> Result<Trim, St
     for trimmer in &surfaces_of.pitch {
         let pitch = settings.place(&trimmer.signal)?;
         let places = [pitch, roll.clone()?, yaw.clone()?];
-        let search = Search { plant, settings, point, surfaces: surfaces.clone(), places, power: Power::Level };
+        let search = Search {
+            plant,
+            settings,
+            point,
+            surfaces: surfaces.clone(),
+            places,
+            power: Power::Level,
+        };
         let found = search.with_thrust_limit()?;
         let needed = found.given.surfaces.get(pitch).copied().unwrap_or(0.0);
         if (trimmer.lower_deg..=trimmer.upper_deg).contains(&needed) {
@@ -92,7 +99,10 @@ pub fn trim(plant: &Plant, settings: &Settings, point: Point) -> Result<Trim, St
             *surface = needed.clamp(trimmer.lower_deg, trimmer.upper_deg);
         }
     }
-    Err(format!("no pitch surface can trim α = {}° within its limits", point.alpha_deg))
+    Err(format!(
+        "no pitch surface can trim α = {}° within its limits",
+        point.alpha_deg
+    ))
 }
 
 impl Search<'_> {
@@ -100,21 +110,30 @@ impl Search<'_> {
         let limit = self.settings.engine.max_thrust(self.point.altitude_ft);
         match self.solve() {
             Ok(level) if level.given.thrust_lbf <= limit => Ok(level),
-            _ => Search { power: Power::Limited(limit), surfaces: self.surfaces.clone(), ..*self }.solve(),
+            _ => Search {
+                power: Power::Limited(limit),
+                surfaces: self.surfaces.clone(),
+                ..*self
+            }
+            .solve(),
         }
     }
 
     fn within_limits(&self, found: Trim) -> Result<Trim, String> {
         for place in self.places {
-            let (Some(deg), Some(name)) = (found.given.surfaces.get(place), self.settings.surface_names.get(place))
-            else {
+            let (Some(deg), Some(name)) = (
+                found.given.surfaces.get(place),
+                self.settings.surface_names.get(place),
+            ) else {
                 continue;
             };
             if let Some(actuator) = self.settings.surfaces.get(name)
                 && !(actuator.lower_deg..=actuator.upper_deg).contains(deg)
             {
                 let alpha = self.point.alpha_deg;
-                return Err(format!("trim at α = {alpha}° takes {deg:.1}° of `{name}`, beyond its limit"));
+                return Err(format!(
+                    "trim at α = {alpha}° takes {deg:.1}° of `{name}`, beyond its limit"
+                ));
             }
         }
         Ok(found)
@@ -130,7 +149,8 @@ impl Search<'_> {
         let phi = x[5];
         // sin γ = cos α sin θ − sin α cos φ cos θ, solved for θ.
         let (forward, down) = (alpha.cos(), alpha.sin() * phi.cos());
-        let theta = down.atan2(forward) + (climb.sin() / forward.hypot(down)).clamp(-1.0, 1.0).asin();
+        let theta =
+            down.atan2(forward) + (climb.sin() / forward.hypot(down)).clamp(-1.0, 1.0).asin();
         let mut surfaces = self.surfaces.clone();
         for (place, deg) in self.places.into_iter().zip([x[2], x[3], x[4]]) {
             if let Some(surface) = surfaces.get_mut(place) {
@@ -172,7 +192,11 @@ impl Search<'_> {
         let weight = self.point.mass_slug * gravity;
         let density = super::atmosphere::air(self.point.altitude_ft).density_slug_ft3;
         let speed = (2.0 * weight / (density * self.plant.aircraft.wing_area_ft2)).sqrt();
-        let second = if self.power == Power::Level { 0.3 * weight } else { -0.2 };
+        let second = if self.power == Power::Level {
+            0.3 * weight
+        } else {
+            -0.2
+        };
         let mut x = Unknowns::from([speed, second, 0.0, 0.0, 0.0, 0.0]);
         let mut residual = self.residual(&x);
         for _ in 0..100 {
@@ -180,20 +204,32 @@ impl Search<'_> {
                 break;
             }
             let slopes = self.slopes(&x);
-            let Some(change) = slopes.lu().solve(&-residual) else { break };
-            let Some((next, after)) = self.shortened(&x, &change, residual.norm()) else { break };
+            let Some(change) = slopes.lu().solve(&-residual) else {
+                break;
+            };
+            let Some((next, after)) = self.shortened(&x, &change, residual.norm()) else {
+                break;
+            };
             (x, residual) = (next, after);
         }
         if residual.norm() < 1e-8 {
             Ok(self.flight(&x))
         } else {
             let (alpha, height) = (self.point.alpha_deg, self.point.altitude_ft);
-            Err(format!("nothing trims α = {alpha}° at {height} ft: {:.1e} ft/s² are left", residual.norm()))
+            Err(format!(
+                "nothing trims α = {alpha}° at {height} ft: {:.1e} ft/s² are left",
+                residual.norm()
+            ))
         }
     }
 
     /// The first of the halved Newton steps that comes nearer.
-    fn shortened(&self, x: &Unknowns, change: &Unknowns, before: f64) -> Option<(Unknowns, Unknowns)> {
+    fn shortened(
+        &self,
+        x: &Unknowns,
+        change: &Unknowns,
+        before: f64,
+    ) -> Option<(Unknowns, Unknowns)> {
         (0..20).find_map(|halvings| {
             let next = x + change * 0.5_f64.powi(halvings);
             let after = (next[0] > 50.0).then(|| self.residual(&next))?;

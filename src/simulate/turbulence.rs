@@ -30,13 +30,24 @@ struct Across {
 
 /// Gusts in body axes, ft/s, at the times k·`step_s`: `count` of them, from the stationary distribution.
 #[must_use]
-pub fn gusts(turbulence: &Turbulence, speed_ft_s: f64, step_s: f64, count: usize, seed: u64) -> Vec<Vector3<f64>> {
+pub fn gusts(
+    turbulence: &Turbulence,
+    speed_ft_s: f64,
+    step_s: f64,
+    count: usize,
+    seed: u64,
+) -> Vec<Vector3<f64>> {
     let part = step_s * speed_ft_s / turbulence.length_ft;
     let sigma = turbulence.sigma_ft_s;
     let along = first_order(part, count, &mut Noise::new(seed, "gust along"));
     let side = across(part, count, &mut Noise::new(seed, "gust across"));
     let down = across(part, count, &mut Noise::new(seed, "gust down"));
-    along.into_iter().zip(side).zip(down).map(|((u, v), w)| Vector3::new(u, v, w) * sigma).collect()
+    along
+        .into_iter()
+        .zip(side)
+        .zip(down)
+        .map(|((u, v), w)| Vector3::new(u, v, w) * sigma)
+        .collect()
 }
 
 fn first_order(part: f64, count: usize, noise: &mut Noise) -> Vec<f64> {
@@ -65,7 +76,10 @@ fn covariance(part: f64) -> [f64; 3] {
 fn draw([a, b, c]: [f64; 3], noise: &mut Noise) -> Across {
     let first = a.sqrt();
     let (x, y) = (noise.normal(), noise.normal());
-    Across { first: first * x, second: b / first * x + (c - b * b / a).max(0.0).sqrt() * y }
+    Across {
+        first: first * x,
+        second: b / first * x + (c - b * b / a).max(0.0).sqrt() * y,
+    }
 }
 
 fn across(part: f64, count: usize, noise: &mut Noise) -> Vec<f64> {
@@ -91,7 +105,16 @@ mod tests {
 
     /// Variance and correlation at a lag of each axis over many scale lengths.
     fn statistics(step_s: f64, lag: usize) -> [(f64, f64); 3] {
-        let gusts = gusts(&Turbulence { sigma_ft_s: 5.0, length_ft: 500.0 }, 500.0, step_s, 400_000, 3);
+        let gusts = gusts(
+            &Turbulence {
+                sigma_ft_s: 5.0,
+                length_ft: 500.0,
+            },
+            500.0,
+            step_s,
+            400_000,
+            3,
+        );
         [0, 1, 2].map(|axis| {
             let values: Vec<f64> = gusts.iter().map(|g| g[axis]).collect();
             let product = |lag: usize| {
@@ -108,9 +131,11 @@ mod tests {
         for (step_s, lag) in [(0.05, 10), (0.1, 5)] {
             let [along, side, down] = statistics(step_s, lag);
             let r = 0.5_f64;
-            for ((variance, correlation), expected) in
-                [(along, (-r).exp()), (side, (-r).exp() * (1.0 - r / 2.0)), (down, (-r).exp() * (1.0 - r / 2.0))]
-            {
+            for ((variance, correlation), expected) in [
+                (along, (-r).exp()),
+                (side, (-r).exp() * (1.0 - r / 2.0)),
+                (down, (-r).exp() * (1.0 - r / 2.0)),
+            ] {
                 assert_relative_eq!(variance, 25.0, max_relative = 0.04);
                 assert_relative_eq!(correlation, expected, max_relative = 0.04);
             }
@@ -119,7 +144,18 @@ mod tests {
 
     #[test]
     fn the_same_seed_is_the_same_air() {
-        let air = |seed| gusts(&Turbulence { sigma_ft_s: 5.0, length_ft: 500.0 }, 300.0, 0.0125, 50, seed);
+        let air = |seed| {
+            gusts(
+                &Turbulence {
+                    sigma_ft_s: 5.0,
+                    length_ft: 500.0,
+                },
+                300.0,
+                0.0125,
+                50,
+                seed,
+            )
+        };
         assert_eq!(air(1), air(1));
         assert_ne!(air(1), air(2));
     }

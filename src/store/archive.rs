@@ -70,7 +70,10 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     } else if Path::new(archive).is_dir() {
         walk(Path::new(archive), DEPTH, &mut files)?;
     } else {
-        let nonsense = |what: String| Error::Archive { place: archive.into(), what };
+        let nonsense = |what: String| Error::Archive {
+            place: archive.into(),
+            what,
+        };
         let paths = glob::glob(archive).map_err(|e| nonsense(format!("not a glob: {e}")))?;
         for path in paths {
             let path = path.map_err(|e| nonsense(e.to_string()))?;
@@ -84,9 +87,11 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
         }
     }
     if files.is_empty() {
-        let what =
-            "no flight records here: looked for files *.parquet in this folder and below it, or matching this glob";
-        return Err(Error::Archive { place: archive.into(), what: what.to_owned() });
+        let what = "no flight records here: looked for files *.parquet in this folder and below it, or matching this glob";
+        return Err(Error::Archive {
+            place: archive.into(),
+            what: what.to_owned(),
+        });
     }
     Ok(flights(files))
 }
@@ -96,7 +101,9 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
     let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        let hidden = path.file_name().is_some_and(|n| is_hidden(&n.to_string_lossy()));
+        let hidden = path
+            .file_name()
+            .is_some_and(|n| is_hidden(&n.to_string_lossy()));
         if hidden {
             continue;
         }
@@ -104,7 +111,10 @@ fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<()
             if depth > 0 && walk(&path, depth - 1, files).is_err() {
                 files.insert(path);
             }
-        } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
+        } else if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
+        {
             files.insert(path);
         }
     }
@@ -116,11 +126,19 @@ fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
     for file in files {
         let (flight_id, source) = identity(&file);
         let new = || {
-            let flight = FlightFiles { flight_id: flight_id.clone(), files: Vec::new(), rivals: Vec::new() };
+            let flight = FlightFiles {
+                flight_id: flight_id.clone(),
+                files: Vec::new(),
+                rivals: Vec::new(),
+            };
             (source.clone(), flight)
         };
         let (first, flight) = flights.entry(flight_id.clone()).or_insert_with(new);
-        if *first == source { flight.files.push(file) } else { flight.rivals.push(file) }
+        if *first == source {
+            flight.files.push(file)
+        } else {
+            flight.rivals.push(file)
+        }
     }
     flights.into_values().map(|(_, flight)| flight).collect()
 }
@@ -128,7 +146,10 @@ fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
 /// The flight that a file belongs to, and the folder or file that all of it comes from.
 fn identity(file: &Path) -> (String, PathBuf) {
     for folder in file.ancestors().skip(1) {
-        let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = folder
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         if let Some((key, value)) = name.split_once('=')
             && matches!(key, "flight" | "flight_id")
             && !value.is_empty()
@@ -136,7 +157,10 @@ fn identity(file: &Path) -> (String, PathBuf) {
             return (value.to_owned(), folder.to_owned());
         }
     }
-    let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = file
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
     (stem, file.to_owned())
 }
 
@@ -182,8 +206,14 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
         place: path.display().to_string(),
         reason,
     };
-    let opened = files.files.iter().map(|path| guarded(|| open_file(path, channels)).map_err(|e| refused(path, e)));
-    Ok(Opened { flight_id: files.flight_id.clone(), files: opened.collect::<Result<_, _>>()? })
+    let opened = files
+        .files
+        .iter()
+        .map(|path| guarded(|| open_file(path, channels)).map_err(|e| refused(path, e)));
+    Ok(Opened {
+        flight_id: files.flight_id.clone(),
+        files: opened.collect::<Result<_, _>>()?,
+    })
 }
 
 /// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too; silently, for the reason
@@ -201,7 +231,9 @@ fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     let outside = READING.replace(true);
     let result = panic::catch_unwind(AssertUnwindSafe(read));
     READING.set(outside);
-    result.unwrap_or_else(|_| Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned()))
+    result.unwrap_or_else(|_| {
+        Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned())
+    })
 }
 
 fn unreadable(e: &dyn std::fmt::Display) -> String {
@@ -209,34 +241,58 @@ fn unreadable(e: &dyn std::fmt::Display) -> String {
 }
 
 fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
-    let object = object::is_object(path).then(|| object::Reader::open(path)).transpose().map_err(|e| e.to_string())?;
+    let object = object::is_object(path)
+        .then(|| object::Reader::open(path))
+        .transpose()
+        .map_err(|e| e.to_string())?;
     let metadata = if let Some(object) = &object {
         // Where its pages lie, a file in an object store is asked for if it knows: then no others are fetched.
-        let options = ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
+        let options =
+            ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
         ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
     } else {
         let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
-        ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))?
+        ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default())
+            .map_err(|e| unreadable(&e))?
     };
     let mut columns = BTreeMap::new();
     for (at, field) in metadata.schema().fields().iter().enumerate() {
-        let Some(channel) = channels.get(field.name()) else { continue };
+        let Some(channel) = channels.get(field.name()) else {
+            continue;
+        };
         refuse_other_types(field, Some(channel))?;
         let unit = field.metadata().get(UNIT).cloned();
-        let column = OpenColumn { at, unit, clock_factor: clock_factor(field.data_type(), Some(channel)) };
+        let column = OpenColumn {
+            at,
+            unit,
+            clock_factor: clock_factor(field.data_type(), Some(channel)),
+        };
         if columns.insert(field.name().clone(), column).is_some() {
             return Err(format!("two columns are named `{}`", field.name()));
         }
     }
     let claimed = |rows: i64| u64::try_from(rows).unwrap_or(u64::MAX);
-    let in_groups = metadata.metadata().row_groups().iter().map(|g| claimed(g.num_rows()));
+    let in_groups = metadata
+        .metadata()
+        .row_groups()
+        .iter()
+        .map(|g| claimed(g.num_rows()));
     let all = claimed(metadata.metadata().file_metadata().num_rows());
     let most = in_groups.fold(0, u64::saturating_add).max(all);
     if most.saturating_mul(columns.len() as u64) > LARGEST_FILE {
-        return Err(format!("claims {most} rows of {} mapped columns, more than any recorder writes", columns.len()));
+        return Err(format!(
+            "claims {most} rows of {} mapped columns, more than any recorder writes",
+            columns.len()
+        ));
     }
     let rows = usize::try_from(all).unwrap_or_default();
-    Ok(OpenFile { path: path.to_owned(), object, metadata, columns, rows })
+    Ok(OpenFile {
+        path: path.to_owned(),
+        object,
+        metadata,
+        columns,
+        rows,
+    })
 }
 
 impl Source for Opened {
@@ -249,7 +305,10 @@ impl Source for Opened {
     }
 
     fn name(&self, file: usize) -> String {
-        self.files.get(file).map(|f| f.path.display().to_string()).unwrap_or_default()
+        self.files
+            .get(file)
+            .map(|f| f.path.display().to_string())
+            .unwrap_or_default()
     }
 
     fn rows(&self, file: usize) -> usize {
@@ -257,22 +316,38 @@ impl Source for Opened {
     }
 
     fn has(&self, file: usize, column: &str) -> bool {
-        self.files.get(file).is_some_and(|f| f.columns.contains_key(column))
+        self.files
+            .get(file)
+            .is_some_and(|f| f.columns.contains_key(column))
     }
 
     fn unit(&self, file: usize, column: &str) -> Option<&str> {
         self.files.get(file)?.columns.get(column)?.unit.as_deref()
     }
 
-    fn read(&self, file: usize, column: &str, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
-        let known = self.files.get(file).and_then(|f| Some((f, f.columns.get(column)?)));
+    fn read(
+        &self,
+        file: usize,
+        column: &str,
+        rows: Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), String> {
+        let known = self
+            .files
+            .get(file)
+            .and_then(|f| Some((f, f.columns.get(column)?)));
         let (file, column) = known.ok_or_else(|| format!("there is no column `{column}`"))?;
         guarded(|| file.read(column, rows, sink))
     }
 }
 
 impl OpenFile {
-    fn read(&self, column: &OpenColumn, rows: Range<usize>, sink: &mut dyn FnMut(&[f64])) -> Result<(), String> {
+    fn read(
+        &self,
+        column: &OpenColumn,
+        rows: Range<usize>,
+        sink: &mut dyn FnMut(&[f64]),
+    ) -> Result<(), String> {
         if rows.is_empty() {
             return Ok(());
         }
@@ -292,18 +367,30 @@ impl OpenFile {
         rows: Range<usize>,
         sink: &mut dyn FnMut(&[f64]),
     ) -> Result<(), String> {
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(source, self.metadata.clone());
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(source, self.metadata.clone());
         let mask = ProjectionMask::roots(builder.parquet_schema(), [column.at]);
-        let selection = RowSelection::from_consecutive_ranges(std::iter::once(rows.clone()), self.rows);
-        let builder = builder.with_projection(mask).with_row_selection(selection).with_batch_size(BATCH_ROWS);
+        let selection =
+            RowSelection::from_consecutive_ranges(std::iter::once(rows.clone()), self.rows);
+        let builder = builder
+            .with_projection(mask)
+            .with_row_selection(selection)
+            .with_batch_size(BATCH_ROWS);
         let mut read = 0;
         for batch in builder.build().map_err(|e| unreadable(&e))? {
             let batch: RecordBatch = batch.map_err(|e| unreadable(&e))?;
-            let array = batch.columns().first().ok_or_else(|| unreadable(&"a batch without its column"))?;
+            let array = batch
+                .columns()
+                .first()
+                .ok_or_else(|| unreadable(&"a batch without its column"))?;
             read += array.len();
             hand_over(array, column.clock_factor, sink).map_err(|e| unreadable(&e))?;
         }
-        if read == rows.len() { Ok(()) } else { Err(unreadable(&format!("{read} of {} rows", rows.len()))) }
+        if read == rows.len() {
+            Ok(())
+        } else {
+            Err(unreadable(&format!("{read} of {} rows", rows.len())))
+        }
     }
 }
 
@@ -320,12 +407,25 @@ fn hand_over(
         sink(plain.values());
         return Ok(());
     }
-    let plain = if clock_factor.is_some() { cast(array, &DataType::Int64)? } else { cast(array, &DataType::Float64)? };
+    let plain = if clock_factor.is_some() {
+        cast(array, &DataType::Int64)?
+    } else {
+        cast(array, &DataType::Float64)?
+    };
     let plain = cast(&plain, &DataType::Float64)?;
     let factor = clock_factor.unwrap_or(1.0);
-    let mut numbers: Vec<f64> = plain.as_primitive::<Float64Type>().values().iter().map(|v| v * factor).collect();
+    let mut numbers: Vec<f64> = plain
+        .as_primitive::<Float64Type>()
+        .values()
+        .iter()
+        .map(|v| v * factor)
+        .collect();
     if let Some(nulls) = plain.nulls().filter(|n| n.null_count() > 0) {
-        numbers.iter_mut().zip(nulls).filter(|(_, valid)| !valid).for_each(|(number, _)| *number = f64::NAN);
+        numbers
+            .iter_mut()
+            .zip(nulls)
+            .filter(|(_, valid)| !valid)
+            .for_each(|(number, _)| *number = f64::NAN);
     }
     sink(&numbers);
     Ok(())
@@ -335,21 +435,31 @@ fn hand_over(
 ///
 /// # Errors
 /// As [`open`], and what cannot be read.
-pub fn read(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<Vec<RawFlight>, Problem> {
+pub fn read(
+    files: &FlightFiles,
+    channels: &BTreeMap<String, Channel>,
+) -> Result<Vec<RawFlight>, Problem> {
     let opened = open(files, channels)?;
     let one = |file: usize| {
-        let mut flight = RawFlight { flight_id: files.flight_id.clone(), columns: BTreeMap::new() };
+        let mut flight = RawFlight {
+            flight_id: files.flight_id.clone(),
+            columns: BTreeMap::new(),
+        };
         for name in channels.keys().filter(|name| opened.has(file, name)) {
             let unit = opened.unit(file, name).map(str::to_owned);
             let mut values = Vec::with_capacity(opened.rows(file));
-            let read = opened.read(file, name, 0..opened.rows(file), &mut |v| values.extend_from_slice(v));
+            let read = opened.read(file, name, 0..opened.rows(file), &mut |v| {
+                values.extend_from_slice(v)
+            });
             read.map_err(|reason| Problem {
                 stage: "ingest".to_owned(),
                 flight_id: files.flight_id.clone(),
                 place: opened.name(file),
                 reason,
             })?;
-            flight.columns.insert(name.clone(), RawColumn { unit, values });
+            flight
+                .columns
+                .insert(name.clone(), RawColumn { unit, values });
         }
         Ok(flight)
     };
@@ -369,12 +479,17 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
     } else {
         "a number (float, integer or boolean)"
     };
-    Err(format!("column `{}` (signal `{signal}`) is of type {found}; expected {number}", field.name()))
+    Err(format!(
+        "column `{}` (signal `{signal}`) is of type {found}; expected {number}",
+        field.name()
+    ))
 }
 
 /// For timestamps and durations, the factor from their ticks to the unit that the channel map states.
 fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
-    let (DataType::Timestamp(tick, _) | DataType::Duration(tick)) = found else { return None };
+    let (DataType::Timestamp(tick, _) | DataType::Duration(tick)) = found else {
+        return None;
+    };
     let name = match tick {
         TimeUnit::Second => "s",
         TimeUnit::Millisecond => "ms",

@@ -33,7 +33,9 @@ pub struct Store {
 }
 
 /// The folders of the store, one per kind of artefact.
-pub const KINDS: &[&str] = &["ingest", "records", "segment", "estimate", "history", "joint", "predict"];
+pub const KINDS: &[&str] = &[
+    "ingest", "records", "segment", "estimate", "history", "joint", "predict",
+];
 
 /// Fingerprints of files' contents.
 const CONTENTS: &str = "contents.json";
@@ -53,7 +55,10 @@ impl Store {
         for kind in KINDS {
             atomic::sweep(&folder.join(kind))?;
         }
-        Ok(Store { _lock: Some(lock), ..Store::look(folder) })
+        Ok(Store {
+            _lock: Some(lock),
+            ..Store::look(folder)
+        })
     }
 
     /// Opens or creates a store as one of many that add to it at the same time, waiting up to `wait` for a run to leave
@@ -63,7 +68,10 @@ impl Store {
     /// As [`Store::open`].
     pub fn join(folder: &Path, wait: Duration) -> Result<Store> {
         let lock = Lock::share(&folder.join("lock"), "store", wait)?;
-        Ok(Store { _lock: Some(lock), ..Store::look(folder) })
+        Ok(Store {
+            _lock: Some(lock),
+            ..Store::look(folder)
+        })
     }
 
     /// A store to look into while others use it; it need not exist.
@@ -85,14 +93,20 @@ impl Store {
     /// # Errors
     /// [`Error::Store`] or [`Error::Archive`] naming the place: what is there cannot be listed.
     pub fn sharing(self, place: Option<&Path>) -> Result<Store> {
-        Ok(Store { shared: place.map(Shared::open).transpose()?, ..self })
+        Ok(Store {
+            shared: place.map(Shared::open).transpose()?,
+            ..self
+        })
     }
 
     /// What is remembered of files' contents; of objects, what others remember too.
     #[must_use]
     pub fn contents(&self) -> Contents {
         let contents = Contents::load(&self.folder.join(CONTENTS));
-        let theirs = self.shared.as_ref().and_then(|shared| shared.get(CONTENTS).ok().flatten());
+        let theirs = self
+            .shared
+            .as_ref()
+            .and_then(|shared| shared.get(CONTENTS).ok().flatten());
         match theirs {
             Some(theirs) => contents.with_objects(&theirs),
             None => contents,
@@ -118,15 +132,27 @@ impl Store {
     /// Where the artefact of a kind for an item (a flight, a maneuver) with a fingerprint lies.
     #[must_use]
     pub fn path(&self, kind: &str, item: &str, fingerprint: &str, extension: &str) -> PathBuf {
-        let safe: String =
-            item.chars().map(|c| if c.is_alphanumeric() || "-_=.".contains(c) { c } else { '_' }).collect();
-        self.folder.join(kind).join(format!("{safe}-{fingerprint}.{extension}"))
+        let safe: String = item
+            .chars()
+            .map(|c| {
+                if c.is_alphanumeric() || "-_=.".contains(c) {
+                    c
+                } else {
+                    '_'
+                }
+            })
+            .collect();
+        self.folder
+            .join(kind)
+            .join(format!("{safe}-{fingerprint}.{extension}"))
     }
 
     /// Where the artefact of another kind under the same name and fingerprint lies.
     #[must_use]
     pub fn beside(&self, path: &Path, kind: &str) -> PathBuf {
-        self.folder.join(kind).join(path.file_name().unwrap_or_default())
+        self.folder
+            .join(kind)
+            .join(path.file_name().unwrap_or_default())
     }
 
     /// The artefact at a path, where there is one that is as it was written; a damaged one counts as none and is made again.
@@ -140,7 +166,9 @@ impl Store {
         let (shared, name) = (self.shared.as_ref()?, self.name(path)?);
         let fetched = shared.get(&name).and_then(|bytes| {
             let bytes = bytes.filter(|bytes| unsealed(bytes).is_some());
-            bytes.map(|bytes| atomic::place(path, &bytes).map(|()| bytes)).transpose()
+            bytes
+                .map(|bytes| atomic::place(path, &bytes).map(|()| bytes))
+                .transpose()
         });
         match fetched {
             Ok(bytes) => read(&bytes?),
@@ -155,7 +183,10 @@ impl Store {
 
     /// Notes that something is in the folder; what is only there is to be sent.
     pub fn is_here(&self, path: &Path) {
-        let is_sent = |shared: &Shared| self.name(path).is_none_or(|name| shared.size(&name).is_some());
+        let is_sent = |shared: &Shared| {
+            self.name(path)
+                .is_none_or(|name| shared.size(&name).is_some())
+        };
         if self.shared.as_ref().is_some_and(|shared| !is_sent(shared))
             && let Ok(mut unsent) = self.unsent.lock()
         {
@@ -175,7 +206,10 @@ impl Store {
     /// # Errors
     /// It cannot be had, or is not what was written.
     pub fn fetch(&self, path: &Path, digest: Option<&Digest>) -> Result<()> {
-        let (Some(shared), Some(name), Some(digest)) = (&self.shared, self.name(path), digest) else { return Ok(()) };
+        let (Some(shared), Some(name), Some(digest)) = (&self.shared, self.name(path), digest)
+        else {
+            return Ok(());
+        };
         if path.exists() || shared.size(&name).is_none() {
             return Ok(());
         }
@@ -187,7 +221,11 @@ impl Store {
     /// # Errors
     /// It cannot be sent, or something could not be had before.
     pub fn send_rest(&self) -> Result<()> {
-        let unsent = self.unsent.lock().map(|mut unsent| std::mem::take(&mut *unsent)).unwrap_or_default();
+        let unsent = self
+            .unsent
+            .lock()
+            .map(|mut unsent| std::mem::take(&mut *unsent))
+            .unwrap_or_default();
         unsent.iter().try_for_each(|path| self.send(path))?;
         self.check()
     }
@@ -197,7 +235,11 @@ impl Store {
     /// # Errors
     /// The first that could not.
     pub fn check(&self) -> Result<()> {
-        self.trouble.lock().ok().and_then(|mut trouble| trouble.take()).map_or(Ok(()), Err)
+        self.trouble
+            .lock()
+            .ok()
+            .and_then(|mut trouble| trouble.take())
+            .map_or(Ok(()), Err)
     }
 
     fn send(&self, path: &Path) -> Result<()> {
@@ -209,7 +251,12 @@ impl Store {
 
     /// A path's name relative to the store.
     fn name(&self, path: &Path) -> Option<String> {
-        Some(path.strip_prefix(&self.folder).ok()?.to_string_lossy().into_owned())
+        Some(
+            path.strip_prefix(&self.folder)
+                .ok()?
+                .to_string_lossy()
+                .into_owned(),
+        )
     }
 
     /// Stores an artefact whole, with a fingerprint of its bytes at its end.
@@ -250,7 +297,9 @@ impl Store {
     /// The artefacts that were noted as needed, relative to the store, with their sizes.
     #[must_use]
     pub fn needed(&self) -> BTreeMap<String, u64> {
-        let Ok(needed) = self.needed.lock() else { return BTreeMap::new() };
+        let Ok(needed) = self.needed.lock() else {
+            return BTreeMap::new();
+        };
         let name = |path: &PathBuf| {
             let name = self.name(path)?;
             let here = std::fs::metadata(path).ok().map(|m| m.len());
@@ -275,7 +324,11 @@ impl Store {
             return true;
         }
         let shared = |shared: &Shared| shared.get(&self.name(path)?).ok()?;
-        self.shared.as_ref().and_then(shared).as_ref().is_some_and(is_sealed)
+        self.shared
+            .as_ref()
+            .and_then(shared)
+            .as_ref()
+            .is_some_and(is_sealed)
     }
 
     /// Notes that what is published in this folder is made of this store's artefacts, so that none of them is removed.
@@ -283,11 +336,15 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] naming the file.
     pub fn serves(&self, reports: &Path) -> Result<()> {
-        let reports = std::fs::canonicalize(reports).map_err(Error::io(reports, "cannot find the folder"))?;
+        let reports =
+            std::fs::canonicalize(reports).map_err(Error::io(reports, "cannot find the folder"))?;
         let mut served = self.served();
         if served.insert(reports) {
             let path = self.folder.join(SERVED);
-            atomic::place(&path, &serde_json::to_vec(&served).map_err(|e| Error::store(&path, &e))?)?;
+            atomic::place(
+                &path,
+                &serde_json::to_vec(&served).map_err(|e| Error::store(&path, &e))?,
+            )?;
         }
         Ok(())
     }
@@ -296,8 +353,11 @@ impl Store {
     /// found stands for those that were in it.
     #[must_use]
     pub fn served(&self) -> BTreeSet<PathBuf> {
-        let Ok(bytes) = std::fs::read(self.folder.join(SERVED)) else { return BTreeSet::new() };
-        serde_json::from_slice(&bytes).unwrap_or_else(|_| [PathBuf::from("unknown: serves.json was damaged")].into())
+        let Ok(bytes) = std::fs::read(self.folder.join(SERVED)) else {
+            return BTreeSet::new();
+        };
+        serde_json::from_slice(&bytes)
+            .unwrap_or_else(|_| [PathBuf::from("unknown: serves.json was damaged")].into())
     }
 
     /// All artefacts, relative to the store, with their sizes; where it is shared, those that others see.
@@ -308,9 +368,16 @@ impl Store {
         }
         let mut found = BTreeMap::new();
         for kind in KINDS {
-            for entry in std::fs::read_dir(self.folder.join(kind)).into_iter().flatten().flatten() {
+            for entry in std::fs::read_dir(self.folder.join(kind))
+                .into_iter()
+                .flatten()
+                .flatten()
+            {
                 let size = entry.metadata().map_or(0, |m| m.len());
-                found.insert(format!("{kind}/{}", entry.file_name().to_string_lossy()), size);
+                found.insert(
+                    format!("{kind}/{}", entry.file_name().to_string_lossy()),
+                    size,
+                );
             }
         }
         found
@@ -360,7 +427,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path(), Duration::ZERO).unwrap();
         let path = store.path("estimate", "flight_001/t00012", "0123", "json");
-        let values = vec![0.1 + 0.2, 1.0 / 3.0, f64::MIN_POSITIVE, -1.234_567_890_123_456_7e300];
+        let values = vec![
+            0.1 + 0.2,
+            1.0 / 3.0,
+            f64::MIN_POSITIVE,
+            -1.234_567_890_123_456_7e300,
+        ];
         store.save(&path, &values).unwrap();
         assert_eq!(store.load::<Vec<f64>>(&path), Some(values));
         std::fs::write(&path, "[0.3, ").unwrap();

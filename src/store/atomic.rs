@@ -19,7 +19,10 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
         return Ok(());
     }
     let mut draft = Draft::of(path)?;
-    draft.file.write_all(bytes).map_err(Error::io(path, "cannot write it"))?;
+    draft
+        .file
+        .write_all(bytes)
+        .map_err(Error::io(path, "cannot write it"))?;
     draft.place()
 }
 
@@ -62,13 +65,22 @@ impl Draft {
         // A temporary file is the owner's alone; what is published is for everybody to read.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-        let file = builder.tempfile_in(folder).map_err(Error::io(folder, "cannot create a file in it"))?;
-        Ok(Draft { file, written: blake3::Hasher::new(), path: path.to_owned() })
+        let file = builder
+            .tempfile_in(folder)
+            .map_err(Error::io(folder, "cannot create a file in it"))?;
+        Ok(Draft {
+            file,
+            written: blake3::Hasher::new(),
+            path: path.to_owned(),
+        })
     }
 
     /// What is written goes into the draft.
     pub fn writer(&mut self) -> impl Write + Send {
-        let through = Digesting { file: self.file.as_file_mut(), written: &mut self.written };
+        let through = Digesting {
+            file: self.file.as_file_mut(),
+            written: &mut self.written,
+        };
         std::io::BufWriter::with_capacity(1 << 20, through)
     }
 
@@ -89,8 +101,13 @@ impl Draft {
     /// # Errors
     /// [`Error::Io`] naming the path.
     pub fn place(self) -> Result<()> {
-        self.file.as_file().sync_all().map_err(Error::io(&self.path, "cannot write it to the disk"))?;
-        self.file.persist(&self.path).map_err(|e| Error::io(&self.path, "cannot put it in its place")(e.error))?;
+        self.file
+            .as_file()
+            .sync_all()
+            .map_err(Error::io(&self.path, "cannot write it to the disk"))?;
+        self.file
+            .persist(&self.path)
+            .map_err(|e| Error::io(&self.path, "cannot put it in its place")(e.error))?;
         Ok(())
     }
 }
@@ -101,7 +118,9 @@ impl Draft {
 /// [`Error::Io`] naming the path.
 pub fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(path, "cannot remove it")(e)),
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::io(path, "cannot remove it")(e))
+        }
         _ => Ok(()),
     }
 }
@@ -129,7 +148,11 @@ pub fn sweep(folder: &Path) -> Result<()> {
         if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
             let path = entry.path();
             let is_folder = entry.file_type().is_ok_and(|t| t.is_dir());
-            let removed = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            let removed = if is_folder {
+                fs::remove_dir_all(&path)
+            } else {
+                fs::remove_file(&path)
+            };
             removed.map_err(Error::io(&path, "cannot remove a leftover"))?;
         }
     }

@@ -46,15 +46,25 @@ impl Contents {
     /// What was remembered at `path`; nothing where there is nothing or it is damaged.
     #[must_use]
     pub fn load(path: &Path) -> Contents {
-        let known = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(unsealed(&bytes)?).ok());
+        let known = std::fs::read(path)
+            .ok()
+            .and_then(|bytes| serde_json::from_slice(unsealed(&bytes)?).ok());
         let known = known.unwrap_or_default();
-        Contents { path: path.to_owned(), known, seen: Mutex::default() }
+        Contents {
+            path: path.to_owned(),
+            known,
+            seen: Mutex::default(),
+        }
     }
 
     /// Remembers nothing: every file is read.
     #[must_use]
     pub fn forgetful() -> Contents {
-        Contents { path: PathBuf::new(), known: BTreeMap::new(), seen: Mutex::default() }
+        Contents {
+            path: PathBuf::new(),
+            known: BTreeMap::new(),
+            seen: Mutex::default(),
+        }
     }
 
     /// Adds what others remember of objects, as [`Contents::objects`] gave it; nothing where it is damaged.
@@ -62,7 +72,9 @@ impl Contents {
     pub fn with_objects(mut self, text: &[u8]) -> Contents {
         let theirs = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
         let theirs: BTreeMap<PathBuf, Known> = theirs.unwrap_or_default();
-        let unknown = theirs.into_iter().filter(|(path, _)| object::is_object(path) && !self.known.contains_key(path));
+        let unknown = theirs
+            .into_iter()
+            .filter(|(path, _)| object::is_object(path) && !self.known.contains_key(path));
         let unknown: Vec<(PathBuf, Known)> = unknown.collect();
         self.known.extend(unknown);
         self
@@ -73,7 +85,11 @@ impl Contents {
     pub fn objects(&self) -> Option<Vec<u8>> {
         let now = self.remembered();
         let objects = |known: &BTreeMap<PathBuf, Known>| -> BTreeMap<PathBuf, Known> {
-            known.iter().filter(|(path, _)| object::is_object(path)).map(|(p, k)| (p.clone(), k.clone())).collect()
+            known
+                .iter()
+                .filter(|(path, _)| object::is_object(path))
+                .map(|(p, k)| (p.clone(), k.clone()))
+                .collect()
         };
         let (now, before) = (objects(&now), objects(&self.known));
         (now != before).then(|| sealed(serde_json::to_vec(&now).unwrap_or_default()))
@@ -91,7 +107,14 @@ impl Contents {
         let content = Digest::of(&mut reader).map_err(|e| e.to_string())?;
         let stamp = stamp_of(reader.about());
         let is_marked = reader.about().tag.is_some();
-        self.see(path, &stamp, is_marked.then(|| Known { stamp: stamp.clone(), content: content.clone() }));
+        self.see(
+            path,
+            &stamp,
+            is_marked.then(|| Known {
+                stamp: stamp.clone(),
+                content: content.clone(),
+            }),
+        );
         Ok(content)
     }
 
@@ -107,8 +130,9 @@ impl Contents {
         // Anything else may block for ever: a pipe that nobody writes into.
         if !metadata.is_file() {
             return Err(if metadata.is_dir() {
-                let why =
-                    std::fs::read_dir(path).err().map_or_else(String::new, |e| format!(" that cannot be read: {e}"));
+                let why = std::fs::read_dir(path)
+                    .err()
+                    .map_or_else(String::new, |e| format!(" that cannot be read: {e}"));
                 format!("is a folder{why}")
             } else {
                 "is no regular file".to_owned()
@@ -126,10 +150,16 @@ impl Contents {
         let content = Digest::of(&mut file).map_err(|e| format!("cannot be read: {e}"))?;
         let after = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
         if stamp(&after) != before {
-            return Err("changes while it is read: it is still being copied, the next run will read it".to_owned());
+            return Err(
+                "changes while it is read: it is still being copied, the next run will read it"
+                    .to_owned(),
+            );
         }
         if let Some(stamp) = before {
-            let known = Known { stamp: stamp.clone(), content: content.clone() };
+            let known = Known {
+                stamp: stamp.clone(),
+                content: content.clone(),
+            };
             self.see(path, &stamp, is_settled(&after, begun).then_some(known));
         }
         Ok(content)
@@ -138,12 +168,29 @@ impl Contents {
     /// Whether a file still is as it was when its fingerprint was taken.
     #[must_use]
     pub fn is_unchanged(&self, path: &Path) -> bool {
-        let of_object = || object::about(path).ok().flatten().map(|about| stamp_of(&about));
+        let of_object = || {
+            object::about(path)
+                .ok()
+                .flatten()
+                .map(|about| stamp_of(&about))
+        };
         let of_file = || std::fs::metadata(path).ok().and_then(|m| stamp(&m));
-        let now = if object::is_object(path) { of_object() } else { of_file() };
-        let seen = self.seen.lock().ok().and_then(|seen| seen.get(path).map(|(stamp, _)| stamp.clone()));
+        let now = if object::is_object(path) {
+            of_object()
+        } else {
+            of_file()
+        };
+        let seen = self
+            .seen
+            .lock()
+            .ok()
+            .and_then(|seen| seen.get(path).map(|(stamp, _)| stamp.clone()));
         // Where there are no stamps there is nothing to compare.
-        if cfg!(unix) { now.is_some() && now == seen } else { path.exists() }
+        if cfg!(unix) {
+            now.is_some() && now == seen
+        } else {
+            path.exists()
+        }
     }
 
     /// Writes down what was seen and has settled; what is no more is forgotten.
@@ -155,16 +202,31 @@ impl Contents {
         if known == self.known {
             return Ok(());
         }
-        atomic::place(&self.path, &sealed(serde_json::to_vec(&known).unwrap_or_default()))
+        atomic::place(
+            &self.path,
+            &sealed(serde_json::to_vec(&known).unwrap_or_default()),
+        )
     }
 
     fn remembered(&self) -> BTreeMap<PathBuf, Known> {
-        let seen = self.seen.lock().map(|seen| seen.clone()).unwrap_or_default();
+        let seen = self
+            .seen
+            .lock()
+            .map(|seen| seen.clone())
+            .unwrap_or_default();
         // Whether an object that was not asked for is still there is not worth a question.
         let is_there = |path: &Path| object::is_object(path) || path.exists();
-        let unasked = self.known.iter().filter(|(path, _)| !seen.contains_key(*path) && is_there(path));
-        let mut known: BTreeMap<PathBuf, Known> = unasked.map(|(path, known)| (path.clone(), known.clone())).collect();
-        known.extend(seen.into_iter().filter_map(|(path, (_, known))| Some((path, known?))));
+        let unasked = self
+            .known
+            .iter()
+            .filter(|(path, _)| !seen.contains_key(*path) && is_there(path));
+        let mut known: BTreeMap<PathBuf, Known> = unasked
+            .map(|(path, known)| (path.clone(), known.clone()))
+            .collect();
+        known.extend(
+            seen.into_iter()
+                .filter_map(|(path, (_, known))| Some((path, known?))),
+        );
         known
     }
 
@@ -176,7 +238,11 @@ impl Contents {
 }
 
 fn stamp_of(about: &object::About) -> Stamp {
-    format!("{}:{}", about.bytes, about.tag.as_deref().unwrap_or_default())
+    format!(
+        "{}:{}",
+        about.bytes,
+        about.tag.as_deref().unwrap_or_default()
+    )
 }
 
 #[cfg(unix)]
@@ -185,7 +251,13 @@ fn stamp(metadata: &Metadata) -> Option<Stamp> {
     use std::os::unix::fs::MetadataExt;
     let m = metadata;
     let (dev, ino, size) = (m.dev(), m.ino(), m.size());
-    Some(format!("{dev}:{ino}:{size}:{}.{:09}:{}.{:09}", m.mtime(), m.mtime_nsec(), m.ctime(), m.ctime_nsec()))
+    Some(format!(
+        "{dev}:{ino}:{size}:{}.{:09}:{}.{:09}",
+        m.mtime(),
+        m.mtime_nsec(),
+        m.ctime(),
+        m.ctime_nsec()
+    ))
 }
 
 #[cfg(not(unix))]
@@ -221,7 +293,10 @@ mod tests {
         let one = contents.of(&file).unwrap();
         assert!(contents.is_unchanged(&file));
         contents.save().unwrap();
-        assert!(Contents::load(&cache).known.is_empty(), "it has not settled");
+        assert!(
+            Contents::load(&cache).known.is_empty(),
+            "it has not settled"
+        );
         std::fs::write(&file, "two").unwrap();
         assert!(!contents.is_unchanged(&file));
         assert_ne!(Contents::load(&cache).of(&file).unwrap(), one);
@@ -233,10 +308,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (file, cache) = (folder.path().join("f"), folder.path().join("contents.json"));
         std::fs::write(&file, "one").unwrap();
-        let remembered = Digest { bytes: 3, blake3: "remembered".into() };
+        let remembered = Digest {
+            bytes: 3,
+            blake3: "remembered".into(),
+        };
         let remember = || {
             let stamp = stamp(&std::fs::metadata(&file).unwrap()).unwrap();
-            let known: BTreeMap<PathBuf, Known> = [(file.clone(), Known { stamp, content: remembered.clone() })].into();
+            let known: BTreeMap<PathBuf, Known> = [(
+                file.clone(),
+                Known {
+                    stamp,
+                    content: remembered.clone(),
+                },
+            )]
+            .into();
             std::fs::write(&cache, sealed(serde_json::to_vec(&known).unwrap())).unwrap();
         };
         remember();
@@ -245,7 +330,12 @@ mod tests {
         let written = std::fs::metadata(&file).unwrap().modified().unwrap();
         std::thread::sleep(Duration::from_millis(20));
         std::fs::write(&file, "two").unwrap();
-        File::options().write(true).open(&file).unwrap().set_modified(written).unwrap();
+        File::options()
+            .write(true)
+            .open(&file)
+            .unwrap()
+            .set_modified(written)
+            .unwrap();
         assert_ne!(Contents::load(&cache).of(&file).unwrap(), remembered);
     }
 
@@ -253,7 +343,17 @@ mod tests {
     fn what_is_no_file_is_not_opened() {
         let folder = tempfile::tempdir().unwrap();
         let contents = Contents::forgetful();
-        assert!(contents.of(folder.path()).unwrap_err().contains("is a folder"));
-        assert!(contents.of(&folder.path().join("none")).unwrap_err().contains("cannot be read"));
+        assert!(
+            contents
+                .of(folder.path())
+                .unwrap_err()
+                .contains("is a folder")
+        );
+        assert!(
+            contents
+                .of(&folder.path().join("none"))
+                .unwrap_err()
+                .contains("cannot be read")
+        );
     }
 }

@@ -19,8 +19,10 @@ use crate::tables::PublishedTrend;
 pub fn text(path: &Path) -> Result<String> {
     if object::is_object(path) {
         let bytes = object::get(path).map_err(|e| e.at(path))?;
-        let bytes =
-            bytes.ok_or_else(|| Error::Archive { place: path.to_owned(), what: "there is no such object".into() })?;
+        let bytes = bytes.ok_or_else(|| Error::Archive {
+            place: path.to_owned(),
+            what: "there is no such object".into(),
+        })?;
         return String::from_utf8(bytes).map_err(|_| Error::config(path, None, "it is no text"));
     }
     std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))
@@ -43,8 +45,11 @@ pub fn place_text(path: &Path, text: &str) -> Result<()> {
 /// [`Error::Io`] naming the folder.
 pub fn with_extension(folder: &Path, extension: &str) -> Result<Vec<std::path::PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
-    let mut files: Vec<_> =
-        entries.flatten().map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == extension)).collect();
+    let mut files: Vec<_> = entries
+        .flatten()
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == extension))
+        .collect();
     files.sort();
     Ok(files)
 }
@@ -93,7 +98,10 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
 pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
-    Ok(rows(&folder.join(format!("{table}.csv")))?.into_iter().map(|(_, row)| row).collect())
+    Ok(rows(&folder.join(format!("{table}.csv")))?
+        .into_iter()
+        .map(|(_, row)| row)
+        .collect())
 }
 
 /// The columns of a CSV of numbers, by the names of its header.
@@ -104,11 +112,19 @@ pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     let text = text(path)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let wrong = |e: &csv::Error| Error::config(path, None, e.to_string());
-    let names: Vec<String> = reader.headers().map_err(|e| wrong(&e))?.iter().map(str::to_owned).collect();
+    let names: Vec<String> = reader
+        .headers()
+        .map_err(|e| wrong(&e))?
+        .iter()
+        .map(str::to_owned)
+        .collect();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
     for row in reader.deserialize() {
         let row: Vec<f64> = row.map_err(|e| wrong(&e))?;
-        columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+        columns
+            .iter_mut()
+            .zip(row)
+            .for_each(|(column, value)| column.push(value));
     }
     Ok(names.into_iter().zip(columns).collect())
 }
@@ -141,11 +157,15 @@ pub fn place_rows<T: Serialize>(path: &Path, rows: &[T]) -> Result<()> {
 
 pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let content = text(path)?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(content.as_bytes());
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(content.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
     let mut rows = Vec::new();
     for record in reader.records() {
-        let line = |position: Option<&csv::Position>| position.and_then(|p| usize::try_from(p.line()).ok());
+        let line = |position: Option<&csv::Position>| {
+            position.and_then(|p| usize::try_from(p.line()).ok())
+        };
         let record = record.map_err(|e| Error::config(path, line(e.position()), e.to_string()))?;
         let at = line(record.position());
         rows.push((
@@ -154,7 +174,9 @@ pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> 
                 let column = match e.kind() {
                     csv::ErrorKind::Deserialize { err, .. } => {
                         let field = err.field().and_then(|f| usize::try_from(f).ok());
-                        field.and_then(|f| header.get(f)).map(|name| format!("column `{name}`: {}", err.kind()))
+                        field
+                            .and_then(|f| header.get(f))
+                            .map(|name| format!("column `{name}`: {}", err.kind()))
                     }
                     _ => None,
                 };

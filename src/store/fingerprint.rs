@@ -72,7 +72,10 @@ impl Digest {
 
     /// Of what was digested so far.
     pub(super) fn so_far(hasher: &blake3::Hasher) -> Digest {
-        Digest { bytes: hasher.count(), blake3: hasher.finalize().to_hex().to_string() }
+        Digest {
+            bytes: hasher.count(),
+            blake3: hasher.finalize().to_hex().to_string(),
+        }
     }
 }
 
@@ -106,6 +109,9 @@ mod tests {
         assert_eq!(key("x", "y"), key("x", "y"));
         assert_ne!(key("x", "y"), key("y", "x"));
         assert_ne!(key("xy", ""), key("x", "y"));
-        assert_ne!(Fingerprint::of("segment", 1).finish(), Fingerprint::of("segment", 2).finish());
+        assert_ne!(
+            Fingerprint::of("segment", 1).finish(),
+            Fingerprint::of("segment", 2).finish()
+        );
     }
 }

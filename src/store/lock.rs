@@ -34,9 +34,17 @@ impl Lock {
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
         let mut lock = Lock::get(path, what, wait, File::try_lock)?;
         // Only a word for others: a disk that is too full for it stops nobody here.
-        let note = format!("pid {} on {} since {}\n", std::process::id(), host(), timestamp(SystemTime::now()));
+        let note = format!(
+            "pid {} on {} since {}\n",
+            std::process::id(),
+            host(),
+            timestamp(SystemTime::now())
+        );
         let file = &mut lock.file;
-        let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(note.as_bytes()));
+        let _ = file
+            .set_len(0)
+            .and_then(|()| file.rewind())
+            .and_then(|()| file.write_all(note.as_bytes()));
         Ok(lock)
     }
 
@@ -48,7 +56,12 @@ impl Lock {
         Lock::get(path, what, wait, File::try_lock_shared)
     }
 
-    fn get(path: &Path, what: &str, wait: Duration, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Lock> {
+    fn get(
+        path: &Path,
+        what: &str,
+        wait: Duration,
+        lock: fn(&File) -> Result<(), TryLockError>,
+    ) -> Result<Lock> {
         let folder = path.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
         let mut file = OpenOptions::new()
@@ -62,8 +75,12 @@ impl Lock {
         loop {
             match lock(&file) {
                 Ok(()) => break,
-                Err(TryLockError::WouldBlock) if Instant::now() < patience => std::thread::sleep(AGAIN),
-                Err(TryLockError::WouldBlock) => return Err(Error::store(folder, &busy(&mut file, what))),
+                Err(TryLockError::WouldBlock) if Instant::now() < patience => {
+                    std::thread::sleep(AGAIN)
+                }
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::store(folder, &busy(&mut file, what)));
+                }
                 Err(TryLockError::Error(e)) if has_none(&e) => break,
                 Err(TryLockError::Error(e)) => return Err(Error::io(path, "cannot lock it")(e)),
             }
@@ -74,23 +91,40 @@ impl Lock {
 
 /// Whether an error says that the file system has no locks: not supported, or no lock manager (Linux's `ENOLCK`).
 fn has_none(error: &std::io::Error) -> bool {
-    error.kind() == std::io::ErrorKind::Unsupported || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
+    error.kind() == std::io::ErrorKind::Unsupported
+        || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
 }
 
 fn busy(file: &mut File, what: &str) -> String {
     let mut note = String::new();
-    let read = file.rewind().and_then(|()| file.take(LONGEST_NOTE).read_to_string(&mut note));
+    let read = file
+        .rewind()
+        .and_then(|()| file.take(LONGEST_NOTE).read_to_string(&mut note));
     let note = note.trim();
-    let who = if read.is_err() || note.is_empty() { String::new() } else { format!(" ({note})") };
-    format!("another run is using this {what}{who}; let harvest wait for it with --wait, or give another --{what}")
+    let who = if read.is_err() || note.is_empty() {
+        String::new()
+    } else {
+        format!(" ({note})")
+    };
+    format!(
+        "another run is using this {what}{who}; let harvest wait for it with --wait, or give another --{what}"
+    )
 }
 
 /// The machine's name as the kernel knows it.
 fn host() -> String {
-    let name = ["/proc/sys/kernel/hostname", "/etc/hostname"].into_iter().find_map(|f| std::fs::read_to_string(f).ok());
-    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).unwrap_or_default();
+    let name = ["/proc/sys/kernel/hostname", "/etc/hostname"]
+        .into_iter()
+        .find_map(|f| std::fs::read_to_string(f).ok());
+    let name = name
+        .or_else(|| std::env::var("HOSTNAME").ok())
+        .unwrap_or_default();
     let name = name.trim();
-    if name.is_empty() { "this machine".to_owned() } else { name.to_owned() }
+    if name.is_empty() {
+        "this machine".to_owned()
+    } else {
+        name.to_owned()
+    }
 }
 
 #[cfg(test)]
@@ -103,9 +137,17 @@ mod tests {
         let path = folder.path().join("lock");
         std::fs::write(&path, "pid 1 on a machine that is no more\n").unwrap();
         let first = Lock::take(&path, "store", Duration::ZERO).unwrap();
-        let second = Lock::take(&path, "store", Duration::from_millis(150)).unwrap_err().to_string();
-        let who = format!("another run is using this store (pid {} on ", std::process::id());
-        assert!(second.contains(&who) && !second.contains("no more"), "{second}");
+        let second = Lock::take(&path, "store", Duration::from_millis(150))
+            .unwrap_err()
+            .to_string();
+        let who = format!(
+            "another run is using this store (pid {} on ",
+            std::process::id()
+        );
+        assert!(
+            second.contains(&who) && !second.contains("no more"),
+            "{second}"
+        );
         drop(first);
         Lock::take(&path, "store", Duration::ZERO).unwrap();
     }
@@ -129,7 +171,8 @@ mod tests {
         let path = folder.path().join("lock");
         let first = Lock::take(&path, "store", Duration::ZERO).unwrap();
         std::thread::scope(|scope| {
-            let second = scope.spawn(|| Lock::take(&path, "store", Duration::from_mins(1)).map(|_| ()));
+            let second =
+                scope.spawn(|| Lock::take(&path, "store", Duration::from_mins(1)).map(|_| ()));
             std::thread::sleep(Duration::from_millis(20));
             drop(first);
             assert!(second.join().unwrap().is_ok());

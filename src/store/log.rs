@@ -26,7 +26,10 @@ impl Log {
     pub fn open(path: &Path) -> Result<Log> {
         let file = OpenOptions::new().create(true).append(true).open(path);
         let file = file.map_err(Error::io(path, "cannot open the log"))?;
-        Ok(Log { path: path.to_owned(), file: Mutex::new((file, None)) })
+        Ok(Log {
+            path: path.to_owned(),
+            file: Mutex::new((file, None)),
+        })
     }
 
     /// Appends a line: time, process, event and what belongs to it. A line is one write, so that two runs that share a log
@@ -36,7 +39,11 @@ impl Log {
         line.insert("time".to_owned(), timestamp(SystemTime::now()).into());
         line.insert("pid".to_owned(), std::process::id().into());
         line.insert("event".to_owned(), event.into());
-        line.extend(fields.iter().map(|(name, value)| ((*name).to_owned(), value.clone())));
+        line.extend(
+            fields
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), value.clone())),
+        );
         let line = format!("{}\n", Value::Object(line));
         if let Ok(mut file) = self.file.lock()
             && let Err(error) = file.0.write_all(line.as_bytes())
@@ -65,11 +72,17 @@ pub fn timestamp(time: SystemTime) -> String {
     let day_of_year = day - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let month_from_march = (5 * day_of_year + 2) / 153;
     let day_of_month = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let month = if month_from_march < 10 {
+        month_from_march + 3
+    } else {
+        month_from_march - 9
+    };
     let year = era * 400 + year_of_era + u64::from(month <= 2);
     let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
     let millisecond = since.subsec_millis();
-    format!("{year:04}-{month:02}-{day_of_month:02}T{hour:02}:{minute:02}:{second:02}.{millisecond:03}Z")
+    format!(
+        "{year:04}-{month:02}-{day_of_month:02}T{hour:02}:{minute:02}:{second:02}.{millisecond:03}Z"
+    )
 }
 
 #[cfg(test)]
@@ -90,11 +103,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.jsonl");
         for n in 0..2 {
-            Log::open(&path).unwrap().write("begin", &[("n", n.into()), ("words", "two\nlines \"quoted\"".into())]);
+            Log::open(&path).unwrap().write(
+                "begin",
+                &[("n", n.into()), ("words", "two\nlines \"quoted\"".into())],
+            );
         }
         let text = std::fs::read_to_string(&path).unwrap();
-        let lines: Vec<Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        let lines: Vec<Value> = text
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect();
         assert_eq!(lines.len(), 2);
-        assert_eq!((&lines[1]["n"], &lines[1]["event"]), (&1.into(), &"begin".into()));
+        assert_eq!(
+            (&lines[1]["n"], &lines[1]["event"]),
+            (&1.into(), &"begin".into())
+        );
     }
 }

@@ -70,7 +70,10 @@ impl Night {
     fn sealed(mut self) -> Night {
         self.seal = String::new();
         let text = serde_json::to_vec(&self).unwrap_or_default();
-        Night { seal: blake3::hash(&text).to_hex()[..16].to_owned(), ..self }
+        Night {
+            seal: blake3::hash(&text).to_hex()[..16].to_owned(),
+            ..self
+        }
     }
 }
 
@@ -89,10 +92,18 @@ impl Nights {
     /// [`Error::Store`] when another run publishes there, [`Error::Io`] when the disk says no.
     pub fn open(reports: &Path, wait: Duration) -> Result<Nights> {
         let lock = Lock::take(&reports.join(NIGHTS).join("lock"), "reports", wait)?;
-        let nights = Nights { reports: reports.to_owned(), _lock: Some(lock) };
+        let nights = Nights {
+            reports: reports.to_owned(),
+            _lock: Some(lock),
+        };
         atomic::sweep(reports)?;
         atomic::sweep(&reports.join(NIGHTS))?;
-        if let Some(newest) = nights.names().iter().rev().find_map(|name| nights.night(name)) {
+        if let Some(newest) = nights
+            .names()
+            .iter()
+            .rev()
+            .find_map(|name| nights.night(name))
+        {
             nights.point(&newest)?;
         }
         Ok(nights)
@@ -101,7 +112,10 @@ impl Nights {
     /// The nights to look at while others publish; there need not be any.
     #[must_use]
     pub fn look(reports: &Path) -> Nights {
-        Nights { reports: reports.to_owned(), _lock: None }
+        Nights {
+            reports: reports.to_owned(),
+            _lock: None,
+        }
     }
 
     /// The night that holds.
@@ -113,13 +127,18 @@ impl Nights {
     /// The last complete night.
     #[must_use]
     pub fn complete(&self) -> Option<Night> {
-        self.names().iter().rev().filter_map(|name| self.night(name)).find(Night::is_complete)
+        self.names()
+            .iter()
+            .rev()
+            .filter_map(|name| self.night(name))
+            .find(Night::is_complete)
     }
 
     /// The manifest of a night; none where there is none or it is damaged.
     #[must_use]
     pub fn night(&self, name: &str) -> Option<Night> {
-        let night: Night = serde_json::from_slice(&fs::read(self.folder(name).join(MANIFEST)).ok()?).ok()?;
+        let night: Night =
+            serde_json::from_slice(&fs::read(self.folder(name).join(MANIFEST)).ok()?).ok()?;
         (night.clone().sealed() == night).then_some(night)
     }
 
@@ -132,8 +151,13 @@ impl Nights {
     /// The names of all nights, the oldest first.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.reports.join(NIGHTS)).into_iter().flatten().flatten();
-        let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        let entries = fs::read_dir(self.reports.join(NIGHTS))
+            .into_iter()
+            .flatten()
+            .flatten();
+        let mut names: Vec<String> = entries
+            .map(|e| e.file_name().to_string_lossy().into_owned())
+            .collect();
         names.retain(|name| name.parse::<u32>().is_ok());
         names.sort_by_key(|name| name.parse::<u32>().unwrap_or_default());
         names
@@ -152,7 +176,12 @@ impl Nights {
         let is_whole = |(name, digest): &(&String, &Digest)| {
             Digest::of_file(&folder.join(name)).is_ok_and(|found| found == **digest)
         };
-        night.files.iter().filter(|file| !is_whole(file)).map(|(name, _)| name.clone()).collect()
+        night
+            .files
+            .iter()
+            .filter(|file| !is_whole(file))
+            .map(|(name, _)| name.clone())
+            .collect()
     }
 
     /// An empty folder to write tonight's files into.
@@ -160,7 +189,10 @@ impl Nights {
     /// # Errors
     /// [`Error::Io`] naming the folder.
     pub fn tonight(&self) -> Result<PathBuf> {
-        let folder = self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY));
+        let folder = self
+            .reports
+            .join(NIGHTS)
+            .join(format!("{}tonight", atomic::TEMPORARY));
         if folder.exists() {
             fs::remove_dir_all(&folder).map_err(Error::io(&folder, "cannot remove a leftover"))?;
         }
@@ -170,7 +202,11 @@ impl Nights {
 
     /// Removes what was written of tonight: something went wrong, or there is nothing new in it.
     pub fn forget_tonight(&self) {
-        let _ = fs::remove_dir_all(self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
+        let _ = fs::remove_dir_all(
+            self.reports
+                .join(NIGHTS)
+                .join(format!("{}tonight", atomic::TEMPORARY)),
+        );
     }
 
     /// Publishes what lies in tonight's folder as `night`, whose name and files are filled in. The last `keep` complete
@@ -179,14 +215,28 @@ impl Nights {
     /// # Errors
     /// [`Error::Io`] when the disk says no; then the night before still holds.
     pub fn publish(&self, night: Night, keep: usize) -> Result<Night> {
-        let (nights, tonight) =
-            (self.reports.join(NIGHTS), self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY)));
-        let last = self.names().last().and_then(|name| name.parse::<u32>().ok()).unwrap_or(0);
-        let night = Night { name: format!("{:04}", last + 1), files: digests(&tonight)?, ..night }.sealed();
+        let (nights, tonight) = (
+            self.reports.join(NIGHTS),
+            self.reports
+                .join(NIGHTS)
+                .join(format!("{}tonight", atomic::TEMPORARY)),
+        );
+        let last = self
+            .names()
+            .last()
+            .and_then(|name| name.parse::<u32>().ok())
+            .unwrap_or(0);
+        let night = Night {
+            name: format!("{:04}", last + 1),
+            files: digests(&tonight)?,
+            ..night
+        }
+        .sealed();
         write_manifest(&tonight, &night)?;
         atomic::sync_folder(&tonight)?;
         let folder = self.folder(&night.name);
-        fs::rename(&tonight, &folder).map_err(Error::io(&folder, "cannot put the night in its place"))?;
+        fs::rename(&tonight, &folder)
+            .map_err(Error::io(&folder, "cannot put the night in its place"))?;
         atomic::sync_folder(&nights)?;
         self.point(&night)?;
         self.prune(keep)?;
@@ -198,8 +248,16 @@ impl Nights {
     /// # Errors
     /// [`Error::Io`] when the disk says no.
     pub fn repair(&self, night: &Night, made: Night) -> Result<Night> {
-        let tonight = self.reports.join(NIGHTS).join(format!("{}tonight", atomic::TEMPORARY));
-        let night = Night { name: night.name.clone(), files: digests(&tonight)?, ..made }.sealed();
+        let tonight = self
+            .reports
+            .join(NIGHTS)
+            .join(format!("{}tonight", atomic::TEMPORARY));
+        let night = Night {
+            name: night.name.clone(),
+            files: digests(&tonight)?,
+            ..made
+        }
+        .sealed();
         let folder = self.folder(&night.name);
         for name in night.files.keys() {
             let path = tonight.join(name);
@@ -221,7 +279,9 @@ impl Nights {
         for name in self.names().into_iter().rev() {
             let is_current = current.as_ref() == Some(&name);
             // What a damaged one was nobody knows.
-            let Some(is_complete) = self.night(&name).map(|n| n.is_complete()) else { continue };
+            let Some(is_complete) = self.night(&name).map(|n| n.is_complete()) else {
+                continue;
+            };
             kept += usize::from(is_complete);
             if !is_current && (!is_complete || kept > keep.max(1)) {
                 superfluous.push(name);
@@ -237,7 +297,10 @@ impl Nights {
     /// [`Error::Io`] naming the folder.
     pub fn prune(&self, keep: usize) -> Result<()> {
         for name in self.superfluous(keep) {
-            let (folder, gone) = (self.folder(&name), self.folder(&format!("{}gone-{name}", atomic::TEMPORARY)));
+            let (folder, gone) = (
+                self.folder(&name),
+                self.folder(&format!("{}gone-{name}", atomic::TEMPORARY)),
+            );
             fs::rename(&folder, &gone).map_err(Error::io(&folder, "cannot remove the night"))?;
             fs::remove_dir_all(&gone).map_err(Error::io(&gone, "cannot remove the night"))?;
         }
@@ -260,7 +323,10 @@ impl Nights {
     /// Makes a night the one that holds.
     fn point(&self, night: &Night) -> Result<()> {
         if self.pointed().as_ref() != Some(&night.name) {
-            link::place(&self.reports.join(CURRENT), &format!("{NIGHTS}/{}", night.name))?;
+            link::place(
+                &self.reports.join(CURRENT),
+                &format!("{NIGHTS}/{}", night.name),
+            )?;
             atomic::sync_folder(&self.reports)?;
         }
         link::beside(&self.reports, &self.folder(&night.name), night.files.keys())
@@ -268,13 +334,21 @@ impl Nights {
 
     fn pointed(&self) -> Option<String> {
         let target = link::target(&self.reports.join(CURRENT))?;
-        Some(target.strip_prefix(NIGHTS)?.trim_start_matches('/').to_owned())
+        Some(
+            target
+                .strip_prefix(NIGHTS)?
+                .trim_start_matches('/')
+                .to_owned(),
+        )
     }
 }
 
 fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
     let path = folder.join(MANIFEST);
-    atomic::place(&path, &serde_json::to_vec(night).map_err(|e| Error::store(&path, &e))?)
+    atomic::place(
+        &path,
+        &serde_json::to_vec(night).map_err(|e| Error::store(&path, &e))?,
+    )
 }
 
 /// The files of a folder but the manifest, with fingerprints of their contents.
@@ -282,7 +356,10 @@ fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
     let mut files = BTreeMap::new();
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
     for entry in entries.flatten() {
-        let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
+        let (name, path) = (
+            entry.file_name().to_string_lossy().into_owned(),
+            entry.path(),
+        );
         if name != MANIFEST {
             files.insert(name, Digest::of_file(&path)?);
         }
@@ -304,22 +381,34 @@ mod link {
         let folder = path.parent().unwrap_or(Path::new("."));
         let beside = folder.join(format!("{}link", atomic::TEMPORARY));
         let _ = fs::remove_file(&beside);
-        std::os::unix::fs::symlink(target, &beside).map_err(Error::io(&beside, "cannot create a link"))?;
+        std::os::unix::fs::symlink(target, &beside)
+            .map_err(Error::io(&beside, "cannot create a link"))?;
         fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
     }
 
     /// Gives each file of a night its name in the folder of reports; names that it does not have go.
-    pub fn beside<'a>(reports: &Path, _: &Path, names: impl Iterator<Item = &'a String>) -> Result<()> {
-        let wanted: std::collections::BTreeMap<String, String> =
-            names.map(|name| (name.clone(), format!("{CURRENT}/{name}"))).collect();
+    pub fn beside<'a>(
+        reports: &Path,
+        _: &Path,
+        names: impl Iterator<Item = &'a String>,
+    ) -> Result<()> {
+        let wanted: std::collections::BTreeMap<String, String> = names
+            .map(|name| (name.clone(), format!("{CURRENT}/{name}")))
+            .collect();
         for (name, to) in &wanted {
             let path = reports.join(name);
             if target(&path).as_ref() != Some(to) {
                 place(&path, to)?;
             }
         }
-        for entry in fs::read_dir(reports).map_err(Error::io(reports, "cannot list the folder"))?.flatten() {
-            let (name, path) = (entry.file_name().to_string_lossy().into_owned(), entry.path());
+        for entry in fs::read_dir(reports)
+            .map_err(Error::io(reports, "cannot list the folder"))?
+            .flatten()
+        {
+            let (name, path) = (
+                entry.file_name().to_string_lossy().into_owned(),
+                entry.path(),
+            );
             let ours = target(&path).is_some_and(|to| to.starts_with(&format!("{CURRENT}/")));
             if ours && !wanted.contains_key(&name) {
                 fs::remove_file(&path).map_err(Error::io(&path, "cannot remove it"))?;
@@ -342,10 +431,17 @@ mod link {
         atomic::place(path, target.as_bytes())
     }
 
-    pub fn beside<'a>(reports: &Path, night: &Path, names: impl Iterator<Item = &'a String>) -> Result<()> {
+    pub fn beside<'a>(
+        reports: &Path,
+        night: &Path,
+        names: impl Iterator<Item = &'a String>,
+    ) -> Result<()> {
         for name in names {
             let from = night.join(name);
-            atomic::place(&reports.join(name), &fs::read(&from).map_err(Error::io(&from, "cannot read it"))?)?;
+            atomic::place(
+                &reports.join(name),
+                &fs::read(&from).map_err(Error::io(&from, "cannot read it"))?,
+            )?;
         }
         Ok(())
     }
@@ -357,7 +453,15 @@ mod tests {
 
     fn publish(nights: &Nights, text: &str, until: Stage) -> Night {
         atomic::place(&nights.tonight().unwrap().join("fits.csv"), text.as_bytes()).unwrap();
-        nights.publish(Night { until, ..Night::default() }, 2).unwrap()
+        nights
+            .publish(
+                Night {
+                    until,
+                    ..Night::default()
+                },
+                2,
+            )
+            .unwrap()
     }
 
     fn opened() -> (tempfile::TempDir, Nights) {
@@ -373,14 +477,24 @@ mod tests {
         publish(&nights, "one", Stage::Report);
         assert_eq!(read(), "one");
         publish(&nights, "two", Stage::Report);
-        assert_eq!((read(), nights.names()), ("two".to_owned(), vec!["0001".to_owned(), "0002".to_owned()]));
-        assert_eq!(fs::read_to_string(folder.path().join("nights/0001/fits.csv")).unwrap(), "one");
+        assert_eq!(
+            (read(), nights.names()),
+            ("two".to_owned(), vec!["0001".to_owned(), "0002".to_owned()])
+        );
+        assert_eq!(
+            fs::read_to_string(folder.path().join("nights/0001/fits.csv")).unwrap(),
+            "one"
+        );
     }
 
     #[test]
     fn the_last_complete_nights_stay_and_incomplete_ones_only_while_they_hold() {
         let (_folder, nights) = opened();
-        for (text, until) in [("a", Stage::Report), ("b", Stage::Report), ("c", Stage::Ingest)] {
+        for (text, until) in [
+            ("a", Stage::Report),
+            ("b", Stage::Report),
+            ("c", Stage::Ingest),
+        ] {
             publish(&nights, text, until);
         }
         assert_eq!(nights.names(), ["0001", "0002", "0003"]);
@@ -421,6 +535,9 @@ mod tests {
         fs::write(folder.path().join("fits.csv"), "old").unwrap();
         let nights = Nights::open(folder.path(), Duration::ZERO).unwrap();
         publish(&nights, "one", Stage::Report);
-        assert_eq!(fs::read_to_string(folder.path().join("fits.csv")).unwrap(), "one");
+        assert_eq!(
+            fs::read_to_string(folder.path().join("fits.csv")).unwrap(),
+            "one"
+        );
     }
 }

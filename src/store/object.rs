@@ -49,8 +49,14 @@ impl Failure {
     #[must_use]
     pub fn at(self, place: &Path) -> Error {
         match self {
-            Failure::Passing(what) => Error::Store { path: place.to_owned(), what },
-            Failure::Lasting(what) => Error::Archive { place: place.to_owned(), what },
+            Failure::Passing(what) => Error::Store {
+                path: place.to_owned(),
+                what,
+            },
+            Failure::Lasting(what) => Error::Archive {
+                place: place.to_owned(),
+                what,
+            },
         }
     }
 }
@@ -80,23 +86,34 @@ impl Address {
     fn parse(path: &Path) -> Result<Address, Failure> {
         let text = path.to_string_lossy();
         let wrong = |what: &str| Failure::Lasting(format!("{what}; expected s3://bucket/prefix"));
-        let rest = text.strip_prefix(SCHEME).ok_or_else(|| wrong("not in an object store"))?;
+        let rest = text
+            .strip_prefix(SCHEME)
+            .ok_or_else(|| wrong("not in an object store"))?;
         let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
         let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
         if bucket.is_empty() || !bucket.chars().all(is_name) {
             return Err(wrong(&format!("`{bucket}` is no name of a bucket")));
         }
         let key = key.trim_end_matches('/');
-        if key.split('/').any(|part| matches!(part, "." | "..")) || key.contains("//") || key.starts_with('/') {
+        if key.split('/').any(|part| matches!(part, "." | ".."))
+            || key.contains("//")
+            || key.starts_with('/')
+        {
             return Err(wrong(&format!("`{key}` is no key: its parts have names")));
         }
-        Ok(Address { bucket: bucket.to_owned(), key: key.to_owned() })
+        Ok(Address {
+            bucket: bucket.to_owned(),
+            key: key.to_owned(),
+        })
     }
 
     fn client(&self) -> Result<Arc<Client>, Failure> {
         // Connections are the process's, as its environment is.
         static OPENED: OnceLock<Mutex<BTreeMap<String, Arc<Client>>>> = OnceLock::new();
-        let mut opened = OPENED.get_or_init(Mutex::default).lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut opened = OPENED
+            .get_or_init(Mutex::default)
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(client) = opened.get(&self.bucket) {
             return Ok(client.clone());
         }
@@ -129,7 +146,12 @@ pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, About>, Failure> {
     let listed = address.client()?.list(&address.key)?;
     Ok(listed
         .into_iter()
-        .map(|(key, about)| (PathBuf::from(format!("{SCHEME}{}/{key}", address.bucket)), about))
+        .map(|(key, about)| {
+            (
+                PathBuf::from(format!("{SCHEME}{}/{key}", address.bucket)),
+                about,
+            )
+        })
         .collect())
 }
 
@@ -204,14 +226,23 @@ pub fn remove(path: &Path) -> Result<(), Failure> {
 /// Why file or object cannot be used.
 pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
     let (client, key) = at(path)?;
-    let unreadable = |e: std::io::Error| Failure::Passing(format!("{} cannot be read: {e}", file.display()));
+    let unreadable =
+        |e: std::io::Error| Failure::Passing(format!("{} cannot be read: {e}", file.display()));
     let mut from = std::fs::File::open(file).map_err(unreadable)?;
     let mut part = || {
         let mut bytes = Vec::new();
-        (&mut from).take(PART as u64).read_to_end(&mut bytes).map(|_| bytes).map_err(unreadable)
+        (&mut from)
+            .take(PART as u64)
+            .read_to_end(&mut bytes)
+            .map(|_| bytes)
+            .map_err(unreadable)
     };
     let first = part()?;
-    if first.len() < PART { client.put(&key, first) } else { client.put_parts(&key, first, &mut part) }
+    if first.len() < PART {
+        client.put(&key, first)
+    } else {
+        client.put_parts(&key, first, &mut part)
+    }
 }
 
 /// Writes an object out, part by part; false where there is none.
@@ -219,12 +250,16 @@ pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
 /// # Errors
 /// Why it cannot be read or written out.
 pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, Failure> {
-    let Some(mut reader) = Reader::of(path)? else { return Ok(false) };
+    let Some(mut reader) = Reader::of(path)? else {
+        return Ok(false);
+    };
     // What a full disk refuses at the end must not be taken for damage to the object.
-    std::io::copy(&mut reader, out).and_then(|_| out.flush()).map_err(|e| match e.downcast::<Failure>() {
-        Ok(failure) => failure,
-        Err(e) => Failure::Passing(format!("cannot be copied: {e}")),
-    })?;
+    std::io::copy(&mut reader, out)
+        .and_then(|_| out.flush())
+        .map_err(|e| match e.downcast::<Failure>() {
+            Ok(failure) => failure,
+            Err(e) => Failure::Passing(format!("cannot be copied: {e}")),
+        })?;
     Ok(true)
 }
 
@@ -242,7 +277,14 @@ mod tests {
         );
         assert_eq!(parsed("s3://flights"), expected("flights", ""));
         assert_eq!(parsed("s3://flights/1995/"), expected("flights", "1995"));
-        for wrong in ["s3://", "s3:///key", "s3://a b/c", "flights/1995", "s3://flights/../x", "s3://flights//x"] {
+        for wrong in [
+            "s3://",
+            "s3:///key",
+            "s3://a b/c",
+            "flights/1995",
+            "s3://flights/../x",
+            "s3://flights//x",
+        ] {
             let failure = parsed(wrong).unwrap_err();
             assert!(
                 matches!(&failure, Failure::Lasting(what) if what.contains("s3://bucket/prefix")),

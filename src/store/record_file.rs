@@ -16,7 +16,9 @@ use arrow::datatypes::{DataType, Field, Float64Type, Schema, UInt8Type};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
 };
-use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
+use parquet::arrow::arrow_writer::{
+    ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves,
+};
 use parquet::arrow::{ArrowSchemaConverter, ProjectionMask};
 use parquet::basic::{Compression, Encoding};
 use parquet::file::metadata::{KeyValue, PageIndexPolicy};
@@ -58,8 +60,10 @@ pub struct About {
 
 impl About {
     fn metadata(&self) -> Vec<KeyValue> {
-        let constants =
-            self.constants.iter().map(|(name, v)| KeyValue::new(format!("{CONSTANT}{name}"), v.to_string()));
+        let constants = self
+            .constants
+            .iter()
+            .map(|(name, v)| KeyValue::new(format!("{CONSTANT}{name}"), v.to_string()));
         let own = [
             KeyValue::new(FLIGHT.to_owned(), self.flight_id.clone()),
             KeyValue::new(START.to_owned(), self.start_s.to_string()),
@@ -97,7 +101,11 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// The reason in words.
-    pub fn create<'s>(about: &About, signals: impl Iterator<Item = &'s str>, out: W) -> Result<Writer<W>, String> {
+    pub fn create<'s>(
+        about: &About,
+        signals: impl Iterator<Item = &'s str>,
+        out: W,
+    ) -> Result<Writer<W>, String> {
         let mut fields = Vec::new();
         // Uncompressed values: to compress what is mostly noise takes longer than to write it. A sample as it was measured,
         // as nearly all are, has no mark: pages without one cost nothing.
@@ -116,11 +124,18 @@ impl<W: Write + Send> Writer<W> {
         }
         // Without the serialised Arrow schema, the key-value metadata is all there is and its order is ours.
         let schema = Arc::new(Schema::new(fields));
-        let parquet = ArrowSchemaConverter::new().convert(&schema).map_err(|e| refused(&e))?;
-        let file = SerializedFileWriter::new(out, parquet.root_schema_ptr(), Arc::new(properties.build()));
+        let parquet = ArrowSchemaConverter::new()
+            .convert(&schema)
+            .map_err(|e| refused(&e))?;
+        let file =
+            SerializedFileWriter::new(out, parquet.root_schema_ptr(), Arc::new(properties.build()));
         let file = file.map_err(|e| refused(&e))?;
         let factory = ArrowRowGroupWriterFactory::new(&file, schema);
-        Ok(Writer { file, factory, groups: 0 })
+        Ok(Writer {
+            file,
+            factory,
+            groups: 0,
+        })
     }
 
     /// The writers of the next row group, one per signal in their order; each takes the group's samples.
@@ -128,11 +143,22 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// The reason in words.
     pub fn group(&mut self) -> Result<Vec<SignalWriter>, String> {
-        let mut columns = self.factory.create_column_writers(self.groups).map_err(|e| refused(&e))?.into_iter();
+        let mut columns = self
+            .factory
+            .create_column_writers(self.groups)
+            .map_err(|e| refused(&e))?
+            .into_iter();
         self.groups += 1;
         let mut signals = Vec::new();
         while let (Some(values), Some(marks)) = (columns.next(), columns.next()) {
-            signals.push(SignalWriter { values, marks, pending: Series { values: Vec::new(), marks: Vec::new() } });
+            signals.push(SignalWriter {
+                values,
+                marks,
+                pending: Series {
+                    values: Vec::new(),
+                    marks: Vec::new(),
+                },
+            });
         }
         Ok(signals)
     }
@@ -149,7 +175,12 @@ impl<W: Write + Send> Writer<W> {
         let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
         let mut made = next()?;
         while let Some(chunks) = made {
-            let write = || chunks.into_iter().flat_map(|c| c.0).try_for_each(|c| c.append_to_row_group(&mut group));
+            let write = || {
+                chunks
+                    .into_iter()
+                    .flat_map(|c| c.0)
+                    .try_for_each(|c| c.append_to_row_group(&mut group))
+            };
             let (written, following) = rayon::join(write, &mut next);
             written.map_err(|e| refused(&e))?;
             made = following?;
@@ -211,7 +242,10 @@ impl SignalWriter {
             marks.iter().map(code).collect()
         };
         let marks: ArrayRef = Arc::new(marks);
-        for (writer, array, nullable) in [(&mut self.values, values, false), (&mut self.marks, marks, true)] {
+        for (writer, array, nullable) in [
+            (&mut self.values, values, false),
+            (&mut self.marks, marks, true),
+        ] {
             let field = Field::new("", array.data_type().clone(), nullable);
             for leaf in compute_leaves(&field, &array).map_err(|e| refused(&e))? {
                 writer.write(&leaf).map_err(|e| refused(&e))?;
@@ -248,16 +282,23 @@ pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
     };
     let whole = |s: &Series| s.values.len() == record.samples && s.marks.len() == record.samples;
     if let Some((name, _)) = record.signals.iter().find(|(_, s)| !whole(s)) {
-        return Err(refused(&format!("signal `{name}` has not {} samples", record.samples)));
+        return Err(refused(&format!(
+            "signal `{name}` has not {} samples",
+            record.samples
+        )));
     }
     let mut writer = Writer::create(&about, record.signals.keys().map(String::as_str), out)?;
     for from in (0..record.samples).step_by(GROUP) {
         let to = (from + GROUP).min(record.samples);
         let mut parts = writer.group()?.into_iter().zip(record.signals.values());
         writer.append(|| {
-            let Some((mut signal, series)) = parts.next() else { return Ok(None) };
-            signal
-                .push(&Series { values: series.values[from..to].to_vec(), marks: series.marks[from..to].to_vec() })?;
+            let Some((mut signal, series)) = parts.next() else {
+                return Ok(None);
+            };
+            signal.push(&Series {
+                values: series.values[from..to].to_vec(),
+                marks: series.marks[from..to].to_vec(),
+            })?;
             Ok(Some(vec![signal.close()?]))
         })?;
     }
@@ -284,24 +325,44 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
     let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
     let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| bad(&e))?;
     let keys = metadata.schema().metadata();
-    let text = |key: &str| keys.get(key).ok_or_else(|| bad(&format!("its metadata has no `{key}`")));
-    let number = |key: &str| text(key)?.parse::<f64>().map_err(|e| bad(&format!("`{key}`: {e}")));
+    let text = |key: &str| {
+        keys.get(key)
+            .ok_or_else(|| bad(&format!("its metadata has no `{key}`")))
+    };
+    let number = |key: &str| {
+        text(key)?
+            .parse::<f64>()
+            .map_err(|e| bad(&format!("`{key}`: {e}")))
+    };
     let mut constants = BTreeMap::new();
-    for (key, name) in keys.keys().filter_map(|key| Some((key, key.strip_prefix(CONSTANT)?))) {
+    for (key, name) in keys
+        .keys()
+        .filter_map(|key| Some((key, key.strip_prefix(CONSTANT)?)))
+    {
         constants.insert(name.to_owned(), number(key)?);
     }
     let about = About {
         flight_id: text(FLIGHT)?.clone(),
         start_s: number(START)?,
         step_s: number(STEP)?,
-        samples: text(SAMPLES)?.parse::<usize>().map_err(|e| bad(&format!("`{SAMPLES}`: {e}")))?,
+        samples: text(SAMPLES)?
+            .parse::<usize>()
+            .map_err(|e| bad(&format!("`{SAMPLES}`: {e}")))?,
         constants,
     };
-    Ok(RecordFile { path: path.to_owned(), metadata, about, corrections: vec![] })
+    Ok(RecordFile {
+        path: path.to_owned(),
+        metadata,
+        about,
+        corrections: vec![],
+    })
 }
 
 fn not_a_record(path: &Path, what: &dyn std::fmt::Display) -> Error {
-    Error::store(path, &format!("not a record; remove it and run again: {what}"))
+    Error::store(
+        path,
+        &format!("not a record; remove it and run again: {what}"),
+    )
 }
 
 /// Reads a whole record; a flight's is better read by windows.
@@ -317,20 +378,30 @@ impl RecordFile {
     /// The same record, signals corrected as it is read.
     #[must_use]
     pub fn corrected(self, corrections: Vec<Correction>) -> RecordFile {
-        RecordFile { corrections, ..self }
+        RecordFile {
+            corrections,
+            ..self
+        }
     }
 
     /// The sample nearest to a time, kept inside the record.
     #[must_use]
     pub fn sample_at(&self, time_s: f64) -> usize {
-        self.about.record(&(0..self.about.samples)).sample_at(time_s)
+        self.about
+            .record(&(0..self.about.samples))
+            .sample_at(time_s)
     }
 
     /// The part of the record from one time to another with a few samples more on each side, as [`Record::part`] cuts it.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
-    pub fn part(&self, signals: Option<&BTreeSet<String>>, start_s: f64, end_s: f64) -> Result<Record, Error> {
+    pub fn part(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        start_s: f64,
+        end_s: f64,
+    ) -> Result<Record, Error> {
         const MARGIN: usize = 10;
         let from = self.sample_at(start_s).saturating_sub(MARGIN);
         let to = (self.sample_at(end_s) + MARGIN + 1).min(self.about.samples);
@@ -341,44 +412,80 @@ impl RecordFile {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
-    pub fn window(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Result<Record, Error> {
+    pub fn window(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        samples: Range<usize>,
+    ) -> Result<Record, Error> {
         let samples = samples.start.min(self.about.samples)..samples.end.min(self.about.samples);
-        let reach = self.corrections.iter().map(|c| c.reach(self.about.step_s)).max().unwrap_or(0);
-        let wide = samples.start.saturating_sub(reach)..(samples.end + reach).min(self.about.samples);
+        let reach = self
+            .corrections
+            .iter()
+            .map(|c| c.reach(self.about.step_s))
+            .max()
+            .unwrap_or(0);
+        let wide =
+            samples.start.saturating_sub(reach)..(samples.end + reach).min(self.about.samples);
         let mut record = self.as_written(signals, wide.clone())?;
-        self.corrections.iter().for_each(|correction| correction.apply(&mut record));
+        self.corrections
+            .iter()
+            .for_each(|correction| correction.apply(&mut record));
         if wide == samples {
             return Ok(record);
         }
         let inside = samples.start - wide.start..samples.end - wide.start;
-        Ok(Record { start_s: self.about.record(&samples).start_s, ..record.cut(None, inside) })
+        Ok(Record {
+            start_s: self.about.record(&samples).start_s,
+            ..record.cut(None, inside)
+        })
     }
 
-    fn as_written(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Result<Record, Error> {
+    fn as_written(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        samples: Range<usize>,
+    ) -> Result<Record, Error> {
         let mut record = self.about.record(&samples);
         let wanted = |name: &str| signals.is_none_or(|s| s.contains(name));
         for (name, value) in self.about.constants.iter().filter(|(name, _)| wanted(name)) {
-            let constant = Series { values: vec![*value; samples.len()], marks: vec![Mark::Measured; samples.len()] };
+            let constant = Series {
+                values: vec![*value; samples.len()],
+                marks: vec![Mark::Measured; samples.len()],
+            };
             record.signals.insert(name.clone(), constant);
         }
         let bad = |what: &dyn std::fmt::Display| not_a_record(&self.path, what);
-        let file = File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let file =
+            File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
         let fields = builder.schema().fields().iter().enumerate();
-        let columns: Vec<usize> =
-            fields.filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name()))).map(|(i, _)| i).collect();
+        let columns: Vec<usize> = fields
+            .filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name())))
+            .map(|(i, _)| i)
+            .collect();
         if samples.is_empty() || columns.is_empty() {
             return Ok(record);
         }
         let mask = ProjectionMask::roots(builder.parquet_schema(), columns);
-        let selection = RowSelection::from_consecutive_ranges(std::iter::once(samples.clone()), self.about.samples);
-        let reader = builder.with_projection(mask).with_row_selection(selection).with_batch_size(PAGE).build();
+        let selection = RowSelection::from_consecutive_ranges(
+            std::iter::once(samples.clone()),
+            self.about.samples,
+        );
+        let reader = builder
+            .with_projection(mask)
+            .with_row_selection(selection)
+            .with_batch_size(PAGE)
+            .build();
         for batch in reader.map_err(|e| bad(&e))? {
             add(&mut record, &batch.map_err(|e| bad(&e))?, samples.len()).map_err(|e| bad(&e))?;
         }
         let whole = |s: &Series| s.values.len() == samples.len() && s.marks.len() == samples.len();
         match record.signals.iter().find(|(_, s)| !whole(s)) {
-            Some((name, _)) => Err(bad(&format!("signal `{name}` has not {} samples", self.about.samples))),
+            Some((name, _)) => Err(bad(&format!(
+                "signal `{name}` has not {} samples",
+                self.about.samples
+            ))),
             None => Ok(record),
         }
     }
@@ -399,7 +506,9 @@ impl RecordFile {
         let mut outline = self.about.record(&(0..2 * all.len().div_ceil(width)));
         outline.step_s = self.about.step_s * width as f64 / 2.0;
         let fields = self.metadata.schema().fields().iter().map(|f| f.name());
-        let recorded = fields.filter(|name| !name.ends_with(MARK)).chain(self.about.constants.keys());
+        let recorded = fields
+            .filter(|name| !name.ends_with(MARK))
+            .chain(self.about.constants.keys());
         for name in recorded {
             let signals = BTreeSet::from([name.clone()]);
             for (name, series) in self.window(Some(&signals), all.clone())?.signals {
@@ -412,9 +521,18 @@ impl RecordFile {
 
 /// The smallest and the largest of each so many samples, in their order; the mark of one with a fault, if there is one.
 fn extremes(series: &Series, width: usize) -> Series {
-    let mut outline = Series { values: Vec::new(), marks: Vec::new() };
+    let mut outline = Series {
+        values: Vec::new(),
+        marks: Vec::new(),
+    };
     for (values, marks) in series.values.chunks(width).zip(series.marks.chunks(width)) {
-        let finite = || values.iter().copied().enumerate().filter(|(_, v)| v.is_finite());
+        let finite = || {
+            values
+                .iter()
+                .copied()
+                .enumerate()
+                .filter(|(_, v)| v.is_finite())
+        };
         let low = finite().min_by(|a, b| a.1.total_cmp(&b.1));
         let high = finite().max_by(|a, b| a.1.total_cmp(&b.1));
         let pair = match (low, high) {
@@ -423,7 +541,11 @@ fn extremes(series: &Series, width: usize) -> Series {
             _ => [f64::NAN; 2],
         };
         outline.values.extend(pair);
-        let mark = marks.iter().find(|m| m.is_fault()).copied().unwrap_or(Mark::Measured);
+        let mark = marks
+            .iter()
+            .find(|m| m.is_fault())
+            .copied()
+            .unwrap_or(Mark::Measured);
         outline.marks.extend([mark; 2]);
     }
     outline
@@ -432,15 +554,24 @@ fn extremes(series: &Series, width: usize) -> Series {
 fn add(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result<(), String> {
     for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
         let name = field.name().strip_suffix(MARK).unwrap_or(field.name());
-        let empty = || Series { values: Vec::with_capacity(samples), marks: Vec::with_capacity(samples) };
+        let empty = || Series {
+            values: Vec::with_capacity(samples),
+            marks: Vec::with_capacity(samples),
+        };
         let series = record.signals.entry(name.to_owned()).or_insert_with(empty);
         let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
         if field.name().ends_with(MARK) {
             let marks = array.as_primitive_opt::<UInt8Type>().ok_or_else(other)?;
             if marks.null_count() == marks.len() {
-                series.marks.resize(series.marks.len() + marks.len(), Mark::Measured);
+                series
+                    .marks
+                    .resize(series.marks.len() + marks.len(), Mark::Measured);
             } else {
-                series.marks.extend(marks.iter().map(|code| code.map_or(Mark::Measured, Mark::from_u8)));
+                series.marks.extend(
+                    marks
+                        .iter()
+                        .map(|code| code.map_or(Mark::Measured, Mark::from_u8)),
+                );
             }
         } else {
             let values = array.as_primitive_opt::<Float64Type>().ok_or_else(other)?;
@@ -455,18 +586,40 @@ mod tests {
     use super::*;
 
     fn record() -> Record {
-        let values = vec![1.5, f64::from_bits(0x7ff8_0000_0000_0001), -0.0, 1e-310, 57.295_779_513_082_32];
-        let marks = vec![Mark::Measured, Mark::Missing, Mark::Bridged, Mark::Despiked, Mark::Measured];
-        let flag = Series { values: vec![0.0, 0.0, 1.0, 1.0, 1.0], marks: vec![Mark::Measured; 5] };
-        let dead = Series { values: vec![f64::NAN; 5], marks: vec![Mark::Missing; 5] };
+        let values = vec![
+            1.5,
+            f64::from_bits(0x7ff8_0000_0000_0001),
+            -0.0,
+            1e-310,
+            57.295_779_513_082_32,
+        ];
+        let marks = vec![
+            Mark::Measured,
+            Mark::Missing,
+            Mark::Bridged,
+            Mark::Despiked,
+            Mark::Measured,
+        ];
+        let flag = Series {
+            values: vec![0.0, 0.0, 1.0, 1.0, 1.0],
+            marks: vec![Mark::Measured; 5],
+        };
+        let dead = Series {
+            values: vec![f64::NAN; 5],
+            marks: vec![Mark::Missing; 5],
+        };
         let alpha = Series { values, marks };
         Record {
             flight_id: "flight 007 ä".to_owned(),
             start_s: 0.1 + 0.2,
             step_s: 0.025_000_000_000_000_3,
             samples: 5,
-            signals: [("alpha_vane_deg".to_owned(), alpha), ("mach".to_owned(), dead), ("obes".to_owned(), flag)]
-                .into(),
+            signals: [
+                ("alpha_vane_deg".to_owned(), alpha),
+                ("mach".to_owned(), dead),
+                ("obes".to_owned(), flag),
+            ]
+            .into(),
         }
     }
 
@@ -487,7 +640,10 @@ mod tests {
     fn a_record_comes_back_to_the_bit() {
         let (given, (_folder, path)) = (record(), saved(&bytes(&record())));
         let back = read(&path).expect("a record");
-        assert_eq!((&back.flight_id, back.samples), (&given.flight_id, given.samples));
+        assert_eq!(
+            (&back.flight_id, back.samples),
+            (&given.flight_id, given.samples)
+        );
         assert_eq!(back.start_s.to_bits(), given.start_s.to_bits());
         assert_eq!(back.step_s.to_bits(), given.step_s.to_bits());
         assert!(back.signals.keys().eq(given.signals.keys()));
@@ -507,9 +663,22 @@ mod tests {
     fn long() -> Record {
         let samples = GROUP + 3 * PAGE + 77;
         let values: Vec<f64> = (0..samples).map(|k| (k as f64 * 0.01).sin()).collect();
-        let mark = |k: usize| if k % 1000 == 3 { Mark::Bridged } else { Mark::Measured };
-        let q = Series { values, marks: (0..samples).map(mark).collect() };
-        Record { samples, signals: [("q_deg_s".to_owned(), q)].into(), ..record() }
+        let mark = |k: usize| {
+            if k % 1000 == 3 {
+                Mark::Bridged
+            } else {
+                Mark::Measured
+            }
+        };
+        let q = Series {
+            values,
+            marks: (0..samples).map(mark).collect(),
+        };
+        Record {
+            samples,
+            signals: [("q_deg_s".to_owned(), q)].into(),
+            ..record()
+        }
     }
 
     #[test]
@@ -517,20 +686,42 @@ mod tests {
         let (given, (_folder, path)) = (long(), saved(&bytes(&long())));
         let file = open(&path).expect("a record");
         let (start_s, end_s) = (given.time_s(GROUP - 40), given.time_s(GROUP + 90));
-        let (part, own) = (given.part(start_s, end_s), file.part(None, start_s, end_s).expect("a part"));
+        let (part, own) = (
+            given.part(start_s, end_s),
+            file.part(None, start_s, end_s).expect("a part"),
+        );
         assert_eq!(own.signals, part.signals);
-        assert_eq!((own.samples, own.start_s.to_bits()), (part.samples, part.start_s.to_bits()));
+        assert_eq!(
+            (own.samples, own.start_s.to_bits()),
+            (part.samples, part.start_s.to_bits())
+        );
         let none = BTreeSet::from(["mach".to_owned()]);
-        assert!(file.window(Some(&none), 0..10).expect("a window").signals.is_empty());
-        assert_eq!(file.window(None, given.samples - 5..given.samples + 5).expect("a window").samples, 5);
+        assert!(
+            file.window(Some(&none), 0..10)
+                .expect("a window")
+                .signals
+                .is_empty()
+        );
+        assert_eq!(
+            file.window(None, given.samples - 5..given.samples + 5)
+                .expect("a window")
+                .samples,
+            5
+        );
     }
 
     #[test]
     fn an_outline_keeps_the_extremes_and_the_marks() {
         let mut given = long();
-        given.signals.values_mut().for_each(|s| s.values[300_001] = 40.0);
+        given
+            .signals
+            .values_mut()
+            .for_each(|s| s.values[300_001] = 40.0);
         let (_folder, path) = saved(&bytes(&given));
-        let outline = open(&path).expect("a record").outline(5000).expect("an outline");
+        let outline = open(&path)
+            .expect("a record")
+            .outline(5000)
+            .expect("an outline");
         let q = &outline.signals["q_deg_s"];
         assert!((4000..=5000).contains(&outline.samples) && q.values.len() == outline.samples);
         let k = q.values.iter().position(|v| *v > 2.0).expect("the peak");
@@ -540,20 +731,33 @@ mod tests {
 
     #[test]
     fn constants_come_back_in_every_window() {
-        let about = About { samples: 3, step_s: 0.1, constants: [("mach".to_owned(), 0.3)].into(), ..About::default() };
+        let about = About {
+            samples: 3,
+            step_s: 0.1,
+            constants: [("mach".to_owned(), 0.3)].into(),
+            ..About::default()
+        };
         let mut out = Vec::new();
         let mut writer = Writer::create(&about, ["obes"].into_iter(), &mut out).expect("a writer");
         let mut parts = writer.group().expect("a group").into_iter();
-        let flag = Series { values: vec![0.0; 3], marks: vec![Mark::Measured; 3] };
+        let flag = Series {
+            values: vec![0.0; 3],
+            marks: vec![Mark::Measured; 3],
+        };
         let mut next = || {
-            let Some(mut signal) = parts.next() else { return Ok(None) };
+            let Some(mut signal) = parts.next() else {
+                return Ok(None);
+            };
             signal.push(&flag)?;
             Ok(Some(vec![signal.close()?]))
         };
         writer.append(&mut next).expect("appended");
         writer.finish().expect("finished");
         let (_folder, path) = saved(&out);
-        let window = open(&path).expect("a record").window(None, 1..3).expect("a window");
+        let window = open(&path)
+            .expect("a record")
+            .window(None, 1..3)
+            .expect("a window");
         assert_eq!(window.values("mach"), Some(&[0.3, 0.3][..]));
         assert_eq!(window.values("obes"), Some(&[0.0, 0.0][..]));
     }
@@ -564,7 +768,11 @@ mod tests {
         if let Some(series) = short.signals.get_mut("obes") {
             series.values.pop();
         }
-        assert!(write(&short, Vec::new()).expect_err("refused").contains("has not 5 samples"));
+        assert!(
+            write(&short, Vec::new())
+                .expect_err("refused")
+                .contains("has not 5 samples")
+        );
     }
 
     #[test]

@@ -20,7 +20,10 @@ use crate::flight::channel::RawColumn;
 /// The reason in words.
 pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
     let field = |(name, column): (&String, &RawColumn)| {
-        let unit = column.unit.iter().map(|unit| (UNIT.to_owned(), unit.clone()));
+        let unit = column
+            .unit
+            .iter()
+            .map(|unit| (UNIT.to_owned(), unit.clone()));
         Field::new(name, DataType::Float64, true).with_metadata(unit.collect::<HashMap<_, _>>())
     };
     let array = |column: &RawColumn| {
@@ -31,7 +34,9 @@ pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
     let batch = RecordBatch::try_new(schema.clone(), columns.values().map(array).collect())
         .map_err(|e| format!("cannot lay out the flight: {e}"))?;
     let level = ZstdLevel::try_new(3).map_err(|e| e.to_string())?;
-    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(level))
+        .build();
     let refused = |e: parquet::errors::ParquetError| format!("cannot write the flight: {e}");
     let mut bytes = Vec::new();
     let mut writer = ArrowWriter::try_new(&mut bytes, schema, Some(properties)).map_err(refused)?;

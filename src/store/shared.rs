@@ -28,9 +28,22 @@ impl Shared {
     /// Why it cannot be listed.
     pub fn open(place: &Path) -> Result<Shared> {
         let listed = object::list(place).map_err(|e| e.at(place))?;
-        let name = |path: &Path| Some(path.strip_prefix(place).ok()?.to_string_lossy().into_owned());
-        let there = listed.into_iter().filter_map(|(path, about)| Some((name(&path)?, about.bytes))).collect();
-        Ok(Shared { place: place.to_owned(), there: Mutex::new(there) })
+        let name = |path: &Path| {
+            Some(
+                path.strip_prefix(place)
+                    .ok()?
+                    .to_string_lossy()
+                    .into_owned(),
+            )
+        };
+        let there = listed
+            .into_iter()
+            .filter_map(|(path, about)| Some((name(&path)?, about.bytes)))
+            .collect();
+        Ok(Shared {
+            place: place.to_owned(),
+            there: Mutex::new(there),
+        })
     }
 
     fn there(&self) -> MutexGuard<'_, BTreeMap<String, u64>> {
@@ -64,7 +77,9 @@ impl Shared {
     /// Puts a file.
     pub fn send(&self, file: &Path, name: &str) -> Result<()> {
         let path = self.place.join(name);
-        let size = std::fs::metadata(file).map_err(Error::io(file, "cannot read it"))?.len();
+        let size = std::fs::metadata(file)
+            .map_err(Error::io(file, "cannot read it"))?
+            .len();
         object::send(file, &path).map_err(|e| e.at(&path))?;
         self.there().insert(name.to_owned(), size);
         Ok(())
@@ -84,6 +99,9 @@ impl Shared {
         }
         object::remove(&path).map_err(|e| e.at(&path))?;
         self.there().remove(name);
-        Err(Error::store(&path, &"its bytes were not those that were written, and it was removed; run again"))
+        Err(Error::store(
+            &path,
+            &"its bytes were not those that were written, and it was removed; run again",
+        ))
     }
 }

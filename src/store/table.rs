@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use polars::prelude::{
-    Column, CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter, SerWriter, Series,
+    Column, CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter,
+    SerWriter, Series,
 };
 
 use super::atomic;
@@ -13,9 +14,9 @@ use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::{Maneuver, Unknown};
 use crate::tables::{
-    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow,
-    EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow,
-    PredictionRow, StartRow, TrendRow, VerdictRow,
+    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow,
+    DisagreementRow, EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow,
+    ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow, VerdictRow,
 };
 
 /// Where tables are published, and what their Parquet files say about where they come from.
@@ -30,7 +31,10 @@ impl Shelf {
     /// A folder for tables that say nothing about where they come from.
     #[must_use]
     pub fn of(folder: &Path) -> Shelf {
-        Shelf { folder: Some(folder.to_owned()), provenance: Vec::new() }
+        Shelf {
+            folder: Some(folder.to_owned()),
+            provenance: Vec::new(),
+        }
     }
 
     /// The same with pairs for the key-value metadata of each Parquet file; the CSV beside it stays as it is.
@@ -48,8 +52,16 @@ impl Shelf {
 pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
     let file = std::fs::File::open(path).map_err(Error::io(path, "cannot open the table"))?;
     let reader = SerializedFileReader::new(file).map_err(|e| Error::store(path, &e))?;
-    let pairs = reader.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
-    Ok(pairs.into_iter().filter_map(|pair| Some((pair.key, pair.value?))).collect())
+    let pairs = reader
+        .metadata()
+        .file_metadata()
+        .key_value_metadata()
+        .cloned()
+        .unwrap_or_default();
+    Ok(pairs
+        .into_iter()
+        .filter_map(|pair| Some((pair.key, pair.value?)))
+        .collect())
 }
 
 /// A row type with the name of its table and its columns.
@@ -88,19 +100,34 @@ impl Cell for Option<String> {
 
 impl Cell for f64 {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[Option<f64>], _>(name, cells.map(|v| v.is_finite().then_some(*v)).collect::<Vec<_>>())
+        column::<[Option<f64>], _>(
+            name,
+            cells
+                .map(|v| v.is_finite().then_some(*v))
+                .collect::<Vec<_>>(),
+        )
     }
 }
 
 impl Cell for Option<f64> {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[Option<f64>], _>(name, cells.map(|v| v.filter(|v| v.is_finite())).collect::<Vec<_>>())
+        column::<[Option<f64>], _>(
+            name,
+            cells
+                .map(|v| v.filter(|v| v.is_finite()))
+                .collect::<Vec<_>>(),
+        )
     }
 }
 
 impl Cell for usize {
     fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[i64], _>(name, cells.map(|v| i64::try_from(*v).unwrap_or(i64::MAX)).collect::<Vec<_>>())
+        column::<[i64], _>(
+            name,
+            cells
+                .map(|v| i64::try_from(*v).unwrap_or(i64::MAX))
+                .collect::<Vec<_>>(),
+        )
     }
 }
 
@@ -193,11 +220,21 @@ impl PredictedRow {
         }
         let mut columns = columns!(prediction predicted_from predicted_cost theil theil_bias theil_variance
             theil_covariance);
-        let outputs = || [Axis::Longitudinal, Axis::Lateral].into_iter().flat_map(Axis::outputs);
+        let outputs = || {
+            [Axis::Longitudinal, Axis::Lateral]
+                .into_iter()
+                .flat_map(Axis::outputs)
+        };
         let mut of = |prefix: &str, values: fn(&Self) -> &BTreeMap<Output, f64>| {
             for output in outputs() {
-                let cells: Vec<Option<f64>> = rows.iter().map(|row| values(row).get(&output).copied()).collect();
-                columns.push(Cell::column(&format!("{prefix}_{}", output.name()), cells.iter()));
+                let cells: Vec<Option<f64>> = rows
+                    .iter()
+                    .map(|row| values(row).get(&output).copied())
+                    .collect();
+                columns.push(Cell::column(
+                    &format!("{prefix}_{}", output.name()),
+                    cells.iter(),
+                ));
             }
         };
         of("theil", |row| &row.theil_of);
@@ -212,7 +249,9 @@ impl PredictedRow {
 /// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) -> Result<()> {
     let none = PredictedRow::default();
-    let beside: Vec<&PredictedRow> = (0..fits.len()).map(|i| predicted.get(i).unwrap_or(&none)).collect();
+    let beside: Vec<&PredictedRow> = (0..fits.len())
+        .map(|i| predicted.get(i).unwrap_or(&none))
+        .collect();
     let mut columns = FitRow::columns(fits);
     columns.extend(PredictedRow::columns(&beside));
     place(shelf, FitRow::NAME, fits.len(), columns)
@@ -249,11 +288,17 @@ pub fn publish_as<T: Table>(shelf: &Shelf, name: &str, rows: &[T]) -> Result<()>
 }
 
 fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result<()> {
-    let Some(folder) = &shelf.folder else { return Ok(()) };
-    let (parquet, csv) = (folder.join(format!("{name}.parquet")), folder.join(format!("{name}.csv")));
+    let Some(folder) = &shelf.folder else {
+        return Ok(());
+    };
+    let (parquet, csv) = (
+        folder.join(format!("{name}.parquet")),
+        folder.join(format!("{name}.csv")),
+    );
     let mut frame = DataFrame::new(rows, columns).map_err(|e| Error::store(&parquet, &e))?;
     let mut bytes = Vec::new();
-    let metadata = (!shelf.provenance.is_empty()).then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
+    let metadata = (!shelf.provenance.is_empty())
+        .then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
     ParquetWriter::new(&mut bytes)
         .with_compression(ParquetCompression::Zstd(None))
         .with_key_value_metadata(metadata)
@@ -261,7 +306,9 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result
         .map_err(|e| Error::store(&parquet, &e))?;
     atomic::place(&parquet, &bytes)?;
     bytes.clear();
-    CsvWriter::new(&mut bytes).finish(&mut frame).map_err(|e| Error::store(&csv, &e))?;
+    CsvWriter::new(&mut bytes)
+        .finish(&mut frame)
+        .map_err(|e| Error::store(&csv, &e))?;
     atomic::place(&csv, &bytes)
 }
 
@@ -294,6 +341,9 @@ mod tests {
         };
         publish(&Shelf::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
-        assert_eq!(csv.lines().nth(1), Some("f1,\"theta rate, against q\",theta_deg q_deg_s,,,not excited"));
+        assert_eq!(
+            csv.lines().nth(1),
+            Some("f1,\"theta rate, against q\",theta_deg q_deg_s,,,not excited")
+        );
     }
 }

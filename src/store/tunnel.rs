@@ -20,13 +20,21 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
-pub fn rows(path: &Path, third: Option<&str>, wanted: impl Fn(&str) -> bool) -> Result<Vec<(usize, TunnelRow)>> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+pub fn rows(
+    path: &Path,
+    third: Option<&str>,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<(usize, TunnelRow)>> {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
     match extension.as_str() {
         "parquet" | "pq" => of_parquet(path, third),
         "dml" | "xml" => {
             let text = files::text(path)?;
-            daveml::rows(&text, third, wanted).map_err(|(line, what)| Error::config(path, line, what))
+            daveml::rows(&text, third, wanted)
+                .map_err(|(line, what)| Error::config(path, line, what))
         }
         _ => of_csv(path, third),
     }
@@ -38,10 +46,16 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let Some(third) = third else { return Ok(rows) };
     let fields: Vec<(usize, BTreeMap<String, String>)> = files::rows(path)?;
     for ((line, row), (_, fields)) in rows.iter_mut().zip(fields) {
-        let Some(text) = fields.get(third).filter(|text| !text.is_empty()) else { continue };
-        let number = text
-            .parse()
-            .map_err(|_| Error::config(path, Some(*line), format!("column `{third}`: `{text}` is no number")));
+        let Some(text) = fields.get(third).filter(|text| !text.is_empty()) else {
+            continue;
+        };
+        let number = text.parse().map_err(|_| {
+            Error::config(
+                path,
+                Some(*line),
+                format!("column `{third}`: `{text}` is no number"),
+            )
+        });
         row.third = Some(number?);
     }
     Ok(rows)
@@ -49,20 +63,34 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let bytes = std::fs::read(path).map_err(Error::io(path, "cannot read it"))?;
-    let frame =
-        ParquetReader::new(Cursor::new(bytes)).finish().map_err(|e| Error::config(path, None, e.to_string()))?;
-    let table = Frame { path, frame: &frame };
+    let frame = ParquetReader::new(Cursor::new(bytes))
+        .finish()
+        .map_err(|e| Error::config(path, None, e.to_string()))?;
+    let table = Frame {
+        path,
+        frame: &frame,
+    };
     let [derivative, unit, source] = ["derivative", "unit", "source"].map(|name| table.words(name));
     let numbers = |name: &str| table.numbers(name);
-    let [alpha, mach, value, uncertainty] = ["alpha_deg", "mach", "value", "uncertainty"].map(numbers);
+    let [alpha, mach, value, uncertainty] =
+        ["alpha_deg", "mach", "value", "uncertainty"].map(numbers);
     let third = third.map_or(Ok(None), numbers)?;
     let (derivative, unit, source) = (derivative?, unit?, source?);
     let (alpha, mach, value, uncertainty) = (alpha?, mach?, value?, uncertainty?);
     let row = |i: usize| {
-        let lacks =
-            |name: &str| Error::config(path, Some(i + 1), format!("column `{name}` has no value here, or is missing"));
-        let at = |column: &Option<Vec<Option<f64>>>| column.as_ref().and_then(|c| c.get(i).copied().flatten());
-        let word = |column: &Option<Vec<Option<String>>>| column.as_ref().and_then(|c| c.get(i).cloned().flatten());
+        let lacks = |name: &str| {
+            Error::config(
+                path,
+                Some(i + 1),
+                format!("column `{name}` has no value here, or is missing"),
+            )
+        };
+        let at = |column: &Option<Vec<Option<f64>>>| {
+            column.as_ref().and_then(|c| c.get(i).copied().flatten())
+        };
+        let word = |column: &Option<Vec<Option<String>>>| {
+            column.as_ref().and_then(|c| c.get(i).cloned().flatten())
+        };
         let row = TunnelRow {
             derivative: word(&derivative).ok_or_else(|| lacks("derivative"))?,
             alpha_deg: at(&alpha).ok_or_else(|| lacks("alpha_deg"))?,
@@ -86,9 +114,12 @@ struct Frame<'a> {
 
 impl Frame<'_> {
     fn cast(&self, name: &str, to: &DataType) -> Result<Option<Column>> {
-        let Ok(column) = self.frame.column(name) else { return Ok(None) };
+        let Ok(column) = self.frame.column(name) else {
+            return Ok(None);
+        };
         let cast = column.strict_cast(to);
-        cast.map(Some).map_err(|e| Error::config(self.path, None, format!("column `{name}`: {e}")))
+        cast.map(Some)
+            .map_err(|e| Error::config(self.path, None, format!("column `{name}`: {e}")))
     }
 
     fn numbers(&self, name: &str) -> Result<Option<Vec<Option<f64>>>> {
@@ -98,6 +129,10 @@ impl Frame<'_> {
 
     fn words(&self, name: &str) -> Result<Option<Vec<Option<String>>>> {
         let column = self.cast(name, &DataType::String)?;
-        Ok(column.and_then(|c| c.str().map(|c| c.iter().map(|w| w.map(str::to_owned)).collect()).ok()))
+        Ok(column.and_then(|c| {
+            c.str()
+                .map(|c| c.iter().map(|w| w.map(str::to_owned)).collect())
+                .ok()
+        }))
     }
 }

@@ -15,15 +15,27 @@ pub(super) struct Basis {
 
 impl Basis {
     pub(super) fn polynomial(range: (f64, f64), order: usize) -> Basis {
-        Basis { range, order, knots: Vec::new() }
+        Basis {
+            range,
+            order,
+            knots: Vec::new(),
+        }
     }
 
     /// A spline of an order between 1 and 3; knots outside the range of the data are left out.
     pub(super) fn spline(range: (f64, f64), order: usize, knots_deg: &[f64]) -> Basis {
-        let mut knots: Vec<f64> = knots_deg.iter().copied().filter(|k| range.0 < *k && *k < range.1).collect();
+        let mut knots: Vec<f64> = knots_deg
+            .iter()
+            .copied()
+            .filter(|k| range.0 < *k && *k < range.1)
+            .collect();
         knots.sort_by(f64::total_cmp);
         knots.dedup();
-        Basis { range, order, knots }
+        Basis {
+            range,
+            order,
+            knots,
+        }
     }
 
     pub(super) fn order(&self) -> usize {
@@ -46,12 +58,20 @@ impl Basis {
 
     /// The functions at an angle of attack.
     pub(super) fn row(&self, alpha_deg: f64) -> RowDVector<f64> {
-        if self.knots.is_empty() { self.legendre(alpha_deg) } else { self.splines(alpha_deg) }
+        if self.knots.is_empty() {
+            self.legendre(alpha_deg)
+        } else {
+            self.splines(alpha_deg)
+        }
     }
 
     fn legendre(&self, alpha_deg: f64) -> RowDVector<f64> {
         let (low, high) = self.range;
-        let x = if high > low { (2.0 * alpha_deg - low - high) / (high - low) } else { 0.0 };
+        let x = if high > low {
+            (2.0 * alpha_deg - low - high) / (high - low)
+        } else {
+            0.0
+        };
         let mut p = vec![1.0, x];
         for j in 1..self.order {
             let n = j as f64;
@@ -63,18 +83,28 @@ impl Basis {
     fn splines(&self, alpha_deg: f64) -> RowDVector<f64> {
         let (low, high) = self.range;
         let ends = |end: f64| std::iter::repeat_n(end, self.order + 1);
-        let knots: Vec<f64> = ends(low).chain(self.knots.iter().copied()).chain(ends(high)).collect();
+        let knots: Vec<f64> = ends(low)
+            .chain(self.knots.iter().copied())
+            .chain(ends(high))
+            .collect();
         let x = alpha_deg.clamp(low, high);
         // Order 0: one on the interval of x; at the upper end on the last interval that has a length.
-        let inside = |i: usize| knots[i] < knots[i + 1] && knots[i] <= x && (x < knots[i + 1] || knots[i + 1] >= high);
+        let inside = |i: usize| {
+            knots[i] < knots[i + 1] && knots[i] <= x && (x < knots[i + 1] || knots[i + 1] >= high)
+        };
         let interval = (0..knots.len() - 1).find(|i| inside(*i));
-        let mut values: Vec<f64> = (0..knots.len() - 1).map(|i| f64::from(u8::from(Some(i) == interval))).collect();
+        let mut values: Vec<f64> = (0..knots.len() - 1)
+            .map(|i| f64::from(u8::from(Some(i) == interval)))
+            .collect();
         for order in 1..=self.order {
             let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
             values = (0..knots.len() - 1 - order)
                 .map(|i| {
                     let rising = share(x - knots[i], knots[i + order] - knots[i]);
-                    let falling = share(knots[i + order + 1] - x, knots[i + order + 1] - knots[i + 1]);
+                    let falling = share(
+                        knots[i + order + 1] - x,
+                        knots[i + order + 1] - knots[i + 1],
+                    );
                     rising * values[i] + falling * values[i + 1]
                 })
                 .collect();
@@ -90,8 +120,28 @@ mod tests {
 
     const DESIGN: [(f64, [f64; 6]); 6] = [
         (0.0, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-        (0.3, [0.342_999_999_999_999_9, 0.579, 0.07575, 0.002_249_999_999_999_999_4, 0.0, 0.0]),
-        (1.0, [0.0, 0.444_444_444_444_444_4, 0.472_222_222_222_222_2, 0.083_333_333_333_333_33, 0.0, 0.0]),
+        (
+            0.3,
+            [
+                0.342_999_999_999_999_9,
+                0.579,
+                0.07575,
+                0.002_249_999_999_999_999_4,
+                0.0,
+                0.0,
+            ],
+        ),
+        (
+            1.0,
+            [
+                0.0,
+                0.444_444_444_444_444_4,
+                0.472_222_222_222_222_2,
+                0.083_333_333_333_333_33,
+                0.0,
+                0.0,
+            ],
+        ),
         (
             2.2,
             [
@@ -103,7 +153,17 @@ mod tests {
                 0.0,
             ],
         ),
-        (3.5, [0.0, 0.0, 0.010_416_666_666_666_666, 0.184_027_777_777_777_76, 0.680_555_555_555_555_6, 0.125]),
+        (
+            3.5,
+            [
+                0.0,
+                0.0,
+                0.010_416_666_666_666_666,
+                0.184_027_777_777_777_76,
+                0.680_555_555_555_555_6,
+                0.125,
+            ],
+        ),
         (4.0, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
     ];
 

@@ -20,19 +20,33 @@ fn covered(study: &Study, campaigns: u64) -> (f64, f64) {
     for _ in 0..campaigns {
         let mut bound = || 0.004 * (0.5 + random.uniform());
         let bounds: Vec<f64> = (0..study.maneuvers).map(|_| bound()).collect();
-        let alpha_of = |i: usize| 5.0 + 55.0 * (i % study.points) as f64 / (study.points - 1) as f64;
+        let alpha_of =
+            |i: usize| 5.0 + 55.0 * (i % study.points) as f64 / (study.points - 1) as f64;
         let draw = |(i, bound): (usize, &f64)| {
             let alpha = alpha_of(i) + 0.3 * random.normal();
-            let value = (study.truth)(alpha) + bound * random.normal() + study.scatter * random.normal();
+            let value =
+                (study.truth)(alpha) + bound * random.normal() + study.scatter * random.normal();
             estimate("d", "A", alpha, value, *bound)
         };
         let estimates: Vec<EstimateRow> = bounds.iter().enumerate().map(draw).collect();
-        for row in through(&estimates, &Settings { per_class: false, ..Settings::default() }).rows {
+        for row in through(
+            &estimates,
+            &Settings {
+                per_class: false,
+                ..Settings::default()
+            },
+        )
+        .rows
+        {
             let truth = (study.truth)(row.alpha_deg);
-            let one_more = truth + study.scatter * random.normal() + 0.004 * (0.5 + random.uniform()) * random.normal();
+            let one_more = truth
+                + study.scatter * random.normal()
+                + 0.004 * (0.5 + random.uniform()) * random.normal();
             all += 1.0;
             held += f64::from(u8::from((row.lower_95..=row.upper_95).contains(&truth)));
-            predicted += f64::from(u8::from((row.prediction_lower_95..=row.prediction_upper_95).contains(&one_more)));
+            predicted += f64::from(u8::from(
+                (row.prediction_lower_95..=row.prediction_upper_95).contains(&one_more),
+            ));
         }
     }
     (held / all, predicted / all)
@@ -51,13 +65,69 @@ fn stall(a: f64) -> f64 {
 /// Maneuvers, test points, truth, scatter between maneuvers; the share that the band holds at least. A stall within 15° bends
 /// more than test points 5° apart show: there the band is known to hold less than it says.
 const STUDIES: [(Study, f64); 7] = [
-    (Study { maneuvers: 4, points: 4, truth: constant, scatter: 0.008 }, 0.92),
-    (Study { maneuvers: 8, points: 4, truth: constant, scatter: 0.003 }, 0.92),
-    (Study { maneuvers: 6, points: 6, truth: parabola, scatter: 0.003 }, 0.92),
-    (Study { maneuvers: 12, points: 12, truth: parabola, scatter: 0.008 }, 0.90),
-    (Study { maneuvers: 40, points: 12, truth: parabola, scatter: 0.003 }, 0.92),
-    (Study { maneuvers: 12, points: 12, truth: stall, scatter: 0.003 }, 0.88),
-    (Study { maneuvers: 40, points: 12, truth: stall, scatter: 0.008 }, 0.91),
+    (
+        Study {
+            maneuvers: 4,
+            points: 4,
+            truth: constant,
+            scatter: 0.008,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 8,
+            points: 4,
+            truth: constant,
+            scatter: 0.003,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 6,
+            points: 6,
+            truth: parabola,
+            scatter: 0.003,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 12,
+            points: 12,
+            truth: parabola,
+            scatter: 0.008,
+        },
+        0.90,
+    ),
+    (
+        Study {
+            maneuvers: 40,
+            points: 12,
+            truth: parabola,
+            scatter: 0.003,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 12,
+            points: 12,
+            truth: stall,
+            scatter: 0.003,
+        },
+        0.88,
+    ),
+    (
+        Study {
+            maneuvers: 40,
+            points: 12,
+            truth: stall,
+            scatter: 0.008,
+        },
+        0.91,
+    ),
 ];
 
 #[test]
@@ -71,7 +141,12 @@ fn the_bands_hold_the_truth_and_one_more_maneuver_as_often_as_they_say() {
 
 #[test]
 fn the_bands_are_not_wide_for_nothing() {
-    let study = Study { maneuvers: 40, points: 12, truth: parabola, scatter: 0.008 };
+    let study = Study {
+        maneuvers: 40,
+        points: 12,
+        truth: parabola,
+        scatter: 0.008,
+    };
     let (held, predicted) = covered(&study, 60);
     assert!(held < 0.99 && predicted < 0.98, "{held} {predicted}");
 }

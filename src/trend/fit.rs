@@ -97,12 +97,31 @@ pub(super) struct Trend {
 
 impl Trend {
     /// The trend through points sorted by α: the lower order on a tie, none where no order has a solution.
-    pub(super) fn through(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Option<Trend> {
+    pub(super) fn through(
+        points: &[Point],
+        settings: &Settings,
+        knots_deg: &[f64],
+    ) -> Option<Trend> {
         let fits = Fit::all(points, settings, knots_deg);
-        let best = fits.iter().reduce(|best, next| if next.criterion < best.criterion { next } else { best })?.clone();
+        let best = fits
+            .iter()
+            .reduce(|best, next| {
+                if next.criterion < best.criterion {
+                    next
+                } else {
+                    best
+                }
+            })?
+            .clone();
         let likelihood = |fit: &Fit| (0.5 * (best.criterion - fit.criterion)).exp();
         let total: f64 = fits.iter().map(likelihood).sum();
-        Some(Trend { orders: fits.iter().map(|fit| (likelihood(fit) / total, fit.clone())).collect(), best })
+        Some(Trend {
+            orders: fits
+                .iter()
+                .map(|fit| (likelihood(fit) / total, fit.clone()))
+                .collect(),
+            best,
+        })
     }
 
     /// Value and standard error at an angle of attack.
@@ -132,29 +151,53 @@ impl Fit {
     /// derivative bends between them. Besides polynomials there are splines: between the analyst's knots, with polynomials
     /// up to the third order; where he gives none, between the flown α, each or every second.
     fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<Fit> {
-        let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return Vec::new();
+        };
         let range = (first.alpha_deg, last.alpha_deg);
         let flown = flown(points, settings.alpha_step_deg);
         let most = flown.len().min(points.len().saturating_sub(2));
-        let highest = if knots_deg.is_empty() { settings.max_order } else { settings.max_order.min(3) };
+        let highest = if knots_deg.is_empty() {
+            settings.max_order
+        } else {
+            settings.max_order.min(3)
+        };
         let polynomials = (0..=highest).map(|order| Basis::polynomial(range, order));
         let splines: Vec<Basis> = if knots_deg.is_empty() {
             let between = flown.get(1..flown.len() - 1).unwrap_or_default();
-            let thinned = |every| between.iter().copied().skip(every - 1).step_by(every).collect::<Vec<f64>>();
+            let thinned = |every| {
+                between
+                    .iter()
+                    .copied()
+                    .skip(every - 1)
+                    .step_by(every)
+                    .collect::<Vec<f64>>()
+            };
             let of = |(order, every)| Basis::spline(range, order, &thinned(every));
             [(1, 1), (1, 2), (3, 2)].map(of).into()
         } else {
-            (1..=highest).map(|order| Basis::spline(range, order, knots_deg)).collect()
+            (1..=highest)
+                .map(|order| Basis::spline(range, order, knots_deg))
+                .collect()
         };
-        let bent = splines.into_iter().filter(|basis| basis.order() <= highest && basis.size() > basis.order() + 1);
+        let bent = splines
+            .into_iter()
+            .filter(|basis| basis.order() <= highest && basis.size() > basis.order() + 1);
         let bases = polynomials.chain(bent).filter(|basis| basis.size() <= most);
-        bases.filter_map(|basis| Fit::of(points, basis, settings.criterion)).collect()
+        bases
+            .filter_map(|basis| Fit::of(points, basis, settings.criterion))
+            .collect()
     }
 
     /// The fit of one basis; none where the normal equations have no solution.
     pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<Fit> {
         let (n, p) = (points.len(), basis.size());
-        let design = DMatrix::from_rows(&points.iter().map(|q| basis.row(q.alpha_deg)).collect::<Vec<_>>());
+        let design = DMatrix::from_rows(
+            &points
+                .iter()
+                .map(|q| basis.row(q.alpha_deg))
+                .collect::<Vec<_>>(),
+        );
         let values = DVector::from_iterator(n, points.iter().map(|q| q.value));
         let variances = floored_variances(points);
         let degrees_of_freedom = n.checked_sub(p).filter(|d| *d > 0)?;
@@ -172,22 +215,36 @@ impl Fit {
             let moved = (&design * (&next.0 - &solution.0)).amax();
             let smallest = total.iter().copied().fold(f64::INFINITY, f64::min);
             solution = next;
-            let settled = total.iter().zip(&before).all(|(now, before)| (now - before).abs() <= 1e-6 * now);
+            let settled = total
+                .iter()
+                .zip(&before)
+                .all(|(now, before)| (now - before).abs() <= 1e-6 * now);
             if settled && moved <= 1e-6 * smallest.sqrt() {
                 break;
             }
         }
         let residuals = &values - &design * &solution.0;
-        let misfit = (0..n).map(|i| deviance(residuals[i], total[i])).sum::<f64>();
+        let misfit = (0..n)
+            .map(|i| deviance(residuals[i], total[i]))
+            .sum::<f64>();
         let covariance = robust_covariance(&design, &residuals, &total)?;
-        let of_bounds = solve(&design, &values, &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)))?.1;
+        let of_bounds = solve(
+            &design,
+            &values,
+            &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)),
+        )?
+        .1;
         Some(Fit {
             residuals: standardised(&design, &residuals, &total, &weights, &solution.1),
             basis,
             coefficients: solution.0,
             covariance,
             of_bounds,
-            scatter2: total.iter().zip(&variances).map(|(all, bound)| all - bound).collect(),
+            scatter2: total
+                .iter()
+                .zip(&variances)
+                .map(|(all, bound)| all - bound)
+                .collect(),
             variances: total,
             degrees_of_freedom,
             criterion: misfit + penalty(criterion, n, p + strata.len()),
@@ -199,7 +256,10 @@ impl Fit {
         let row = self.basis.row(alpha_deg);
         let variance = |covariance: &DMatrix<f64>| (&row * covariance * row.transpose())[(0, 0)];
         let variance = variance(&self.covariance).max(variance(&self.of_bounds));
-        ((&row * &self.coefficients)[(0, 0)], variance.max(0.0).sqrt())
+        (
+            (&row * &self.coefficients)[(0, 0)],
+            variance.max(0.0).sqrt(),
+        )
     }
 
     pub(super) fn basis(&self) -> &Basis {
@@ -222,12 +282,17 @@ impl Fit {
 
     /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees of freedom.
     pub(super) fn quantile_95(&self) -> f64 {
-        StudentsT::new(0.0, 1.0, self.degrees_of_freedom as f64).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+        StudentsT::new(0.0, 1.0, self.degrees_of_freedom as f64)
+            .map_or(f64::NAN, |t| t.inverse_cdf(0.975))
     }
 }
 
 /// The covariance of an M-estimate's coefficients, by the residuals as they are.
-fn robust_covariance(design: &DMatrix<f64>, residuals: &DVector<f64>, variances: &[f64]) -> Option<DMatrix<f64>> {
+fn robust_covariance(
+    design: &DMatrix<f64>,
+    residuals: &DVector<f64>,
+    variances: &[f64],
+) -> Option<DMatrix<f64>> {
     let (n, p) = (design.nrows() as f64, design.ncols() as f64);
     let u2 = || residuals.iter().zip(variances).map(|(r, v)| r * r / v);
     let kept = u2().filter(|u2| *u2 <= HUBER * HUBER).count() as f64 / n;
@@ -252,7 +317,10 @@ fn standardised(
         let row = design.row(i);
         let leverage = weights[i] * (row * inverse * row.transpose())[(0, 0)];
         let left = (1.0 - leverage).max(1e-6);
-        Residual { z: residuals[i] / (variances[i] * left).sqrt(), share: weights[i] * variances[i] }
+        Residual {
+            z: residuals[i] / (variances[i] * left).sqrt(),
+            share: weights[i] * variances[i],
+        }
     };
     (0..design.nrows()).map(of).collect()
 }
@@ -263,12 +331,17 @@ fn flown(points: &[Point], step_deg: f64) -> Vec<f64> {
     let mut clusters: Vec<Vec<f64>> = Vec::new();
     for p in points {
         match clusters.last_mut() {
-            Some(cluster) if p.alpha_deg - cluster[0] <= 0.5 * step_deg => cluster.push(p.alpha_deg),
+            Some(cluster) if p.alpha_deg - cluster[0] <= 0.5 * step_deg => {
+                cluster.push(p.alpha_deg)
+            }
             _ => clusters.push(vec![p.alpha_deg]),
         }
     }
     let mean = |cluster: &Vec<f64>| cluster.iter().sum::<f64>() / cluster.len() as f64;
-    clusters.iter().map(|cluster| (10.0 * mean(cluster)).round() / 10.0).collect()
+    clusters
+        .iter()
+        .map(|cluster| (10.0 * mean(cluster)).round() / 10.0)
+        .collect()
 }
 
 /// Bounds squared, none smaller than the floor.
@@ -284,9 +357,20 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// The points of each scatter: of every class that has one of its own, and of all points, last, where any is left.
 fn strata(points: &[Point]) -> Vec<Vec<usize>> {
-    let classes = points.iter().map(|p| p.class).max().map_or(0, |most| most + 1);
-    let of = |class: usize| (0..points.len()).filter(|i| points[*i].class == class).collect::<Vec<usize>>();
-    let mut strata: Vec<Vec<usize>> = (0..classes).map(of).filter(|own| own.len() >= OWN_SCATTER).collect();
+    let classes = points
+        .iter()
+        .map(|p| p.class)
+        .max()
+        .map_or(0, |most| most + 1);
+    let of = |class: usize| {
+        (0..points.len())
+            .filter(|i| points[*i].class == class)
+            .collect::<Vec<usize>>()
+    };
+    let mut strata: Vec<Vec<usize>> = (0..classes)
+        .map(of)
+        .filter(|own| own.len() >= OWN_SCATTER)
+        .collect();
     if strata.iter().map(Vec::len).sum::<usize>() < points.len() {
         strata.push((0..points.len()).collect());
     }
@@ -303,7 +387,12 @@ fn freedom(design: &DMatrix<f64>, weights: &DVector<f64>, inverse: &DMatrix<f64>
 }
 
 /// b² + τ² of each point, τ of its stratum: the classes' own take the place of that of all.
-fn total_variances(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64], strata: &[Vec<usize>]) -> Vec<f64> {
+fn total_variances(
+    residuals: &DVector<f64>,
+    variances: &[f64],
+    freedom: &[f64],
+    strata: &[Vec<usize>],
+) -> Vec<f64> {
     let mut total = variances.to_vec();
     for stratum in strata.iter().rev() {
         let scatter2 = scatter_squared(residuals, variances, freedom, stratum);
@@ -315,17 +404,30 @@ fn total_variances(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64],
 }
 
 /// Coefficients and their covariance for given weights.
-fn solve(design: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| weights[i] * design[(i, j)]);
+fn solve(
+    design: &DMatrix<f64>,
+    values: &DVector<f64>,
+    weights: &DVector<f64>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| {
+        weights[i] * design[(i, j)]
+    });
     let normal = weighted.transpose() * design;
     let cholesky = normal.cholesky()?;
-    Some((cholesky.solve(&(weighted.transpose() * values)), cholesky.inverse()))
+    Some((
+        cholesky.solve(&(weighted.transpose() * values)),
+        cholesky.inverse(),
+    ))
 }
 
 /// One over the variance, less where the residual is wild.
 fn weight(residual: f64, variance: f64) -> f64 {
     let u = residual.abs() / variance.sqrt();
-    if u > HUBER { HUBER / u / variance } else { 1.0 / variance }
+    if u > HUBER {
+        HUBER / u / variance
+    } else {
+        1.0 / variance
+    }
 }
 
 /// Minus twice the log-likelihood of one residual; a wild one costs the same however wild it is, so that no order is
@@ -346,9 +448,16 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
 
 /// τ² of some of the points: where the sum of their squared residuals over their variances, wild ones cut, is what its
 /// degrees of freedom expect. The sum falls as τ² grows, so bisection finds it.
-fn scatter_squared(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64], stratum: &[usize]) -> f64 {
+fn scatter_squared(
+    residuals: &DVector<f64>,
+    variances: &[f64],
+    freedom: &[f64],
+    stratum: &[usize],
+) -> f64 {
     let expected = HUBER_VARIANCE * stratum.iter().map(|i| freedom[*i]).sum::<f64>();
-    let cut = |i: &usize, scatter2: f64| (residuals[*i].powi(2) / (variances[*i] + scatter2)).min(HUBER * HUBER);
+    let cut = |i: &usize, scatter2: f64| {
+        (residuals[*i].powi(2) / (variances[*i] + scatter2)).min(HUBER * HUBER)
+    };
     let sum = |scatter2: f64| stratum.iter().map(|i| cut(i, scatter2)).sum::<f64>();
     if sum(0.0) <= expected || expected <= 0.0 {
         return 0.0;
@@ -357,7 +466,11 @@ fn scatter_squared(residuals: &DVector<f64>, variances: &[f64], freedom: &[f64],
     let (mut low, mut high) = (0.0, square / expected);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if sum(middle) > expected { low = middle } else { high = middle }
+        if sum(middle) > expected {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     high
 }
@@ -368,7 +481,15 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn points(of: impl Fn(f64) -> f64, alphas: &[f64]) -> Vec<Point> {
-        alphas.iter().map(|&a| Point { alpha_deg: a, value: of(a), bound: 0.01, class: 0 }).collect()
+        alphas
+            .iter()
+            .map(|&a| Point {
+                alpha_deg: a,
+                value: of(a),
+                bound: 0.01,
+                class: 0,
+            })
+            .collect()
     }
 
     fn constant(points: &[Point]) -> Option<Fit> {
@@ -384,8 +505,10 @@ mod tests {
     fn the_variance_of_cut_normal_residuals_is_that_of_its_integral() {
         let density = |u: f64| (-0.5 * u * u).exp() / std::f64::consts::TAU.sqrt();
         let h = 1e-3;
-        let integral: f64 =
-            (-8000..8000).map(|i| (f64::from(i) + 0.5) * h).map(|u| (u * u).min(HUBER * HUBER) * density(u) * h).sum();
+        let integral: f64 = (-8000..8000)
+            .map(|i| (f64::from(i) + 0.5) * h)
+            .map(|u| (u * u).min(HUBER * HUBER) * density(u) * h)
+            .sum();
         assert_relative_eq!(integral, HUBER_VARIANCE, max_relative = 1e-5);
     }
 
@@ -398,7 +521,15 @@ mod tests {
             p.value += 0.01 * [1.1, -0.7, 0.2, -1.3, 0.9, -0.2][i % 6];
         }
         for criterion in [Criterion::Aicc, Criterion::Bic] {
-            let fit = Trend::through(&data, &Settings { criterion, ..Settings::default() }, &[]).expect("a fit");
+            let fit = Trend::through(
+                &data,
+                &Settings {
+                    criterion,
+                    ..Settings::default()
+                },
+                &[],
+            )
+            .expect("a fit");
             assert_eq!(fit.best.basis().order(), 3);
             for a in [5.0, 20.0, 40.0, 60.0] {
                 assert_relative_eq!(fit.at(a).0, cubic(a), epsilon = 0.01);
@@ -408,13 +539,27 @@ mod tests {
 
     #[test]
     fn order_zero_is_the_weighted_mean() {
-        let data = [(10.0, 1.0, 0.1), (20.0, 1.1, 0.2), (30.0, 0.95, 0.1), (40.0, 1.05, 0.15)];
-        let data = data.map(|(alpha_deg, value, bound)| Point { alpha_deg, value, bound, class: 0 });
+        let data = [
+            (10.0, 1.0, 0.1),
+            (20.0, 1.1, 0.2),
+            (30.0, 0.95, 0.1),
+            (40.0, 1.05, 0.15),
+        ];
+        let data = data.map(|(alpha_deg, value, bound)| Point {
+            alpha_deg,
+            value,
+            bound,
+            class: 0,
+        });
         let fit = constant(&data).expect("a fit");
         let sum = |f: &dyn Fn(&Point) -> f64| data.iter().map(f).sum::<f64>();
         let weight = sum(&|p| p.bound.powi(-2));
         assert_relative_eq!(fit.scatter(), 0.0);
-        assert_relative_eq!(fit.at(33.0).0, sum(&|p| p.value * p.bound.powi(-2)) / weight, max_relative = 1e-12);
+        assert_relative_eq!(
+            fit.at(33.0).0,
+            sum(&|p| p.value * p.bound.powi(-2)) / weight,
+            max_relative = 1e-12
+        );
         assert_relative_eq!(fit.at(33.0).1, weight.sqrt().recip(), max_relative = 1e-12);
     }
 
@@ -427,7 +572,11 @@ mod tests {
             p.bound = 1e-4;
         }
         let fit = constant(&data).expect("a fit");
-        assert_relative_eq!(fit.scatter(), (0.25 * 48.0 / 47.0 / HUBER_VARIANCE).sqrt(), max_relative = 1e-4);
+        assert_relative_eq!(
+            fit.scatter(),
+            (0.25 * 48.0 / 47.0 / HUBER_VARIANCE).sqrt(),
+            max_relative = 1e-4
+        );
     }
 
     #[test]
@@ -439,7 +588,12 @@ mod tests {
         }
         let settings = Settings::default();
         let clean = Trend::through(&data, &settings, &[]).expect("a fit");
-        data.push(Point { alpha_deg: 60.0, value: 5.0, bound: 0.01, class: 0 });
+        data.push(Point {
+            alpha_deg: 60.0,
+            value: 5.0,
+            bound: 0.01,
+            class: 0,
+        });
         let wild = Trend::through(&data, &settings, &[]).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {
             assert_relative_eq!(wild.at(a).0, clean.at(a).0, epsilon = 0.01);
@@ -459,7 +613,10 @@ mod tests {
     #[test]
     fn a_bend_between_few_alpha_is_followed() {
         let bent = |a: f64| if a < 15.0 { 0.8 } else { 0.4 };
-        let four: Vec<f64> = [10.0, 20.0, 30.0, 40.0].iter().flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3]).collect();
+        let four: Vec<f64> = [10.0, 20.0, 30.0, 40.0]
+            .iter()
+            .flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3])
+            .collect();
         let fit = Trend::through(&points(bent, &four), &Settings::default(), &[]).expect("a fit");
         assert!((fit.at(20.0).0 - 0.4).abs() < 0.02, "{}", fit.at(20.0).0);
     }
@@ -467,13 +624,25 @@ mod tests {
     #[test]
     fn few_alpha_limit_the_order() {
         let wavy = |a: f64| (a / 3.0).sin();
-        let three: Vec<f64> = [10.0, 20.0, 30.0].iter().flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9]).collect();
+        let three: Vec<f64> = [10.0, 20.0, 30.0]
+            .iter()
+            .flat_map(|a| [*a, a + 0.3, a + 0.6, a + 0.9])
+            .collect();
         assert!(
-            Trend::through(&points(wavy, &three), &Settings::default(), &[]).expect("a fit").best.basis().order() <= 2
+            Trend::through(&points(wavy, &three), &Settings::default(), &[])
+                .expect("a fit")
+                .best
+                .basis()
+                .order()
+                <= 2
         );
         let one = [20.0, 20.1, 20.2, 20.3, 20.4];
         assert_eq!(
-            Trend::through(&points(wavy, &one), &Settings::default(), &[]).expect("a fit").best.basis().order(),
+            Trend::through(&points(wavy, &one), &Settings::default(), &[])
+                .expect("a fit")
+                .best
+                .basis()
+                .order(),
             0
         );
     }

@@ -107,7 +107,10 @@ fn default_per_class() -> bool {
     true
 }
 fn default_groups() -> Vec<Group> {
-    vec![Group { name: "all".into(), ..Group::default() }]
+    vec![Group {
+        name: "all".into(),
+        ..Group::default()
+    }]
 }
 
 impl Default for Settings {
@@ -132,7 +135,10 @@ impl Settings {
     pub fn group_of(&self, derivative: &str) -> Option<&Group> {
         let names = |g: &&Group| g.derivatives.iter().any(|d| d == derivative);
         let rest = |g: &&Group| g.derivatives.is_empty();
-        self.groups.iter().find(names).or_else(|| self.groups.iter().find(rest))
+        self.groups
+            .iter()
+            .find(names)
+            .or_else(|| self.groups.iter().find(rest))
     }
 }
 
@@ -159,10 +165,16 @@ pub struct Trends {
 /// single class of so few is passed over. A trend is published at the multiples of the step and at the derivative's
 /// `breakpoints`, deg, as far as they lie inside its data.
 #[must_use]
-pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl Fn(&str) -> Vec<f64> + Sync) -> Trends {
+pub fn trends(
+    estimates: &[EstimateRow],
+    settings: &Settings,
+    breakpoints: impl Fn(&str) -> Vec<f64> + Sync,
+) -> Trends {
     let each: Vec<Trends> = by_derivative(estimates, settings)
         .into_par_iter()
-        .map(|(derivative, of_it)| of_derivative(derivative, &of_it, settings, &breakpoints(derivative)))
+        .map(|(derivative, of_it)| {
+            of_derivative(derivative, &of_it, settings, &breakpoints(derivative))
+        })
         .collect();
     let mut trends = Trends::default();
     for own in each {
@@ -174,35 +186,56 @@ pub fn trends(estimates: &[EstimateRow], settings: &Settings, breakpoints: impl 
 }
 
 /// Those of one derivative.
-fn of_derivative(derivative: &str, of_it: &[&EstimateRow], settings: &Settings, further: &[f64]) -> Trends {
+fn of_derivative(
+    derivative: &str,
+    of_it: &[&EstimateRow],
+    settings: &Settings,
+    further: &[f64],
+) -> Trends {
     let mut trends = Trends::default();
     let group = settings.group_of(derivative);
     if let Some(group) = group {
-        let members: Vec<&EstimateRow> = of_it.iter().filter(|e| group.has(&e.class)).copied().collect();
+        let members: Vec<&EstimateRow> = of_it
+            .iter()
+            .filter(|e| group.has(&e.class))
+            .copied()
+            .collect();
         let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
         match trend(&members, &group.name, settings, knots, further) {
             Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
-            Err(reason) => trends.problems.push(problem(derivative, &group.name, reason)),
+            Err(reason) => trends
+                .problems
+                .push(problem(derivative, &group.name, reason)),
         }
     }
     if settings.per_class {
         let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
-        for class in names.into_iter().filter(|name| group.is_none_or(|g| g.name != *name)) {
-            let members: Vec<&EstimateRow> = of_it.iter().filter(|e| e.class == class).copied().collect();
+        for class in names
+            .into_iter()
+            .filter(|name| group.is_none_or(|g| g.name != *name))
+        {
+            let members: Vec<&EstimateRow> =
+                of_it.iter().filter(|e| e.class == class).copied().collect();
             // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
             let of_class = trend(&members, class, settings, &settings.knots_deg, further);
-            trends.rows.extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
+            trends
+                .rows
+                .extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
         }
     }
     trends
 }
 
 /// The usable estimates of each derivative, derivatives in order of appearance.
-fn by_derivative<'a>(estimates: &'a [EstimateRow], settings: &Settings) -> Vec<(&'a str, Vec<&'a EstimateRow>)> {
+fn by_derivative<'a>(
+    estimates: &'a [EstimateRow],
+    settings: &Settings,
+) -> Vec<(&'a str, Vec<&'a EstimateRow>)> {
     let mut order: Vec<(&str, Vec<&EstimateRow>)> = Vec::new();
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
-    let is_free =
-        |e: &&EstimateRow| e.status == Status::Estimated.name() && !settings.leave_out.contains(&e.derivative);
+    let is_free = |e: &&EstimateRow| {
+        e.status == Status::Estimated.name() && !settings.leave_out.contains(&e.derivative)
+    };
     for estimate in estimates.iter().filter(is_free) {
         let at = *place.entry(&estimate.derivative).or_insert(order.len());
         if at == order.len() {
@@ -218,8 +251,14 @@ fn by_derivative<'a>(estimates: &'a [EstimateRow], settings: &Settings) -> Vec<(
 /// An estimate as the fit sees it, of the first class; none without a value and a bound.
 fn point(e: &EstimateRow) -> Option<Point> {
     let bound = e.bound_corrected.or(e.bound)?;
-    let p = Point { alpha_deg: e.alpha_deg, value: e.value?, bound, class: 0 };
-    (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0).then_some(p)
+    let p = Point {
+        alpha_deg: e.alpha_deg,
+        value: e.value?,
+        bound,
+        class: 0,
+    };
+    (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0)
+        .then_some(p)
 }
 
 /// One trend on the published grid, and the maneuvers far from it.
@@ -231,22 +270,39 @@ fn trend(
     breakpoints: &[f64],
 ) -> Result<(Vec<TrendRow>, Vec<OutlierRow>), String> {
     if members.len() < FEWEST_MANEUVERS {
-        return Err(format!("{} maneuvers with an estimate and a bound are too few for a trend", members.len()));
+        return Err(format!(
+            "{} maneuvers with an estimate and a bound are too few for a trend",
+            members.len()
+        ));
     }
     let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
     let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
-    let of_class = |e: &EstimateRow| Some(Point { class: class(e), ..point(e)? });
-    let mut placed: Vec<(Point, &EstimateRow)> = members.iter().filter_map(|e| Some((of_class(e)?, *e))).collect();
+    let of_class = |e: &EstimateRow| {
+        Some(Point {
+            class: class(e),
+            ..point(e)?
+        })
+    };
+    let mut placed: Vec<(Point, &EstimateRow)> = members
+        .iter()
+        .filter_map(|e| Some((of_class(e)?, *e)))
+        .collect();
     // Sums do not depend on the order in which the maneuvers come.
-    placed.sort_by(|a, b| a.0.key().partial_cmp(&b.0.key()).unwrap_or(std::cmp::Ordering::Equal));
+    placed.sort_by(|a, b| {
+        a.0.key()
+            .partial_cmp(&b.0.key())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
     let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
-    let fit = Trend::through(&points, settings, knots_deg).ok_or("the least-squares fit has no solution")?;
+    let fit = Trend::through(&points, settings, knots_deg)
+        .ok_or("the least-squares fit has no solution")?;
     let outliers = outliers(&placed, &fit, group, settings.outlier_z);
     let (half_width, named) = (fit.best.quantile_95(), outliers.len());
     let one_more = fit.best.one_more();
     let row = |alpha_deg: f64| {
         let (value, own_error) = fit.at(inside(&points, alpha_deg));
-        let standard_error = own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
+        let standard_error =
+            own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
         let prediction = half_width * standard_error.hypot(one_more);
         TrendRow {
             derivative: members[0].derivative.clone(),
@@ -266,12 +322,26 @@ fn trend(
             scatter: fit.best.scatter(),
         }
     };
-    Ok((grid(&points, settings, breakpoints).into_iter().map(row).collect(), outliers))
+    Ok((
+        grid(&points, settings, breakpoints)
+            .into_iter()
+            .map(row)
+            .collect(),
+        outliers,
+    ))
 }
 
 /// The maneuvers further than `limit` standard deviations from the trend.
-fn outliers(placed: &[(Point, &EstimateRow)], fit: &Trend, group: &str, limit: f64) -> Vec<OutlierRow> {
-    let far = placed.iter().zip(fit.best.residuals()).filter(|(_, residual)| residual.z.abs() > limit);
+fn outliers(
+    placed: &[(Point, &EstimateRow)],
+    fit: &Trend,
+    group: &str,
+    limit: f64,
+) -> Vec<OutlierRow> {
+    let far = placed
+        .iter()
+        .zip(fit.best.residuals())
+        .filter(|(_, residual)| residual.z.abs() > limit);
     far.map(|((point, estimate), residual)| OutlierRow {
         derivative: estimate.derivative.clone(),
         unit: estimate.unit.clone(),
@@ -290,7 +360,9 @@ fn outliers(placed: &[(Point, &EstimateRow)], fit: &Trend, group: &str, limit: f
 
 /// α, or the end of the data where it lies a little beyond: a trend is not continued past its last maneuver.
 fn inside(points: &[Point], alpha_deg: f64) -> f64 {
-    let (Some(first), Some(last)) = (points.first(), points.last()) else { return alpha_deg };
+    let (Some(first), Some(last)) = (points.first(), points.last()) else {
+        return alpha_deg;
+    };
     alpha_deg.max(first.alpha_deg).min(last.alpha_deg)
 }
 
@@ -298,11 +370,16 @@ fn inside(points: &[Point], alpha_deg: f64) -> f64 {
 /// Maneuvers that hold the same derivative at the same tunnel err together, and so do those with the same instruments: it
 /// does not average out. It is the mean over the maneuvers within a step of α, each with its weight 1/bound².
 fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
-    let near = members.iter().filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
+    let near = members
+        .iter()
+        .filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
     let (mut sum, mut weights) = (0.0, 0.0);
     for (e, p) in near.filter_map(|e| Some((e, point(e)?))) {
         let weight = p.bound.powi(-2);
-        sum += weight * e.bound_held.unwrap_or(0.0).hypot(e.bound_calibration.unwrap_or(0.0));
+        sum += weight
+            * e.bound_held
+                .unwrap_or(0.0)
+                .hypot(e.bound_calibration.unwrap_or(0.0));
         weights += weight;
     }
     if weights > 0.0 { sum / weights } else { 0.0 }
@@ -311,15 +388,22 @@ fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 
 /// The multiples of the step and the breakpoints inside the range of the data, ascending.
 fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> {
     let (step, reach) = (settings.alpha_step_deg, settings.alpha_reach_deg);
-    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+    let (Some(first), Some(last)) = (points.first(), points.last()) else {
+        return Vec::new();
+    };
     let (from, to) = (first.alpha_deg - reach, last.alpha_deg + reach);
-    let mut grid: Vec<f64> = breakpoints.iter().copied().filter(|a| (from..=to).contains(a)).collect();
+    let mut grid: Vec<f64> = breakpoints
+        .iter()
+        .copied()
+        .filter(|a| (from..=to).contains(a))
+        .collect();
     if step > 0.0 {
         let steps = std::iter::successors(Some((from / step).ceil()), |k| Some(k + 1.0));
         let multiples = steps.map(|k| k * step).take_while(|alpha| *alpha <= to);
         // A breakpoint that is a multiple but for rounding stands once, as the tunnel writes it.
-        let new: Vec<f64> =
-            multiples.filter(|alpha| !breakpoints.iter().any(|b| (b - alpha).abs() < 1e-6 * step)).collect();
+        let new: Vec<f64> = multiples
+            .filter(|alpha| !breakpoints.iter().any(|b| (b - alpha).abs() < 1e-6 * step))
+            .collect();
         grid.extend(new);
     }
     grid.sort_by(f64::total_cmp);
@@ -328,5 +412,10 @@ fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> 
 }
 
 fn problem(derivative: &str, group: &str, reason: String) -> Problem {
-    Problem { stage: "trend".into(), flight_id: String::new(), place: format!("{derivative}, group {group}"), reason }
+    Problem {
+        stage: "trend".into(),
+        flight_id: String::new(),
+        place: format!("{derivative}, group {group}"),
+        reason,
+    }
 }

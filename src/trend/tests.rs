@@ -4,7 +4,13 @@ use approx::assert_relative_eq;
 
 use super::*;
 
-pub(super) fn estimate(derivative: &str, class: &str, alpha_deg: f64, value: f64, bound: f64) -> EstimateRow {
+pub(super) fn estimate(
+    derivative: &str,
+    class: &str,
+    alpha_deg: f64,
+    value: f64,
+    bound: f64,
+) -> EstimateRow {
     EstimateRow {
         maneuver_id: format!("f1_t{alpha_deg:05.1}"),
         flight_id: "f1".into(),
@@ -33,7 +39,10 @@ pub(super) struct Lcg(pub u64);
 
 impl Lcg {
     pub(super) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -48,7 +57,10 @@ pub(super) fn through(estimates: &[EstimateRow], settings: &Settings) -> Trends 
 }
 
 fn groups_of<'a>(rows: &'a [TrendRow], derivative: &str) -> BTreeSet<&'a str> {
-    rows.iter().filter(|r| r.derivative == derivative).map(|r| r.group.as_str()).collect()
+    rows.iter()
+        .filter(|r| r.derivative == derivative)
+        .map(|r| r.group.as_str())
+        .collect()
 }
 
 #[test]
@@ -64,11 +76,19 @@ fn the_band_covers_the_truth_as_often_as_it_says() {
             estimate("d", "A", alpha, value, bound)
         };
         let estimates: Vec<EstimateRow> = (0..40).map(draw).collect();
-        let Trends { rows, problems, .. } = through(&estimates, &Settings { per_class: false, ..Settings::default() });
+        let Trends { rows, problems, .. } = through(
+            &estimates,
+            &Settings {
+                per_class: false,
+                ..Settings::default()
+            },
+        );
         assert_eq!(problems, []);
         for row in rows {
             all += 1.0;
-            inside += f64::from(u8::from((row.lower_95..=row.upper_95).contains(&truth(row.alpha_deg))));
+            inside += f64::from(u8::from(
+                (row.lower_95..=row.upper_95).contains(&truth(row.alpha_deg)),
+            ));
         }
     }
     let covered = inside / all;
@@ -80,7 +100,13 @@ fn the_order_of_the_maneuvers_does_not_matter_to_the_bit() {
     let mut random = Lcg(1);
     let mut estimates: Vec<EstimateRow> = (0..30)
         .map(|i| {
-            estimate("d", ["A", "B"][i % 2], 5.0 + 55.0 * random.uniform(), random.normal(), 0.1 + random.uniform())
+            estimate(
+                "d",
+                ["A", "B"][i % 2],
+                5.0 + 55.0 * random.uniform(),
+                random.normal(),
+                0.1 + random.uniform(),
+            )
         })
         .collect();
     let Trends { rows, .. } = through(&estimates, &Settings::default());
@@ -98,20 +124,33 @@ fn the_first_group_that_names_a_derivative_speaks_for_it() {
         classes: classes.iter().map(|&s| s.to_owned()).collect(),
         knots_deg: None,
     };
-    let groups = vec![group("all", &[], &[]), group("B", &["vane"], &["B"]), group("A and B", &["rate"], &["A", "B"])];
-    let settings = Settings { groups, ..Settings::default() };
+    let groups = vec![
+        group("all", &[], &[]),
+        group("B", &["vane"], &["B"]),
+        group("A and B", &["rate"], &["A", "B"]),
+    ];
+    let settings = Settings {
+        groups,
+        ..Settings::default()
+    };
     let value = |class: &str| if class == "B" { 1.03 } else { 1.0 };
     let estimates: Vec<EstimateRow> = ["vane", "rate", "other"]
         .iter()
         .flat_map(|d| ["A", "B", "C"].map(|c| (*d, c)))
-        .flat_map(|(d, c)| (0..8).map(move |i| estimate(d, c, 10.0 + 5.0 * f64::from(i), value(c), 0.1)))
+        .flat_map(|(d, c)| {
+            (0..8).map(move |i| estimate(d, c, 10.0 + 5.0 * f64::from(i), value(c), 0.1))
+        })
         .collect();
     let Trends { rows, problems, .. } = through(&estimates, &settings);
     assert_eq!(problems, []);
     assert_eq!(groups_of(&rows, "vane"), ["A", "B", "C"].into());
     assert_eq!(groups_of(&rows, "rate"), ["A", "A and B", "B", "C"].into());
     assert_eq!(groups_of(&rows, "other"), ["A", "B", "C", "all"].into());
-    let of = |d: &str, g: &str| rows.iter().find(|r| r.derivative == d && r.group == g).expect("a trend");
+    let of = |d: &str, g: &str| {
+        rows.iter()
+            .find(|r| r.derivative == d && r.group == g)
+            .expect("a trend")
+    };
     assert_relative_eq!(of("vane", "B").value, 1.03, max_relative = 1e-9);
     assert_eq!(of("rate", "A and B").maneuvers, 16);
     assert_relative_eq!(of("other", "all").value, 1.01, max_relative = 1e-6);
@@ -121,24 +160,49 @@ fn the_first_group_that_names_a_derivative_speaks_for_it() {
 fn a_class_that_strays_does_not_take_the_weight_from_those_that_agree() {
     let mut random = Lcg(5);
     let mut draw = |class: &str, i: u32, value: f64, bound: f64| {
-        estimate("d", class, 5.0 + 4.0 * f64::from(i), value + bound * random.normal(), bound)
+        estimate(
+            "d",
+            class,
+            5.0 + 4.0 * f64::from(i),
+            value + bound * random.normal(),
+            bound,
+        )
     };
     let mut estimates: Vec<EstimateRow> = (0..14).map(|i| draw("A", i, 1.0, 0.02)).collect();
     // As a vane of which the rudder that moves with it is held at a wrong value.
     estimates.extend((0..14).map(|i| draw("B", i, -2.0 + 0.3 * f64::from(i), 0.4)));
-    let trends = through(&estimates, &Settings { per_class: false, ..Settings::default() });
+    let trends = through(
+        &estimates,
+        &Settings {
+            per_class: false,
+            ..Settings::default()
+        },
+    );
     for row in trends.rows {
-        assert!((row.value - 1.0).abs() < 0.05 && row.standard_error < 0.1, "{row:?}");
+        assert!(
+            (row.value - 1.0).abs() < 0.05 && row.standard_error < 0.1,
+            "{row:?}"
+        );
     }
 }
 
 #[test]
 fn the_grid_stays_inside_the_data() {
-    let estimates: Vec<EstimateRow> =
-        [11.0, 14.8, 20.1, 25.0, 29.7].iter().map(|&a| estimate("d", "A", a, 1.0, 0.1)).collect();
+    let estimates: Vec<EstimateRow> = [11.0, 14.8, 20.1, 25.0, 29.7]
+        .iter()
+        .map(|&a| estimate("d", "A", a, 1.0, 0.1))
+        .collect();
     let at = |reach| {
-        let settings = Settings { alpha_reach_deg: reach, per_class: false, ..Settings::default() };
-        through(&estimates, &settings).rows.iter().map(|r| r.alpha_deg).collect::<Vec<_>>()
+        let settings = Settings {
+            alpha_reach_deg: reach,
+            per_class: false,
+            ..Settings::default()
+        };
+        through(&estimates, &settings)
+            .rows
+            .iter()
+            .map(|r| r.alpha_deg)
+            .collect::<Vec<_>>()
     };
     assert_eq!(at(0.0), [15.0, 20.0, 25.0]);
     assert_eq!(at(0.5), [15.0, 20.0, 25.0, 30.0]);
@@ -146,8 +210,9 @@ fn the_grid_stays_inside_the_data() {
 
 #[test]
 fn held_unbounded_and_left_out_estimates_have_no_part() {
-    let mut estimates: Vec<EstimateRow> =
-        (0..6).map(|i| estimate("d", "A", 10.0 + 5.0 * f64::from(i), 1.0, 0.1)).collect();
+    let mut estimates: Vec<EstimateRow> = (0..6)
+        .map(|i| estimate("d", "A", 10.0 + 5.0 * f64::from(i), 1.0, 0.1))
+        .collect();
     let wrong = |change: &dyn Fn(&mut EstimateRow)| {
         let mut row = estimate("d", "A", 20.0, 99.0, 0.1);
         change(&mut row);
@@ -157,15 +222,24 @@ fn held_unbounded_and_left_out_estimates_have_no_part() {
     estimates.push(wrong(&|e| (e.bound, e.bound_corrected) = (None, None)));
     estimates.push(wrong(&|e| e.bound_corrected = Some(f64::INFINITY)));
     estimates.push(wrong(&|e| e.derivative = "bias".into()));
-    let settings = Settings { leave_out: ["bias".to_owned()].into(), ..Settings::default() };
+    let settings = Settings {
+        leave_out: ["bias".to_owned()].into(),
+        ..Settings::default()
+    };
     let Trends { rows, problems, .. } = through(&estimates, &settings);
     assert_eq!(problems, []);
-    assert!(rows.iter().all(|r| r.derivative == "d" && r.maneuvers == 6 && (r.value - 1.0).abs() < 1e-9));
+    assert!(
+        rows.iter()
+            .all(|r| r.derivative == "d" && r.maneuvers == 6 && (r.value - 1.0).abs() < 1e-9)
+    );
 }
 
 #[test]
 fn too_few_maneuvers_are_a_problem_of_the_group_and_silent_for_a_class() {
-    let few = [estimate("d", "A", 10.0, 1.0, 0.1), estimate("d", "B", 20.0, 1.0, 0.1)];
+    let few = [
+        estimate("d", "A", 10.0, 1.0, 0.1),
+        estimate("d", "B", 20.0, 1.0, 0.1),
+    ];
     let Trends { rows, problems, .. } = through(&few, &Settings::default());
     assert_eq!(rows, []);
     assert_eq!(problems.len(), 1);
@@ -174,8 +248,9 @@ fn too_few_maneuvers_are_a_problem_of_the_group_and_silent_for_a_class() {
 
 #[test]
 fn the_uncertainty_of_held_values_does_not_average_out() {
-    let mut estimates: Vec<EstimateRow> =
-        (0..40).map(|i| estimate("Cm_dpv", "PPSSTV", 10.0 + f64::from(i), 1.0, 0.1)).collect();
+    let mut estimates: Vec<EstimateRow> = (0..40)
+        .map(|i| estimate("Cm_dpv", "PPSSTV", 10.0 + f64::from(i), 1.0, 0.1))
+        .collect();
     let without = through(&estimates, &Settings::default()).rows[0].standard_error;
     for e in &mut estimates {
         e.bound_held = Some(0.08);
@@ -187,19 +262,31 @@ fn the_uncertainty_of_held_values_does_not_average_out() {
 
 #[test]
 fn the_tunnel_s_breakpoints_inside_the_data_are_published_too() {
-    let estimates: Vec<EstimateRow> =
-        [11.0, 14.8, 20.1, 25.0, 29.7].iter().map(|&a| estimate("d", "A", a, 1.0, 0.1)).collect();
-    let settings = Settings { per_class: false, ..Settings::default() };
-    let found = trends(&estimates, &settings, |_| vec![2.0, 12.0, 15.000_000_1, 22.5, 40.0]);
+    let estimates: Vec<EstimateRow> = [11.0, 14.8, 20.1, 25.0, 29.7]
+        .iter()
+        .map(|&a| estimate("d", "A", a, 1.0, 0.1))
+        .collect();
+    let settings = Settings {
+        per_class: false,
+        ..Settings::default()
+    };
+    let found = trends(&estimates, &settings, |_| {
+        vec![2.0, 12.0, 15.000_000_1, 22.5, 40.0]
+    });
     let alphas: Vec<f64> = found.rows.iter().map(|r| r.alpha_deg).collect();
     assert_eq!(alphas, [12.0, 15.000_000_1, 20.0, 22.5, 25.0, 30.0]);
 }
 
 #[test]
 fn a_trend_is_not_continued_past_its_last_maneuver() {
-    let estimates: Vec<EstimateRow> =
-        (0..12).map(|i| 10.2 + 2.0 * f64::from(i)).map(|a| estimate("d", "A", a, 0.1 * a, 0.01)).collect();
-    let settings = Settings { per_class: false, ..Settings::default() };
+    let estimates: Vec<EstimateRow> = (0..12)
+        .map(|i| 10.2 + 2.0 * f64::from(i))
+        .map(|a| estimate("d", "A", a, 0.1 * a, 0.01))
+        .collect();
+    let settings = Settings {
+        per_class: false,
+        ..Settings::default()
+    };
     let rows = through(&estimates, &settings).rows;
     assert_relative_eq!(rows[0].alpha_deg, 10.0);
     assert_relative_eq!(rows[0].value, 1.02, max_relative = 1e-9);
@@ -207,34 +294,74 @@ fn a_trend_is_not_continued_past_its_last_maneuver() {
 
 #[test]
 fn each_outlier_is_named_and_a_good_maneuver_is_not() {
-    let wave = |i: i32| 0.004 * [1.0, -1.1, 0.3, -0.6, 0.9, -0.5][usize::try_from(i % 6).expect("small")];
-    let mut estimates: Vec<EstimateRow> =
-        (0..20).map(|i| estimate("d", "A", 10.0 + 2.0 * f64::from(i), 1.0 + wave(i), 0.005)).collect();
+    let wave =
+        |i: i32| 0.004 * [1.0, -1.1, 0.3, -0.6, 0.9, -0.5][usize::try_from(i % 6).expect("small")];
+    let mut estimates: Vec<EstimateRow> = (0..20)
+        .map(|i| estimate("d", "A", 10.0 + 2.0 * f64::from(i), 1.0 + wave(i), 0.005))
+        .collect();
     estimates[7].value = Some(1.2);
     estimates[7].maneuver_id = "wild".into();
-    let settings = Settings { per_class: false, ..Settings::default() };
+    let settings = Settings {
+        per_class: false,
+        ..Settings::default()
+    };
     let found = through(&estimates, &settings);
-    let names: Vec<&str> = found.outliers.iter().map(|o| o.maneuver_id.as_str()).collect();
+    let names: Vec<&str> = found
+        .outliers
+        .iter()
+        .map(|o| o.maneuver_id.as_str())
+        .collect();
     assert_eq!(names, ["wild"]);
     let wild = &found.outliers[0];
-    assert!(wild.z > 10.0 && wild.weight_share < 0.2 && (wild.trend - 1.0).abs() < 0.01, "{wild:?}");
-    assert!(found.rows.iter().all(|r| r.outliers == 1 && (r.value - 1.0).abs() < 0.01));
+    assert!(
+        wild.z > 10.0 && wild.weight_share < 0.2 && (wild.trend - 1.0).abs() < 0.01,
+        "{wild:?}"
+    );
+    assert!(
+        found
+            .rows
+            .iter()
+            .all(|r| r.outliers == 1 && (r.value - 1.0).abs() < 0.01)
+    );
 }
 
 #[test]
 fn a_spline_follows_a_kink_at_its_knot_or_between_the_flown_alpha() {
-    let kinked = |a: f64| if a < 30.0 { 1.0 } else { 1.0 + 0.05 * (a - 30.0) };
-    let estimates: Vec<EstimateRow> =
-        (0..56).map(|i| 5.0 + f64::from(i)).map(|a| estimate("d", "A", a, kinked(a), 0.002)).collect();
+    let kinked = |a: f64| {
+        if a < 30.0 {
+            1.0
+        } else {
+            1.0 + 0.05 * (a - 30.0)
+        }
+    };
+    let estimates: Vec<EstimateRow> = (0..56)
+        .map(|i| 5.0 + f64::from(i))
+        .map(|a| estimate("d", "A", a, kinked(a), 0.002))
+        .collect();
     let settings = |knots_deg: Vec<f64>| {
-        let groups = vec![Group { name: "all".into(), knots_deg: Some(knots_deg), ..Group::default() }];
-        Settings { per_class: false, groups, ..Settings::default() }
+        let groups = vec![Group {
+            name: "all".into(),
+            knots_deg: Some(knots_deg),
+            ..Group::default()
+        }];
+        Settings {
+            per_class: false,
+            groups,
+            ..Settings::default()
+        }
     };
     let at_kink = |settings: &Settings| {
-        through(&estimates, settings).rows.into_iter().find(|r| (r.alpha_deg - 30.0).abs() < 1e-9).expect("30")
+        through(&estimates, settings)
+            .rows
+            .into_iter()
+            .find(|r| (r.alpha_deg - 30.0).abs() < 1e-9)
+            .expect("30")
     };
     let spline = at_kink(&settings(vec![30.0]));
-    assert_eq!((spline.curve.as_str(), spline.order), ("spline, knots 30", 1));
+    assert_eq!(
+        (spline.curve.as_str(), spline.order),
+        ("spline, knots 30", 1)
+    );
     assert_relative_eq!(spline.value, 1.0, epsilon = 1e-6);
     let unguided = at_kink(&settings(vec![]));
     assert!(unguided.curve.starts_with("spline, knots"), "{unguided:?}");

@@ -16,19 +16,34 @@ const HALF_95: f64 = 1.959_964;
 
 /// A row per estimated derivative.
 #[must_use]
-pub fn coverage(subject: &Subject, setting: Setting, realisations: usize, seed: u64) -> Vec<CoverageRow> {
+pub fn coverage(
+    subject: &Subject,
+    setting: Setting,
+    realisations: usize,
+    seed: u64,
+) -> Vec<CoverageRow> {
     let estimated: Vec<Estimated> = (0..realisations)
         .into_par_iter()
         .map(|i| subject.estimate(setting, seed_of(seed, &format!("realisation {i}"))))
         .collect();
-    let converged: Vec<&Estimated> = estimated.iter().filter(|e| e.fit.outcome == Outcome::Converged.name()).collect();
+    let converged: Vec<&Estimated> = estimated
+        .iter()
+        .filter(|e| e.fit.outcome == Outcome::Converged.name())
+        .collect();
     let row = |truth: &TrueDerivative| {
-        let rows: Vec<&EstimateRow> = converged.iter().filter_map(|e| row_of(e, &truth.derivative)).collect();
+        let rows: Vec<&EstimateRow> = converged
+            .iter()
+            .filter_map(|e| row_of(e, &truth.derivative))
+            .collect();
         (!rows.is_empty()).then(|| {
-            let errors: Vec<f64> = rows.iter().filter_map(|r| Some(r.value? - truth.value)).collect();
+            let errors: Vec<f64> = rows
+                .iter()
+                .filter_map(|r| Some(r.value? - truth.value))
+                .collect();
             let spread = Spread::of(&errors);
             let white = Intervals::new(&errors, &spread, rows.iter().map(|r| r.bound));
-            let corrected = Intervals::new(&errors, &spread, rows.iter().map(|r| r.bound_corrected));
+            let corrected =
+                Intervals::new(&errors, &spread, rows.iter().map(|r| r.bound_corrected));
             CoverageRow {
                 class: subject.class.name.clone(),
                 alpha_deg: subject.flown.maneuver.alpha_deg,
@@ -55,7 +70,10 @@ pub fn coverage(subject: &Subject, setting: Setting, realisations: usize, seed: 
 }
 
 fn row_of<'a>(estimated: &'a Estimated, derivative: &str) -> Option<&'a EstimateRow> {
-    estimated.estimates.iter().find(|r| r.derivative == derivative && r.status == Status::Estimated.name())
+    estimated
+        .estimates
+        .iter()
+        .find(|r| r.derivative == derivative && r.status == Status::Estimated.name())
 }
 
 /// Mean and standard deviation of errors.
@@ -69,7 +87,10 @@ impl Spread {
         let n = errors.len() as f64;
         let mean = errors.iter().sum::<f64>() / n;
         let square: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
-        Spread { mean, deviation: (square / (n - 1.0).max(1.0)).sqrt() }
+        Spread {
+            mean,
+            deviation: (square / (n - 1.0).max(1.0)).sqrt(),
+        }
     }
 }
 
@@ -83,12 +104,27 @@ struct Intervals {
 
 impl Intervals {
     /// A bound that does not exist holds nothing.
-    fn new(errors: &[f64], spread: &Spread, bounds: impl Iterator<Item = Option<f64>>) -> Intervals {
+    fn new(
+        errors: &[f64],
+        spread: &Spread,
+        bounds: impl Iterator<Item = Option<f64>>,
+    ) -> Intervals {
         let bounds: Vec<f64> = bounds.map(|b| b.unwrap_or(0.0)).collect();
         let n = bounds.len().max(1) as f64;
-        let within = |half: f64| errors.iter().zip(&bounds).filter(|(e, b)| e.abs() <= half * **b).count() as f64 / n;
+        let within = |half: f64| {
+            errors
+                .iter()
+                .zip(&bounds)
+                .filter(|(e, b)| e.abs() <= half * **b)
+                .count() as f64
+                / n
+        };
         let square = bounds.iter().map(|b| b * b).sum::<f64>() / n;
-        Intervals { ratio: spread.deviation / square.sqrt(), share_68: within(HALF_68), share_95: within(HALF_95) }
+        Intervals {
+            ratio: spread.deviation / square.sqrt(),
+            share_68: within(HALF_68),
+            share_95: within(HALF_95),
+        }
     }
 }
 
@@ -103,7 +139,11 @@ mod tests {
         let errors = [0.5, -0.9, 1.5, -3.0];
         let spread = Spread::of(&errors);
         assert_relative_eq!(spread.mean, -0.475);
-        let found = Intervals::new(&errors, &spread, [Some(1.0), Some(1.0), Some(1.0), None].into_iter());
+        let found = Intervals::new(
+            &errors,
+            &spread,
+            [Some(1.0), Some(1.0), Some(1.0), None].into_iter(),
+        );
         assert_relative_eq!(found.share_68, 0.5);
         assert_relative_eq!(found.share_95, 0.75);
         assert_relative_eq!(found.ratio, spread.deviation / 0.75_f64.sqrt());

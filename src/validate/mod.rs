@@ -65,7 +65,13 @@ pub fn tunnel_of_truth(flown: &Flown) -> WindTunnel {
     let mut tunnel = WindTunnel::default();
     for truth in &flown.truth {
         for alpha_deg in [-180.0, 180.0] {
-            let point = TunnelPoint { alpha_deg, mach: None, value: truth.value, uncertainty: None, source: None };
+            let point = TunnelPoint {
+                alpha_deg,
+                mach: None,
+                value: truth.value,
+                uncertainty: None,
+                source: None,
+            };
             tunnel.insert(&truth.derivative, point);
         }
     }
@@ -76,8 +82,19 @@ impl Subject<'_> {
     /// The estimate from one record.
     fn estimate(&self, setting: Setting, seed: u64) -> Estimated {
         let record = self.flown.recorded(&self.noise_only(setting), seed);
-        let settings = estimate::Settings { weights: setting.weights, ..self.basis.settings.clone() };
-        estimate::maneuver(&record, &self.flown.maneuver, self.class, &Basis { settings: &settings, ..self.basis })
+        let settings = estimate::Settings {
+            weights: setting.weights,
+            ..self.basis.settings.clone()
+        };
+        estimate::maneuver(
+            &record,
+            &self.flown.maneuver,
+            self.class,
+            &Basis {
+                settings: &settings,
+                ..self.basis
+            },
+        )
     }
 
     /// Instruments with nothing but noise.
@@ -87,9 +104,11 @@ impl Subject<'_> {
             let (noise, is_output) = (instrument.noise, outputs.contains(&signal.as_str()));
             let perfect = Instrument::default();
             let instrument = match setting.residuals {
-                Residuals::Coloured if is_output => {
-                    Instrument { coloured: noise, coloured_time_s: setting.coloured_time_s, ..perfect }
-                }
+                Residuals::Coloured if is_output => Instrument {
+                    coloured: noise,
+                    coloured_time_s: setting.coloured_time_s,
+                    ..perfect
+                },
                 Residuals::White if is_output => Instrument { noise, ..perfect },
                 Residuals::EveryChannel => Instrument { noise, ..perfect },
                 Residuals::White | Residuals::Coloured => perfect,

@@ -29,7 +29,9 @@ pub fn page(command: &str, coverage: &[CoverageRow], starts: &[StartRow]) -> Str
     page += &summary(coverage);
     page += &starts_table(starts);
     for (residuals, weights) in settings(coverage) {
-        let rows = coverage.iter().filter(|r| r.residuals == residuals && r.weights == weights);
+        let rows = coverage
+            .iter()
+            .filter(|r| r.residuals == residuals && r.weights == weights);
         let _ = write!(page, "\n## {residuals} residuals, weights: {weights}\n\n");
         page += &derivatives(rows);
     }
@@ -38,12 +40,23 @@ pub fn page(command: &str, coverage: &[CoverageRow], starts: &[StartRow]) -> Str
 
 /// Standard error of a coverage of 95%.
 fn counting_error(coverage: &[CoverageRow]) -> f64 {
-    let n = coverage.iter().map(|r| r.converged).min().unwrap_or(1).max(1) as f64;
+    let n = coverage
+        .iter()
+        .map(|r| r.converged)
+        .min()
+        .unwrap_or(1)
+        .max(1) as f64;
     (0.95 * 0.05 / n).sqrt()
 }
 
 fn bias_error(coverage: &[CoverageRow]) -> f64 {
-    1.0 / (coverage.iter().map(|r| r.converged).min().unwrap_or(1).max(1) as f64).sqrt()
+    1.0 / (coverage
+        .iter()
+        .map(|r| r.converged)
+        .min()
+        .unwrap_or(1)
+        .max(1) as f64)
+        .sqrt()
 }
 
 /// The ways of recording and weighting, in the order they come.
@@ -64,7 +77,10 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-fn share<'a>(rows: impl Iterator<Item = &'a CoverageRow> + Clone, holds: impl Fn(&CoverageRow) -> bool) -> f64 {
+fn share<'a>(
+    rows: impl Iterator<Item = &'a CoverageRow> + Clone,
+    holds: impl Fn(&CoverageRow) -> bool,
+) -> f64 {
     100.0 * rows.clone().filter(|r| holds(r)).count() as f64 / rows.count().max(1) as f64
 }
 
@@ -75,7 +91,9 @@ fn summary(coverage: &[CoverageRow]) -> String {
          bias under 0.1 scatter |\n|---|---|---|---|---|---|---|\n",
     );
     for (residuals, weights) in settings(coverage) {
-        let rows = coverage.iter().filter(|r| r.residuals == residuals && r.weights == weights);
+        let rows = coverage
+            .iter()
+            .filter(|r| r.residuals == residuals && r.weights == weights);
         let of = |f: fn(&CoverageRow) -> f64| median(rows.clone().map(f));
         let _ = writeln!(
             text,
@@ -110,7 +128,10 @@ fn starts_table(starts: &[StartRow]) -> String {
         let records = sum(|r| r.records);
         let percent = |count: usize| 100.0 * count as f64 / records.max(1) as f64;
         let (alone, reached) = (percent(sum(|r| r.alone)), percent(sum(|r| r.reached)));
-        let _ = writeln!(text, "| {kind} | {records} | {alone:.1} % | {reached:.1} % |");
+        let _ = writeln!(
+            text,
+            "| {kind} | {records} | {alone:.1} % | {reached:.1} % |"
+        );
     }
     text
 }
@@ -131,8 +152,13 @@ fn derivatives<'a>(rows: impl Iterator<Item = &'a CoverageRow>) -> String {
          95 % covered |\n|---|---|---|---|---|---|---|---|\n",
     );
     for key in groups {
-        let each =
-            |f: &dyn Fn(&CoverageRow) -> String| members[&key].iter().map(|r| f(r)).collect::<Vec<_>>().join(", ");
+        let each = |f: &dyn Fn(&CoverageRow) -> String| {
+            members[&key]
+                .iter()
+                .map(|r| f(r))
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
         let _ = writeln!(
             text,
             "| {} | {} | {} | {} | {} | {} | {} | {} |",
@@ -178,7 +204,11 @@ mod tests {
 
     #[test]
     fn the_page_says_how_many_intervals_keep_their_promise() {
-        let rows = [row("white", 10.0, 0.95), row("white", 20.0, 0.90), row("coloured", 10.0, 0.93)];
+        let rows = [
+            row("white", 10.0, 0.95),
+            row("white", 20.0, 0.90),
+            row("coloured", 10.0, 0.93),
+        ];
         let starts = [StartRow {
             class: "class".into(),
             alpha_deg: 10.0,
@@ -188,7 +218,12 @@ mod tests {
             reached: 199,
         }];
         let page = page("make validate", &rows, &starts);
-        assert!(page.contains("| white | table | 2 | 2.00, 70.0 % | 1.00, 68.0 %, 95.0 % | 50 % | 100 % |"), "{page}");
+        assert!(
+            page.contains(
+                "| white | table | 2 | 2.00, 70.0 % | 1.00, 68.0 %, 95.0 % | 50 % | 100 % |"
+            ),
+            "{page}"
+        );
         assert!(page.contains("| half | 200 | 75.0 % | 99.5 % |"), "{page}");
         assert!(
             page.contains(

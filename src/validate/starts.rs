@@ -32,21 +32,40 @@ impl From {
     }
 
     fn table(self, flown: &Flown, buildup: &Buildup) -> WindTunnel {
-        let surface =
-            |name: &str| buildup.derivatives.iter().any(|d| d.name == name && d.regressor.surface().is_some());
+        let surface = |name: &str| {
+            buildup
+                .derivatives
+                .iter()
+                .any(|d| d.name == name && d.regressor.surface().is_some())
+        };
         let factor = |t: &TrueDerivative| match self {
             From::Double => 2.0,
             From::Half => 0.5,
             From::NoSurfaces => f64::from(u8::from(!surface(&t.derivative))),
         };
-        let truth = flown.truth.iter().map(|t| TrueDerivative { value: factor(t) * t.value, ..t.clone() }).collect();
-        tunnel_of_truth(&Flown { truth, ..flown.clone() })
+        let truth = flown
+            .truth
+            .iter()
+            .map(|t| TrueDerivative {
+                value: factor(t) * t.value,
+                ..t.clone()
+            })
+            .collect();
+        tunnel_of_truth(&Flown {
+            truth,
+            ..flown.clone()
+        })
     }
 }
 
 /// A row per kind of start, over `realisations` records.
 #[must_use]
-pub fn starts(subject: &Subject, setting: Setting, realisations: usize, seed: u64) -> Vec<StartRow> {
+pub fn starts(
+    subject: &Subject,
+    setting: Setting,
+    realisations: usize,
+    seed: u64,
+) -> Vec<StartRow> {
     let truth = tunnel_of_truth(subject.flown);
     let reached = |from: From| -> Vec<(bool, bool)> {
         let elsewhere = from.table(subject.flown, subject.basis.buildup);
@@ -55,7 +74,10 @@ pub fn starts(subject: &Subject, setting: Setting, realisations: usize, seed: u6
             let reference = subject.from(&truth, setting, seed);
             let found = subject.from(&elsewhere, setting, seed);
             let same = same(&reference, &found);
-            (same && found.fit.start.as_deref() == Some(Start::WindTunnel.in_words()), same)
+            (
+                same && found.fit.start.as_deref() == Some(Start::WindTunnel.in_words()),
+                same,
+            )
         };
         (0..realisations).into_par_iter().map(one).collect()
     };
@@ -76,9 +98,20 @@ pub fn starts(subject: &Subject, setting: Setting, realisations: usize, seed: u6
 impl Subject<'_> {
     /// The estimate from one record whose iteration starts from the values of a table.
     fn from(&self, start: &WindTunnel, setting: Setting, seed: u64) -> Estimated {
-        let settings = estimate::Settings { start: Start::WindTunnel, ..self.basis.settings.clone() };
-        let basis = Basis { settings: &settings, start, ..self.basis };
-        Subject { basis, ..self.clone() }.estimate(setting, seed)
+        let settings = estimate::Settings {
+            start: Start::WindTunnel,
+            ..self.basis.settings.clone()
+        };
+        let basis = Basis {
+            settings: &settings,
+            start,
+            ..self.basis
+        };
+        Subject {
+            basis,
+            ..self.clone()
+        }
+        .estimate(setting, seed)
     }
 }
 

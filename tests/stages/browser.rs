@@ -11,7 +11,8 @@ use crate::support::demo;
 fn chromium() -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
     let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-    let mut candidates = std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name)));
+    let mut candidates =
+        std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name)));
     candidates.find(|path| path.is_file())
 }
 
@@ -26,9 +27,21 @@ fn open(chromium: &Path, folder: &Path, page: &Path, options: &[&str]) -> Seen {
     let (out, err) = (folder.join("out"), folder.join("err"));
     let file = |path: &Path| Stdio::from(std::fs::File::create(path).unwrap());
     let mut child = Command::new(chromium)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--virtual-time-budget=20000"])
-        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--force-prefers-reduced-motion"])
-        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=20000",
+        ])
+        .args([
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            "--force-prefers-reduced-motion",
+        ])
+        .arg(format!(
+            "--user-data-dir={}",
+            folder.join("profile").display()
+        ))
         .args(options)
         .arg(format!("file://{}", page.display()))
         .stdout(file(&out))
@@ -40,12 +53,22 @@ fn open(chromium: &Path, folder: &Path, page: &Path, options: &[&str]) -> Seen {
         if started.elapsed() > Duration::from_mins(2) {
             child.kill().unwrap();
         }
-        assert!(started.elapsed() < Duration::from_mins(3), "the browser did not come to an end");
+        assert!(
+            started.elapsed() < Duration::from_mins(3),
+            "the browser did not come to an end"
+        );
         std::thread::sleep(Duration::from_millis(50));
     }
     let said = String::from_utf8_lossy(&std::fs::read(&err).unwrap()).into_owned();
-    let console = said.lines().filter(|line| line.contains("CONSOLE")).map(str::to_owned).collect();
-    Seen { page: std::fs::read_to_string(&out).unwrap(), console }
+    let console = said
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .map(str::to_owned)
+        .collect();
+    Seen {
+        page: std::fs::read_to_string(&out).unwrap(),
+        console,
+    }
 }
 
 /// Asks the page what a reader would see, and writes the answers into its title.
@@ -74,14 +97,27 @@ fn a_browser_shows_the_report_wide_and_narrow_and_complains_of_nothing() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
     let page = folder.path().join("asked.html");
-    let asked = demo().report.replace("</body>", &format!("<script>{QUESTIONS}</script></body>"));
+    let asked = demo()
+        .report
+        .replace("</body>", &format!("<script>{QUESTIONS}</script></body>"));
     std::fs::write(&page, asked).unwrap();
     for size in ["--window-size=1400,1000", "--window-size=500,900"] {
         let seen = open(&chromium, folder.path(), &page, &["--dump-dom", size]);
         assert!(seen.console.is_empty(), "{size}: {:?}", seen.console);
-        let title = seen.page.split_once("<title>").and_then(|(_, rest)| rest.split_once("</title>")).unwrap().0;
-        assert!(title.starts_with("loaded 0; wide false; figures "), "{size}: {title}");
-        assert!(title.ends_with(" empty 0; drawn true; sorted true; before true; after false"), "{size}: {title}");
+        let title = seen
+            .page
+            .split_once("<title>")
+            .and_then(|(_, rest)| rest.split_once("</title>"))
+            .unwrap()
+            .0;
+        assert!(
+            title.starts_with("loaded 0; wide false; figures "),
+            "{size}: {title}"
+        );
+        assert!(
+            title.ends_with(" empty 0; drawn true; sorted true; before true; after false"),
+            "{size}: {title}"
+        );
     }
 }
 
@@ -89,13 +125,21 @@ fn a_browser_shows_the_report_wide_and_narrow_and_complains_of_nothing() {
 fn a_browser_prints_the_report() {
     let Some(chromium) = chromium() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let (page, printed) = (folder.path().join("report.html"), folder.path().join("printed.pdf"));
+    let (page, printed) = (
+        folder.path().join("report.html"),
+        folder.path().join("printed.pdf"),
+    );
     std::fs::write(&page, &demo().report).unwrap();
     let option = format!("--print-to-pdf={}", printed.display());
-    let seen = open(&chromium, folder.path(), &page, &[&option, "--no-pdf-header-footer"]);
+    let seen = open(
+        &chromium,
+        folder.path(),
+        &page,
+        &[&option, "--no-pdf-header-footer"],
+    );
     assert!(seen.console.is_empty(), "{:?}", seen.console);
     let pages = lopdf::Document::load(&printed).unwrap().get_pages().len();
-    let sheets =
-        demo().report.matches("class=\"maneuver sheet\"").count() + demo().report.matches("class=\"derivative").count();
+    let sheets = demo().report.matches("class=\"maneuver sheet\"").count()
+        + demo().report.matches("class=\"derivative").count();
     assert!(pages > sheets, "{pages} pages for {sheets} sheets");
 }

@@ -7,7 +7,10 @@ pub fn assert_same_estimates(a: &[Row], b: &[Row]) {
     assert_eq!(a.len(), b.len());
     assert!(a.iter().any(|row| row["status"] == "estimated"));
     for (a, b) in a.iter().zip(b) {
-        assert_eq!((&a["derivative"], &a["status"], &a["unit"]), (&b["derivative"], &b["status"], &b["unit"]));
+        assert_eq!(
+            (&a["derivative"], &a["status"], &a["unit"]),
+            (&b["derivative"], &b["status"], &b["unit"])
+        );
         if a["status"] == "estimated" {
             let apart = (number(a, "value") - number(b, "value")).abs();
             assert!(apart < 1e-3 * number(a, "bound"), "{a:?}\n{b:?}");
@@ -53,7 +56,10 @@ fn derivatives_are_near_those_that_were_flown() {
         ("flight_004_t00124", "Cl_p", -0.227_934),
     ] {
         let ratio = estimate(maneuver, derivative) / truth;
-        assert!((ratio - 1.0).abs() < 0.1, "{derivative} of {maneuver} is {ratio} times the truth");
+        assert!(
+            (ratio - 1.0).abs() < 0.1,
+            "{derivative} of {maneuver} is {ratio} times the truth"
+        );
     }
 }
 
@@ -63,20 +69,35 @@ fn primary_derivatives_have_the_sign_of_a_conventional_aircraft() {
     for (derivative, sign, sentence) in [
         ("CN_alpha", 1.0, "more angle of attack, more normal force"),
         ("CN_de", 1.0, "stabilator trailing edge down lifts the tail"),
-        ("Cm_de", -1.0, "stabilator trailing edge down pitches the nose down"),
+        (
+            "Cm_de",
+            -1.0,
+            "stabilator trailing edge down pitches the nose down",
+        ),
         ("Cm_q", -1.0, "pitching up is damped"),
         ("Cm_dpv", -1.0, "plume down pitches the nose down"),
         ("CY_beta", -1.0, "wind from the right pushes to the left"),
         ("Cl_beta", -1.0, "wind from the right rolls to the left"),
         ("Cl_p", -1.0, "rolling is damped"),
         ("Cl_da", 1.0, "ailerons roll to the right"),
-        ("CY_dr", 1.0, "rudder trailing edge left pushes to the right"),
-        ("Cn_dr", -1.0, "rudder trailing edge left yaws the nose left"),
+        (
+            "CY_dr",
+            1.0,
+            "rudder trailing edge left pushes to the right",
+        ),
+        (
+            "Cn_dr",
+            -1.0,
+            "rudder trailing edge left yaws the nose left",
+        ),
         ("Cn_dyv", 1.0, "plume right yaws the nose right"),
     ] {
         let of = |row: &&Row| row["derivative"] == derivative && row["status"] == "estimated";
-        let mut values: Vec<f64> =
-            demo().tables["estimates"].iter().filter(of).map(|row| number(row, "value")).collect();
+        let mut values: Vec<f64> = demo().tables["estimates"]
+            .iter()
+            .filter(of)
+            .map(|row| number(row, "value"))
+            .collect();
         values.sort_by(f64::total_cmp);
         let median = values[values.len() / 2];
         assert!(median * sign > 0.0, "{sentence}: {derivative} is {median}");
@@ -86,13 +107,25 @@ fn primary_derivatives_have_the_sign_of_a_conventional_aircraft() {
 #[test]
 fn a_bound_stands_beside_every_estimate_and_nowhere_else() {
     for row in &demo().tables["estimates"] {
-        assert_eq!(row["status"] == "estimated", !row["bound"].is_empty(), "{row:?}");
-        assert_eq!(row["status"] == "inactive", row["value"].is_empty(), "{row:?}");
+        assert_eq!(
+            row["status"] == "estimated",
+            !row["bound"].is_empty(),
+            "{row:?}"
+        );
+        assert_eq!(
+            row["status"] == "inactive",
+            row["value"].is_empty(),
+            "{row:?}"
+        );
         if row["status"] == "held" {
             assert_eq!(row["value"], row["wind_tunnel"], "{row:?}");
         }
         if row["status"] == "estimated" {
-            assert!(number(row, "bound_corrected") >= number(row, "bound") && number(row, "bound") > 0.0, "{row:?}");
+            assert!(
+                number(row, "bound_corrected") >= number(row, "bound")
+                    && number(row, "bound") > 0.0,
+                "{row:?}"
+            );
         }
     }
 }
@@ -100,10 +133,16 @@ fn a_bound_stands_beside_every_estimate_and_nowhere_else() {
 #[test]
 fn an_override_of_a_class_holds_above_its_angle_of_attack() {
     // The paper's asterisk in Table 3: CY_da of pilot yaw and roll steps.
-    let statuses = demo().tables["estimates"].iter().filter(|r| r["class"] == "PYRS" && r["derivative"] == "CY_da");
+    let statuses = demo().tables["estimates"]
+        .iter()
+        .filter(|r| r["class"] == "PYRS" && r["derivative"] == "CY_da");
     let mut seen = 0;
     for row in statuses {
-        let expected = if number(row, "alpha_deg") > 22.5 { "estimated" } else { "held" };
+        let expected = if number(row, "alpha_deg") > 22.5 {
+            "estimated"
+        } else {
+            "held"
+        };
         assert_eq!(row["status"], expected, "{row:?}");
         seen += 1;
     }
@@ -116,16 +155,30 @@ fn a_derivative_under_another_name_is_a_matter_of_the_model_s_file() {
     shipped.ends("estimate", 0);
     let other = Campaign::of_pitch_steps();
     other.copy_pipeline();
-    other.edit("model.yaml", "CN_de,     coefficient", "CN_stab,   coefficient");
+    other.edit(
+        "model.yaml",
+        "CN_de,     coefficient",
+        "CN_stab,   coefficient",
+    );
     for file in other.class_files() {
-        if std::fs::read_to_string(other.path("pipeline").join(&file)).unwrap().contains("CN_de") {
+        if std::fs::read_to_string(other.path("pipeline").join(&file))
+            .unwrap()
+            .contains("CN_de")
+        {
             other.edit(&file, "CN_de,", "CN_stab,");
         }
     }
     let table = std::fs::read_to_string("data/demo/wt_tables.csv").unwrap();
-    let renamed = table.replace("CN_de,", "CN_stab,").replace("CNde,", "CNstab,");
+    let renamed = table
+        .replace("CN_de,", "CN_stab,")
+        .replace("CNde,", "CNstab,");
     std::fs::write(other.path("tunnel.csv"), renamed).unwrap();
-    let outcome = crate::support::run(other.command("estimate").arg("--wind-tunnel").arg(other.path("tunnel.csv")));
+    let outcome = crate::support::run(
+        other
+            .command("estimate")
+            .arg("--wind-tunnel")
+            .arg(other.path("tunnel.csv")),
+    );
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     let mut rows = other.table("estimates");
     for row in &mut rows {
@@ -141,7 +194,11 @@ fn a_new_derivative_is_a_line_in_the_model_and_one_in_each_class() {
     campaign.copy_pipeline();
     // Normal force from the pitch rate's own surface, the ailerons: estimated by no class, absent in each.
     let first = "  - { name: CN_alpha,";
-    campaign.edit("model.yaml", first, &format!("  - {{ name: CN_da, coefficient: CN, regressor: da_deg }}\n{first}"));
+    campaign.edit(
+        "model.yaml",
+        first,
+        &format!("  - {{ name: CN_da, coefficient: CN, regressor: da_deg }}\n{first}"),
+    );
     for file in campaign.class_files() {
         let text = std::fs::read_to_string(campaign.path("pipeline").join(&file)).unwrap();
         if text.contains("axis: longitudinal") {
@@ -156,7 +213,11 @@ fn a_new_derivative_is_a_line_in_the_model_and_one_in_each_class() {
     let rows = campaign.table("estimates");
     let names: Vec<&str> = rows.iter().map(|r| r["derivative"].as_str()).collect();
     let at = names.iter().position(|n| *n == "CN_da").unwrap();
-    assert_eq!(names[at + 1], "CN_alpha", "rows come in the order of the model");
+    assert_eq!(
+        names[at + 1],
+        "CN_alpha",
+        "rows come in the order of the model"
+    );
     assert_eq!(rows[at]["status"], "inactive");
 }
 
@@ -166,26 +227,48 @@ fn a_bias_less_is_a_line_less() {
     campaign.copy_pipeline();
     campaign.edit("model.yaml", "  - { name: q_bias, output: q }\n", "");
     for file in campaign.class_files() {
-        if std::fs::read_to_string(campaign.path("pipeline").join(&file)).unwrap().contains("q_bias") {
+        if std::fs::read_to_string(campaign.path("pipeline").join(&file))
+            .unwrap()
+            .contains("q_bias")
+        {
             campaign.edit(&file, " q_bias,", "");
         }
     }
     campaign.ends("estimate", 0);
-    assert!(campaign.table("estimates").iter().all(|row| row["derivative"] != "q_bias"));
-    assert!(campaign.table("estimates").iter().any(|row| row["derivative"] == "an_bias"));
+    assert!(
+        campaign
+            .table("estimates")
+            .iter()
+            .all(|row| row["derivative"] != "q_bias")
+    );
+    assert!(
+        campaign
+            .table("estimates")
+            .iter()
+            .any(|row| row["derivative"] == "an_bias")
+    );
 }
 
 #[test]
 fn a_held_derivative_without_a_tunnel_value_stops_the_run() {
     let campaign = Campaign::of_pitch_steps();
     let table = std::fs::read_to_string("data/demo/wt_tables.csv").unwrap();
-    let without: Vec<&str> =
-        table.lines().filter(|l| !l.starts_with("CN_dlef,") && !l.starts_with("CNdlef,")).collect();
+    let without: Vec<&str> = table
+        .lines()
+        .filter(|l| !l.starts_with("CN_dlef,") && !l.starts_with("CNdlef,"))
+        .collect();
     assert!(without.len() < table.lines().count());
     std::fs::write(campaign.path("tunnel.csv"), without.join("\n")).unwrap();
-    let outcome =
-        crate::support::run(campaign.command("estimate").arg("--wind-tunnel").arg(campaign.path("tunnel.csv")));
+    let outcome = crate::support::run(
+        campaign
+            .command("estimate")
+            .arg("--wind-tunnel")
+            .arg(campaign.path("tunnel.csv")),
+    );
     assert_eq!(outcome.code, Some(1), "{outcome:?}");
     assert!(outcome.stderr.contains("3211.yaml:"), "{outcome:?}");
-    assert!(outcome.stderr.contains("`CN_dlef` is held, and "), "{outcome:?}");
+    assert!(
+        outcome.stderr.contains("`CN_dlef` is held, and "),
+        "{outcome:?}"
+    );
 }

@@ -24,29 +24,50 @@ fn the_export_is_the_trend_where_flight_has_data_and_comes_back_as_the_tunnel() 
     let mut flight = 0;
     for row in rows.iter().filter(|r| r["is_flight"] == "1") {
         let same = |c: &&crate::support::Row| {
-            c["derivative"] == row["derivative"] && (number(c, "alpha_deg") - number(row, "alpha_deg")).abs() < 1e-9
+            c["derivative"] == row["derivative"]
+                && (number(c, "alpha_deg") - number(row, "alpha_deg")).abs() < 1e-9
         };
         // A constant is what is left of its sum.
         if row["source"].contains("−") {
             continue;
         }
-        let compared = comparison.iter().find(same).unwrap_or_else(|| panic!("{row:?}"));
+        let compared = comparison
+            .iter()
+            .find(same)
+            .unwrap_or_else(|| panic!("{row:?}"));
         assert_eq!(compared["flight"], row["value"]);
         flight += 1;
     }
-    assert!(flight > 100 && flight < rows.len(), "{flight} of {}", rows.len());
+    assert!(
+        flight > 100 && flight < rows.len(),
+        "{flight} of {}",
+        rows.len()
+    );
     let value = |name: &str, alpha: &str| {
         let there = |r: &&crate::support::Row| r["derivative"] == name && r["alpha_deg"] == alpha;
         rows.iter().find(there).map(|r| number(r, "value"))
     };
-    for row in rows.iter().filter(|r| r["source"].contains("CN_ba − CN_alpha α")) {
+    for row in rows
+        .iter()
+        .filter(|r| r["source"].contains("CN_ba − CN_alpha α"))
+    {
         let alpha = &row["alpha_deg"];
-        let sum = number(row, "value") + value("CN_alpha", alpha).unwrap() * number(row, "alpha_deg");
+        let sum =
+            number(row, "value") + value("CN_alpha", alpha).unwrap() * number(row, "alpha_deg");
         approx::assert_relative_eq!(sum, value("CN_ba", alpha).unwrap(), max_relative = 1e-12);
     }
     // Every format is a tunnel that the pipeline takes; `export::tests` hold that its values are the same to the bit.
-    for name in ["flight_updated.csv", "flight_updated.parquet", "flight_updated.dml"] {
-        let outcome = crate::support::run(campaign.command("check").arg("--wind-tunnel").arg(folder.join(name)));
+    for name in [
+        "flight_updated.csv",
+        "flight_updated.parquet",
+        "flight_updated.dml",
+    ] {
+        let outcome = crate::support::run(
+            campaign
+                .command("check")
+                .arg("--wind-tunnel")
+                .arg(folder.join(name)),
+        );
         assert_eq!(outcome.code, Some(0), "{name}: {outcome:?}");
     }
 }
@@ -56,16 +77,32 @@ fn jsbsim_itself_computes_the_exported_coefficients() {
     let campaign = exported();
     let python = std::env::var("JSBSIM_PYTHON").unwrap_or_else(|_| "python3".into());
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/load_in_jsbsim.py");
-    let Ok(output) = Command::new(python).arg(script).arg(campaign.path("reports/export")).output() else { return };
+    let Ok(output) = Command::new(python)
+        .arg(script)
+        .arg(campaign.path("reports/export"))
+        .output()
+    else {
+        return;
+    };
     // 77: JSBSim is not installed; `export::tests` evaluates the section by its rules in any case.
-    assert!(matches!(output.status.code(), Some(0 | 77)), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        matches!(output.status.code(), Some(0 | 77)),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 #[test]
 fn an_export_does_not_change_what_is_up_to_date() {
     let campaign = exported();
-    let names = ["flight_updated.csv", "flight_updated.parquet", "flight_updated.dml", "flight_updated_jsbsim.xml"];
-    let bytes = || names.map(|name| std::fs::read(campaign.path("reports/export").join(name)).unwrap());
+    let names = [
+        "flight_updated.csv",
+        "flight_updated.parquet",
+        "flight_updated.dml",
+        "flight_updated_jsbsim.xml",
+    ];
+    let bytes =
+        || names.map(|name| std::fs::read(campaign.path("reports/export").join(name)).unwrap());
     let first = bytes();
     campaign.ends("export", 0);
     assert_eq!(bytes(), first);

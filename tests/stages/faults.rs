@@ -19,11 +19,24 @@ fn config() -> Config {
 
 fn flights(config: &Config) -> Vec<RawFlight> {
     let found = archive::find(&config.archive).unwrap();
-    found.iter().map(|files| archive::read(files, &config.channels).unwrap().swap_remove(0)).collect()
+    found
+        .iter()
+        .map(|files| {
+            archive::read(files, &config.channels)
+                .unwrap()
+                .swap_remove(0)
+        })
+        .collect()
 }
 
 fn ingest(config: &Config, raw: &RawFlight, settings: &Settings) -> Result<Ingested, Problem> {
-    ingest::record(raw, &config.channels, &config.constants, &config.aircraft, settings)
+    ingest::record(
+        raw,
+        &config.channels,
+        &config.constants,
+        &config.aircraft,
+        settings,
+    )
 }
 
 #[test]
@@ -36,26 +49,39 @@ fn every_demonstration_flight_passes_its_checks_and_is_repaired() {
         assert_eq!(ingested.problems, [], "{}", raw.flight_id);
         assert_eq!(ingested.checks.len(), 12);
         for check in &ingested.checks {
-            let weak = check.relation.contains("lateral acceleration") && check.verdict == "not excited";
-            assert!(weak || check.verdict == "ok", "{}: {check:?}", raw.flight_id);
+            let weak =
+                check.relation.contains("lateral acceleration") && check.verdict == "not excited";
+            assert!(
+                weak || check.verdict == "ok",
+                "{}: {check:?}",
+                raw.flight_id
+            );
         }
         let lost = ingested.record.samples - raw.columns["time"].values.len();
         assert!(lost < 30, "{lost} lost frames");
         for row in &ingested.channels {
             assert_eq!((row.missing, row.stuck, row.between), (0, 0, 0), "{row:?}");
-            assert!(row.rate_hz.is_some_and(|rate| (rate - 40.0).abs() < 0.01), "{row:?}");
+            assert!(
+                row.rate_hz.is_some_and(|rate| (rate - 40.0).abs() < 0.01),
+                "{row:?}"
+            );
             assert!(row.bridged >= lost && row.bridged < 150, "{row:?}");
             assert!(row.despiked <= 12, "{row:?}");
         }
         let heading = ingested.record.values("psi_deg").unwrap();
-        assert!(heading.windows(2).all(|p| (p[1] - p[0]).abs() < 10.0), "a heading that wraps");
+        assert!(
+            heading.windows(2).all(|p| (p[1] - p[0]).abs() < 10.0),
+            "a heading that wraps"
+        );
     }
 }
 
 /// Ten minutes of the second flight.
 fn ten_minutes(config: &Config) -> RawFlight {
     let mut raw = flights(config).swap_remove(1);
-    raw.columns.values_mut().for_each(|c| c.values.truncate(24_000));
+    raw.columns
+        .values_mut()
+        .for_each(|c| c.values.truncate(24_000));
     raw
 }
 
@@ -63,15 +89,24 @@ fn ten_minutes(config: &Config) -> RawFlight {
 fn each_is_named_alone(planted: &[(&str, f64)]) {
     let config = config();
     let raw = ten_minutes(&config);
-    let gross = Compatibility { reconstruct: false, ..Compatibility::default() };
+    let gross = Compatibility {
+        reconstruct: false,
+        ..Compatibility::default()
+    };
     let on_failed_check = ingest::OnFailedCheck::Report;
-    let settings = Settings { on_failed_check, compatibility: gross, ..Settings::default() };
+    let settings = Settings {
+        on_failed_check,
+        compatibility: gross,
+        ..Settings::default()
+    };
     for (channel, factor) in planted {
         let mut wrong = raw.clone();
         let column = wrong.columns.get_mut(*channel).unwrap();
         column.values.iter_mut().for_each(|v| *v *= factor);
         let rows = ingest(&config, &wrong, &settings).unwrap().channels;
-        let accused = rows.iter().filter(|c| c.verdict != "ok" && c.verdict != "not checked");
+        let accused = rows
+            .iter()
+            .filter(|c| c.verdict != "ok" && c.verdict != "not checked");
         let accused: Vec<&str> = accused.map(|c| c.channel.as_str()).collect();
         assert_eq!(accused, [*channel], "times {factor}");
     }
@@ -84,12 +119,16 @@ fn a_reversed_attitude_or_rate_is_named() {
 
 #[test]
 fn a_reversed_vane_accelerometer_or_altitude_is_named() {
-    each_is_named_alone(&["alpha_vane", "beta_vane", "an", "ax", "ay", "altitude"].map(|name| (name, -1.0)));
+    each_is_named_alone(
+        &["alpha_vane", "beta_vane", "an", "ax", "ay", "altitude"].map(|name| (name, -1.0)),
+    );
 }
 
 #[test]
 fn an_angle_or_a_rate_in_radians_is_named() {
-    each_is_named_alone(&["theta", "phi", "alpha_vane", "beta_vane", "p", "q", "r"].map(|name| (name, 1.0 / DEG)));
+    each_is_named_alone(
+        &["theta", "phi", "alpha_vane", "beta_vane", "p", "q", "r"].map(|name| (name, 1.0 / DEG)),
+    );
 }
 
 #[test]
@@ -114,16 +153,43 @@ fn a_dead_rate_gyro_is_named() {
 fn a_refused_flight_names_channel_relation_and_cause() {
     let config = config();
     let mut raw = ten_minutes(&config);
-    raw.columns.get_mut("q").unwrap().values.iter_mut().for_each(|v| *v /= DEG);
+    raw.columns
+        .get_mut("q")
+        .unwrap()
+        .values
+        .iter_mut()
+        .for_each(|v| *v /= DEG);
     let problem = ingest(&config, &raw, &Settings::default()).unwrap_err();
-    assert_eq!((problem.flight_id.as_str(), problem.place.as_str()), ("flight_002", "channel `q`"));
-    assert!(problem.reason.contains("theta rate against q and r: slope "), "{}", problem.reason);
-    assert!(problem.reason.contains("it is recorded in rad/s, not in deg/s"), "{}", problem.reason);
+    assert_eq!(
+        (problem.flight_id.as_str(), problem.place.as_str()),
+        ("flight_002", "channel `q`")
+    );
+    assert!(
+        problem
+            .reason
+            .contains("theta rate against q and r: slope "),
+        "{}",
+        problem.reason
+    );
+    assert!(
+        problem
+            .reason
+            .contains("it is recorded in rad/s, not in deg/s"),
+        "{}",
+        problem.reason
+    );
 }
 
 /// Fewer windows than by default, for speed.
 fn few_windows(fault: OnFault) -> Settings {
-    Settings { compatibility: Compatibility { windows: 8, fault, ..Compatibility::default() }, ..Settings::default() }
+    Settings {
+        compatibility: Compatibility {
+            windows: 8,
+            fault,
+            ..Compatibility::default()
+        },
+        ..Settings::default()
+    }
 }
 
 /// A channel recorded so many samples late; each is 25 ms.
@@ -137,8 +203,12 @@ fn delay(raw: &mut RawFlight, channel: &str, samples: usize) {
 
 /// The channels that are named as delayed, each with its delay in s.
 fn delayed(ingested: &Ingested) -> Vec<(&str, f64)> {
-    let rows = ingested.instruments.iter().filter(|r| r.verdict.contains("delayed by"));
-    rows.map(|r| (r.channel.as_str(), r.delay_s.unwrap())).collect()
+    let rows = ingested
+        .instruments
+        .iter()
+        .filter(|r| r.verdict.contains("delayed by"));
+    rows.map(|r| (r.channel.as_str(), r.delay_s.unwrap()))
+        .collect()
 }
 
 #[test]
@@ -152,13 +222,18 @@ fn a_delay_of_a_tenth_of_a_second_is_named_and_the_record_corrected_by_it() {
         let mut raw = exact.clone();
         delay(&mut raw, channel, 4);
         let ingested = ingest(&config, &raw, &settings).unwrap();
-        let [(named, delay_s)] = delayed(&ingested)[..] else { panic!("{:?}", ingested.problems) };
+        let [(named, delay_s)] = delayed(&ingested)[..] else {
+            panic!("{:?}", ingested.problems)
+        };
         assert_eq!(named, channel);
         assert!((delay_s - 0.1).abs() < 0.01, "{delay_s}");
         assert_eq!(ingested.problems.len(), 1, "{:?}", ingested.problems);
         assert_eq!(ingested.problems[0].place, format!("channel `{channel}`"));
         let signal = &config.channels[channel].signal;
-        let (values, before) = (ingested.record.values(signal).unwrap(), healthy.record.values(signal).unwrap());
+        let (values, before) = (
+            ingested.record.values(signal).unwrap(),
+            healthy.record.values(signal).unwrap(),
+        );
         let apart = |shift: usize| {
             let pairs = values.iter().zip(&before[shift..]).skip(100).take(20_000);
             pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>()
@@ -182,12 +257,25 @@ fn delays_of_two_channels_are_both_named() {
 fn a_reversed_sign_and_a_delay_in_one_flight_are_both_named() {
     let config = config();
     let mut raw = ten_minutes(&config);
-    raw.columns.get_mut("an").unwrap().values.iter_mut().for_each(|v| *v = -*v);
+    raw.columns
+        .get_mut("an")
+        .unwrap()
+        .values
+        .iter_mut()
+        .for_each(|v| *v = -*v);
     delay(&mut raw, "q", 4);
     let problem = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap_err();
     assert_eq!(problem.place, "channel `an`");
-    assert!(problem.reason.contains("its sign is reversed"), "{}", problem.reason);
-    assert!(problem.reason.contains("`q` is delayed by"), "{}", problem.reason);
+    assert!(
+        problem.reason.contains("its sign is reversed"),
+        "{}",
+        problem.reason
+    );
+    assert!(
+        problem.reason.contains("`q` is delayed by"),
+        "{}",
+        problem.reason
+    );
 }
 
 #[test]
@@ -201,8 +289,15 @@ fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
     let report = few_windows(OnFault::Report);
     let ingested = ingest(&config, &raw, &report).unwrap();
     assert_eq!(ingested.problems.len(), 1);
-    let q = ingested.instruments.iter().find(|r| r.channel == "q").unwrap();
-    assert!(q.verdict.starts_with("delayed by") && !q.applied.contains("delay"), "{q:?}");
+    let q = ingested
+        .instruments
+        .iter()
+        .find(|r| r.channel == "q")
+        .unwrap();
+    assert!(
+        q.verdict.starts_with("delayed by") && !q.applied.contains("delay"),
+        "{q:?}"
+    );
 }
 
 #[test]
@@ -211,8 +306,18 @@ fn of_a_healthy_flight_with_known_errors_the_table_tells_them() {
     let settings = few_windows(OnFault::Apply);
     let mut raw = ten_minutes(&config);
     let before = ingest(&config, &raw, &settings).unwrap().instruments;
-    raw.columns.get_mut("q").unwrap().values.iter_mut().for_each(|v| *v += 0.08);
-    raw.columns.get_mut("ax").unwrap().values.iter_mut().for_each(|v| *v -= 0.01);
+    raw.columns
+        .get_mut("q")
+        .unwrap()
+        .values
+        .iter_mut()
+        .for_each(|v| *v += 0.08);
+    raw.columns
+        .get_mut("ax")
+        .unwrap()
+        .values
+        .iter_mut()
+        .for_each(|v| *v -= 0.01);
     let ingested = ingest(&config, &raw, &settings).unwrap();
     assert_eq!(ingested.problems, []);
     for (channel, bias) in [("q", 0.08), ("ax", -0.01)] {
@@ -221,6 +326,9 @@ fn of_a_healthy_flight_with_known_errors_the_table_tells_them() {
             (row.bias.unwrap(), row.bias_bound.unwrap())
         };
         let ((with, bound), (without, _)) = (of(&ingested.instruments), of(&before));
-        assert!((with - without - bias).abs() < 2.0 * bound, "{channel}: {with} after {without}, bound {bound}");
+        assert!(
+            (with - without - bias).abs() < 2.0 * bound,
+            "{channel}: {with} after {without}, bound {bound}"
+        );
     }
 }

@@ -10,7 +10,9 @@ use harvest::config::{Config, Overrides};
 use harvest::error::Error;
 use serde_yaml::Value;
 
-use crate::support::{Campaign, Outcome, Random, copy_tree, files, flight, from_environment, pitch_steps};
+use crate::support::{
+    Campaign, Outcome, Random, copy_tree, files, flight, from_environment, pitch_steps,
+};
 
 /// Memory that a run on small flights gets, kB of address space; what it takes is far less.
 const MEMORY_KB: usize = 4_000_000;
@@ -22,8 +24,13 @@ const PATIENCE: Duration = Duration::from_mins(5);
 fn bounded(campaign: &Campaign) -> Outcome {
     let command = campaign.command("ingest");
     let words = std::iter::once(command.get_program()).chain(command.get_args());
-    let words: Vec<String> = words.map(|word| format!("'{}'", word.to_string_lossy())).collect();
-    let script = format!("ulimit -v {MEMORY_KB}; exec {} --threads 2", words.join(" "));
+    let words: Vec<String> = words
+        .map(|word| format!("'{}'", word.to_string_lossy()))
+        .collect();
+    let script = format!(
+        "ulimit -v {MEMORY_KB}; exec {} --threads 2",
+        words.join(" ")
+    );
     let (out, err) = (campaign.path("stdout"), campaign.path("stderr"));
     let mut child = Command::new("sh")
         .args(["-c", &script])
@@ -46,7 +53,11 @@ fn bounded(campaign: &Campaign) -> Outcome {
         std::thread::sleep(Duration::from_millis(10));
     };
     let text = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
-    Outcome { code, stdout: text(&out), stderr: text(&err) }
+    Outcome {
+        code,
+        stdout: text(&out),
+        stderr: text(&err),
+    }
 }
 
 /// One way to spoil a file.
@@ -63,13 +74,19 @@ fn spoiled(whole: &[u8], random: &mut Random) -> Vec<u8> {
         }
         2 => {
             let from = random.below(length);
-            let run: Vec<u8> = (0..random.below(64)).map(|_| random.next().to_le_bytes()[0]).collect();
+            let run: Vec<u8> = (0..random.below(64))
+                .map(|_| random.next().to_le_bytes()[0])
+                .collect();
             bytes.splice(from..from, run);
         }
         3 => {
             let (from, to) = (random.below(length), random.below(length));
             let piece = bytes[from..length.min(from + 500)].to_vec();
-            bytes.iter_mut().skip(to).zip(piece).for_each(|(b, p)| *b = p);
+            bytes
+                .iter_mut()
+                .skip(to)
+                .zip(piece)
+                .for_each(|(b, p)| *b = p);
         }
         4 | 5 => {
             for _ in 0..=random.below(4) {
@@ -79,7 +96,11 @@ fn spoiled(whole: &[u8], random: &mut Random) -> Vec<u8> {
         }
         6 => {
             let at = footer + random.below(length - footer);
-            bytes.iter_mut().skip(at).take(1 + random.below(8)).for_each(|b| *b = 0xff);
+            bytes
+                .iter_mut()
+                .skip(at)
+                .take(1 + random.below(8))
+                .for_each(|b| *b = 0xff);
         }
         _ => {
             for _ in 0..=random.below(20) {
@@ -102,7 +123,11 @@ fn whatever_bytes_a_flight_has_the_others_are_read() {
     for _ in 0..wanted.div_ceil(per_run) {
         let campaign = Campaign::of_pitch_steps();
         for i in 0..per_run {
-            fs::write(campaign.flight(&format!("spoiled_{i:03}")), spoiled(&whole, &mut random)).unwrap();
+            fs::write(
+                campaign.flight(&format!("spoiled_{i:03}")),
+                spoiled(&whole, &mut random),
+            )
+            .unwrap();
         }
         let outcome = bounded(&campaign);
         if outcome.code != Some(2) {
@@ -111,7 +136,12 @@ fn whatever_bytes_a_flight_has_the_others_are_read() {
             panic!("{outcome:?}; the files are in {}", kept.display());
         }
         assert_eq!(outcome.stderr, "");
-        let told = |table: &str, id: &str| campaign.table(table).iter().any(|row| row["flight_id"] == id);
+        let told = |table: &str, id: &str| {
+            campaign
+                .table(table)
+                .iter()
+                .any(|row| row["flight_id"] == id)
+        };
         assert!(told("channels", "flight_001") && !told("problems", "flight_001"));
         for i in 0..per_run {
             let id = format!("spoiled_{i:03}");
@@ -131,19 +161,37 @@ fn a_parquet_bomb_is_refused_and_the_other_flights_are_read() {
     let path = campaign.flight("bomb");
     let reader = SerializedFileReader::new(fs::File::open(&path).unwrap()).unwrap();
     let groups = reader.metadata().row_groups().iter();
-    let claims = groups.map(|g| g.clone().into_builder().set_num_rows(1_000_000_000_000).build().unwrap()).collect();
+    let claims = groups
+        .map(|g| {
+            g.clone()
+                .into_builder()
+                .set_num_rows(1_000_000_000_000)
+                .build()
+                .unwrap()
+        })
+        .collect();
     let metadata = ParquetMetaData::new(reader.metadata().file_metadata().clone(), claims);
     let mut bytes = fs::read(&path).unwrap();
     let end = bytes.len();
     let footer: [u8; 4] = bytes[end - 8..end - 4].try_into().unwrap();
     bytes.truncate(end - 8 - usize::try_from(u32::from_le_bytes(footer)).unwrap());
-    ParquetMetaDataWriter::new(&mut bytes, &metadata).finish().unwrap();
+    ParquetMetaDataWriter::new(&mut bytes, &metadata)
+        .finish()
+        .unwrap();
     fs::write(&path, bytes).unwrap();
     let outcome = bounded(&campaign);
     assert_eq!(outcome.code, Some(2), "{outcome:?}");
     let problems = campaign.table("problems");
-    assert!(problems.len() == 1 && problems[0]["reason"].contains("claims 1000000000000 rows"), "{problems:?}");
-    assert!(campaign.table("channels").iter().any(|row| row["flight_id"] == "flight_001"));
+    assert!(
+        problems.len() == 1 && problems[0]["reason"].contains("claims 1000000000000 rows"),
+        "{problems:?}"
+    );
+    assert!(
+        campaign
+            .table("channels")
+            .iter()
+            .any(|row| row["flight_id"] == "flight_001")
+    );
 }
 
 /// Values that a tired analyst, or a program, might write.
@@ -172,7 +220,11 @@ fn mutate(value: &mut Value, random: &mut Random) {
     match value {
         Value::Mapping(map) if !map.is_empty() && go_on => {
             let at = random.below(map.len());
-            let (key, _) = map.iter().nth(at).map(|(k, v)| (k.clone(), v.clone())).unwrap();
+            let (key, _) = map
+                .iter()
+                .nth(at)
+                .map(|(k, v)| (k.clone(), v.clone()))
+                .unwrap();
             match random.below(12) {
                 0 => drop(map.remove(&key)),
                 1 => {
@@ -197,15 +249,22 @@ fn mutate(value: &mut Value, random: &mut Random) {
 #[test]
 fn whatever_stands_in_the_yaml_it_is_read_or_refused_with_the_file_s_name() {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv");
-    let names: Vec<PathBuf> = files(&shipped).into_iter().filter(|p| !p.ends_with("cards.yaml")).collect();
+    let names: Vec<PathBuf> = files(&shipped)
+        .into_iter()
+        .filter(|p| !p.ends_with("cards.yaml"))
+        .collect();
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(2);
     let (mut refused, rounds) = (0, from_environment("HARVEST_FUZZ", 300));
     for _ in 0..rounds {
         let pipeline = folder.path().join("pipeline");
         copy_tree(&shipped, &pipeline);
-        let name = names[random.below(names.len())].strip_prefix(&shipped).unwrap().to_owned();
-        let mut document: Value = serde_yaml::from_str(&fs::read_to_string(shipped.join(&name)).unwrap()).unwrap();
+        let name = names[random.below(names.len())]
+            .strip_prefix(&shipped)
+            .unwrap()
+            .to_owned();
+        let mut document: Value =
+            serde_yaml::from_str(&fs::read_to_string(shipped.join(&name)).unwrap()).unwrap();
         for _ in 0..=random.below(3) {
             mutate(&mut document, &mut random);
         }
@@ -216,22 +275,37 @@ fn whatever_stands_in_the_yaml_it_is_read_or_refused_with_the_file_s_name() {
             Err(error @ (Error::Config { .. } | Error::Io { .. })) => {
                 refused += 1;
                 // A path that cannot be read is itself what was written: `wind_tunnel: null`.
-                let names_the_file = error.to_string().contains(".yaml") || matches!(error, Error::Io { .. });
-                assert!(names_the_file || error.to_string().contains(".csv"), "{error}");
+                let names_the_file =
+                    error.to_string().contains(".yaml") || matches!(error, Error::Io { .. });
+                assert!(
+                    names_the_file || error.to_string().contains(".csv"),
+                    "{error}"
+                );
             }
             Err(error) => panic!("{error} for\n{text}"),
         }
     }
-    assert!(refused > rounds / 4, "{refused} of {rounds}: it changes too little");
+    assert!(
+        refused > rounds / 4,
+        "{refused} of {rounds}: it changes too little"
+    );
 }
 
 #[test]
 fn yaml_that_is_none_or_unfolds_without_end_is_refused() {
-    let bomb = (1..30)
-        .fold("a0: &a0 [x, x]\n".to_owned(), |text, i| format!("{text}a{i}: &a{i} [*a{}, *a{}]\n", i - 1, i - 1));
+    let bomb = (1..30).fold("a0: &a0 [x, x]\n".to_owned(), |text, i| {
+        format!("{text}a{i}: &a{i} [*a{}, *a{}]\n", i - 1, i - 1)
+    });
     let deep = "[".repeat(100_000);
     let binary = String::from_utf8_lossy(&[0, 159, 146, 150]).into_owned();
-    for text in [bomb, deep, binary, "title: [".to_owned(), String::new(), "- 1".to_owned()] {
+    for text in [
+        bomb,
+        deep,
+        binary,
+        "title: [".to_owned(),
+        String::new(),
+        "- 1".to_owned(),
+    ] {
         let campaign = Campaign::new();
         campaign.copy_pipeline();
         fs::write(campaign.path("pipeline/pipeline.yaml"), &text).unwrap();
@@ -243,12 +317,16 @@ fn yaml_that_is_none_or_unfolds_without_end_is_refused() {
 
 #[test]
 fn whatever_stands_in_a_csv_it_is_read_or_refused_with_file_and_line() {
-    let tunnel = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/wt_tables.csv")).unwrap();
+    let tunnel =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/wt_tables.csv"))
+            .unwrap();
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table.csv");
     let mut random = Random::new(3);
-    let cells = ["", "nan", "inf", "1e999", "-0", "\"", "ten", "CN_q", "per_deg", "ä", "5,5", "\r", "9e307"];
+    let cells = [
+        "", "nan", "inf", "1e999", "-0", "\"", "ten", "CN_q", "per_deg", "ä", "5,5", "\r", "9e307",
+    ];
     for _ in 0..from_environment("HARVEST_FUZZ", 300) {
         let mut lines: Vec<String> = tunnel.lines().map(str::to_owned).collect();
         for _ in 0..=random.below(4) {
@@ -263,10 +341,16 @@ fn whatever_stands_in_a_csv_it_is_read_or_refused_with_file_and_line() {
             lines[at] = fields.join(",");
         }
         fs::write(&path, lines.join("\n")).unwrap();
-        let overrides =
-            Overrides { wind_tunnel: Some(path.clone()), archive: Some(String::new()), ..Overrides::default() };
+        let overrides = Overrides {
+            wind_tunnel: Some(path.clone()),
+            archive: Some(String::new()),
+            ..Overrides::default()
+        };
         if let Err(error) = Config::load(&pipeline, overrides) {
-            assert!(error.to_string().contains(".csv") || error.to_string().contains(".yaml"), "{error}");
+            assert!(
+                error.to_string().contains(".csv") || error.to_string().contains(".yaml"),
+                "{error}"
+            );
         }
         fs::write(
             &path,
@@ -277,7 +361,10 @@ fn whatever_stands_in_a_csv_it_is_read_or_refused_with_file_and_line() {
             ),
         )
         .unwrap();
-        let overrides = Overrides { events: Some(path.clone()), ..Overrides::default() };
+        let overrides = Overrides {
+            events: Some(path.clone()),
+            ..Overrides::default()
+        };
         if let Err(error) = Config::load(&pipeline, overrides) {
             assert!(error.to_string().contains("table.csv"), "{error}");
         }

@@ -7,7 +7,8 @@ use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::DataType;
 
 use crate::support::{
-    Campaign, pitch_steps, renamed, replaced, values, with_unit, with_values, without, yaw_and_roll_steps,
+    Campaign, pitch_steps, renamed, replaced, values, with_unit, with_values, without,
+    yaw_and_roll_steps,
 };
 
 /// A flight whose file was spoiled beside a healthy one: the run ends with 2, the healthy flight's maneuver is estimated,
@@ -16,15 +17,24 @@ fn is_refused(spoil: impl FnOnce(&Campaign), place: &str, words: &[&str]) {
     let campaign = Campaign::of_pitch_steps();
     spoil(&campaign);
     let outcome = campaign.ends("estimate", 2);
-    assert!(outcome.stdout.contains("2 flights, 1 refused"), "{outcome:?}");
+    assert!(
+        outcome.stdout.contains("2 flights, 1 refused"),
+        "{outcome:?}"
+    );
 
     let problems = campaign.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
     let problem = &problems[0];
-    assert_eq!((&*problem["stage"], &*problem["flight_id"]), ("ingest", "spoiled"));
+    assert_eq!(
+        (&*problem["stage"], &*problem["flight_id"]),
+        ("ingest", "spoiled")
+    );
     assert!(problem["place"].contains(place), "{problem:?}");
     for word in words {
-        assert!(problem["reason"].contains(word), "`{word}` is not said: {problem:?}");
+        assert!(
+            problem["reason"].contains(word),
+            "`{word}` is not said: {problem:?}"
+        );
     }
     assert!(outcome.stdout.contains(&problem["reason"]), "{outcome:?}");
 
@@ -43,7 +53,11 @@ fn a_truncated_file_is_refused() {
         let whole = fs::read(campaign.flight("flight_001")).unwrap();
         fs::write(campaign.flight("spoiled"), &whole[..whole.len() / 2]).unwrap();
     };
-    is_refused(truncated, "spoiled.parquet", &["not a readable Parquet file", "truncated"]);
+    is_refused(
+        truncated,
+        "spoiled.parquet",
+        &["not a readable Parquet file", "truncated"],
+    );
 }
 
 #[test]
@@ -59,8 +73,18 @@ fn damaged_bytes_in_the_middle_of_a_file_are_refused_without_a_panic() {
 
 #[test]
 fn a_text_file_named_parquet_is_refused() {
-    let text = |campaign: &Campaign| fs::write(campaign.flight("spoiled"), "time,alpha\n0.0,5.1\n0.025,5.2\n").unwrap();
-    is_refused(text, "spoiled.parquet", &["not a readable Parquet file", "another format"]);
+    let text = |campaign: &Campaign| {
+        fs::write(
+            campaign.flight("spoiled"),
+            "time,alpha\n0.0,5.1\n0.025,5.2\n",
+        )
+        .unwrap()
+    };
+    is_refused(
+        text,
+        "spoiled.parquet",
+        &["not a readable Parquet file", "another format"],
+    );
 }
 
 #[test]
@@ -74,7 +98,11 @@ fn an_empty_file_is_refused() {
 
 #[test]
 fn a_record_without_rows_is_refused() {
-    record_is_refused(&yaw_and_roll_steps().slice(0, 0), "channel `time`", &["0 rows are no record"]);
+    record_is_refused(
+        &yaw_and_roll_steps().slice(0, 0),
+        "channel `time`",
+        &["0 rows are no record"],
+    );
 }
 
 #[test]
@@ -88,22 +116,37 @@ fn a_record_without_a_required_channel_is_refused() {
 
 #[test]
 fn a_record_without_time_is_refused() {
-    record_is_refused(&without(&yaw_and_roll_steps(), "time"), "channel `time`", &["`time` is not in the file"]);
+    record_is_refused(
+        &without(&yaw_and_roll_steps(), "time"),
+        "channel `time`",
+        &["`time` is not in the file"],
+    );
 }
 
 #[test]
 fn a_channel_of_text_is_refused() {
     let text = |channel: &str| {
         let record = yaw_and_roll_steps();
-        let words: Vec<String> = values(&record, channel).iter().map(|v| format!("{v:.2}")).collect();
+        let words: Vec<String> = values(&record, channel)
+            .iter()
+            .map(|v| format!("{v:.2}"))
+            .collect();
         replaced(&record, channel, |field, _| {
-            (field.clone().with_data_type(DataType::Utf8), Arc::new(StringArray::from(words)))
+            (
+                field.clone().with_data_type(DataType::Utf8),
+                Arc::new(StringArray::from(words)),
+            )
         })
     };
     record_is_refused(
         &text("p"),
         "spoiled.parquet",
-        &["column `p`", "`p_deg_s`", "is of type Utf8", "expected a number"],
+        &[
+            "column `p`",
+            "`p_deg_s`",
+            "is of type Utf8",
+            "expected a number",
+        ],
     );
 }
 
@@ -112,7 +155,11 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused() {
     record_is_refused(
         &with_unit(&yaw_and_roll_steps(), "p", "rad/s"),
         "channel `p`",
-        &["the file states `rad/s`", "the channel map `deg/s`", "correct"],
+        &[
+            "the file states `rad/s`",
+            "the channel map `deg/s`",
+            "correct",
+        ],
     );
 }
 
@@ -138,7 +185,10 @@ fn is_repaired_and_named(record: &RecordBatch, words: &[&str]) -> Campaign {
     let problems = campaign.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
     for word in words {
-        assert!(problems[0]["reason"].contains(word), "`{word}` is not said: {problems:?}");
+        assert!(
+            problems[0]["reason"].contains(word),
+            "`{word}` is not said: {problems:?}"
+        );
     }
     campaign
 }
@@ -147,14 +197,23 @@ fn is_repaired_and_named(record: &RecordBatch, words: &[&str]) -> Campaign {
 fn lengths(campaign: &Campaign) -> Vec<(String, usize)> {
     let channels = campaign.table("channels");
     let clocks = channels.iter().filter(|r| r["channel"] == "time");
-    clocks.map(|r| (r["flight_id"].clone(), r["samples"].parse().unwrap())).collect()
+    clocks
+        .map(|r| (r["flight_id"].clone(), r["samples"].parse().unwrap()))
+        .collect()
 }
 
 #[test]
 fn time_that_starts_anew_begins_a_stretch_and_says_where() {
     let record = yaw_and_roll_steps();
-    let back = with_values(&record, "time", |row, t| if row >= 1000 { t - 10.0 } else { t });
-    let campaign = is_repaired_and_named(&back, &["time jumps back from", "in row 1001 of ", "`spoiled.2`"]);
+    let back = with_values(
+        &record,
+        "time",
+        |row, t| if row >= 1000 { t - 10.0 } else { t },
+    );
+    let campaign = is_repaired_and_named(
+        &back,
+        &["time jumps back from", "in row 1001 of ", "`spoiled.2`"],
+    );
     let ids: Vec<String> = lengths(&campaign).into_iter().map(|l| l.0).collect();
     assert_eq!(ids, ["spoiled", "spoiled.2"]);
 }
@@ -163,10 +222,21 @@ fn time_that_starts_anew_begins_a_stretch_and_says_where() {
 fn rows_with_a_time_that_cannot_be_are_left_out_and_named() {
     let record = yaw_and_roll_steps();
     let times = values(&record, "time");
-    let still = with_values(&record, "time", |row, t| if row == 1000 { times[999] } else { t });
+    let still = with_values(
+        &record,
+        "time",
+        |row, t| if row == 1000 { times[999] } else { t },
+    );
     is_repaired_and_named(&still, &["time stands still in 1 rows", "row 1001"]);
-    let hole = with_values(&record, "time", |row, t| if row == 1000 { f64::NAN } else { t });
-    is_repaired_and_named(&hole, &["1 rows have a time that is not a number", "row 1001"]);
+    let hole = with_values(
+        &record,
+        "time",
+        |row, t| if row == 1000 { f64::NAN } else { t },
+    );
+    is_repaired_and_named(
+        &hole,
+        &["1 rows have a time that is not a number", "row 1001"],
+    );
 }
 
 #[test]
@@ -179,10 +249,23 @@ fn a_copy_under_another_name_is_left_out_and_named() {
     campaign.ends("segment", 2);
     let problems = campaign.table("problems");
     let named: Vec<&str> = problems.iter().map(|p| &*p["flight_id"]).collect();
-    assert_eq!(named, ["flight_003", "flight_002", "flight_003", "flight_004"], "{problems:?}");
-    assert!(problems[1]["reason"].contains("the same bytes as flight `flight_001`"), "{problems:?}");
-    assert!(problems[2]["reason"].contains("holds the rows of flight `flight_001` again"), "{problems:?}");
-    assert!(problems[3]["reason"].contains("holds the rows of flight `flight_001` again"), "{problems:?}");
+    assert_eq!(
+        named,
+        ["flight_003", "flight_002", "flight_003", "flight_004"],
+        "{problems:?}"
+    );
+    assert!(
+        problems[1]["reason"].contains("the same bytes as flight `flight_001`"),
+        "{problems:?}"
+    );
+    assert!(
+        problems[2]["reason"].contains("holds the rows of flight `flight_001` again"),
+        "{problems:?}"
+    );
+    assert!(
+        problems[3]["reason"].contains("holds the rows of flight `flight_001` again"),
+        "{problems:?}"
+    );
     assert_eq!(campaign.table("maneuvers").len(), 1);
 }
 
@@ -192,7 +275,11 @@ fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one
     // Instruments are measured by fewer samples of the slow channel: what is wrong with them comes out a little different.
     for campaign in [&whole, &parted] {
         campaign.copy_pipeline();
-        campaign.edit("pipeline.yaml", "bias: apply, scale: apply", "bias: report, scale: report");
+        campaign.edit(
+            "pipeline.yaml",
+            "bias: apply, scale: apply",
+            "bias: report, scale: report",
+        );
     }
     whole.ends("estimate", 0);
     let record = pitch_steps();
@@ -200,18 +287,33 @@ fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one
     fs::create_dir(&folder).unwrap();
     let main = without(&record, "psi");
     crate::support::write(&main.slice(0, 3000), &folder.join("a.parquet"));
-    crate::support::write(&main.slice(2500, main.num_rows() - 2500), &folder.join("b.parquet"));
-    let every_fourth =
-        arrow::array::UInt32Array::from_iter_values((0..u32::try_from(record.num_rows()).unwrap()).step_by(4));
-    let slow = record.project(&[record.schema().index_of("time").unwrap(), record.schema().index_of("psi").unwrap()]);
+    crate::support::write(
+        &main.slice(2500, main.num_rows() - 2500),
+        &folder.join("b.parquet"),
+    );
+    let every_fourth = arrow::array::UInt32Array::from_iter_values(
+        (0..u32::try_from(record.num_rows()).unwrap()).step_by(4),
+    );
+    let slow = record.project(&[
+        record.schema().index_of("time").unwrap(),
+        record.schema().index_of("psi").unwrap(),
+    ]);
     let slow = arrow::compute::take_record_batch(&slow.unwrap(), &every_fourth).unwrap();
     crate::support::write(&slow, &folder.join("heading.parquet"));
     parted.ends("estimate", 2);
     let problems = parted.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
-    assert!(problems[0]["place"].ends_with("b.parquet") && problems[0]["reason"].contains("are there already"));
+    assert!(
+        problems[0]["place"].ends_with("b.parquet")
+            && problems[0]["reason"].contains("are there already")
+    );
     let channels = parted.table("channels");
-    let rate = |name: &str| crate::support::number(channels.iter().find(|c| c["channel"] == name).unwrap(), "rate_hz");
+    let rate = |name: &str| {
+        crate::support::number(
+            channels.iter().find(|c| c["channel"] == name).unwrap(),
+            "rate_hz",
+        )
+    };
     assert!((rate("psi") - 10.0).abs() < 0.1 && (rate("theta") - 40.0).abs() < 0.1);
     crate::estimate::assert_same_estimates(&whole.table("estimates"), &parted.table("estimates"));
 }
@@ -235,16 +337,21 @@ fn a_stuck_surface_rejects_its_maneuver_with_the_reason() {
     let campaign = Campaign::new();
     let record = pitch_steps();
     let held = values(&record, "de")[4900];
-    let stuck = with_values(&record, "de", |row, v| if (4900..5100).contains(&row) { held } else { v });
+    let stuck = with_values(&record, "de", |row, v| {
+        if (4900..5100).contains(&row) { held } else { v }
+    });
     campaign.add("flight_001", &stuck);
     campaign.ends("estimate", 2);
     let problems = campaign.table("problems");
     assert!(
-        problems[0]["place"] == "channel `de`" && problems[0]["reason"].contains("its value is stuck"),
+        problems[0]["place"] == "channel `de`"
+            && problems[0]["reason"].contains("its value is stuck"),
         "{problems:?}"
     );
     let fits = campaign.table("fits");
-    let rejected = |f: &crate::support::Row| f["outcome"] == "rejected" && f["reason"].contains("`de_deg` are marked");
+    let rejected = |f: &crate::support::Row| {
+        f["outcome"] == "rejected" && f["reason"].contains("`de_deg` are marked")
+    };
     assert!(fits.is_empty() || fits.iter().all(rejected), "{fits:?}");
 }
 
@@ -260,7 +367,10 @@ fn a_required_channel_without_any_number_is_refused() {
 #[test]
 fn a_channel_that_the_equations_can_do_without_is_reported_and_the_flight_goes_on() {
     let campaign = Campaign::new();
-    campaign.add("flight_001", &with_values(&pitch_steps(), "psi", |_, _| f64::NAN));
+    campaign.add(
+        "flight_001",
+        &with_values(&pitch_steps(), "psi", |_, _| f64::NAN),
+    );
     campaign.ends("estimate", 2);
     let problems = campaign.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
@@ -274,10 +384,17 @@ fn an_archive_of_spoiled_flights_only_still_says_what_is_wrong_with_each() {
     fs::write(campaign.flight("one"), "").unwrap();
     fs::write(campaign.flight("two"), "text").unwrap();
     campaign.ends("run", 2);
-    let named: Vec<String> = campaign.table("problems").iter().map(|p| p["flight_id"].clone()).collect();
+    let named: Vec<String> = campaign
+        .table("problems")
+        .iter()
+        .map(|p| p["flight_id"].clone())
+        .collect();
     assert_eq!(named, ["one", "two"]);
     let report = fs::read_to_string(campaign.path("reports/report.html")).unwrap();
-    assert!(report.contains("not a readable Parquet file"), "the report names what was refused");
+    assert!(
+        report.contains("not a readable Parquet file"),
+        "the report names what was refused"
+    );
 }
 
 #[test]
@@ -296,11 +413,20 @@ fn repairs_are_counted_per_channel() {
     healthy.ends("ingest", 0);
     let channels = [campaign.table("channels"), healthy.table("channels")].concat();
     let count = |flight: &str, column: &str| -> i64 {
-        let theta = channels.iter().find(|r| r["flight_id"] == flight && r["channel"] == "theta").unwrap();
+        let theta = channels
+            .iter()
+            .find(|r| r["flight_id"] == flight && r["channel"] == "theta")
+            .unwrap();
         theta[column].parse().unwrap()
     };
-    assert_eq!(count("spoiled", "despiked") - count("flight_001", "despiked"), 3);
-    assert_eq!(count("spoiled", "bridged") - count("flight_001", "bridged"), 5);
+    assert_eq!(
+        count("spoiled", "despiked") - count("flight_001", "despiked"),
+        3
+    );
+    assert_eq!(
+        count("spoiled", "bridged") - count("flight_001", "bridged"),
+        5
+    );
     assert_eq!(count("spoiled", "missing"), 0);
 }
 
@@ -313,7 +439,10 @@ fn a_hive_partitioned_flight_of_several_files_is_the_same_flight() {
     let folder = parted.path("flights/flight=flight_001");
     fs::create_dir(&folder).unwrap();
     crate::support::write(&record.slice(0, 2000), &folder.join("part-0.parquet"));
-    crate::support::write(&record.slice(2000, record.num_rows() - 2000), &folder.join("part-1.parquet"));
+    crate::support::write(
+        &record.slice(2000, record.num_rows() - 2000),
+        &folder.join("part-1.parquet"),
+    );
     parted.ends("segment", 0);
     // The jitter of the clock is about the step of the first file: a digit of it may differ.
     assert_eq!(parted.table("maneuvers"), whole.table("maneuvers"));
@@ -335,7 +464,11 @@ fn a_recorder_with_other_names_units_and_signs_is_a_matter_of_its_channel_map() 
         "q: { signal: q_deg_s, unit: deg/s }",
         "pitch_rate: { signal: q_deg_s, unit: rad/s, sign: -1 }",
     );
-    other.edit("aircraft.yaml", "velocity_ft_s, unit: ft/s }", "velocity_ft_s, unit: m/s }");
+    other.edit(
+        "aircraft.yaml",
+        "velocity_ft_s, unit: ft/s }",
+        "velocity_ft_s, unit: m/s }",
+    );
     other.ends("estimate", 0);
 
     crate::estimate::assert_same_estimates(&shipped.table("estimates"), &other.table("estimates"));
@@ -345,7 +478,10 @@ fn a_recorder_with_other_names_units_and_signs_is_a_matter_of_its_channel_map() 
 fn an_archive_without_records_cannot_be_run() {
     let campaign = Campaign::new();
     let outcome = campaign.ends("run", 1);
-    assert!(outcome.stderr.contains("no flight records here"), "{outcome:?}");
+    assert!(
+        outcome.stderr.contains("no flight records here"),
+        "{outcome:?}"
+    );
     assert!(outcome.stderr.contains("flights"), "{outcome:?}");
     assert!(!campaign.path("reports").exists(), "nothing is published");
 }
@@ -354,14 +490,28 @@ fn an_archive_without_records_cannot_be_run() {
 fn an_archive_that_does_not_exist_cannot_be_run() {
     let campaign = Campaign::on("data/demo/fligths");
     let outcome = campaign.ends("ingest", 1);
-    assert!(outcome.stderr.contains("data/demo/fligths: no flight records here"), "{outcome:?}");
+    assert!(
+        outcome
+            .stderr
+            .contains("data/demo/fligths: no flight records here"),
+        "{outcome:?}"
+    );
 }
 
 #[test]
 fn one_flight_in_two_places_counts_once_and_is_said() {
     let campaign = Campaign::of_pitch_steps();
     fs::create_dir(campaign.path("flights/copy")).unwrap();
-    fs::copy(campaign.flight("flight_001"), campaign.path("flights/copy/flight_001.parquet")).unwrap();
+    fs::copy(
+        campaign.flight("flight_001"),
+        campaign.path("flights/copy/flight_001.parquet"),
+    )
+    .unwrap();
     let outcome = campaign.ends("ingest", 2);
-    assert!(outcome.stdout.contains("a copy of a file of flight `flight_001`"), "{outcome:?}");
+    assert!(
+        outcome
+            .stdout
+            .contains("a copy of a file of flight `flight_001`"),
+        "{outcome:?}"
+    );
 }

@@ -7,7 +7,14 @@ use harvest::memory::keep;
 fn faults() -> u64 {
     let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
     // The name of the program, in brackets, may hold spaces; the count is the eighth number after it.
-    stat.rsplit(')').next().unwrap().split_whitespace().nth(7).unwrap().parse().unwrap()
+    stat.rsplit(')')
+        .next()
+        .unwrap()
+        .split_whitespace()
+        .nth(7)
+        .unwrap()
+        .parse()
+        .unwrap()
 }
 
 /// The faults of taking ten blocks of half a megabyte and giving them back, a hundred times.

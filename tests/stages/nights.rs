@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::support::{
-    Campaign, Outcome, Random, files, flight, from_environment, pitch_steps, run, yaw_and_roll_steps,
+    Campaign, Outcome, Random, files, flight, from_environment, pitch_steps, run,
+    yaw_and_roll_steps,
 };
 
 /// Every file of store and reports with its bytes, but those that hold a clock or a process.
@@ -18,19 +19,37 @@ fn everything(campaign: &Campaign) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = campaign.bytes("store");
     let nights = campaign.path("reports/nights");
     let kept = files(&nights).into_iter().filter(|p| !p.ends_with("lock"));
-    all.extend(kept.map(|p| (p.strip_prefix(campaign.path("")).unwrap().to_owned(), fs::read(&p).unwrap())));
+    all.extend(kept.map(|p| {
+        (
+            p.strip_prefix(campaign.path("")).unwrap().to_owned(),
+            fs::read(&p).unwrap(),
+        )
+    }));
     all.extend(campaign.bytes("reports"));
     let current = fs::read_link(campaign.path("reports/current")).unwrap();
-    all.insert("current".into(), current.to_string_lossy().into_owned().into_bytes());
+    all.insert(
+        "current".into(),
+        current.to_string_lossy().into_owned().into_bytes(),
+    );
     all
 }
 
 fn differing(a: &BTreeMap<PathBuf, Vec<u8>>, b: &BTreeMap<PathBuf, Vec<u8>>) -> Vec<PathBuf> {
-    a.keys().chain(b.keys()).filter(|path| a.get(*path) != b.get(*path)).cloned().collect()
+    a.keys()
+        .chain(b.keys())
+        .filter(|path| a.get(*path) != b.get(*path))
+        .cloned()
+        .collect()
 }
 
 fn spawned(campaign: &Campaign) -> std::process::Child {
-    campaign.command("run").arg("--quiet").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    campaign
+        .command("run")
+        .arg("--quiet")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 /// Two nights, the second with one flight more. Before each ends, `disturb` may do something to it.
@@ -89,7 +108,10 @@ fn of_two_runs_at_once_one_leaves_with_a_word_about_the_other_or_waits_for_it() 
     assert_ne!(waited.code, Some(1), "{waited:?}");
     assert_eq!(second.code, Some(1), "{second:?}");
     let named = format!("another run is using this store (pid {} on ", first.id());
-    assert!(second.stderr.contains(&named) && second.stderr.contains(" since 20"), "{second:?}");
+    assert!(
+        second.stderr.contains(&named) && second.stderr.contains(" since 20"),
+        "{second:?}"
+    );
 }
 
 #[test]
@@ -112,8 +134,15 @@ fn runs_that_race_from_the_start_leave_one_good_store() {
     campaign.finishes("run");
     let expected = everything(&campaign);
     campaign.forget();
-    let mut racing: Vec<_> =
-        (0..4).map(|_| campaign.command("run").args(["--quiet", "--wait", "120"]).spawn().unwrap()).collect();
+    let mut racing: Vec<_> = (0..4)
+        .map(|_| {
+            campaign
+                .command("run")
+                .args(["--quiet", "--wait", "120"])
+                .spawn()
+                .unwrap()
+        })
+        .collect();
     for child in &mut racing {
         assert!(matches!(child.wait().unwrap().code(), Some(0 | 2)));
     }
@@ -126,9 +155,18 @@ fn runs_that_race_from_the_start_leave_one_good_store() {
 fn with_room_for(campaign: &Campaign, kilobytes: u32) -> Outcome {
     let command = campaign.command("run");
     let words = std::iter::once(command.get_program()).chain(command.get_args());
-    let words: Vec<String> = words.map(|word| format!("'{}'", word.to_string_lossy())).collect();
-    let script = format!("trap '' XFSZ; ulimit -f {}; exec {}", 2 * kilobytes, words.join(" "));
-    run(Command::new("sh").arg("-c").arg(script).current_dir(env!("CARGO_MANIFEST_DIR")))
+    let words: Vec<String> = words
+        .map(|word| format!("'{}'", word.to_string_lossy()))
+        .collect();
+    let script = format!(
+        "trap '' XFSZ; ulimit -f {}; exec {}",
+        2 * kilobytes,
+        words.join(" ")
+    );
+    run(Command::new("sh")
+        .arg("-c")
+        .arg(script)
+        .current_dir(env!("CARGO_MANIFEST_DIR")))
 }
 
 #[cfg(unix)]
@@ -138,15 +176,27 @@ fn a_full_disk_ends_in_a_clear_message_and_a_store_that_is_still_good() {
     campaign.finishes("run");
     let expected = everything(&campaign);
     let largest = |folder: &str| {
-        files(&campaign.path(folder)).iter().map(|p| fs::metadata(p).unwrap().len()).max().unwrap_or_default() / 1000
+        files(&campaign.path(folder))
+            .iter()
+            .map(|p| fs::metadata(p).unwrap().len())
+            .max()
+            .unwrap_or_default()
+            / 1000
     };
     // Nothing fits; the records do not; the report does not.
-    let rooms = [1, largest("store/records") / 2, largest("reports/nights") / 2];
+    let rooms = [
+        1,
+        largest("store/records") / 2,
+        largest("reports/nights") / 2,
+    ];
     for room in rooms {
         campaign.forget();
         let outcome = with_room_for(&campaign, u32::try_from(room).unwrap());
         assert_eq!(outcome.code, Some(1), "{room} kB: {outcome:?}");
-        assert!(outcome.stderr.contains("cannot write") && outcome.stderr.lines().count() == 1, "{outcome:?}");
+        assert!(
+            outcome.stderr.contains("cannot write") && outcome.stderr.lines().count() == 1,
+            "{outcome:?}"
+        );
         assert!(!campaign.path("reports/report.html").exists());
         campaign.finishes("run");
         let differing = differing(&everything(&campaign), &expected);
@@ -171,7 +221,10 @@ fn a_read_only_folder_ends_in_a_clear_message() {
         let is_superuser = fs::write(path.join("probe"), "").is_ok();
         if !is_superuser {
             let outcome = campaign.ends("run", 1);
-            assert!(outcome.stderr.contains(folder) && outcome.stderr.contains("cannot create"), "{outcome:?}");
+            assert!(
+                outcome.stderr.contains(folder) && outcome.stderr.contains("cannot create"),
+                "{outcome:?}"
+            );
         }
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
         let _ = fs::remove_file(path.join("probe"));
@@ -186,8 +239,14 @@ fn a_file_that_vanishes_or_is_no_file_is_a_problem_of_its_flight() {
     std::os::unix::fs::symlink("nowhere", campaign.flight("flight_002")).unwrap();
     campaign.ends("ingest", 2);
     let problems = campaign.table("problems");
-    assert_eq!((problems.len(), &*problems[0]["flight_id"]), (1, "flight_002"));
-    assert!(problems[0]["reason"].contains("cannot be read"), "{problems:?}");
+    assert_eq!(
+        (problems.len(), &*problems[0]["flight_id"]),
+        (1, "flight_002")
+    );
+    assert!(
+        problems[0]["reason"].contains("cannot be read"),
+        "{problems:?}"
+    );
     fs::remove_file(campaign.flight("flight_002")).unwrap();
     campaign.ends("ingest", 0);
 }
@@ -197,17 +256,30 @@ fn a_copy_of_a_flight_does_not_count_twice_and_comes_in_when_it_is_another() {
     let campaign = Campaign::of_pitch_steps();
     fs::copy(campaign.flight("flight_001"), campaign.flight("flight_002")).unwrap();
     campaign.ends("segment", 2);
-    assert!(campaign.table("problems")[0]["reason"].contains("the same bytes as flight `flight_001`"));
+    assert!(
+        campaign.table("problems")[0]["reason"].contains("the same bytes as flight `flight_001`")
+    );
     assert_eq!(campaign.table("maneuvers").len(), 1);
     fs::create_dir(campaign.path("flights/again")).unwrap();
-    fs::copy(campaign.flight("flight_001"), campaign.path("flights/again/flight_001.parquet")).unwrap();
+    fs::copy(
+        campaign.flight("flight_001"),
+        campaign.path("flights/again/flight_001.parquet"),
+    )
+    .unwrap();
     campaign.add("flight_002", &yaw_and_roll_steps());
     campaign.ends("segment", 2);
-    assert!(campaign.table("problems")[0]["reason"].contains("a copy of a file of flight `flight_001`"));
+    assert!(
+        campaign.table("problems")[0]["reason"].contains("a copy of a file of flight `flight_001`")
+    );
     assert_eq!(campaign.table("maneuvers").len(), 2);
     campaign.add("again/flight_001", &yaw_and_roll_steps());
     campaign.ends("segment", 2);
-    assert!(campaign.table("problems").iter().any(|p| p["reason"].contains("two records would be flight")));
+    assert!(
+        campaign
+            .table("problems")
+            .iter()
+            .any(|p| p["reason"].contains("two records would be flight"))
+    );
 }
 
 #[test]
@@ -215,12 +287,19 @@ fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     let said = campaign.ends("diff", 0).stdout;
-    assert!(said.contains("night 0002 since night 0001") && said.contains("new flight flight_004"), "{said}");
+    assert!(
+        said.contains("night 0002 since night 0001") && said.contains("new flight flight_004"),
+        "{said}"
+    );
     assert!(said.contains("new flight_004_t00124"), "{said}");
     let report = fs::read_to_string(campaign.path("reports/report.html")).unwrap();
     assert!(report.contains("What changed") && report.contains("new flight flight_004"));
-    let alert: Value = serde_json::from_slice(&fs::read(campaign.path("reports/alert.json")).unwrap()).unwrap();
-    assert_eq!((&alert["since"], &alert["alert"]), (&"0001".into(), &false.into()));
+    let alert: Value =
+        serde_json::from_slice(&fs::read(campaign.path("reports/alert.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&alert["since"], &alert["alert"]),
+        (&"0001".into(), &false.into())
+    );
 
     // Coefficients are by wing area: a tenth more of it is more than any bound.
     campaign.copy_pipeline();
@@ -233,19 +312,33 @@ fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
     let json = run(campaign.command("diff").arg("--json")).stdout;
     let changes: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(changes["alert"], true);
-    assert!(changes["estimates"][0]["because"].as_str().unwrap().contains("wing_area_ft2"));
+    assert!(
+        changes["estimates"][0]["because"]
+            .as_str()
+            .unwrap()
+            .contains("wing_area_ft2")
+    );
 
     assert_eq!(run(campaign.command("diff").arg("--once")).code, Some(3));
     assert_eq!(run(campaign.command("diff").arg("--once")).code, Some(0));
-    assert_eq!(run(campaign.command("diff").args(["--since", "1", "--to", "2"])).code, Some(0));
-    assert_eq!(run(campaign.command("diff").args(["--since", "77"])).code, Some(1));
+    assert_eq!(
+        run(campaign.command("diff").args(["--since", "1", "--to", "2"])).code,
+        Some(0)
+    );
+    assert_eq!(
+        run(campaign.command("diff").args(["--since", "77"])).code,
+        Some(1)
+    );
 }
 
 #[test]
 fn status_says_what_a_run_would_do_and_why_and_changes_nothing() {
     let campaign = Campaign::of_pitch_steps();
     let before = campaign.ends("status", 3).stdout;
-    assert!(before.contains("no night is published yet") && before.contains("not made yet"), "{before}");
+    assert!(
+        before.contains("no night is published yet") && before.contains("not made yet"),
+        "{before}"
+    );
     assert!(!campaign.path("store").exists() && !campaign.path("reports").exists());
     campaign.finishes("run");
     let fresh = campaign.ends("status", 0).stdout;
@@ -253,14 +346,24 @@ fn status_says_what_a_run_would_do_and_why_and_changes_nothing() {
     campaign.add("flight_004", &yaw_and_roll_steps());
     fs::write(campaign.flight("spoiled"), "text").unwrap();
     let stale = campaign.ends("status", 3).stdout;
-    assert!(stale.contains("ingest: stale: flight_004: new flight flight_004"), "{stale}");
+    assert!(
+        stale.contains("ingest: stale: flight_004: new flight flight_004"),
+        "{stale}"
+    );
     campaign.ends("run", 2);
     let failed = campaign.ends("status", 2).stdout;
     assert!(failed.contains("ingest: failed: spoiled"), "{failed}");
     campaign.copy_pipeline();
-    campaign.edit("pipeline.yaml", "initial_state: estimated", "initial_state: measured");
+    campaign.edit(
+        "pipeline.yaml",
+        "initial_state: estimated",
+        "initial_state: measured",
+    );
     let stale = campaign.ends("status", 3).stdout;
-    assert!(stale.contains("estimate: stale") && stale.contains("estimate.initial_state"), "{stale}");
+    assert!(
+        stale.contains("estimate: stale") && stale.contains("estimate.initial_state"),
+        "{stale}"
+    );
     assert!(!stale.contains("segment: stale"), "{stale}");
 }
 
@@ -270,8 +373,14 @@ fn a_maneuver_s_story_is_told_whole() {
     campaign.finishes("run");
     let explain = |id: &str| {
         let mut command = crate::support::harvest();
-        command.args(["explain", id, "harv", "--archive"]).arg(campaign.path("flights"));
-        run(command.arg("--store").arg(campaign.path("store")).arg("--reports").arg(campaign.path("reports")))
+        command
+            .args(["explain", id, "harv", "--archive"])
+            .arg(campaign.path("flights"));
+        run(command
+            .arg("--store")
+            .arg(campaign.path("store"))
+            .arg("--reports")
+            .arg(campaign.path("reports")))
     };
     let story = explain("flight_001_t00118");
     assert_eq!(story.code, Some(0), "{story:?}");
@@ -293,7 +402,10 @@ fn a_maneuver_s_story_is_told_whole() {
     }
     let wrong = explain("flight_001_t00181");
     assert_eq!(wrong.code, Some(1));
-    assert!(wrong.stderr.contains("did you mean `flight_001_t00118`?"), "{wrong:?}");
+    assert!(
+        wrong.stderr.contains("did you mean `flight_001_t00118`?"),
+        "{wrong:?}"
+    );
 }
 
 #[test]
@@ -301,29 +413,63 @@ fn every_published_table_carries_its_lineage_and_verify_says_whether_it_holds() 
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
     campaign.finishes("run");
-    assert!(campaign.ends("verify", 0).stdout.contains("All of it holds."));
+    assert!(
+        campaign
+            .ends("verify", 0)
+            .stdout
+            .contains("All of it holds.")
+    );
 
     // A setting that only trends read: what comes before them still holds.
     campaign.edit("pipeline.yaml", "criterion: aicc", "criterion: bic");
     let said = campaign.ends("verify", 2).stdout;
-    let of = |table: &str| said.lines().find(|l| l.trim_start().starts_with(&format!("{table}.parquet"))).unwrap();
-    assert!(of("estimates").ends_with(" holds") && of("trends").contains("does not hold"), "{said}");
-    assert!(said.contains("configuration trend.criterion: \"aicc\" became \"bic\""), "{said}");
-    assert_eq!(run(campaign.command("verify").args(["--table", "estimates"])).code, Some(0));
-    assert_eq!(run(campaign.command("verify").args(["--table", "nonsense"])).code, Some(1));
+    let of = |table: &str| {
+        said.lines()
+            .find(|l| l.trim_start().starts_with(&format!("{table}.parquet")))
+            .unwrap()
+    };
+    assert!(
+        of("estimates").ends_with(" holds") && of("trends").contains("does not hold"),
+        "{said}"
+    );
+    assert!(
+        said.contains("configuration trend.criterion: \"aicc\" became \"bic\""),
+        "{said}"
+    );
+    assert_eq!(
+        run(campaign.command("verify").args(["--table", "estimates"])).code,
+        Some(0)
+    );
+    assert_eq!(
+        run(campaign.command("verify").args(["--table", "nonsense"])).code,
+        Some(1)
+    );
     campaign.edit("pipeline.yaml", "criterion: bic", "criterion: aicc");
 
     // One bit of a published table, and of an artefact.
     let table = fs::canonicalize(campaign.path("reports/fits.csv")).unwrap();
     flip(&table);
     let said = campaign.ends("verify", 2).stdout;
-    assert!(said.contains("its bytes are not those that were published"), "{said}");
+    assert!(
+        said.contains("its bytes are not those that were published"),
+        "{said}"
+    );
     campaign.finishes("run");
     campaign.ends("verify", 0);
     flip(&files(&campaign.path("store/estimate"))[0]);
-    assert!(campaign.ends("verify", 2).stdout.contains("damaged or gone"));
+    assert!(
+        campaign
+            .ends("verify", 2)
+            .stdout
+            .contains("damaged or gone")
+    );
     campaign.add("flight_001", &flight(1, 151));
-    assert!(campaign.ends("verify", 2).stdout.contains("the file of flight flight_001 changed"));
+    assert!(
+        campaign
+            .ends("verify", 2)
+            .stdout
+            .contains("the file of flight flight_001 changed")
+    );
 }
 
 fn flip(path: &Path) {
@@ -340,7 +486,11 @@ fn any_file_of_store_and_reports_may_be_damaged_and_the_next_run_ends_the_same()
     let expected = campaign.bytes("reports");
     let all = || -> Vec<PathBuf> {
         let night = fs::canonicalize(campaign.path("reports/current")).unwrap();
-        files(&campaign.path("store")).into_iter().chain(files(&night)).filter(|p| !p.ends_with("lock")).collect()
+        files(&campaign.path("store"))
+            .into_iter()
+            .chain(files(&night))
+            .filter(|p| !p.ends_with("lock"))
+            .collect()
     };
     let ends_the_same = |what: &str| {
         campaign.finishes("run");
@@ -366,7 +516,10 @@ fn any_file_of_store_and_reports_may_be_damaged_and_the_next_run_ends_the_same()
         let all = all();
         let what = flip_one(&all[which.below(all.len())]);
         ends_the_same(&what);
-        assert!(!matches!(campaign.harvest("verify").code, Some(1)), "{what}");
+        assert!(
+            !matches!(campaign.harvest("verify").code, Some(1)),
+            "{what}"
+        );
     }
 }
 
@@ -374,17 +527,31 @@ fn any_file_of_store_and_reports_may_be_damaged_and_the_next_run_ends_the_same()
 fn gc_shows_first_removes_what_no_night_needs_and_nothing_else() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
-    assert!(run(campaign.command("gc").arg("--yes")).stdout.contains("0 artefacts (0 MB) and 0 nights removed"));
+    assert!(
+        run(campaign.command("gc").arg("--yes"))
+            .stdout
+            .contains("0 artefacts (0 MB) and 0 nights removed")
+    );
     campaign.copy_pipeline();
     fs::remove_file(campaign.flight("flight_004")).unwrap();
     campaign.finishes("run");
     let all = campaign.bytes("store");
     campaign.ends("gc", 0);
-    assert!(campaign.bytes("store") == all, "the nights before need them");
+    assert!(
+        campaign.bytes("store") == all,
+        "the nights before need them"
+    );
 
-    campaign.edit("pipeline.yaml", "histories_at_alpha_deg: 30", "histories_at_alpha_deg: 30\n  keep_nights: 1");
+    campaign.edit(
+        "pipeline.yaml",
+        "histories_at_alpha_deg: 30",
+        "histories_at_alpha_deg: 30\n  keep_nights: 1",
+    );
     let shown = campaign.ends("gc", 0).stdout;
-    assert!(shown.contains("would be removed") && shown.contains("night 0001"), "{shown}");
+    assert!(
+        shown.contains("would be removed") && shown.contains("night 0001"),
+        "{shown}"
+    );
     assert!(campaign.bytes("store") == all, "it only shows");
     assert_eq!(run(campaign.command("gc").arg("--yes")).code, Some(0));
     let alone = Campaign::of_pitch_steps();
@@ -401,11 +568,20 @@ fn gc_removes_nothing_where_it_cannot_tell_what_a_night_needs() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     flip(&campaign.path("reports/nights/0001/night.json"));
-    fs::write(campaign.path("store/estimate/superseded.json"), "of a night before").unwrap();
+    fs::write(
+        campaign.path("store/estimate/superseded.json"),
+        "of a night before",
+    )
+    .unwrap();
     let before = campaign.bytes("store");
     let outcome = run(campaign.command("gc").arg("--yes"));
     assert_eq!(outcome.code, Some(1), "{outcome:?}");
-    assert!(outcome.stderr.contains("0001: its manifest night.json cannot be read"), "{outcome:?}");
+    assert!(
+        outcome
+            .stderr
+            .contains("0001: its manifest night.json cannot be read"),
+        "{outcome:?}"
+    );
     assert!(campaign.bytes("store") == before && campaign.path("reports/nights/0001").exists());
 }
 
@@ -415,13 +591,19 @@ fn a_stage_that_has_nothing_new_leaves_the_whole_night_in_its_place() {
     campaign.finishes("run");
     let published = everything(&campaign);
     let outcome = campaign.harvest("estimate");
-    assert!(outcome.stdout.contains("nothing new: night 0001 holds"), "{outcome:?}");
+    assert!(
+        outcome.stdout.contains("nothing new: night 0001 holds"),
+        "{outcome:?}"
+    );
     assert!(everything(&campaign) == published);
     for estimate in files(&campaign.path("store/estimate")) {
         fs::remove_file(estimate).unwrap();
     }
     campaign.harvest("segment");
-    assert!(campaign.path("reports/report.html").is_file(), "the same night, to the report");
+    assert!(
+        campaign.path("reports/report.html").is_file(),
+        "the same night, to the report"
+    );
     campaign.finishes("run");
     assert!(everything(&campaign) == published);
 }
@@ -432,16 +614,43 @@ fn the_log_is_one_json_object_per_line_with_a_clock_and_the_terminal_stays_quiet
     fs::write(campaign.flight("spoiled"), "text").unwrap();
     let log = campaign.path("nightly.jsonl");
     for _ in 0..2 {
-        let outcome = run(campaign.command("run").arg("--quiet").arg("--jobs").arg("1").arg("--log").arg(&log));
-        assert_eq!((outcome.code, &*outcome.stdout, &*outcome.stderr), (Some(2), "", ""));
+        let outcome = run(campaign
+            .command("run")
+            .arg("--quiet")
+            .arg("--jobs")
+            .arg("1")
+            .arg("--log")
+            .arg(&log));
+        assert_eq!(
+            (outcome.code, &*outcome.stdout, &*outcome.stderr),
+            (Some(2), "", "")
+        );
     }
     let text = fs::read_to_string(&log).unwrap();
-    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let of = |event: &str| lines.iter().filter(|l| l["event"] == event).collect::<Vec<_>>();
-    assert!(lines.iter().all(|l| l["time"].as_str().unwrap().ends_with('Z') && l["pid"].is_u64()));
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let of = |event: &str| {
+        lines
+            .iter()
+            .filter(|l| l["event"] == event)
+            .collect::<Vec<_>>()
+    };
+    assert!(
+        lines
+            .iter()
+            .all(|l| l["time"].as_str().unwrap().ends_with('Z') && l["pid"].is_u64())
+    );
     assert_eq!((of("begin").len(), of("end").len()), (2, 2));
-    assert_eq!((&of("night")[0]["new"], &of("night")[1]["new"]), (&true.into(), &false.into()));
-    assert_eq!((&of("end")[1]["artefacts_made"], &of("end")[1]["exit"]), (&0.into(), &2.into()));
+    assert_eq!(
+        (&of("night")[0]["new"], &of("night")[1]["new"]),
+        (&true.into(), &false.into())
+    );
+    assert_eq!(
+        (&of("end")[1]["artefacts_made"], &of("end")[1]["exit"]),
+        (&0.into(), &2.into())
+    );
     assert!(of("problem").iter().any(|p| p["flight"] == "spoiled"));
     assert!(of("stage").iter().any(|s| s["stage"] == "estimate"));
 }

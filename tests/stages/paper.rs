@@ -13,7 +13,14 @@ fn printed() -> Document {
 /// The text of every page, with spaces as single ones.
 fn texts(document: &Document) -> Vec<String> {
     let pages = document.get_pages();
-    let text = |page: u32| document.extract_text(&[page]).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = |page: u32| {
+        document
+            .extract_text(&[page])
+            .unwrap()
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
     pages.keys().map(|page| text(*page)).collect()
 }
 
@@ -21,15 +28,25 @@ fn texts(document: &Document) -> Vec<String> {
 fn the_summary_can_be_read_and_every_page_says_which_it_is() {
     let texts = texts(&printed());
     let all = texts.join(" ");
-    for words in
-        ["What is new", "What failed", "What disagrees", "Flight against wind tunnel, derivative by derivative"]
-    {
+    for words in [
+        "What is new",
+        "What failed",
+        "What disagrees",
+        "Flight against wind tunnel, derivative by derivative",
+    ] {
         assert!(all.contains(words), "{words}");
     }
     let maneuvers = demo().tables["maneuvers"].len();
-    assert!(all.contains(&format!("{maneuvers} maneuvers in ")), "the first line of the summary");
+    assert!(
+        all.contains(&format!("{maneuvers} maneuvers in ")),
+        "the first line of the summary"
+    );
     for (i, text) in texts.iter().enumerate() {
-        assert!(text.contains(&format!("page {} of {}", i + 1, texts.len())), "page {}: {text}", i + 1);
+        assert!(
+            text.contains(&format!("page {} of {}", i + 1, texts.len())),
+            "page {}: {text}",
+            i + 1
+        );
     }
 }
 
@@ -37,14 +54,27 @@ fn the_summary_can_be_read_and_every_page_says_which_it_is() {
 fn every_derivative_and_maneuver_is_on_a_page_of_its_own_that_the_outline_names() {
     let document = printed();
     let texts = texts(&document);
-    let outline: BTreeMap<String, usize> =
-        document.get_toc().unwrap().toc.into_iter().map(|entry| (entry.title, entry.page)).collect();
-    let page_of = |words: &str| outline.iter().find(|(title, _)| title.contains(words)).map(|(_, page)| *page);
+    let outline: BTreeMap<String, usize> = document
+        .get_toc()
+        .unwrap()
+        .toc
+        .into_iter()
+        .map(|entry| (entry.title, entry.page))
+        .collect();
+    let page_of = |words: &str| {
+        outline
+            .iter()
+            .find(|(title, _)| title.contains(words))
+            .map(|(_, page)| *page)
+    };
     let mut pages = Vec::new();
     for row in &demo().tables["maneuvers"] {
-        let page =
-            page_of(&row["maneuver_id"]).unwrap_or_else(|| panic!("{} is not in the outline", row["maneuver_id"]));
-        assert!(texts[page - 1].contains(&row["maneuver_id"]) && texts[page - 1].contains("Flight condition"));
+        let page = page_of(&row["maneuver_id"])
+            .unwrap_or_else(|| panic!("{} is not in the outline", row["maneuver_id"]));
+        assert!(
+            texts[page - 1].contains(&row["maneuver_id"])
+                && texts[page - 1].contains("Flight condition")
+        );
         pages.push(page);
     }
     let every = pages.len();
@@ -52,8 +82,14 @@ fn every_derivative_and_maneuver_is_on_a_page_of_its_own_that_the_outline_names(
     assert_eq!(pages.len(), every, "no two on one page");
     for row in &demo().tables["comparison"] {
         let name = format!(", {}", row["derivative"]);
-        let page = outline.iter().find(|(title, _)| title.ends_with(&name)).map(|(_, page)| *page);
-        assert!(page.is_some_and(|page| texts[page - 1].contains(&row["derivative"])), "{name}");
+        let page = outline
+            .iter()
+            .find(|(title, _)| title.ends_with(&name))
+            .map(|(_, page)| *page);
+        assert!(
+            page.is_some_and(|page| texts[page - 1].contains(&row["derivative"])),
+            "{name}"
+        );
     }
 }
 
@@ -72,7 +108,11 @@ fn the_contents_tell_the_pages_on_which_the_chapters_are() {
             chapter.title,
             chapter.page
         );
-        assert!(texts[chapter.page - 1].contains(&chapter.title), "{}", chapter.title);
+        assert!(
+            texts[chapter.page - 1].contains(&chapter.title),
+            "{}",
+            chapter.title
+        );
     }
 }
 

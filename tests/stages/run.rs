@@ -11,8 +11,16 @@ use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_ro
 
 /// Tables and their columns that other programs rely on, with the stage that publishes them.
 const PUBLISHED: &[(&str, &str, &str)] = &[
-    ("ingest", "channels", "flight_id channel signal samples bridged despiked missing verdict"),
-    ("ingest", "checks", "flight_id relation signals slope correlation verdict"),
+    (
+        "ingest",
+        "channels",
+        "flight_id channel signal samples bridged despiked missing verdict",
+    ),
+    (
+        "ingest",
+        "checks",
+        "flight_id relation signals slope correlation verdict",
+    ),
     (
         "ingest",
         "instruments",
@@ -30,7 +38,11 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "events",
         "flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict",
     ),
-    ("segment", "unknown", "flight_id start_s end_s inputs nearest_class reason"),
+    (
+        "segment",
+        "unknown",
+        "flight_id start_s end_s inputs nearest_class reason",
+    ),
     (
         "estimate",
         "fits",
@@ -49,7 +61,11 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "combined",
         "maneuver_id flight_id class alpha_deg mach derivative unit status value bound bound_corrected wind_tunnel",
     ),
-    ("estimate", "correlations", "maneuver_id class kind first second correlation"),
+    (
+        "estimate",
+        "correlations",
+        "maneuver_id class kind first second correlation",
+    ),
     (
         "estimate",
         "predictions",
@@ -68,7 +84,11 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95 prediction_upper_95 \
          maneuvers outliers curve",
     ),
-    ("trend", "outliers", "derivative unit group maneuver_id class alpha_deg value bound trend z weight_share"),
+    (
+        "trend",
+        "outliers",
+        "derivative unit group maneuver_id class alpha_deg value bound trend z weight_share",
+    ),
     (
         "compare",
         "comparison",
@@ -79,17 +99,43 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "maneuver_comparison",
         "maneuver_id derivative alpha_deg mach flight bound wind_tunnel difference uncertainty difference_pct z verdict",
     ),
-    ("compare", "verdicts", "against derivative alpha_from_deg alpha_to_deg verdict difference_pct words"),
-    ("compare", "disagreements", "rank against derivative alpha_deg flight other difference z size_pct words"),
-    ("compare", "changes", "against derivative group alpha_deg flight before difference difference_pct z verdict"),
-    ("compare", "beyond_tunnel", "maneuver_id variable read_at tabulated_from tabulated_to treatment derivatives"),
+    (
+        "compare",
+        "verdicts",
+        "against derivative alpha_from_deg alpha_to_deg verdict difference_pct words",
+    ),
+    (
+        "compare",
+        "disagreements",
+        "rank against derivative alpha_deg flight other difference z size_pct words",
+    ),
+    (
+        "compare",
+        "changes",
+        "against derivative group alpha_deg flight before difference difference_pct z verdict",
+    ),
+    (
+        "compare",
+        "beyond_tunnel",
+        "maneuver_id variable read_at tabulated_from tabulated_to treatment derivatives",
+    ),
 ];
 
 /// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
 /// nothing fails.
-const WITHOUT_ROWS: [&str; 7] = ["beyond_tunnel", "changes", "events", "joint", "predictions", "problems", "unknown"];
+const WITHOUT_ROWS: [&str; 7] = [
+    "beyond_tunnel",
+    "changes",
+    "events",
+    "joint",
+    "predictions",
+    "problems",
+    "unknown",
+];
 
-const STAGES: [&str; 6] = ["ingest", "segment", "estimate", "trend", "compare", "report"];
+const STAGES: [&str; 6] = [
+    "ingest", "segment", "estimate", "trend", "compare", "report",
+];
 
 /// Two short flights, one maneuver of each axis.
 fn two_flights() -> Campaign {
@@ -107,12 +153,21 @@ fn each_stage_brings_its_predecessors_up_to_date_and_publishes_its_tables() {
         let rank = |name: &str| STAGES.iter().position(|s| *s == name).unwrap();
         for (of, table, _) in PUBLISHED {
             for extension in ["csv", "parquet"] {
-                let path = campaign.path("reports").join(format!("{table}.{extension}"));
-                assert_eq!(path.is_file(), rank(of) <= rank(stage), "{table}.{extension} after {stage}");
+                let path = campaign
+                    .path("reports")
+                    .join(format!("{table}.{extension}"));
+                assert_eq!(
+                    path.is_file(),
+                    rank(of) <= rank(stage),
+                    "{table}.{extension} after {stage}"
+                );
             }
         }
         assert!(campaign.path("reports/problems.csv").is_file(), "{stage}");
-        assert_eq!(campaign.path("reports/report.html").is_file(), stage == "report");
+        assert_eq!(
+            campaign.path("reports/report.html").is_file(),
+            stage == "report"
+        );
     }
 }
 
@@ -125,12 +180,21 @@ fn tables_have_their_fixed_columns_and_parquet_says_what_csv_says() {
     }
     for (_, table, columns) in PUBLISHED {
         let frame = campaign.frame(table);
-        let names: Vec<&str> = frame.get_column_names().iter().map(|n| n.as_str()).collect();
+        let names: Vec<&str> = frame
+            .get_column_names()
+            .iter()
+            .map(|n| n.as_str())
+            .collect();
         for column in columns.split_whitespace() {
             assert!(names.contains(&column), "{table} lacks {column}");
         }
-        let mut csv = csv::Reader::from_path(campaign.path("reports").join(format!("{table}.csv"))).unwrap();
-        assert_eq!(csv.headers().unwrap().iter().collect::<Vec<_>>(), names, "{table}");
+        let mut csv =
+            csv::Reader::from_path(campaign.path("reports").join(format!("{table}.csv"))).unwrap();
+        assert_eq!(
+            csv.headers().unwrap().iter().collect::<Vec<_>>(),
+            names,
+            "{table}"
+        );
         let rows: Vec<csv::StringRecord> = csv.records().map(Result::unwrap).collect();
         assert_eq!(rows.len(), frame.height(), "{table}");
         assert_eq!(rows.is_empty(), WITHOUT_ROWS.contains(table), "{table}");
@@ -140,7 +204,9 @@ fn tables_have_their_fixed_columns_and_parquet_says_what_csv_says() {
             assert_eq!(empty, column.null_count(), "{table}: {name}");
             if let Ok(numbers) = column.f64() {
                 let same = |(row, number): (&csv::StringRecord, Option<f64>)| {
-                    number.is_none_or(|number| row[j].parse::<f64>().unwrap().to_bits() == number.to_bits())
+                    number.is_none_or(|number| {
+                        row[j].parse::<f64>().unwrap().to_bits() == number.to_bits()
+                    })
                 };
                 assert!(rows.iter().zip(numbers.iter()).all(same), "{table}: {name}");
             }
@@ -150,36 +216,75 @@ fn tables_have_their_fixed_columns_and_parquet_says_what_csv_says() {
 
 /// The columns of each table that was published, by its name.
 fn published_columns() -> BTreeMap<String, Vec<String>> {
-    let tables = demo().bytes.iter().filter(|(path, _)| path.extension().is_some_and(|e| e == "csv"));
-    let columns = |bytes: &[u8]| csv::Reader::from_reader(bytes).headers().unwrap().iter().map(str::to_owned).collect();
-    tables.map(|(path, bytes)| (path.file_stem().unwrap().to_string_lossy().into_owned(), columns(bytes))).collect()
+    let tables = demo()
+        .bytes
+        .iter()
+        .filter(|(path, _)| path.extension().is_some_and(|e| e == "csv"));
+    let columns = |bytes: &[u8]| {
+        csv::Reader::from_reader(bytes)
+            .headers()
+            .unwrap()
+            .iter()
+            .map(str::to_owned)
+            .collect()
+    };
+    tables
+        .map(|(path, bytes)| {
+            (
+                path.file_stem().unwrap().to_string_lossy().into_owned(),
+                columns(bytes),
+            )
+        })
+        .collect()
 }
 
 #[test]
 fn every_published_table_is_promised() {
     let promised: BTreeSet<&str> = PUBLISHED.iter().map(|(_, table, _)| *table).collect();
-    assert_eq!(published_columns().keys().map(String::as_str).collect::<BTreeSet<_>>(), promised);
+    assert_eq!(
+        published_columns()
+            .keys()
+            .map(String::as_str)
+            .collect::<BTreeSet<_>>(),
+        promised
+    );
 }
 
 /// The columns that `reports/README.md` explains, by table: what is in backticks in the first cell of a row. An ellipsis
 /// between two of them stands for the table's columns in between.
-fn explained_columns(published: &BTreeMap<String, Vec<String>>) -> BTreeMap<String, BTreeSet<String>> {
-    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/reports/README.md")).unwrap();
+fn explained_columns(
+    published: &BTreeMap<String, Vec<String>>,
+) -> BTreeMap<String, BTreeSet<String>> {
+    let page =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/reports/README.md")).unwrap();
     let mut explained = BTreeMap::new();
     for section in page.split("\n## ").skip(1) {
         let table = section.split([' ', '\n']).next().unwrap();
         // Not every section is of a table; a table without a section is found by its name.
-        let Some(columns) = published.get(table) else { continue };
+        let Some(columns) = published.get(table) else {
+            continue;
+        };
         let mut names = BTreeSet::new();
-        for cell in section.lines().filter_map(|line| line.strip_prefix("| `")?.split(" |").next()) {
-            let words: Vec<&str> = cell.split(['`', ' ']).filter(|word| !word.is_empty()).collect();
+        for cell in section
+            .lines()
+            .filter_map(|line| line.strip_prefix("| `")?.split(" |").next())
+        {
+            let words: Vec<&str> = cell
+                .split(['`', ' '])
+                .filter(|word| !word.is_empty())
+                .collect();
             for range in words.windows(3).filter(|words| words[1] == "…") {
                 let at = |name: &str| columns.iter().position(|c| c == name);
                 if let (Some(first), Some(last)) = (at(range[0]), at(range[2])) {
                     names.extend(columns[first..last].iter().cloned());
                 }
             }
-            names.extend(words.into_iter().filter(|word| *word != "…").map(str::to_owned));
+            names.extend(
+                words
+                    .into_iter()
+                    .filter(|word| *word != "…")
+                    .map(str::to_owned),
+            );
         }
         if section.contains("\nThe columns of `estimates`.") {
             names.extend(columns.iter().cloned());
@@ -193,13 +298,23 @@ fn explained_columns(published: &BTreeMap<String, Vec<String>>) -> BTreeMap<Stri
 fn the_page_beside_the_tables_explains_every_column_and_no_other() {
     let published = published_columns();
     let explained = explained_columns(&published);
-    assert_eq!(published["combined"], published["estimates"], "the page says so");
+    assert_eq!(
+        published["combined"], published["estimates"],
+        "the page says so"
+    );
     for (table, columns) in &published {
         let columns: BTreeSet<String> = columns.iter().cloned().collect();
-        let explained = explained.get(table).unwrap_or_else(|| panic!("no word of {table}"));
-        let (silent, unknown): (Vec<_>, Vec<_>) =
-            (columns.difference(explained).collect(), explained.difference(&columns).collect());
-        assert!(silent.is_empty() && unknown.is_empty(), "{table}: not explained {silent:?}, not there {unknown:?}");
+        let explained = explained
+            .get(table)
+            .unwrap_or_else(|| panic!("no word of {table}"));
+        let (silent, unknown): (Vec<_>, Vec<_>) = (
+            columns.difference(explained).collect(),
+            explained.difference(&columns).collect(),
+        );
+        assert!(
+            silent.is_empty() && unknown.is_empty(),
+            "{table}: not explained {silent:?}, not there {unknown:?}"
+        );
     }
 }
 
@@ -208,7 +323,9 @@ fn state(campaign: &Campaign) -> BTreeMap<PathBuf, (Vec<u8>, SystemTime)> {
     ["store", "reports"]
         .iter()
         .flat_map(|folder| files(&campaign.path(folder)))
-        .filter(|path| !["lock", "contents.json"].contains(&&*path.file_name().unwrap().to_string_lossy()))
+        .filter(|path| {
+            !["lock", "contents.json"].contains(&&*path.file_name().unwrap().to_string_lossy())
+        })
         .map(|path| {
             let changed = fs::metadata(&path).unwrap().modified().unwrap();
             (path.clone(), (fs::read(&path).unwrap(), changed))
@@ -232,7 +349,10 @@ fn a_second_run_of_a_campaign_with_a_refused_flight_changes_nothing_and_says_it_
     campaign.ends("run", 2);
     let before = state(&campaign);
     let again = campaign.ends("run", 2);
-    assert!(again.stdout.contains("not a readable Parquet file"), "{again:?}");
+    assert!(
+        again.stdout.contains("not a readable Parquet file"),
+        "{again:?}"
+    );
     assert!(state(&campaign) == before, "a file was written again");
 }
 
@@ -244,7 +364,10 @@ fn tables_and_report_are_the_same_bytes_with_one_thread_and_with_two() {
     let with_threads = |threads: &str| {
         campaign.forget();
         let outcome = run(campaign.command("run").args(["--threads", threads]));
-        assert!(outcome.stdout.contains("5 of them converged"), "{outcome:?}");
+        assert!(
+            outcome.stdout.contains("5 of them converged"),
+            "{outcome:?}"
+        );
         assert!(!campaign.table("trends").is_empty());
         campaign.bytes("reports")
     };
@@ -262,8 +385,13 @@ fn a_killed_run_goes_on_where_it_was() {
     let (store, reports) = (campaign.bytes("store"), campaign.bytes("reports"));
 
     campaign.forget();
-    let mut child =
-        campaign.command("run").args(["--threads", "1"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = campaign
+        .command("run")
+        .args(["--threads", "1"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     let records = campaign.path("store/records");
     let patience = Instant::now() + Duration::from_mins(1);
     while fs::read_dir(&records).map_or(0, Iterator::count) == 0 && Instant::now() < patience {
@@ -271,7 +399,10 @@ fn a_killed_run_goes_on_where_it_was() {
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    assert!(!campaign.path("reports/report.html").exists(), "it was killed before its end");
+    assert!(
+        !campaign.path("reports/report.html").exists(),
+        "it was killed before its end"
+    );
 
     campaign.finishes("run");
     assert!(campaign.bytes("store") == store);
@@ -285,11 +416,20 @@ fn what_a_killed_run_leaves_is_swept_or_made_again() {
     let (store, reports) = (campaign.bytes("store"), campaign.bytes("reports"));
 
     // Half-written files beside their places, one artefact cut short, others and half of the tables not there yet.
-    for folder in ["store/estimate", "store/records", "store/ingest", "store/segment", "reports"] {
+    for folder in [
+        "store/estimate",
+        "store/records",
+        "store/ingest",
+        "store/segment",
+        "reports",
+    ] {
         fs::write(campaign.path(folder).join(".harvest-xyz"), "half").unwrap();
     }
     let estimates = files(&campaign.path("store/estimate"));
-    let artefact = estimates.iter().find(|p| p.extension().is_some_and(|e| e == "json")).unwrap();
+    let artefact = estimates
+        .iter()
+        .find(|p| p.extension().is_some_and(|e| e == "json"))
+        .unwrap();
     let whole = fs::read(artefact).unwrap();
     fs::write(artefact, &whole[..whole.len() / 2]).unwrap();
     fs::remove_file(&files(&campaign.path("store/ingest"))[1]).unwrap();
@@ -328,7 +468,10 @@ fn a_flight_that_is_taken_out_of_the_archive_leaves_the_tables() {
     let alone = Campaign::of_pitch_steps();
     alone.finishes("run");
     let (left, alone) = (campaign.tables(), alone.tables());
-    let apart: Vec<_> = left.keys().filter(|table| alone.get(*table) != left.get(*table)).collect();
+    let apart: Vec<_> = left
+        .keys()
+        .filter(|table| alone.get(*table) != left.get(*table))
+        .collect();
     assert!(apart.is_empty() && left.len() == alone.len(), "{apart:?}");
 }
 
@@ -336,12 +479,18 @@ fn a_flight_that_is_taken_out_of_the_archive_leaves_the_tables() {
 fn a_flight_that_is_added_leaves_the_others_artefacts_untouched() {
     let campaign = Campaign::of_pitch_steps();
     campaign.ends("estimate", 0);
-    let before: BTreeMap<_, _> =
-        state(&campaign).into_iter().filter(|(p, _)| p.starts_with(campaign.path("store"))).collect();
+    let before: BTreeMap<_, _> = state(&campaign)
+        .into_iter()
+        .filter(|(p, _)| p.starts_with(campaign.path("store")))
+        .collect();
     campaign.add("flight_004", &yaw_and_roll_steps());
     campaign.ends("estimate", 0);
     let after = state(&campaign);
-    assert!(before.iter().all(|(path, state)| after.get(path) == Some(state)));
+    assert!(
+        before
+            .iter()
+            .all(|(path, state)| after.get(path) == Some(state))
+    );
     assert_eq!(campaign.table("fits").len(), 2);
 }
 
@@ -352,7 +501,10 @@ fn a_store_that_another_run_uses_is_left_alone() {
     let lock = File::create(campaign.path("store/lock")).unwrap();
     lock.try_lock().unwrap();
     let outcome = campaign.ends("run", 1);
-    assert!(outcome.stderr.contains("another run is using this store"), "{outcome:?}");
+    assert!(
+        outcome.stderr.contains("another run is using this store"),
+        "{outcome:?}"
+    );
     assert!(!campaign.path("reports").exists());
     drop(lock);
     campaign.ends("ingest", 0);
@@ -372,5 +524,12 @@ fn a_reports_folder_that_cannot_be_written_is_named() {
 fn a_quiet_run_says_nothing() {
     let campaign = Campaign::of_pitch_steps();
     let outcome = run(campaign.command("segment").arg("--quiet"));
-    assert_eq!((outcome.code, outcome.stdout.as_str(), outcome.stderr.as_str()), (Some(0), "", ""));
+    assert_eq!(
+        (
+            outcome.code,
+            outcome.stdout.as_str(),
+            outcome.stderr.as_str()
+        ),
+        (Some(0), "", "")
+    );
 }

@@ -12,19 +12,30 @@ fn two_flights() -> Campaign {
 }
 
 fn plan_of(campaign: &Campaign, of: &str, shards: usize) -> Outcome {
-    run(campaign.command("plan").args(["--of", of, "--shards", &shards.to_string()]))
+    run(campaign
+        .command("plan")
+        .args(["--of", of, "--shards", &shards.to_string()]))
 }
 
 fn shard(campaign: &Campaign, stage: &str, number: usize, shards: usize) -> Command {
-    let of = if stage == "estimate" { "maneuvers" } else { "flights" };
+    let of = if stage == "estimate" {
+        "maneuvers"
+    } else {
+        "flights"
+    };
     let mut command = campaign.command(stage);
-    command.arg("--plan").arg(campaign.path(&format!("store/{of}.plan.json")));
+    command
+        .arg("--plan")
+        .arg(campaign.path(&format!("store/{of}.plan.json")));
     command.args(["--shard", &format!("{number}/{shards}"), "--threads", "1"]);
     command
 }
 
 fn with_plan(campaign: &Campaign, command: &str, of: &str) -> Outcome {
-    run(campaign.command(command).arg("--plan").arg(campaign.path(&format!("store/{of}.plan.json"))))
+    run(campaign
+        .command(command)
+        .arg("--plan")
+        .arg(campaign.path(&format!("store/{of}.plan.json"))))
 }
 
 /// Every shard of a stage, the last first.
@@ -51,7 +62,10 @@ fn the_tables_of_many_shards_are_those_of_one_process() {
         all_shards(&campaign, "estimate", shards);
         let merged = with_plan(&campaign, "merge", "maneuvers");
         assert_eq!(merged.code, demo().outcome.code, "{merged:?}");
-        assert!(campaign.tables() == demo().bytes, "{shards} shards publish other tables");
+        assert!(
+            campaign.tables() == demo().bytes,
+            "{shards} shards publish other tables"
+        );
     }
 }
 
@@ -60,36 +74,66 @@ fn a_merge_refuses_what_is_missing_and_status_names_its_shards() {
     let campaign = two_flights();
     let early = plan_of(&campaign, "maneuvers", 2);
     assert_eq!(early.code, Some(1));
-    assert!(early.stderr.contains("2 flights are not ingested and segmented, flight_001 first"), "{early:?}");
+    assert!(
+        early
+            .stderr
+            .contains("2 flights are not ingested and segmented, flight_001 first"),
+        "{early:?}"
+    );
 
     plan_of(&campaign, "flights", 2);
     let status = with_plan(&campaign, "status", "flights");
-    assert_eq!((status.code, status.stdout.trim()), (Some(3), "1-2"), "{status:?}");
+    assert_eq!(
+        (status.code, status.stdout.trim()),
+        (Some(3), "1-2"),
+        "{status:?}"
+    );
     all_shards(&campaign, "segment", 2);
     assert_eq!(with_plan(&campaign, "status", "flights").code, Some(0));
     plan_of(&campaign, "maneuvers", 2);
     assert_eq!(run(&mut shard(&campaign, "estimate", 1, 2)).code, Some(0));
 
     let status = with_plan(&campaign, "status", "maneuvers");
-    assert_eq!((status.code, status.stdout.trim()), (Some(3), "2"), "{status:?}");
+    assert_eq!(
+        (status.code, status.stdout.trim()),
+        (Some(3), "2"),
+        "{status:?}"
+    );
     let merged = with_plan(&campaign, "merge", "maneuvers");
     assert_eq!(merged.code, Some(1));
-    assert!(merged.stderr.contains("1 of 2 maneuvers are missing, of shards 2: run these shards"), "{merged:?}");
+    assert!(
+        merged
+            .stderr
+            .contains("1 of 2 maneuvers are missing, of shards 2: run these shards"),
+        "{merged:?}"
+    );
     assert!(!campaign.path("reports/fits.csv").exists());
     let wrong = with_plan(&campaign, "merge", "flights");
-    assert!(wrong.code == Some(1) && wrong.stderr.contains("the plan of maneuvers"), "{wrong:?}");
+    assert!(
+        wrong.code == Some(1) && wrong.stderr.contains("the plan of maneuvers"),
+        "{wrong:?}"
+    );
 }
 
 #[test]
 fn a_shard_that_runs_again_or_twice_at_once_makes_the_same() {
     let campaign = two_flights();
     plan_of(&campaign, "flights", 1);
-    let spawned = || shard(&campaign, "segment", 1, 1).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let spawned = || {
+        shard(&campaign, "segment", 1, 1)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap()
+    };
     let ends = [spawned(), spawned()].map(|mut child| child.wait().unwrap().code());
     assert_eq!(ends, [Some(0); 2]);
     let before = campaign.bytes("store");
     let again = run(&mut shard(&campaign, "segment", 1, 1));
-    assert!(again.code == Some(0) && again.stdout.contains("2 flights, 0 artefacts made"), "{again:?}");
+    assert!(
+        again.code == Some(0) && again.stdout.contains("2 flights, 0 artefacts made"),
+        "{again:?}"
+    );
     assert!(campaign.bytes("store") == before);
 }
 
@@ -99,10 +143,16 @@ fn a_plan_of_something_else_is_refused_and_says_what_changed() {
     plan_of(&campaign, "flights", 1);
     let refused = |words: &str| {
         let outcome = run(&mut shard(&campaign, "segment", 1, 1));
-        assert!(outcome.code == Some(1) && outcome.stderr.contains(words), "{words}: {outcome:?}");
+        assert!(
+            outcome.code == Some(1) && outcome.stderr.contains(words),
+            "{words}: {outcome:?}"
+        );
     };
     let wrong = run(&mut shard(&campaign, "segment", 1, 3));
-    assert!(wrong.code == Some(1) && wrong.stderr.contains("the plan deals to 1 shards, not 3"), "{wrong:?}");
+    assert!(
+        wrong.code == Some(1) && wrong.stderr.contains("the plan deals to 1 shards, not 3"),
+        "{wrong:?}"
+    );
     campaign.add("flight_004", &pitch_steps());
     refused("flight_004");
     campaign.add("flight_004", &yaw_and_roll_steps());
@@ -118,11 +168,17 @@ fn a_store_in_use_and_a_file_that_cannot_be_read_ask_for_another_try() {
     let lock = fs::File::open(campaign.path("store/lock")).unwrap();
     lock.lock().unwrap();
     let busy = run(&mut shard(&campaign, "segment", 1, 1));
-    assert!(busy.code == Some(75) && busy.stderr.contains("another try may go well"), "{busy:?}");
+    assert!(
+        busy.code == Some(75) && busy.stderr.contains("another try may go well"),
+        "{busy:?}"
+    );
     drop(lock);
     fs::remove_file(campaign.flight("flight_004")).unwrap();
     let gone = run(&mut shard(&campaign, "segment", 1, 1));
-    assert!(gone.code == Some(1) && gone.stderr.contains("flight_004"), "{gone:?}");
+    assert!(
+        gone.code == Some(1) && gone.stderr.contains("flight_004"),
+        "{gone:?}"
+    );
 }
 
 #[test]
@@ -132,12 +188,17 @@ fn scripts_are_written_for_a_scheduler_and_nothing_is_run() {
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     for name in ["flights", "plan", "maneuvers", "merge", "submit"] {
         let script = campaign.path(&format!("store/cluster/{name}.sh"));
-        let checked = Command::new("bash").arg("-n").arg(&script).status().unwrap();
+        let checked = Command::new("bash")
+            .arg("-n")
+            .arg(&script)
+            .status()
+            .unwrap();
         assert!(checked.success(), "{}", script.display());
     }
     let maneuvers = fs::read_to_string(campaign.path("store/cluster/maneuvers.sh")).unwrap();
     assert!(
-        maneuvers.contains("#SBATCH --array=1-24") && maneuvers.contains("estimate harv --archive "),
+        maneuvers.contains("#SBATCH --array=1-24")
+            && maneuvers.contains("estimate harv --archive "),
         "{maneuvers}"
     );
 }

@@ -29,7 +29,12 @@ fn anywhere(noise: &mut Noise, surfaces: usize) -> (State, Given) {
     let mut within = |low: f64, high: f64| low + (high - low) * noise.uniform();
     let speed = within(220.0, 600.0);
     let (alpha, beta) = (within(0.05, 1.05), within(-0.2, 0.2));
-    let attitude = Euler { phi: within(-1.0, 1.0), theta: within(-0.8, 0.9), psi: within(-3.0, 3.0) }.attitude();
+    let attitude = Euler {
+        phi: within(-1.0, 1.0),
+        theta: within(-0.8, 0.9),
+        psi: within(-3.0, 3.0),
+    }
+    .attitude();
     let state = State {
         velocity: AirData::velocity(speed, alpha, beta),
         rates: Vector3::new(within(-0.9, 0.9), within(-0.5, 0.5), within(-0.5, 0.5)),
@@ -48,7 +53,8 @@ fn anywhere(noise: &mut Noise, surfaces: usize) -> (State, Given) {
 
 /// The instant as the estimator would have measured it without any error.
 fn measured(simulation: &Simulation, state: &State, given: &Given, instant: &Instant) -> Motion {
-    let (aircraft, loading, angles) = (&simulation.config.aircraft, &instant.loading, state.euler());
+    let (aircraft, loading, angles) =
+        (&simulation.config.aircraft, &instant.loading, state.euler());
     Motion {
         alpha: instant.air.alpha,
         beta: instant.air.beta,
@@ -68,7 +74,8 @@ fn measured(simulation: &Simulation, state: &State, given: &Given, instant: &Ins
         iy: loading.iy_slug_ft2,
         iz: loading.iz_slug_ft2,
         ixz: loading.ixz_slug_ft2,
-        engine_momentum: aircraft.engine_inertia_slug_ft2 * given.rpm * 2.0 * std::f64::consts::PI / 60.0,
+        engine_momentum: aircraft.engine_inertia_slug_ft2 * given.rpm * 2.0 * std::f64::consts::PI
+            / 60.0,
         cg: loading.cg(),
     }
 }
@@ -78,8 +85,16 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
     let (plant, aircraft) = (simulation.simulator.plant(), &simulation.config.aircraft);
     let (state, given) = anywhere(noise, simulation.simulator.settings().surface_names.len());
     let instant = plant.instant(&state, &given, None);
-    let values = plant.aerodynamics.values(instant.air.alpha * DEG, instant.air.mach);
-    let (force, moment) = plant.aerodynamics.loads(aircraft, &values, &instant.air, &state.rates, &given.surfaces);
+    let values = plant
+        .aerodynamics
+        .values(instant.air.alpha * DEG, instant.air.mach);
+    let (force, moment) = plant.aerodynamics.loads(
+        aircraft,
+        &values,
+        &instant.air,
+        &state.rates,
+        &given.surfaces,
+    );
     let area = instant.air.qbar_psf * aircraft.wing_area_ft2;
     let (chord, span) = (area * aircraft.chord_ft, area * aircraft.span_ft);
     let motion = measured(simulation, &state, &given, &instant);
@@ -88,12 +103,14 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
     let x = Longitudinal::measured_state(&motion);
     let c = [-force.z / area, moment.y / chord, -force.x / area];
     let pitch = Longitudinal::rates(&known, &x, &c).rates;
-    let pitch_outputs = Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &motion), &x, &c).outputs;
+    let pitch_outputs =
+        Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &motion), &x, &c).outputs;
     let known = Lateral::known(aircraft, &motion);
     let x = Lateral::measured_state(&motion);
     let c = [force.y / area, moment.x / span, moment.z / span];
     let lateral = Lateral::rates(&known, &x, &c).rates;
-    let lateral_outputs = Lateral::outputs(&known, &Lateral::sensed(aircraft, &motion), &x, &c).outputs;
+    let lateral_outputs =
+        Lateral::outputs(&known, &Lateral::sensed(aircraft, &motion), &x, &c).outputs;
 
     let (v, v_dot, w_dot) = (state.velocity, instant.slope.velocity, instant.slope.rates);
     let speed = v.norm();
@@ -103,17 +120,41 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
     let (phi_dot, theta_dot) = state.euler_rates(&instant.slope);
     let rates = [
         pitch - SVector::from([alpha_dot, w_dot.y, theta_dot]),
-        SVector::from([lateral[0] - beta_dot, lateral[1] - w_dot.x, lateral[2] - w_dot.z]),
+        SVector::from([
+            lateral[0] - beta_dot,
+            lateral[1] - w_dot.x,
+            lateral[2] - w_dot.z,
+        ]),
         SVector::from([lateral[3] - phi_dot, 0.0, 0.0]),
     ];
     let read = sensors::read(aircraft, &state, &given, &instant);
     let signal = |name: &str| read.iter().find(|(n, _)| *n == name).unwrap().1;
-    let pitch_read = [signal::ALPHA_VANE, signal::Q, signal::THETA, signal::AN, signal::AX].map(signal);
-    let lateral_read = [signal::BETA_VANE, signal::P, signal::R, signal::PHI, signal::AY].map(signal);
-    let outputs = [pitch_outputs - SVector::from(pitch_read), lateral_outputs - SVector::from(lateral_read)]
-        .map(|d| d.abs().sum());
+    let pitch_read = [
+        signal::ALPHA_VANE,
+        signal::Q,
+        signal::THETA,
+        signal::AN,
+        signal::AX,
+    ]
+    .map(signal);
+    let lateral_read = [
+        signal::BETA_VANE,
+        signal::P,
+        signal::R,
+        signal::PHI,
+        signal::AY,
+    ]
+    .map(signal);
+    let outputs = [
+        pitch_outputs - SVector::from(pitch_read),
+        lateral_outputs - SVector::from(lateral_read),
+    ]
+    .map(|d| d.abs().sum());
     // Sums, so that what is no number does not pass.
-    (rates.iter().map(|d| d.abs().sum()).sum(), outputs.iter().sum())
+    (
+        rates.iter().map(|d| d.abs().sum()).sum(),
+        outputs.iter().sum(),
+    )
 }
 
 #[test]
@@ -133,28 +174,67 @@ fn the_simulator_s_equations_and_the_estimator_s_agree_to_twelve_digits() {
 fn every_surface_turns_the_aircraft_as_its_sign_says() {
     let simulation = simulation();
     let settings = simulation.simulator.settings();
-    let trim = simulation.simulator.trim(&simulation.card("OLAT", 10.0).unwrap()).unwrap();
-    let at = |state: &State, given: &Given| simulation.simulator.plant().instant(state, given, None).slope;
+    let trim = simulation
+        .simulator
+        .trim(&simulation.card("OLAT", 10.0).unwrap())
+        .unwrap();
+    let at = |state: &State, given: &Given| {
+        simulation
+            .simulator
+            .plant()
+            .instant(state, given, None)
+            .slope
+    };
     let still = at(&trim.state, &trim.given);
     let moved = |name: &str| {
         let mut given = trim.given.clone();
         given.surfaces[settings.place(name).unwrap()] += 5.0;
         at(&trim.state, &given).rates - still.rates
     };
-    assert!(moved("de_deg").y < 0.0, "stabilator trailing edge down pitches down");
+    assert!(
+        moved("de_deg").y < 0.0,
+        "stabilator trailing edge down pitches down"
+    );
     assert!(moved("dpv_deg").y < 0.0, "plume down pitches down");
     assert!(moved("da_deg").x > 0.0, "ailerons roll right");
-    assert!(moved("ddht_deg").x > 0.0, "the differential tail rolls right");
-    assert!(moved("dr_deg").z < 0.0, "rudder trailing edge left yaws left");
+    assert!(
+        moved("ddht_deg").x > 0.0,
+        "the differential tail rolls right"
+    );
+    assert!(
+        moved("dr_deg").z < 0.0,
+        "rudder trailing edge left yaws left"
+    );
     assert!(moved("dyv_deg").z > 0.0, "plume right yaws right");
 
-    let wind_from_the_right = State { velocity: AirData::velocity(400.0, 10.0 / DEG, 0.1), ..trim.state };
+    let wind_from_the_right = State {
+        velocity: AirData::velocity(400.0, 10.0 / DEG, 0.1),
+        ..trim.state
+    };
     let turned = at(&wind_from_the_right, &trim.given);
-    assert!(turned.rates.z > 0.0 && turned.rates.x < 0.0, "it weathercocks into the wind and rolls away from it");
-    let faster = at(&trim.state, &Given { thrust_lbf: trim.given.thrust_lbf + 1000.0, ..trim.given.clone() });
-    assert!(faster.velocity.x > still.velocity.x, "thrust pushes forward");
-    let nose_up = State { rates: Vector3::new(0.0, 0.1, 0.0), ..trim.state };
-    assert!(at(&nose_up, &trim.given).rates.y < still.rates.y, "pitching is damped");
+    assert!(
+        turned.rates.z > 0.0 && turned.rates.x < 0.0,
+        "it weathercocks into the wind and rolls away from it"
+    );
+    let faster = at(
+        &trim.state,
+        &Given {
+            thrust_lbf: trim.given.thrust_lbf + 1000.0,
+            ..trim.given.clone()
+        },
+    );
+    assert!(
+        faster.velocity.x > still.velocity.x,
+        "thrust pushes forward"
+    );
+    let nose_up = State {
+        rates: Vector3::new(0.0, 0.1, 0.0),
+        ..trim.state
+    };
+    assert!(
+        at(&nose_up, &trim.given).rates.y < still.rates.y,
+        "pitching is damped"
+    );
 }
 
 #[test]
@@ -165,37 +245,66 @@ fn a_trimmed_aircraft_stays_where_it_is() {
         let mut card = simulation.card("OLAT", alpha).unwrap();
         card.program.inputs.clear();
         let trim = simulation.simulator.trim(&card).unwrap();
-        let slope = simulation.simulator.plant().instant(&trim.state, &trim.given, None).slope;
-        assert!(slope.velocity.norm() < 1e-8 && slope.rates.norm() < 1e-9, "{alpha}: {slope:?}");
+        let slope = simulation
+            .simulator
+            .plant()
+            .instant(&trim.state, &trim.given, None)
+            .slope;
+        assert!(
+            slope.velocity.norm() < 1e-8 && slope.rates.norm() < 1e-9,
+            "{alpha}: {slope:?}"
+        );
         let flown = simulation.simulator.fly(&card).unwrap();
         let theta = flown.record.values(signal::THETA).unwrap();
-        let moved = theta.iter().map(|t| (t - theta[0]).abs()).fold(0.0, f64::max);
+        let moved = theta
+            .iter()
+            .map(|t| (t - theta[0]).abs())
+            .fold(0.0, f64::max);
         assert!(moved < drift_deg, "at {alpha}° it moves by {moved}°");
         // An accelerometer at rest feels gravity: an = cos θ cos φ nearly, in g of 32.174 ft/s².
         let an = flown.record.values(signal::AN).unwrap()[0];
         let phi = flown.record.values(signal::PHI).unwrap()[0];
-        assert_abs_diff_eq!(an, (theta[0] / DEG).cos() * (phi / DEG).cos() * 0.9969, epsilon = 2e-3);
+        assert_abs_diff_eq!(
+            an,
+            (theta[0] / DEG).cos() * (phi / DEG).cos() * 0.9969,
+            epsilon = 2e-3
+        );
     }
 }
 
 #[test]
 fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
     let simulation = simulation();
-    for (class, stick, rate) in
-        [("PPSS", "stick_pitch_in", signal::Q), ("PYRS", "stick_lat_in", signal::P), ("PYRS", "pedal_in", signal::R)]
-    {
+    for (class, stick, rate) in [
+        ("PPSS", "stick_pitch_in", signal::Q),
+        ("PYRS", "stick_lat_in", signal::P),
+        ("PYRS", "pedal_in", signal::R),
+    ] {
         let mut card = simulation.card(class, 15.0).unwrap();
         card.program.inputs.retain(|i| i.signal == stick);
         card.program.inputs[0].start_s = 1.0;
         let record = simulation.simulator.fly(&card).unwrap().record;
-        assert!(record.values(rate).unwrap()[record.sample_at(1.4)] > 0.5, "{stick}");
+        assert!(
+            record.values(rate).unwrap()[record.sample_at(1.4)] > 0.5,
+            "{stick}"
+        );
     }
 }
 
 fn estimated(simulation: &Simulation, flown: &Flown) -> Estimated {
     let config = &simulation.config;
-    let basis = Basis::new(&config.aircraft, &config.buildup, &config.tunnel, &config.estimate);
-    estimate::maneuver(&flown.record, &flown.maneuver, config.class(&flown.maneuver.class).unwrap(), &basis)
+    let basis = Basis::new(
+        &config.aircraft,
+        &config.buildup,
+        &config.tunnel,
+        &config.estimate,
+    );
+    estimate::maneuver(
+        &flown.record,
+        &flown.maneuver,
+        config.class(&flown.maneuver.class).unwrap(),
+        &basis,
+    )
 }
 
 #[test]
@@ -205,22 +314,62 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
     let campaign = Campaign::new();
     let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     assert!(text.contains("control_hz: 80"));
-    fs::write(campaign.path("cards.yaml"), text.replace("control_hz: 80", "control_hz: 40")).unwrap();
+    fs::write(
+        campaign.path("cards.yaml"),
+        text.replace("control_hz: 80", "control_hz: 40"),
+    )
+    .unwrap();
     let simulation = Simulation::load(&campaign.path("cards.yaml")).unwrap();
     for (class, alpha, derivatives) in [
-        ("SSIMD_LON", 10.0, &["CN_alpha", "CN_de", "Cm_alpha", "Cm_q", "Cm_de", "Cm_dsa", "Cm_dpv"][..]),
-        ("3211", 40.0, &["CN_q", "CN_de", "Cm_alpha", "Cm_q", "Cm_de"]),
-        ("SSIMD_LAT", 30.0, &["CY_beta", "Cl_beta", "Cl_p", "Cl_da", "Cl_ddht", "Cn_r", "Cn_dr", "Cn_dyv"]),
-        ("OLAT", 20.0, &["CY_beta", "Cl_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"]),
+        (
+            "SSIMD_LON",
+            10.0,
+            &[
+                "CN_alpha", "CN_de", "Cm_alpha", "Cm_q", "Cm_de", "Cm_dsa", "Cm_dpv",
+            ][..],
+        ),
+        (
+            "3211",
+            40.0,
+            &["CN_q", "CN_de", "Cm_alpha", "Cm_q", "Cm_de"],
+        ),
+        (
+            "SSIMD_LAT",
+            30.0,
+            &[
+                "CY_beta", "Cl_beta", "Cl_p", "Cl_da", "Cl_ddht", "Cn_r", "Cn_dr", "Cn_dyv",
+            ],
+        ),
+        (
+            "OLAT",
+            20.0,
+            &["CY_beta", "Cl_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"],
+        ),
     ] {
-        let flown = simulation.simulator.fly(&simulation.card(class, alpha).unwrap()).unwrap();
+        let flown = simulation
+            .simulator
+            .fly(&simulation.card(class, alpha).unwrap())
+            .unwrap();
         let estimated = estimated(&simulation, &flown);
         assert_eq!(estimated.fit.outcome, "converged");
         for name in derivatives {
-            let truth = flown.truth.iter().find(|t| t.derivative == *name).unwrap().value;
-            let row = estimated.estimates.iter().find(|e| e.derivative == *name).unwrap();
+            let truth = flown
+                .truth
+                .iter()
+                .find(|t| t.derivative == *name)
+                .unwrap()
+                .value;
+            let row = estimated
+                .estimates
+                .iter()
+                .find(|e| e.derivative == *name)
+                .unwrap();
             let off = row.value.unwrap() / truth - 1.0;
-            assert!(off.abs() < 1e-3, "{class} at {alpha}°: {name} is off by {:.3}%", 100.0 * off);
+            assert!(
+                off.abs() < 1e-3,
+                "{class} at {alpha}°: {name} is off by {:.3}%",
+                100.0 * off
+            );
         }
     }
 }
@@ -229,12 +378,33 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
 fn instruments_change_a_record_and_not_the_flight() {
     let simulation = simulation();
     let mut card = simulation.card("3211", 20.0).unwrap();
-    card.program = Program { duration_s: 6.0, maneuver_s: (0.0, 5.0), ..card.program };
+    card.program = Program {
+        duration_s: 6.0,
+        maneuver_s: (0.0, 5.0),
+        ..card.program
+    };
     let flown = simulation.simulator.fly(&card).unwrap();
-    let instruments = Instruments([(signal::Q.to_owned(), Instrument { bias: 0.5, ..Instrument::default() })].into());
+    let instruments = Instruments(
+        [(
+            signal::Q.to_owned(),
+            Instrument {
+                bias: 0.5,
+                ..Instrument::default()
+            },
+        )]
+        .into(),
+    );
     let record = flown.recorded(&instruments, 1);
-    let (exact, read) = (flown.record.values(signal::Q).unwrap(), record.values(signal::Q).unwrap());
-    assert!(exact.iter().zip(read).all(|(x, y)| (y - x - 0.5).abs() < 1e-12));
+    let (exact, read) = (
+        flown.record.values(signal::Q).unwrap(),
+        record.values(signal::Q).unwrap(),
+    );
+    assert!(
+        exact
+            .iter()
+            .zip(read)
+            .all(|(x, y)| (y - x - 0.5).abs() < 1e-12)
+    );
     assert_eq!(record.values(signal::P), flown.record.values(signal::P));
     assert_eq!(flown, simulation.simulator.fly(&card).unwrap());
 }
@@ -258,7 +428,12 @@ fn a_simulated_campaign_is_found_and_estimated() {
     fs::write(&file, cards(TWO)).unwrap();
     let simulate = |out: &Path, threads: &str| {
         let mut command = harvest();
-        command.arg("simulate").arg(&file).arg("--out").arg(out).args(["--threads", threads]);
+        command
+            .arg("simulate")
+            .arg(&file)
+            .arg("--out")
+            .arg(out)
+            .args(["--threads", threads]);
         let outcome = run(&mut command);
         assert_eq!(outcome.code, Some(0), "{outcome:?}");
     };
@@ -269,18 +444,29 @@ fn a_simulated_campaign_is_found_and_estimated() {
     assert_eq!(written.len(), 7, "{written:?}");
     for file in &written {
         let other = again.join(file.strip_prefix(&out).unwrap());
-        assert!(fs::read(file).unwrap() == fs::read(other).unwrap(), "{} differs", file.display());
+        assert!(
+            fs::read(file).unwrap() == fs::read(other).unwrap(),
+            "{} differs",
+            file.display()
+        );
     }
 
     let flights = Campaign::on(&out.join("flights").to_string_lossy());
     let mut command = flights.command("estimate");
-    command.arg("--wind-tunnel").arg(out.join("wind_tunnel.csv"));
+    command
+        .arg("--wind-tunnel")
+        .arg(out.join("wind_tunnel.csv"));
     let outcome = run(&mut command);
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     let maneuvers = flights.table("maneuvers");
     let classes: Vec<&str> = maneuvers.iter().map(|m| m["class"].as_str()).collect();
     assert_eq!(classes, ["3211", "OLAT", "PPSSTV"]);
-    assert!(flights.table("fits").iter().all(|fit| fit["outcome"] == "converged"));
+    assert!(
+        flights
+            .table("fits")
+            .iter()
+            .all(|fit| fit["outcome"] == "converged")
+    );
 }
 
 #[test]
@@ -289,16 +475,28 @@ fn a_wrong_card_is_named_with_its_line() {
     let file = campaign.path("cards.yaml");
     for (right, wrong, said) in [
         ("class: OLAT", "class: OLTA", "did you mean `OLAT`?"),
-        ("signal: da_deg, size: 5", "signal: dx_deg, size: 5", "law `plain` moves no `dx_deg`"),
+        (
+            "signal: da_deg, size: 5",
+            "signal: dx_deg, size: 5",
+            "law `plain` moves no `dx_deg`",
+        ),
         ("seed: 1994", "sed: 1994", "did you mean `seed`?"),
         ("roll: da_deg", "roll: dA_deg", "did you mean `da_deg`?"),
     ] {
         let text = cards(TWO);
         assert!(text.contains(right), "{right}");
         fs::write(&file, text.replacen(right, wrong, 1)).unwrap();
-        let outcome = run(harvest().arg("simulate").arg(&file).arg("--out").arg(campaign.path("out")));
+        let outcome = run(harvest()
+            .arg("simulate")
+            .arg(&file)
+            .arg("--out")
+            .arg(campaign.path("out")));
         assert_eq!(outcome.code, Some(1), "{outcome:?}");
-        assert!(outcome.stderr.contains(said) && outcome.stderr.contains("cards.yaml:"), "{}", outcome.stderr);
+        assert!(
+            outcome.stderr.contains(said) && outcome.stderr.contains("cards.yaml:"),
+            "{}",
+            outcome.stderr
+        );
     }
 }
 
@@ -314,7 +512,13 @@ fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
     let validate = |name: &str, threads: &str| {
         let (out, page) = (campaign.path(name), campaign.path(name).join("coverage.md"));
         let mut command = harvest();
-        command.arg("validate").arg(&file).arg("--out").arg(&out).arg("--page").arg(&page);
+        command
+            .arg("validate")
+            .arg(&file)
+            .arg("--out")
+            .arg(&out)
+            .arg("--page")
+            .arg(&page);
         let outcome = run(command.args(["--realisations", "8", "--threads", threads]));
         assert_eq!(outcome.code, Some(0), "{outcome:?}");
         out
@@ -322,24 +526,43 @@ fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
     let (once, again) = (validate("once", "1"), validate("again", "2"));
     for written in files(&once) {
         let other = again.join(written.strip_prefix(&once).unwrap());
-        assert!(fs::read(&written).unwrap() == fs::read(other).unwrap(), "{} differs", written.display());
+        assert!(
+            fs::read(&written).unwrap() == fs::read(other).unwrap(),
+            "{} differs",
+            written.display()
+        );
     }
     let rows = table(&once.join("coverage.csv"));
-    let settings: std::collections::BTreeSet<(&str, &str)> =
-        rows.iter().map(|r| (r["residuals"].as_str(), r["weights"].as_str())).collect();
+    let settings: std::collections::BTreeSet<(&str, &str)> = rows
+        .iter()
+        .map(|r| (r["residuals"].as_str(), r["weights"].as_str()))
+        .collect();
     assert_eq!(settings.len(), 5);
-    assert!(rows.iter().all(|r| r["class"] == "PPSS" && r["converged"] == "8"));
+    assert!(
+        rows.iter()
+            .all(|r| r["class"] == "PPSS" && r["converged"] == "8")
+    );
     // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far more.
     let ratio = |residuals: &str, column: &str| {
-        let mut ratios: Vec<f64> =
-            rows.iter().filter(|r| r["residuals"] == residuals).map(|r| number(r, column)).collect();
+        let mut ratios: Vec<f64> = rows
+            .iter()
+            .filter(|r| r["residuals"] == residuals)
+            .map(|r| number(r, column))
+            .collect();
         ratios.sort_by(f64::total_cmp);
         ratios[ratios.len() / 2]
     };
     assert!((0.6..1.5).contains(&ratio("white", "scatter_over_bound")));
     assert!(ratio("coloured", "scatter_over_bound") > 2.5);
     assert!((0.6..1.5).contains(&ratio("coloured", "scatter_over_corrected")));
-    assert!(table(&once.join("starts.csv")).iter().all(|r| r["reached"] == r["records"]));
+    assert!(
+        table(&once.join("starts.csv"))
+            .iter()
+            .all(|r| r["reached"] == r["records"])
+    );
     let page = fs::read_to_string(once.join("coverage.md")).unwrap();
-    assert!(page.contains("--realisations 8`") && page.contains("| PPSS | Cm_alpha | 20 |"), "{page}");
+    assert!(
+        page.contains("--realisations 8`") && page.contains("| PPSS | Cm_alpha | 20 |"),
+        "{page}"
+    );
 }

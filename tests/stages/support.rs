@@ -53,7 +53,10 @@ impl Campaign {
     pub fn new() -> Campaign {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("flights")).unwrap();
-        Campaign { folder, archive: None }
+        Campaign {
+            folder,
+            archive: None,
+        }
     }
 
     /// A campaign of one short flight with one maneuver, pilot pitch stick steps.
@@ -65,7 +68,10 @@ impl Campaign {
 
     /// On an archive that lies elsewhere.
     pub fn on(archive: &str) -> Campaign {
-        Campaign { archive: Some(archive.to_owned()), ..Campaign::new() }
+        Campaign {
+            archive: Some(archive.to_owned()),
+            ..Campaign::new()
+        }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -95,12 +101,18 @@ impl Campaign {
     pub fn command(&self, stage: &str) -> Command {
         let mut command = harvest();
         let own = self.path("pipeline");
-        command.arg(stage).arg(if own.is_dir() { own } else { "harv".into() });
+        command
+            .arg(stage)
+            .arg(if own.is_dir() { own } else { "harv".into() });
         match &self.archive {
             Some(archive) => command.arg("--archive").arg(archive),
             None => command.arg("--archive").arg(self.path("flights")),
         };
-        command.arg("--store").arg(self.path("store")).arg("--reports").arg(self.path("reports"));
+        command
+            .arg("--store")
+            .arg(self.path("store"))
+            .arg("--reports")
+            .arg(self.path("reports"));
         command.stdin(Stdio::null());
         command
     }
@@ -120,14 +132,24 @@ impl Campaign {
     /// by ending with 2.
     pub fn finishes(&self, stage: &str) -> Outcome {
         let outcome = self.harvest(stage);
-        assert!(matches!(outcome.code, Some(0 | 2)) && outcome.stderr.is_empty(), "{outcome:?}");
-        assert!(self.table("problems").iter().all(|p| p["stage"] == "trend"), "{:?}", self.table("problems"));
+        assert!(
+            matches!(outcome.code, Some(0 | 2)) && outcome.stderr.is_empty(),
+            "{outcome:?}"
+        );
+        assert!(
+            self.table("problems").iter().all(|p| p["stage"] == "trend"),
+            "{:?}",
+            self.table("problems")
+        );
         outcome
     }
 
     /// Makes the campaign's pipeline a copy of the shipped one, to be edited.
     pub fn copy_pipeline(&self) {
-        copy_tree(&Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv"), &self.path("pipeline"));
+        copy_tree(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv"),
+            &self.path("pipeline"),
+        );
     }
 
     /// Replaces text of a pipeline's file wherever it stands; it must stand somewhere. Returns its first line.
@@ -143,7 +165,9 @@ impl Campaign {
     /// The files of the pipeline's classes, relative to its folder.
     pub fn class_files(&self) -> Vec<String> {
         let names = fs::read_dir(self.path("pipeline/maneuvers")).unwrap();
-        names.map(|e| format!("maneuvers/{}", e.unwrap().file_name().to_string_lossy())).collect()
+        names
+            .map(|e| format!("maneuvers/{}", e.unwrap().file_name().to_string_lossy()))
+            .collect()
     }
 
     pub fn table(&self, name: &str) -> Vec<Row> {
@@ -161,14 +185,25 @@ impl Campaign {
         let folder = self.path(folder);
         let relative = |p: PathBuf| p.strip_prefix(&folder).unwrap().to_owned();
         let no_result = ["lock", "contents.json", "serves.json", "nights", "current"];
-        let counts = |p: &PathBuf| !no_result.iter().any(|name| relative(p.clone()).starts_with(name));
-        files(&folder).into_iter().filter(counts).map(|p| (relative(p.clone()), fs::read(&p).unwrap())).collect()
+        let counts = |p: &PathBuf| {
+            !no_result
+                .iter()
+                .any(|name| relative(p.clone()).starts_with(name))
+        };
+        files(&folder)
+            .into_iter()
+            .filter(counts)
+            .map(|p| (relative(p.clone()), fs::read(&p).unwrap()))
+            .collect()
     }
 
     /// Bytes of the published tables; the report, on screen and on paper, says where the archive lies.
     pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let is_table = |p: &PathBuf| p.extension().is_some_and(|e| e == "csv" || e == "parquet");
-        self.bytes("reports").into_iter().filter(|(p, _)| is_table(p)).collect()
+        self.bytes("reports")
+            .into_iter()
+            .filter(|(p, _)| is_table(p))
+            .collect()
     }
 }
 
@@ -178,9 +213,19 @@ pub fn demo() -> &'static Demo {
     DEMO.get_or_init(|| {
         let campaign = Campaign::on("data/demo/flights");
         let outcome = run(campaign.command("run").args(["--threads", "1"]));
-        let tables = ["maneuvers", "fits", "estimates", "trends", "comparison", "problems"];
+        let tables = [
+            "maneuvers",
+            "fits",
+            "estimates",
+            "trends",
+            "comparison",
+            "problems",
+        ];
         Demo {
-            tables: tables.iter().map(|name| (*name, campaign.table(name))).collect(),
+            tables: tables
+                .iter()
+                .map(|name| (*name, campaign.table(name)))
+                .collect(),
             bytes: campaign.tables(),
             report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
             printed: fs::read(campaign.path("reports/report.pdf")).unwrap(),
@@ -226,7 +271,11 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() { found.extend(files(&path)) } else { found.push(path) }
+        if path.is_dir() {
+            found.extend(files(&path))
+        } else {
+            found.push(path)
+        }
     }
     found.sort();
     found
@@ -248,11 +297,17 @@ pub fn number(row: &Row, column: &str) -> f64 {
 
 /// The first seconds of a demonstration flight.
 pub fn flight(number: u32, seconds: usize) -> RecordBatch {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/demo/flights/flight_{number:03}.parquet"));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join(format!("data/demo/flights/flight_{number:03}.parquet"));
     let rows = seconds * RATE_HZ;
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
     let schema = reader.schema().clone();
-    let batches: Vec<RecordBatch> = reader.with_limit(rows).build().unwrap().map(Result::unwrap).collect();
+    let batches: Vec<RecordBatch> = reader
+        .with_limit(rows)
+        .build()
+        .unwrap()
+        .map(Result::unwrap)
+        .collect();
     concat_batches(&schema, &batches).unwrap()
 }
 
@@ -269,7 +324,8 @@ pub fn yaw_and_roll_steps() -> RecordBatch {
 }
 
 pub fn write(record: &RecordBatch, path: &Path) {
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), record.schema(), None).unwrap();
+    let mut writer =
+        ArrowWriter::try_new(File::create(path).unwrap(), record.schema(), None).unwrap();
     writer.write(record).unwrap();
     writer.close().unwrap();
 }
@@ -277,7 +333,11 @@ pub fn write(record: &RecordBatch, path: &Path) {
 /// The values of a channel.
 pub fn values(record: &RecordBatch, channel: &str) -> Vec<f64> {
     let numbers = cast(record.column_by_name(channel).unwrap(), &DataType::Float64).unwrap();
-    numbers.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)).collect()
+    numbers
+        .as_primitive::<Float64Type>()
+        .iter()
+        .map(|v| v.unwrap_or(f64::NAN))
+        .collect()
 }
 
 /// The record with a channel's field and values replaced.
@@ -297,10 +357,21 @@ pub fn replaced(
 }
 
 /// The record with other values in a channel, made from row and value.
-pub fn with_values(record: &RecordBatch, channel: &str, value: impl Fn(usize, f64) -> f64) -> RecordBatch {
-    let edited: Vec<f64> = values(record, channel).into_iter().enumerate().map(|(row, v)| value(row, v)).collect();
+pub fn with_values(
+    record: &RecordBatch,
+    channel: &str,
+    value: impl Fn(usize, f64) -> f64,
+) -> RecordBatch {
+    let edited: Vec<f64> = values(record, channel)
+        .into_iter()
+        .enumerate()
+        .map(|(row, v)| value(row, v))
+        .collect();
     replaced(record, channel, |field, _| {
-        (field.clone().with_data_type(DataType::Float64), Arc::new(Float64Array::from(edited)))
+        (
+            field.clone().with_data_type(DataType::Float64),
+            Arc::new(Float64Array::from(edited)),
+        )
     })
 }
 
@@ -315,7 +386,9 @@ pub fn with_unit(record: &RecordBatch, channel: &str, unit: &str) -> RecordBatch
 
 /// The record with a channel under another name.
 pub fn renamed(record: &RecordBatch, channel: &str, name: &str) -> RecordBatch {
-    replaced(record, channel, |field, array| (field.clone().with_name(name), array.clone()))
+    replaced(record, channel, |field, array| {
+        (field.clone().with_name(name), array.clone())
+    })
 }
 
 /// The record without a channel.
@@ -327,7 +400,10 @@ pub fn without(record: &RecordBatch, channel: &str) -> RecordBatch {
 
 /// A number that the environment may give, for tests that take as long as they are let.
 pub fn from_environment(name: &str, default: usize) -> usize {
-    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
+    std::env::var(name)
+        .ok()
+        .and_then(|value| value.parse().ok())
+        .unwrap_or(default)
 }
 
 /// Random numbers that are the same each time (the generator of Steele, Lea and Flood).

@@ -12,7 +12,9 @@ fn twins(edits: &[(&str, &str)]) -> Campaign {
     let campaign = Campaign::new();
     let first = pitch_steps();
     // A sawtooth of the size of the gyro's noise.
-    let second = with_values(&first, "q", |row, q| q + 0.02 * ((row * 7 % 11) as f64 - 5.0) / 5.0);
+    let second = with_values(&first, "q", |row, q| {
+        q + 0.02 * ((row * 7 % 11) as f64 - 5.0) / 5.0
+    });
     campaign.add("flight_001", &first);
     campaign.add("flight_002", &second);
     campaign.copy_pipeline();
@@ -28,7 +30,9 @@ fn left(campaign: &Campaign) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
 }
 
 fn without_joint(rows: Vec<Row>) -> Vec<Row> {
-    rows.into_iter().filter(|row| !row["maneuver_id"].starts_with("joint/")).collect()
+    rows.into_iter()
+        .filter(|row| !row["maneuver_id"].starts_with("joint/"))
+        .collect()
 }
 
 #[test]
@@ -39,7 +43,11 @@ fn by_evidence_every_held_derivative_says_why_and_a_second_run_changes_nothing()
     campaign.finishes("run");
     let estimates = campaign.table("estimates");
     for row in &estimates {
-        assert_eq!(row["status"] == "held", !row["held_because"].is_empty(), "{row:?}");
+        assert_eq!(
+            row["status"] == "held",
+            !row["held_because"].is_empty(),
+            "{row:?}"
+        );
     }
     assert!(estimates.iter().any(|row| row["status"] == "held"));
     let report = std::fs::read_to_string(campaign.path("reports/report.html")).unwrap();
@@ -50,7 +58,8 @@ fn by_evidence_every_held_derivative_says_why_and_a_second_run_changes_nothing()
 }
 
 #[test]
-fn maneuvers_joined_have_rows_of_their_own_leave_the_others_alone_and_are_the_same_with_one_thread_and_with_two() {
+fn maneuvers_joined_have_rows_of_their_own_leave_the_others_alone_and_are_the_same_with_one_thread_and_with_two()
+ {
     let alone = twins(&[]);
     alone.ends("estimate", 0);
     assert!(alone.table("joint").is_empty());
@@ -63,23 +72,50 @@ fn maneuvers_joined_have_rows_of_their_own_leave_the_others_alone_and_are_the_sa
         left(&joint)
     };
     let one = with_threads("1");
-    assert!(with_threads("2") == one, "the number of threads decides something");
+    assert!(
+        with_threads("2") == one,
+        "the number of threads decides something"
+    );
 
     let members = joint.table("joint");
     assert_eq!(members.len(), 2);
-    assert!(members.iter().all(|row| row["part"] == "joined" && row["maneuvers"] == "2"), "{members:?}");
-    let shared: Vec<Row> =
-        joint.table("estimates").into_iter().filter(|r| r["maneuver_id"] == members[0]["joint_id"]).collect();
+    assert!(
+        members
+            .iter()
+            .all(|row| row["part"] == "joined" && row["maneuvers"] == "2"),
+        "{members:?}"
+    );
+    let shared: Vec<Row> = joint
+        .table("estimates")
+        .into_iter()
+        .filter(|r| r["maneuver_id"] == members[0]["joint_id"])
+        .collect();
     let of = |rows: &[Row], name: &str| {
-        let row = rows.iter().find(|r| r["derivative"] == name && r["status"] == "estimated").cloned();
+        let row = rows
+            .iter()
+            .find(|r| r["derivative"] == name && r["status"] == "estimated")
+            .cloned();
         row.unwrap_or_else(|| panic!("{name} is not estimated"))
     };
-    let (both, single) = (of(&shared, "Cm_alpha"), of(&alone.table("estimates"), "Cm_alpha"));
+    let (both, single) = (
+        of(&shared, "Cm_alpha"),
+        of(&alone.table("estimates"), "Cm_alpha"),
+    );
     assert_eq!(both["flight_id"], "joint");
-    assert!(number(&both, "bound") < number(&single, "bound"), "{both:?}\n{single:?}");
-    assert!((number(&both, "value") - number(&single, "value")).abs() < number(&single, "bound_corrected"));
+    assert!(
+        number(&both, "bound") < number(&single, "bound"),
+        "{both:?}\n{single:?}"
+    );
+    assert!(
+        (number(&both, "value") - number(&single, "value")).abs()
+            < number(&single, "bound_corrected")
+    );
     for table in ["fits", "estimates", "combined"] {
-        assert_eq!(without_joint(joint.table(table)), alone.table(table), "{table}");
+        assert_eq!(
+            without_joint(joint.table(table)),
+            alone.table(table),
+            "{table}"
+        );
     }
     for table in ["maneuvers", "correlations", "predictions"] {
         assert_eq!(joint.table(table), alone.table(table), "{table}");
@@ -91,9 +127,18 @@ fn what_each_maneuver_holds_by_its_own_evidence_cannot_be_joined_and_the_configu
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
     campaign.edit("pipeline.yaml", "hold: table", "hold: evidence");
-    let line = campaign.edit("pipeline.yaml", "# joint: { alpha_bin_deg: 2.5 }", "joint: {}");
+    let line = campaign.edit(
+        "pipeline.yaml",
+        "# joint: { alpha_bin_deg: 2.5 }",
+        "joint: {}",
+    );
     let outcome = campaign.ends("check", 1);
-    assert!(outcome.stderr.contains(&format!("pipeline.yaml:{line}: `joint` needs `hold: table`")), "{outcome:?}");
+    assert!(
+        outcome.stderr.contains(&format!(
+            "pipeline.yaml:{line}: `joint` needs `hold: table`"
+        )),
+        "{outcome:?}"
+    );
 }
 
 #[test]
@@ -102,18 +147,31 @@ fn each_of_two_maneuvers_is_predicted_from_the_other_and_one_alone_says_why_it_i
     campaign.ends("estimate", 0);
     let outputs = ["alpha", "q", "theta", "an", "ax"];
     for fit in campaign.table("fits") {
-        assert_eq!((fit["prediction"].as_str(), fit["predicted_from"].as_str()), ("predicted", "1"));
-        let shares = ["theil_bias", "theil_variance", "theil_covariance"].map(|column| number(&fit, column));
+        assert_eq!(
+            (fit["prediction"].as_str(), fit["predicted_from"].as_str()),
+            ("predicted", "1")
+        );
+        let shares =
+            ["theil_bias", "theil_variance", "theil_covariance"].map(|column| number(&fit, column));
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{fit:?}");
         // The same maneuver but for the gyro's noise.
-        assert!((number(&fit, "predicted_cost") / number(&fit, "final_cost") - 1.0).abs() < 0.1, "{fit:?}");
+        assert!(
+            (number(&fit, "predicted_cost") / number(&fit, "final_cost") - 1.0).abs() < 0.1,
+            "{fit:?}"
+        );
         for output in outputs {
-            assert!(number(&fit, &format!("theil_{output}")) < 0.1 && !fit[&format!("r_squared_{output}")].is_empty());
+            assert!(
+                number(&fit, &format!("theil_{output}")) < 0.1
+                    && !fit[&format!("r_squared_{output}")].is_empty()
+            );
         }
         assert!(fit["theil_beta"].is_empty(), "an output of the other axis");
     }
     let predictions = campaign.table("predictions");
-    let predicted: BTreeSet<&str> = predictions.iter().map(|row| row["output"].as_str()).collect();
+    let predicted: BTreeSet<&str> = predictions
+        .iter()
+        .map(|row| row["output"].as_str())
+        .collect();
     assert_eq!((predictions.len(), predicted), (10, outputs.into()));
     let before = left(&campaign);
     campaign.ends("estimate", 0);
@@ -121,7 +179,10 @@ fn each_of_two_maneuvers_is_predicted_from_the_other_and_one_alone_says_why_it_i
 
     std::fs::remove_file(campaign.flight("flight_002")).unwrap();
     campaign.ends("estimate", 0);
-    assert_eq!(campaign.table("fits")[0]["prediction"], "no other maneuver of its class and angle of attack");
+    assert_eq!(
+        campaign.table("fits")[0]["prediction"],
+        "no other maneuver of its class and angle of attack"
+    );
     assert!(campaign.table("predictions").is_empty());
     assert_eq!(run(campaign.command("gc").arg("--yes")).code, Some(0));
     assert!(campaign.bytes("store/predict").is_empty());

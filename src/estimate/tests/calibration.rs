@@ -4,21 +4,40 @@ use super::*;
 
 fn calibrated(calibration: &[(&str, Calibration)]) -> Bench {
     let mut bench = bench();
-    bench.settings.calibration = calibration.iter().map(|(name, c)| ((*name).to_owned(), *c)).collect();
+    bench.settings.calibration = calibration
+        .iter()
+        .map(|(name, c)| ((*name).to_owned(), *c))
+        .collect();
     bench
 }
 
 #[test]
 fn the_scale_of_a_surface_is_the_least_that_its_derivatives_are_known_to() {
-    let bench = calibrated(&[("de_deg", Calibration { bias: 0.0, scale_pct: 2.0 })]);
+    let bench = calibrated(&[(
+        "de_deg",
+        Calibration {
+            bias: 0.0,
+            scale_pct: 2.0,
+        },
+    )]);
     let record = bench.flown(5, 1.0, 0.0);
-    let (with, without) =
-        (bench.estimate(&record, &maneuver("m", 20.0)), super::bench().estimate(&record, &maneuver("m", 20.0)));
+    let (with, without) = (
+        bench.estimate(&record, &maneuver("m", 20.0)),
+        super::bench().estimate(&record, &maneuver("m", 20.0)),
+    );
     let (with_row, without_row) = (row(&with, "Cm_de"), row(&without, "Cm_de"));
     let part = with_row.bound_calibration.unwrap();
-    assert_relative_eq!(part, 0.02 * with_row.value.unwrap().abs(), max_relative = 1e-2);
+    assert_relative_eq!(
+        part,
+        0.02 * with_row.value.unwrap().abs(),
+        max_relative = 1e-2
+    );
     assert_eq!(
-        (with_row.value, with_row.bound, without_row.bound_calibration),
+        (
+            with_row.value,
+            with_row.bound,
+            without_row.bound_calibration
+        ),
         (without_row.value, without_row.bound, None)
     );
     assert_relative_eq!(
@@ -30,7 +49,13 @@ fn the_scale_of_a_surface_is_the_least_that_its_derivatives_are_known_to() {
 
 #[test]
 fn a_signal_that_the_maneuver_does_not_use_adds_nothing() {
-    let bench = calibrated(&[("dr_deg", Calibration { bias: 1.0, scale_pct: 5.0 })]);
+    let bench = calibrated(&[(
+        "dr_deg",
+        Calibration {
+            bias: 1.0,
+            scale_pct: 5.0,
+        },
+    )]);
     let record = bench.flown(5, 1.0, 0.0);
     let estimated = bench.estimate(&record, &maneuver("m", 20.0));
     assert_eq!(row(&estimated, "Cm_de").bound_calibration, Some(0.0));
@@ -38,12 +63,22 @@ fn a_signal_that_the_maneuver_does_not_use_adds_nothing() {
 
 #[test]
 fn an_error_common_to_maneuvers_does_not_average_out() {
-    let mut bench = calibrated(&[("de_deg", Calibration { bias: 0.0, scale_pct: 2.0 })]);
+    let mut bench = calibrated(&[(
+        "de_deg",
+        Calibration {
+            bias: 0.0,
+            scale_pct: 2.0,
+        },
+    )]);
     bench.settings.joint = Some(joint::Settings::default());
     let records = [bench.flown(5, 1.0, 0.0), bench.flown(6, 1.0, 0.0)];
     let maneuvers = [maneuver("a", 20.0), maneuver("b", 20.0)];
     let members: Vec<(&Record, &Maneuver)> = records.iter().zip(&maneuvers).collect();
     let joined = joint::estimate("joint", &members, &bench.class, &bench.basis());
     let row = row(&joined.estimated, "Cm_de");
-    assert_relative_eq!(row.bound_calibration.unwrap(), 0.02 * row.value.unwrap().abs(), max_relative = 1e-2);
+    assert_relative_eq!(
+        row.bound_calibration.unwrap(),
+        0.02 * row.value.unwrap().abs(),
+        max_relative = 1e-2
+    );
 }

@@ -11,7 +11,9 @@ use crate::dynamics::tests::aircraft;
 use crate::flight::record::Series;
 use crate::flight::signal;
 use crate::maneuver::class::Recognition;
-use crate::output_error::tests::{NOISE, Noise, SAMPLES, derivative, nothing_measured, record, surface, truth};
+use crate::output_error::tests::{
+    NOISE, Noise, SAMPLES, derivative, nothing_measured, record, surface, truth,
+};
 
 /// The longitudinal derivatives that are true, and what is flown with them.
 struct Flown {
@@ -23,24 +25,44 @@ struct Flown {
 fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
     let mut record = record();
     edit(&mut record);
-    let model = Model { free: truth.iter().map(|(d, _)| d).collect(), ..Model::default() };
+    let model = Model {
+        free: truth.iter().map(|(d, _)| d).collect(),
+        ..Model::default()
+    };
     let surfaces = truth.iter().filter_map(|(d, _)| d.regressor.surface());
     let window = Window::cut(&record, 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap();
     let case = Case::<3, Longitudinal>::new(&aircraft(), &window, nothing_measured(), &model);
     let values: BTreeMap<&str, f64> = truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
     let mut response = case.response();
-    case.respond(&case.starting_values(|name| values[name]), &mut response).unwrap();
+    case.respond(&case.starting_values(|name| values[name]), &mut response)
+        .unwrap();
     let mut noise = Noise(11);
-    let outputs = [signal::ALPHA_VANE, signal::Q, signal::THETA, signal::AN, signal::AX];
+    let outputs = [
+        signal::ALPHA_VANE,
+        signal::Q,
+        signal::THETA,
+        signal::AN,
+        signal::AX,
+    ];
     for (o, name) in outputs.into_iter().enumerate() {
-        let measured = response.outputs.iter().map(|y| y[o] + 0.1 * NOISE[o] * noise.gaussian()).collect();
+        let measured = response
+            .outputs
+            .iter()
+            .map(|y| y[o] + 0.1 * NOISE[o] * noise.gaussian())
+            .collect();
         put(&mut record, name, measured);
     }
     Flown { truth, record }
 }
 
 fn put(record: &mut Record, name: &str, values: Vec<f64>) {
-    record.signals.insert(name.into(), Series { marks: vec![Mark::Measured; values.len()], values });
+    record.signals.insert(
+        name.into(),
+        Series {
+            marks: vec![Mark::Measured; values.len()],
+            values,
+        },
+    );
 }
 
 /// A tunnel that is a tenth off and says that it may be off by `share` of each derivative.
@@ -48,7 +70,13 @@ fn tunnel(truth: &[(Derivative, f64)], share: f64) -> WindTunnel {
     let mut tunnel = WindTunnel::default();
     for (derivative, value) in truth.iter().filter(|(_, value)| *value != 0.0) {
         let (value, uncertainty) = (1.1 * value, Some(share * value.abs()));
-        let point = TunnelPoint { alpha_deg: 20.0, mach: None, value, uncertainty, source: None };
+        let point = TunnelPoint {
+            alpha_deg: 20.0,
+            mach: None,
+            value,
+            uncertainty,
+            source: None,
+        };
         tunnel.insert(&derivative.name, point);
     }
     tunnel
@@ -61,51 +89,99 @@ impl Flown {
 
     fn estimated_with(&self, hold: Hold, tunnel: &WindTunnel) -> Estimated {
         let axis = Axis::Longitudinal;
-        let weights = axis.outputs().into_iter().zip(NOISE.map(|sd| 1.0 / (0.01 * sd * sd))).collect();
+        let weights = axis
+            .outputs()
+            .into_iter()
+            .zip(NOISE.map(|sd| 1.0 / (0.01 * sd * sd)))
+            .collect();
         let class = Class {
             name: "steps".into(),
             title: String::new(),
             axis,
             recognition: Recognition::default(),
-            statuses: self.truth.iter().map(|(d, _)| (d.name.clone(), Status::Estimated)).collect(),
+            statuses: self
+                .truth
+                .iter()
+                .map(|(d, _)| (d.name.clone(), Status::Estimated))
+                .collect(),
             weights,
             overrides: vec![],
         };
         let maneuver = super::maneuver("f_t0", 20.0);
         let derivatives = self.truth.iter().map(|(d, _)| d.clone()).collect();
-        let (aircraft, buildup) = (aircraft(), Buildup { derivatives, ..Buildup::default() });
-        let settings = Settings { hold, ..Settings::default() };
+        let (aircraft, buildup) = (
+            aircraft(),
+            Buildup {
+                derivatives,
+                ..Buildup::default()
+            },
+        );
+        let settings = Settings {
+            hold,
+            ..Settings::default()
+        };
         let basis = Basis::new(&aircraft, &buildup, tunnel, &settings);
         super::super::maneuver(&self.record, &maneuver, &class, &basis)
     }
 }
 
 fn held(estimated: &Estimated) -> Vec<(&str, &str)> {
-    let held = estimated.estimates.iter().filter(|row| row.status == "held");
-    held.map(|row| (row.derivative.as_str(), row.held_because.as_deref().unwrap_or(""))).collect()
+    let held = estimated
+        .estimates
+        .iter()
+        .filter(|row| row.status == "held");
+    held.map(|row| {
+        (
+            row.derivative.as_str(),
+            row.held_because.as_deref().unwrap_or(""),
+        )
+    })
+    .collect()
 }
 
 fn row<'a>(estimated: &'a Estimated, derivative: &str) -> &'a EstimateRow {
-    estimated.estimates.iter().find(|row| row.derivative == derivative).unwrap()
+    estimated
+        .estimates
+        .iter()
+        .find(|row| row.derivative == derivative)
+        .unwrap()
 }
 
 #[test]
 fn evidence_holds_nothing_where_all_is_excited() {
     let flown = fly(truth(Axis::Longitudinal), |_| {});
     let estimated = flown.estimated(Hold::Evidence, 0.5);
-    assert_eq!(estimated.fit.outcome, "converged", "{}", estimated.fit.reason);
+    assert_eq!(
+        estimated.fit.outcome, "converged",
+        "{}",
+        estimated.fit.reason
+    );
     assert_eq!(held(&estimated), []);
 }
 
 #[test]
 fn evidence_holds_exactly_the_surface_that_did_not_move() {
-    let flown = fly(truth(Axis::Longitudinal), |record| put(record, "dpv_deg", vec![0.0; SAMPLES]));
+    let flown = fly(truth(Axis::Longitudinal), |record| {
+        put(record, "dpv_deg", vec![0.0; SAMPLES])
+    });
     let estimated = flown.estimated(Hold::Evidence, 0.5);
-    assert_eq!(estimated.fit.outcome, "converged", "{}", estimated.fit.reason);
+    assert_eq!(
+        estimated.fit.outcome, "converged",
+        "{}",
+        estimated.fit.reason
+    );
     let because = "dpv_deg did not move";
     assert_eq!(held(&estimated), [("CN_dpv", because), ("Cm_dpv", because)]);
-    for row in estimated.estimates.iter().filter(|row| row.status == "held") {
-        assert_eq!((row.value, row.excitation), (row.wind_tunnel, Some(0.0)), "{row:?}");
+    for row in estimated
+        .estimates
+        .iter()
+        .filter(|row| row.status == "held")
+    {
+        assert_eq!(
+            (row.value, row.excitation),
+            (row.wind_tunnel, Some(0.0)),
+            "{row:?}"
+        );
     }
 }
 
@@ -113,19 +189,39 @@ fn evidence_holds_exactly_the_surface_that_did_not_move() {
 fn evidence_holds_what_a_tunnel_without_error_knows_better_but_no_constant() {
     let flown = fly(truth(Axis::Longitudinal), |_| {});
     let estimated = flown.estimated(Hold::Evidence, 1e-9);
-    let free: Vec<&str> =
-        estimated.estimates.iter().filter(|r| r.status == "estimated").map(|r| r.derivative.as_str()).collect();
+    let free: Vec<&str> = estimated
+        .estimates
+        .iter()
+        .filter(|r| r.status == "estimated")
+        .map(|r| r.derivative.as_str())
+        .collect();
     assert_eq!(free, ["CN_0", "Cm_0", "CA_0"]);
-    assert!(held(&estimated).iter().all(|(_, because)| because.starts_with("estimated, its bound would be")));
-    assert!(held(&estimated).iter().all(|(_, because)| !because.contains("e-")), "numbers that a reader can read");
+    assert!(
+        held(&estimated)
+            .iter()
+            .all(|(_, because)| because.starts_with("estimated, its bound would be"))
+    );
+    assert!(
+        held(&estimated)
+            .iter()
+            .all(|(_, because)| !because.contains("e-")),
+        "numbers that a reader can read"
+    );
 }
 
 /// A second surface that moves in proportion to the first, as stabilator and pitch vane of pilot's steps nearly do.
 fn with_twin() -> Flown {
     let mut truth = truth(Axis::Longitudinal);
-    truth.push((derivative("Cm_twin", Coefficient::Cm, surface("twin_deg")), -0.006));
+    truth.push((
+        derivative("Cm_twin", Coefficient::Cm, surface("twin_deg")),
+        -0.006,
+    ));
     fly(truth, |record| {
-        let twin = record.signals["de_deg"].values.iter().map(|v| 2.0 * v).collect();
+        let twin = record.signals["de_deg"]
+            .values
+            .iter()
+            .map(|v| 2.0 * v)
+            .collect();
         put(record, "twin_deg", twin);
     })
 }
@@ -133,49 +229,94 @@ fn with_twin() -> Flown {
 #[test]
 fn surfaces_that_move_in_proportion_are_unidentifiable_named_and_have_no_bound() {
     let estimated = with_twin().estimated(Hold::Table, 0.5);
-    assert_eq!(estimated.fit.outcome, "unidentifiable", "{}", estimated.fit.reason);
+    assert_eq!(
+        estimated.fit.outcome, "unidentifiable",
+        "{}",
+        estimated.fit.reason
+    );
     let named = estimated.fit.confounded.as_deref().unwrap();
     for name in ["Cm_de", "Cm_twin"] {
-        assert!(estimated.fit.reason.contains(name) && named.contains(name), "{} / {named}", estimated.fit.reason);
+        assert!(
+            estimated.fit.reason.contains(name) && named.contains(name),
+            "{} / {named}",
+            estimated.fit.reason
+        );
         assert_eq!(row(&estimated, name).variance_inflation, None);
     }
     for row in &estimated.estimates {
-        assert!(row.bound.is_none() && row.bound_corrected.is_none() && row.bound_held.is_none(), "{row:?}");
+        assert!(
+            row.bound.is_none() && row.bound_corrected.is_none() && row.bound_held.is_none(),
+            "{row:?}"
+        );
     }
-    let of = |c: &&CorrelationRow| c.kind == "regressors" && c.first == "de_deg" && c.second == "twin_deg";
-    assert_relative_eq!(estimated.correlations.iter().find(of).unwrap().correlation, 1.0, max_relative = 1e-12);
-    assert!(!estimated.correlations.iter().any(|c| c.kind == "estimates"), "there is no inverse to take them from");
+    let of = |c: &&CorrelationRow| {
+        c.kind == "regressors" && c.first == "de_deg" && c.second == "twin_deg"
+    };
+    assert_relative_eq!(
+        estimated.correlations.iter().find(of).unwrap().correlation,
+        1.0,
+        max_relative = 1e-12
+    );
+    assert!(
+        !estimated.correlations.iter().any(|c| c.kind == "estimates"),
+        "there is no inverse to take them from"
+    );
 }
 
 #[test]
-fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_cannot_be_told_apart() {
+fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_cannot_be_told_apart()
+ {
     let flown = with_twin();
     let estimated = flown.estimated(Hold::Evidence, 0.5);
-    assert_eq!(estimated.fit.outcome, "converged", "{}", estimated.fit.reason);
+    assert_eq!(
+        estimated.fit.outcome, "converged",
+        "{}",
+        estimated.fit.reason
+    );
     let held = held(&estimated);
     assert_eq!(held.len(), 1, "{held:?}");
     let (name, because) = held[0];
     let other = if name == "Cm_de" { "Cm_twin" } else { "Cm_de" };
     assert!(["Cm_de", "Cm_twin"].contains(&name), "{held:?}");
-    assert!(because.starts_with("the data do not tell it apart from") && because.contains(other), "{because}");
+    assert!(
+        because.starts_with("the data do not tell it apart from") && because.contains(other),
+        "{because}"
+    );
     // The twin moves by twice the elevator: what is wrong with the one goes into the other, and its bound counts it.
     let factor = if name == "Cm_twin" { 2.0 } else { 0.5 };
-    let wrong = 0.5 * flown.truth.iter().find(|(d, _)| d.name == name).map(|(_, value)| value.abs()).unwrap();
+    let wrong = 0.5
+        * flown
+            .truth
+            .iter()
+            .find(|(d, _)| d.name == name)
+            .map(|(_, value)| value.abs())
+            .unwrap();
     let free = row(&estimated, other);
-    assert_relative_eq!(free.bound_held.unwrap(), factor * wrong, max_relative = 1e-3);
+    assert_relative_eq!(
+        free.bound_held.unwrap(),
+        factor * wrong,
+        max_relative = 1e-3
+    );
     assert!(free.bound_corrected.unwrap() >= free.bound_held.unwrap());
 }
 
 #[test]
-fn of_surfaces_that_move_in_proportion_neither_can_be_held_without_a_tunnel_and_the_reason_says_so() {
+fn of_surfaces_that_move_in_proportion_neither_can_be_held_without_a_tunnel_and_the_reason_says_so()
+{
     let flown = with_twin();
-    let known: Vec<(Derivative, f64)> =
-        flown.truth.iter().filter(|(d, _)| !["Cm_de", "Cm_twin"].contains(&d.name.as_str())).cloned().collect();
+    let known: Vec<(Derivative, f64)> = flown
+        .truth
+        .iter()
+        .filter(|(d, _)| !["Cm_de", "Cm_twin"].contains(&d.name.as_str()))
+        .cloned()
+        .collect();
     let estimated = flown.estimated_with(Hold::Evidence, &tunnel(&known, 0.5));
     assert_eq!(estimated.fit.outcome, "unidentifiable");
     let reason = &estimated.fit.reason;
     assert!(
-        reason.ends_with("; none of Cm_de, Cm_twin has a wind-tunnel value with an uncertainty to be held at"),
+        reason.ends_with(
+            "; none of Cm_de, Cm_twin has a wind-tunnel value with an uncertainty to be held at"
+        ),
         "{reason}"
     );
 }
@@ -185,7 +326,9 @@ fn equation_error_agrees_with_the_truth_of_what_is_well_excited() {
     let flown = fly(truth(Axis::Longitudinal), |_| {});
     let estimated = flown.estimated(Hold::Table, 0.5);
     for (derivative, value) in &flown.truth {
-        if ["CN_alpha", "CN_de", "Cm_alpha", "Cm_q", "Cm_de", "Cm_dpv"].contains(&derivative.name.as_str()) {
+        if ["CN_alpha", "CN_de", "Cm_alpha", "Cm_q", "Cm_de", "Cm_dpv"]
+            .contains(&derivative.name.as_str())
+        {
             let found = row(&estimated, &derivative.name).equation_error.unwrap();
             assert_relative_eq!(found, *value, max_relative = 0.05);
         }
@@ -198,8 +341,15 @@ fn excitation_is_the_surface_s_motion_in_degrees_and_contributions_are_shares_of
     let estimated = flown.estimated(Hold::Table, 0.5);
     // 5 deg for 60 of 320 samples, as many up as down.
     let expected = 5.0 * (60.0 / SAMPLES as f64).sqrt();
-    assert_relative_eq!(row(&estimated, "Cm_dpv").excitation.unwrap(), expected, max_relative = 1e-9);
+    assert_relative_eq!(
+        row(&estimated, "Cm_dpv").excitation.unwrap(),
+        expected,
+        max_relative = 1e-9
+    );
     assert_eq!(row(&estimated, "Cm_0").excitation, None);
-    let shares: f64 = ["CA_0", "CA_alpha"].iter().filter_map(|name| row(&estimated, name).contribution_pct).sum();
+    let shares: f64 = ["CA_0", "CA_alpha"]
+        .iter()
+        .filter_map(|name| row(&estimated, name).contribution_pct)
+        .sum();
     assert_relative_eq!(shares, 100.0, max_relative = 1e-9);
 }

@@ -7,7 +7,11 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 /// Element; its children in order, with ? * + as in the DTD, and an alternative's names between bars; required attributes.
 const MODELS: [(&str, &str, &str); 35] = [
-    ("DAVEfunc", "fileHeader variableDef+ breakpointDef* griddedTableDef* ungriddedTableDef* function* checkData?", ""),
+    (
+        "DAVEfunc",
+        "fileHeader variableDef+ breakpointDef* griddedTableDef* ungriddedTableDef* function* checkData?",
+        "",
+    ),
     (
         "fileHeader",
         "author+ creationDate|fileCreationDate fileVersion? description? reference* modificationRecord* provenance*",
@@ -32,20 +36,36 @@ const MODELS: [(&str, &str, &str); 35] = [
     ("ci", "#text", ""),
     ("breakpointDef", "description? bpVals", "bpID"),
     ("bpVals", "#text", ""),
-    ("griddedTableDef", "description? provenance|provenanceRef? breakpointRefs uncertainty? dataTable", "gtID"),
+    (
+        "griddedTableDef",
+        "description? provenance|provenanceRef? breakpointRefs uncertainty? dataTable",
+        "gtID",
+    ),
     ("breakpointRefs", "bpRef+", ""),
     ("bpRef", "", "bpID"),
     ("uncertainty", "normalPDF|uniformPDF", "effect"),
-    ("normalPDF", "bounds correlatesWith* correlation*", "numSigmas"),
+    (
+        "normalPDF",
+        "bounds correlatesWith* correlation*",
+        "numSigmas",
+    ),
     ("bounds", "dataTable", ""),
     ("dataTable", "#text", ""),
-    ("function", "description? provenance|provenanceRef? independentVarRef+ dependentVarRef functionDefn", "name"),
+    (
+        "function",
+        "description? provenance|provenanceRef? independentVarRef+ dependentVarRef functionDefn",
+        "name",
+    ),
     ("independentVarRef", "", "varID"),
     ("dependentVarRef", "", "varID"),
     ("functionDefn", "griddedTableRef|griddedTableDef", ""),
     ("griddedTableRef", "", "gtID"),
     ("checkData", "provenance|provenanceRef? staticShot+", ""),
-    ("staticShot", "description? provenance|provenanceRef? checkInputs? internalValues? checkOutputs", "name"),
+    (
+        "staticShot",
+        "description? provenance|provenanceRef? checkInputs? internalValues? checkOutputs",
+        "name",
+    ),
     ("checkInputs", "signal+", ""),
     ("checkOutputs", "signal+", ""),
     ("signal", "varID|signalID signalValue tol?", ""),
@@ -55,8 +75,14 @@ const MODELS: [(&str, &str, &str); 35] = [
 
 /// All that is wrong with a document.
 pub(super) fn faults(text: &str) -> Vec<String> {
-    let document =
-        Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..Default::default() }).unwrap();
+    let document = Document::parse_with_options(
+        text,
+        ParsingOptions {
+            allow_dtd: true,
+            ..Default::default()
+        },
+    )
+    .unwrap();
     let nodes: Vec<Node> = document.descendants().filter(Node::is_element).collect();
     let mut faults: Vec<String> = nodes.iter().flat_map(|n| of(*n)).collect();
     let ids: Vec<&str> = nodes
@@ -80,7 +106,11 @@ pub(super) fn faults(text: &str) -> Vec<String> {
             "ci" => node.text(),
             _ => None,
         };
-        faults.extend(reference.filter(|r| !known.contains(r)).map(|r| format!("nothing is called {r}")));
+        faults.extend(
+            reference
+                .filter(|r| !known.contains(r))
+                .map(|r| format!("nothing is called {r}")),
+        );
     }
     faults
 }
@@ -95,7 +125,11 @@ fn of(node: Node) -> Vec<String> {
         .filter(|a| node.attribute(*a).is_none())
         .map(|a| format!("{name} lacks {a}"))
         .collect();
-    let children: Vec<&str> = node.children().filter(Node::is_element).map(|c| c.tag_name().name()).collect();
+    let children: Vec<&str> = node
+        .children()
+        .filter(Node::is_element)
+        .map(|c| c.tag_name().name())
+        .collect();
     if !follows(&children, model) {
         faults.push(format!("{name} has {children:?}, not {model}"));
     }
@@ -107,7 +141,10 @@ fn follows(names: &[&str], model: &str) -> bool {
     let mut rest = names;
     for part in model.split_whitespace().filter(|p| *p != "#text") {
         let plain = part.trim_end_matches(['?', '*', '+']);
-        let count = rest.iter().take_while(|n| plain.split('|').any(|p| p == **n)).count();
+        let count = rest
+            .iter()
+            .take_while(|n| plain.split('|').any(|p| p == **n))
+            .count();
         let (least, most) = match &part[plain.len()..] {
             "?" => (0, 1),
             "*" => (0, usize::MAX),

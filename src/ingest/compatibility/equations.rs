@@ -60,15 +60,47 @@ pub struct Readings {
 }
 
 /// Where the slopes of the rates of each state can be other than zero: along which states, along which inputs.
-pub const RATES_BY_STATE: [&[usize]; STATES] =
-    [&[1, 2, 4], &[0, 2, 3, 4], &[0, 1, 3, 4], &[3, 4], &[3], &[3, 4], &[0, 1, 2, 3, 4]];
-pub const RATES_BY_INPUT: [&[usize]; STATES] =
-    [&[0, 1, 2, 3], &[0, 1, 2, 4], &[0, 1, 2, 5], &[0, 1, 2], &[1, 2], &[1, 2], &[0, 1, 2]];
+pub const RATES_BY_STATE: [&[usize]; STATES] = [
+    &[1, 2, 4],
+    &[0, 2, 3, 4],
+    &[0, 1, 3, 4],
+    &[3, 4],
+    &[3],
+    &[3, 4],
+    &[0, 1, 2, 3, 4],
+];
+pub const RATES_BY_INPUT: [&[usize]; STATES] = [
+    &[0, 1, 2, 3],
+    &[0, 1, 2, 4],
+    &[0, 1, 2, 5],
+    &[0, 1, 2],
+    &[1, 2],
+    &[1, 2],
+    &[0, 1, 2],
+];
 /// The same of each reading: along which states, along which body rates.
-pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] =
-    [&[0, 1, 2], &[0, 1, 2], &[0, 1, 2], &[4], &[3], &[5], &[6], &[0, 1, 2, 6], &[0, 1, 2, 6]];
-pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] =
-    [&[0, 1, 2], &[0, 1, 2], &[0, 1, 2], &[], &[], &[], &[], &[0, 1, 2], &[0, 1, 2]];
+pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] = [
+    &[0, 1, 2],
+    &[0, 1, 2],
+    &[0, 1, 2],
+    &[4],
+    &[3],
+    &[5],
+    &[6],
+    &[0, 1, 2, 6],
+    &[0, 1, 2, 6],
+];
+pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] = [
+    &[0, 1, 2],
+    &[0, 1, 2],
+    &[0, 1, 2],
+    &[],
+    &[],
+    &[],
+    &[],
+    &[0, 1, 2],
+    &[0, 1, 2],
+];
 
 #[inline(always)]
 fn vector(omega: &Driven) -> Vector3<f64> {
@@ -98,7 +130,11 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
     let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
     let g = known.gravity;
     let turning = omega + known.earth;
-    let mut out = Motion { rates: State::zeros(), by_state: SMatrix::zeros(), by_input: SMatrix::zeros() };
+    let mut out = Motion {
+        rates: State::zeros(),
+        by_state: SMatrix::zeros(),
+        by_input: SMatrix::zeros(),
+    };
     let gravity = Vector3::new(-g * st, g * ct * sp, g * ct * cp);
     let turned = turning.cross(&velocity);
     let cross = turning.cross_matrix();
@@ -112,11 +148,15 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
         out.by_input[(i, 3 + i)] = 1.0;
     }
     out.by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&-cross);
-    out.by_input.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_rates);
+    out.by_input
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&by_rates);
     let by_phi = Vector3::new(0.0, g * ct * cp, -g * ct * sp);
     let by_theta = Vector3::new(-g * ct, -g * st * sp, -g * st * cp);
     out.by_state.fixed_view_mut::<3, 1>(0, 3).copy_from(&by_phi);
-    out.by_state.fixed_view_mut::<3, 1>(0, 4).copy_from(&by_theta);
+    out.by_state
+        .fixed_view_mut::<3, 1>(0, 4)
+        .copy_from(&by_theta);
     attitude(&mut out, omega - known.horizon, (sp, cp), (st, ct));
     climb(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
     out
@@ -135,22 +175,30 @@ fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (
     out.by_state[(4, 3)] = -along;
     out.by_state[(5, 3)] = across / ct;
     out.by_state[(5, 4)] = along * tan / ct;
-    out.by_input.fixed_view_mut::<3, 3>(3, 0).copy_from(&Matrix3::new(
-        1.0,
-        tan * sp,
-        tan * cp, //
-        0.0,
-        cp,
-        -sp, //
-        0.0,
-        sp / ct,
-        cp / ct,
-    ));
+    out.by_input
+        .fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&Matrix3::new(
+            1.0,
+            tan * sp,
+            tan * cp, //
+            0.0,
+            cp,
+            -sp, //
+            0.0,
+            sp / ct,
+            cp / ct,
+        ));
 }
 
 /// Rate of climb.
 #[inline(always)]
-fn climb(out: &mut Motion, v: Vector3<f64>, v_by_rates: Matrix3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+fn climb(
+    out: &mut Motion,
+    v: Vector3<f64>,
+    v_by_rates: Matrix3<f64>,
+    (sp, cp): (f64, f64),
+    (st, ct): (f64, f64),
+) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
     out.rates[6] = up.dot(&v);
     for i in 0..3 {
@@ -172,17 +220,26 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -
     let beta = (v.y / speed).clamp(-1.0, 1.0).asin();
     let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
     let beta_by = (Vector3::y() - unit * unit.y) / (speed * beta.cos());
-    let flow = Flow { alpha: v.z.atan2(v.x), beta, velocity: speed, rates: [omega.x, omega.y, omega.z] };
+    let flow = Flow {
+        alpha: v.z.atan2(v.x),
+        beta,
+        velocity: speed,
+        rates: [omega.x, omega.y, omega.z],
+    };
     let air = Air::at(x[6]);
     let mut values = [0.0; OUTPUTS];
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
-    let vanes = [aircraft.sensors.alpha_reading(&flow, known.cg), aircraft.sensors.beta_reading(&flow, known.cg)];
+    let vanes = [
+        aircraft.sensors.alpha_reading(&flow, known.cg),
+        aircraft.sensors.beta_reading(&flow, known.cg),
+    ];
     for (o, vane) in vanes.iter().enumerate() {
         values[o] = DEG * vane.angle;
         // A reading depends on the rates over the velocity only, which gives its slope along the velocity.
         let rates: Vector3<f64> = vane.by_rates.into();
-        let by = alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);
+        let by =
+            alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);
         by_velocity.set_row(o, &(by * DEG).transpose());
         by_rates.set_row(o, &(rates * DEG).transpose());
     }
@@ -206,7 +263,11 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -
     by_state[(6, 6)] = 1.0;
     by_state[(7, 6)] = 0.5 * air.density_slope * speed * speed;
     by_state[(8, 6)] = -speed * air.sound_slope / (air.sound * air.sound);
-    Readings { values, by_state, by_rates }
+    Readings {
+        values,
+        by_state,
+        by_rates,
+    }
 }
 
 /// Standard atmosphere at an altitude with its slopes per ft.
@@ -220,9 +281,17 @@ struct Air {
 impl Air {
     fn at(altitude_ft: f64) -> Air {
         const REACH_FT: f64 = 5.0;
-        let ((density, sound), up, down) =
-            (atmosphere(altitude_ft), atmosphere(altitude_ft + REACH_FT), atmosphere(altitude_ft - REACH_FT));
+        let ((density, sound), up, down) = (
+            atmosphere(altitude_ft),
+            atmosphere(altitude_ft + REACH_FT),
+            atmosphere(altitude_ft - REACH_FT),
+        );
         let slope = |up: f64, down: f64| (up - down) / (2.0 * REACH_FT);
-        Air { density, density_slope: slope(up.0, down.0), sound, sound_slope: slope(up.1, down.1) }
+        Air {
+            density,
+            density_slope: slope(up.0, down.0),
+            sound,
+            sound_slope: slope(up.1, down.1),
+        }
     }
 }

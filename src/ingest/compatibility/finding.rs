@@ -55,9 +55,14 @@ impl Findings {
         let finding = |i: usize| {
             let signal = SIGNALS[i];
             let (channel, _) = channels.iter().find(|(_, c)| c.signal == signal)?;
-            let mut estimates = ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
+            let mut estimates =
+                ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
             correct_together(&mut estimates, settings);
-            recorded.iter().any(|s| s == signal).then(|| Finding { signal, channel: channel.clone(), estimates })
+            recorded.iter().any(|s| s == signal).then(|| Finding {
+                signal,
+                channel: channel.clone(),
+                estimates,
+            })
         };
         Findings((0..INSTRUMENTS).filter_map(finding).collect())
     }
@@ -71,14 +76,20 @@ impl Findings {
     /// Whether one has that the equations cannot do without.
     #[must_use]
     pub fn required_faulty(&self) -> bool {
-        self.0.iter().any(|f| signal::REQUIRED.contains(&f.signal) && !f.faults().is_empty())
+        self.0
+            .iter()
+            .any(|f| signal::REQUIRED.contains(&f.signal) && !f.faults().is_empty())
     }
 
     /// The same with every fault applied.
     #[must_use]
     pub fn freed(&self) -> Findings {
         let mut freed = self.clone();
-        for estimate in freed.0.iter_mut().flat_map(|f| f.estimates.iter_mut().flatten()) {
+        for estimate in freed
+            .0
+            .iter_mut()
+            .flat_map(|f| f.estimates.iter_mut().flatten())
+        {
             estimate.applied |= estimate.fault;
         }
         freed
@@ -87,7 +98,11 @@ impl Findings {
     /// The same with nothing applied.
     #[must_use]
     pub fn reported(mut self) -> Findings {
-        for estimate in self.0.iter_mut().flat_map(|f| f.estimates.iter_mut().flatten()) {
+        for estimate in self
+            .0
+            .iter_mut()
+            .flat_map(|f| f.estimates.iter_mut().flatten())
+        {
             estimate.applied = false;
         }
         self
@@ -97,10 +112,19 @@ impl Findings {
     #[must_use]
     pub fn corrections(&self) -> Vec<Correction> {
         let correction = |finding: &Finding| {
-            let of = |kind: Kind| finding.estimates[kind as usize].filter(|e| e.applied).map_or(0.0, |e| e.value);
+            let of = |kind: Kind| {
+                finding.estimates[kind as usize]
+                    .filter(|e| e.applied)
+                    .map_or(0.0, |e| e.value)
+            };
             let (bias, scale, delay_s) = (of(Kind::Bias), of(Kind::Scale), of(Kind::Delay));
             let counts = (bias, scale, delay_s) != (0.0, 0.0, 0.0);
-            counts.then(|| Correction { signal: finding.signal.to_owned(), bias, scale, delay_s })
+            counts.then(|| Correction {
+                signal: finding.signal.to_owned(),
+                bias,
+                scale,
+                delay_s,
+            })
         };
         self.0.iter().filter_map(correction).collect()
     }
@@ -128,7 +152,12 @@ impl Findings {
     /// All faults in one sentence; none where there is none.
     #[must_use]
     pub fn accusations(&self) -> Option<String> {
-        let all: Vec<String> = self.0.iter().filter(|f| !f.faults().is_empty()).map(Finding::accusation).collect();
+        let all: Vec<String> = self
+            .0
+            .iter()
+            .filter(|f| !f.faults().is_empty())
+            .map(Finding::accusation)
+            .collect();
         (!all.is_empty()).then(|| all.join("; "))
     }
 
@@ -142,7 +171,12 @@ impl Findings {
 }
 
 /// What the fit says of one parameter; none where the flight does not tell it.
-fn estimate(errors: &Errors, instrument: usize, kind: Kind, settings: &Compatibility) -> Option<Estimate> {
+fn estimate(
+    errors: &Errors,
+    instrument: usize,
+    kind: Kind,
+    settings: &Compatibility,
+) -> Option<Estimate> {
     let j = place(instrument, kind);
     let (value, ordinary) = (errors.values[j], size(&settings.ordinary, instrument, kind));
     let model = match kind {
@@ -150,7 +184,10 @@ fn estimate(errors: &Errors, instrument: usize, kind: Kind, settings: &Compatibi
         Kind::Scale => MODEL_SCALE,
         Kind::Delay => MODEL_DELAY_S,
     };
-    if !observable(instrument, kind) || errors.bounds[j] <= 0.0 || errors.bounds[j] > TOLD * errors.prior[j] {
+    if !observable(instrument, kind)
+        || errors.bounds[j] <= 0.0
+        || errors.bounds[j] > TOLD * errors.prior[j]
+    {
         return None;
     }
     let bound = errors.bounds[j].hypot(model);
@@ -164,8 +201,18 @@ fn estimate(errors: &Errors, instrument: usize, kind: Kind, settings: &Compatibi
     };
     let doubtful = value.abs() > limit && !fault;
     let counts = value.abs() > settings.standard_errors * bound && !doubtful;
-    let applied = if fault { settings.fault == OnFault::Apply } else { action == Action::Apply && counts };
-    Some(Estimate { value, bound, fault, doubtful, applied })
+    let applied = if fault {
+        settings.fault == OnFault::Apply
+    } else {
+        action == Action::Apply && counts
+    };
+    Some(Estimate {
+        value,
+        bound,
+        fault,
+        doubtful,
+        applied,
+    })
 }
 
 /// A bias and a scale error are estimated together and make sense together: where one is applied so is the other.
@@ -209,11 +256,20 @@ impl Finding {
         };
         let bounds: Vec<String> = ALL_KINDS.into_iter().filter_map(bound).collect();
         let (faults, bounds) = (self.faults().join(", "), bounds.join(", "));
-        format!("`{}` is {faults} against the other channels ({bounds})", self.channel).replace("is reads", "reads")
+        format!(
+            "`{}` is {faults} against the other channels ({bounds})",
+            self.channel
+        )
+        .replace("is reads", "reads")
     }
 
     fn consequence(&self) -> &'static str {
-        if self.estimates.iter().flatten().any(|e| e.fault && e.applied) {
+        if self
+            .estimates
+            .iter()
+            .flatten()
+            .any(|e| e.fault && e.applied)
+        {
             "the record is corrected by it. Look after the instrument or the recorder"
         } else {
             "the channel is left as recorded. Look after the instrument or the recorder, or have it corrected \
@@ -225,8 +281,11 @@ impl Finding {
         let of = |kind: Kind| self.estimates[kind as usize];
         let value = |kind: Kind| of(kind).map(|e| e.value);
         let bound = |kind: Kind| of(kind).map(|e| e.bound);
-        let applied: Vec<&str> =
-            ALL_KINDS.into_iter().filter(|k| of(*k).is_some_and(|e| e.applied)).map(name).collect();
+        let applied: Vec<&str> = ALL_KINDS
+            .into_iter()
+            .filter(|k| of(*k).is_some_and(|e| e.applied))
+            .map(name)
+            .collect();
         let faults = self.faults();
         let told = self.estimates.iter().any(Option::is_some);
         let verdict = match (faults.is_empty(), told) {

@@ -17,7 +17,9 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Compatibility;
-use super::instruments::{ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size};
+use super::instruments::{
+    ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size,
+};
 use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
@@ -109,7 +111,12 @@ struct Problem<'a> {
 /// Fits the windows; none where there are too few that can be followed.
 pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) -> Option<Errors> {
     let step_s = windows.first()?.step_s;
-    let problem = Problem { aircraft, margin: margin(settings, step_s), settings, present: present(windows) };
+    let problem = Problem {
+        aircraft,
+        margin: margin(settings, step_s),
+        settings,
+        present: present(windows),
+    };
     let mut shared = [0.0; PARAMETERS];
     let begin = |window| Member::begin(window, &problem, &shared);
     let mut members: Vec<Member> = windows.par_iter().filter_map(begin).collect();
@@ -127,7 +134,9 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         }
     }
     for _ in 0..MOST_FREED {
-        let Some((j, size)) = problem.surest(&members, &shared, &prior) else { break };
+        let Some((j, size)) = problem.surest(&members, &shared, &prior) else {
+            break;
+        };
         prior[j] = size;
         problem.settle(&mut members, &mut shared, &prior)?;
     }
@@ -141,7 +150,12 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
         bounds = problem.bounds(&members, &shared, &prior, windows)?;
     }
     let fault_bounds = problem.fault_bounds(&members, &bounds);
-    Some(Errors { values: shared, bounds, fault_bounds, prior })
+    Some(Errors {
+        values: shared,
+        bounds,
+        fault_bounds,
+        prior,
+    })
 }
 
 /// How many times larger than the swings of each accelerometer (forward, right, up) those of ω × v are which they are
@@ -149,7 +163,10 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
 fn outweighed(windows: &[Window]) -> [f64; 3] {
     let swings = |values: &dyn Fn(&Window, usize) -> f64| {
         let of = |window: &Window| {
-            let values: Vec<f64> = (0..window.samples).map(|k| values(window, k)).filter(|v| v.is_finite()).collect();
+            let values: Vec<f64> = (0..window.samples)
+                .map(|k| values(window, k))
+                .filter(|v| v.is_finite())
+                .collect();
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
             values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
         };
@@ -158,13 +175,22 @@ fn outweighed(windows: &[Window]) -> [f64; 3] {
     std::array::from_fn(|i| {
         let turning = swings(&|w, k| w.turning(k)[i]);
         let felt = swings(&|w, k| factor(3 + i) * w.inputs[3 + i][w.margin + k]);
-        if felt > 0.0 { (turning / felt).sqrt() } else { 0.0 }
+        if felt > 0.0 {
+            (turning / felt).sqrt()
+        } else {
+            0.0
+        }
     })
 }
 
 /// The parameters of instruments that are recorded and that the equations say something of.
 fn present(windows: &[Window]) -> [bool; PARAMETERS] {
-    let recorded = |i: usize| i < INPUTS || windows.iter().any(|w| w.outputs[i - INPUTS].iter().any(|v| v.is_finite()));
+    let recorded = |i: usize| {
+        i < INPUTS
+            || windows
+                .iter()
+                .any(|w| w.outputs[i - INPUTS].iter().any(|v| v.is_finite()))
+    };
     let mut present = [false; PARAMETERS];
     for i in (0..INSTRUMENTS).filter(|i| recorded(*i)) {
         for kind in ALL_KINDS {
@@ -179,7 +205,11 @@ fn size_of(errors: &super::settings::Errors, j: usize) -> f64 {
 }
 
 fn total(members: &[Member]) -> DMatrix<f64> {
-    members.iter().fold(DMatrix::zeros(PARAMETERS, PARAMETERS), |sum, m| sum + &m.reduced.0)
+    members
+        .iter()
+        .fold(DMatrix::zeros(PARAMETERS, PARAMETERS), |sum, m| {
+            sum + &m.reduced.0
+        })
 }
 
 impl Problem<'_> {
@@ -202,7 +232,9 @@ impl Problem<'_> {
                 break;
             }
         }
-        members.par_iter_mut().for_each(|member| member.reweigh(self));
+        members
+            .par_iter_mut()
+            .for_each(|member| member.reweigh(self));
         Some(steps)
     }
 
@@ -219,10 +251,16 @@ impl Problem<'_> {
             let (variance, ordinary) = (inverse[(j, j)], size_of(&self.settings.ordinary, j));
             let told = 1.0 - variance / (prior[j] * prior[j]);
             let (value, bound) = (shared[j] / told, (variance / told).sqrt());
-            let beyond = self.present[j] && told > 1e-6 && prior[j] <= ordinary && value.abs() > 2.0 * ordinary;
-            (beyond && value.abs() > FREED * bound).then(|| (j, ordinary.hypot(value), value.abs() / bound))
+            let beyond = self.present[j]
+                && told > 1e-6
+                && prior[j] <= ordinary
+                && value.abs() > 2.0 * ordinary;
+            (beyond && value.abs() > FREED * bound)
+                .then(|| (j, ordinary.hypot(value), value.abs() / bound))
         };
-        let surest = (0..PARAMETERS).filter_map(alone).max_by(|a, b| a.2.total_cmp(&b.2));
+        let surest = (0..PARAMETERS)
+            .filter_map(alone)
+            .max_by(|a, b| a.2.total_cmp(&b.2));
         surest.map(|(j, size, _)| (j, size))
     }
 
@@ -237,49 +275,100 @@ impl Problem<'_> {
         Some(std::array::from_fn(|j| {
             let ordinary = size_of(&self.settings.ordinary, j);
             let surely = shared[j].abs() > SURELY * inverse[(j, j)].sqrt();
-            if surely { ordinary.hypot(shared[j]) } else { ordinary }
+            if surely {
+                ordinary.hypot(shared[j])
+            } else {
+                ordinary
+            }
         }))
     }
 
     /// The weights of the delays in their mean.
     fn common(&self, prior: &[f64; PARAMETERS]) -> [f64; PARAMETERS] {
         let delay = |j: usize| self.present[j] && ALL_KINDS[j % KINDS] == Kind::Delay;
-        let weight = |j: usize| if delay(j) { 1.0 / (prior[j] * prior[j]) } else { 0.0 };
+        let weight = |j: usize| {
+            if delay(j) {
+                1.0 / (prior[j] * prior[j])
+            } else {
+                0.0
+            }
+        };
         let sum: f64 = (0..PARAMETERS).map(weight).sum();
         std::array::from_fn(|j| weight(j) / sum / COMMON_DELAY_S)
     }
 
     /// The gradient of what is thought before, and of the data.
-    fn gradient(&self, members: &[Member], shared: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> DVector<f64> {
+    fn gradient(
+        &self,
+        members: &[Member],
+        shared: &[f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+    ) -> DVector<f64> {
         let common = self.common(prior);
         let mean: f64 = common.iter().zip(shared).map(|(c, v)| c * v).sum();
-        let drawn = |j: usize| if self.present[j] { shared[j] / (prior[j] * prior[j]) } else { 0.0 };
-        members.iter().fold(DVector::from_fn(PARAMETERS, |j, _| -drawn(j) - common[j] * mean), |g, m| g + &m.reduced.1)
+        let drawn = |j: usize| {
+            if self.present[j] {
+                shared[j] / (prior[j] * prior[j])
+            } else {
+                0.0
+            }
+        };
+        members.iter().fold(
+            DVector::from_fn(PARAMETERS, |j, _| -drawn(j) - common[j] * mean),
+            |g, m| g + &m.reduced.1,
+        )
     }
 
-    fn cost(&self, members: &[Member], shared: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> f64 {
+    fn cost(
+        &self,
+        members: &[Member],
+        shared: &[f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+    ) -> f64 {
         let drawn: f64 = shared.iter().zip(prior).map(|(v, p)| (v / p).powi(2)).sum();
-        let mean: f64 = self.common(prior).iter().zip(shared).map(|(c, v)| c * v).sum();
+        let mean: f64 = self
+            .common(prior)
+            .iter()
+            .zip(shared)
+            .map(|(c, v)| c * v)
+            .sum();
         members.iter().map(|m| m.sums.cost).sum::<f64>() + drawn + mean * mean
     }
 
     /// (H + P⁻¹)⁻¹ over what is present; the rest is zero.
-    fn inverse(&self, information: &DMatrix<f64>, prior: &[f64; PARAMETERS]) -> Option<DMatrix<f64>> {
+    fn inverse(
+        &self,
+        information: &DMatrix<f64>,
+        prior: &[f64; PARAMETERS],
+    ) -> Option<DMatrix<f64>> {
         let common = self.common(prior);
         // In units of the prior: a unit diagonal is added.
         let whitened = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
             let own = f64::from(u8::from(i == j));
             let together = information[(i, j)] + common[i] * common[j];
-            if self.present[i] && self.present[j] { together * prior[i] * prior[j] + own } else { own }
+            if self.present[i] && self.present[j] {
+                together * prior[i] * prior[j] + own
+            } else {
+                own
+            }
         });
         let inverse = Cholesky::new(whitened)?.inverse();
         Some(DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
-            if self.present[i] && self.present[j] { inverse[(i, j)] * prior[i] * prior[j] } else { 0.0 }
+            if self.present[i] && self.present[j] {
+                inverse[(i, j)] * prior[i] * prior[j]
+            } else {
+                0.0
+            }
         }))
     }
 
     /// One step of all parameters; the largest move of a shared one over its bound.
-    fn step(&self, members: &mut [Member], shared: &mut [f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> Option<f64> {
+    fn step(
+        &self,
+        members: &mut [Member],
+        shared: &mut [f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+    ) -> Option<f64> {
         let inverse = self.inverse(&total(members), prior)?;
         let full = &inverse * self.gradient(members, shared, prior);
         let cost = self.cost(members, shared, prior);
@@ -287,12 +376,18 @@ impl Problem<'_> {
         for _ in 0..=HALVINGS {
             let trial = self.moved(shared, &full, share);
             // In the order of the windows, so that no sum depends on the threads.
-            let moved: Option<Vec<Member>> = members.par_iter().map(|m| m.moved(self, &trial, &full, share)).collect();
+            let moved: Option<Vec<Member>> = members
+                .par_iter()
+                .map(|m| m.moved(self, &trial, &full, share))
+                .collect();
             if let Some(moved) = moved
                 && self.cost(&moved, &trial, prior) <= cost * (1.0 + 1e-9)
             {
                 let over = |j: usize| (trial[j] - shared[j]).abs() / inverse[(j, j)].sqrt();
-                let largest = (0..PARAMETERS).filter(|j| self.present[*j]).map(over).fold(0.0, f64::max);
+                let largest = (0..PARAMETERS)
+                    .filter(|j| self.present[*j])
+                    .map(over)
+                    .fold(0.0, f64::max);
                 for (member, moved) in members.iter_mut().zip(moved) {
                     *member = moved;
                 }
@@ -305,7 +400,12 @@ impl Problem<'_> {
     }
 
     /// The shared parameters a share of a step on, kept within sense.
-    fn moved(&self, shared: &[f64; PARAMETERS], step: &DVector<f64>, share: f64) -> [f64; PARAMETERS] {
+    fn moved(
+        &self,
+        shared: &[f64; PARAMETERS],
+        step: &DVector<f64>,
+        share: f64,
+    ) -> [f64; PARAMETERS] {
         let longest = self.settings.longest_delay_s;
         std::array::from_fn(|j| {
             let value = shared[j] + share * step[j];
@@ -341,7 +441,8 @@ impl Problem<'_> {
         let mut wider = *bounds;
         for o in 0..OUTPUTS {
             let sums = members.iter().map(|m| m.unexplained(self, o));
-            let (slow, moved) = sums.fold((0.0, 0.0), |(slow, moved), (s, m)| (slow + s, moved + m));
+            let (slow, moved) =
+                sums.fold((0.0, 0.0), |(slow, moved), (s, m)| (slow + s, moved + m));
             let j = place(INPUTS + o, Kind::Scale);
             if moved > 0.0 {
                 wider[j] = wider[j].hypot(ANSWERED * (slow / moved).sqrt());
@@ -352,12 +453,22 @@ impl Problem<'_> {
 
     /// Parameters that came out as large as a fault but, seen by their bounds, not as sure as one: no ordinary error is
     /// that large, so they are thought ordinary after all.
-    fn doubted(&self, shared: &[f64; PARAMETERS], bounds: &[f64; PARAMETERS], prior: &[f64; PARAMETERS]) -> Vec<usize> {
-        let freed = |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
+    fn doubted(
+        &self,
+        shared: &[f64; PARAMETERS],
+        bounds: &[f64; PARAMETERS],
+        prior: &[f64; PARAMETERS],
+    ) -> Vec<usize> {
+        let freed =
+            |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
         let large = |j: &usize| shared[*j].abs() > size_of(&self.settings.faulty, *j);
         let needed = |j: usize| self.settings.needed(ALL_KINDS[j % KINDS], shared[j]);
         let unsure = |j: &usize| shared[*j].abs() <= needed(*j) * bounds[*j];
-        (0..PARAMETERS).filter(freed).filter(large).filter(unsure).collect()
+        (0..PARAMETERS)
+            .filter(freed)
+            .filter(large)
+            .filter(unsure)
+            .collect()
     }
 
     /// Variances of the shared parameters from the scatter between windows: each left out in turn. Few windows know their
@@ -369,23 +480,35 @@ impl Problem<'_> {
         prior: &[f64; PARAMETERS],
     ) -> [f64; PARAMETERS] {
         let (whole, all) = (total(members), self.gradient(members, shared, prior));
-        let without = |m: &Member| Some(self.inverse(&(&whole - &m.reduced.0), prior)? * (&all - &m.reduced.1));
+        let without = |m: &Member| {
+            Some(self.inverse(&(&whole - &m.reduced.0), prior)? * (&all - &m.reduced.1))
+        };
         let left_out: Vec<DVector<f64>> = members.iter().filter_map(without).collect();
         let count = left_out.len() as f64;
         let longer = freedom::longer(count - 1.0).powi(2);
         std::array::from_fn(|j| {
             let mean = left_out.iter().map(|d| d[j]).sum::<f64>() / count.max(1.0);
-            longer * left_out.iter().map(|d| (d[j] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count.max(1.0)
+            longer * left_out.iter().map(|d| (d[j] - mean).powi(2)).sum::<f64>() * (count - 1.0)
+                / count.max(1.0)
         })
     }
 }
 
 impl<'a> Member<'a> {
-    fn begin(window: &'a Window, problem: &Problem, shared: &[f64; PARAMETERS]) -> Option<Member<'a>> {
+    fn begin(
+        window: &'a Window,
+        problem: &Problem,
+        shared: &[f64; PARAMETERS],
+    ) -> Option<Member<'a>> {
         let mut local = [0.0; LOCAL];
-        local.iter_mut().zip(window.start.iter()).for_each(|(l, x)| *l = *x);
+        local
+            .iter_mut()
+            .zip(window.start.iter())
+            .for_each(|(l, x)| *l = *x);
         // What is believed before residuals are seen.
-        let variances = std::array::from_fn(|o| size(&problem.settings.ordinary, INPUTS + o, Kind::Bias).powi(2));
+        let variances = std::array::from_fn(|o| {
+            size(&problem.settings.ordinary, INPUTS + o, Kind::Bias).powi(2)
+        });
         Member::at(window, problem, local, variances, shared)
     }
 
@@ -397,10 +520,25 @@ impl<'a> Member<'a> {
         shared: &[f64; PARAMETERS],
     ) -> Option<Member<'a>> {
         let mut summing = Summing::over(window);
-        respond(window, problem.aircraft, &local, shared, problem.compared(window), &mut summing)?;
+        respond(
+            window,
+            problem.aircraft,
+            &local,
+            shared,
+            problem.compared(window),
+            &mut summing,
+        )?;
         let (raw, residuals) = summing.finished();
         let (sums, reduced) = (Sums::none(), (DMatrix::zeros(0, 0), DVector::zeros(0)));
-        let mut member = Member { window, local, variances, raw, sums, reduced, residuals };
+        let mut member = Member {
+            window,
+            local,
+            variances,
+            raw,
+            sums,
+            reduced,
+            residuals,
+        };
         member.weigh(problem);
         Some(member)
     }
@@ -413,7 +551,8 @@ impl<'a> Member<'a> {
         step: &DVector<f64>,
         share: f64,
     ) -> Option<Member<'a>> {
-        let own = Cholesky::new(self.sums.ll.clone())?.solve(&(&self.sums.gl - &self.sums.ls * step));
+        let own =
+            Cholesky::new(self.sums.ll.clone())?.solve(&(&self.sums.gl - &self.sums.ls * step));
         let local = std::array::from_fn(|i| self.local[i] + share * own[i]);
         Member::at(self.window, problem, local, self.variances, shared)
     }
@@ -439,7 +578,9 @@ impl<'a> Member<'a> {
     /// Of one output: the squares of the slow part of what the equations leave, and of the motion that they explain.
     fn unexplained(&self, problem: &Problem, o: usize) -> (f64, f64) {
         let measured = &self.window.outputs[o];
-        let known = problem.compared(self.window).filter(|k| measured[*k].is_finite());
+        let known = problem
+            .compared(self.window)
+            .filter(|k| measured[*k].is_finite());
         let both = known.map(|k| (self.residuals[o][k], measured[k] - self.residuals[o][k]));
         let (residuals, values): (Vec<f64>, Vec<f64>) = both.unzip();
         (slow(&residuals), about_mean(&values))
@@ -459,7 +600,11 @@ impl<'a> Member<'a> {
 
 /// The sum of squares without that of what does not continue from sample to sample.
 fn slow(values: &[f64]) -> f64 {
-    let noise = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / 2.0;
+    let noise = values
+        .windows(2)
+        .map(|w| (w[1] - w[0]).powi(2))
+        .sum::<f64>()
+        / 2.0;
     (values.iter().map(|v| v * v).sum::<f64>() - noise).max(0.0)
 }
 
@@ -488,7 +633,9 @@ impl<'a> Summing<'a> {
         Summing {
             measured: &window.outputs,
             residuals: std::array::from_fn(|_| vec![f64::NAN; window.samples]),
-            raw: (0..OUTPUTS).map(|_| Raw(Aligned::zeros(WIDE * WIDE))).collect(),
+            raw: (0..OUTPUTS)
+                .map(|_| Raw(Aligned::zeros(WIDE * WIDE)))
+                .collect(),
             rows: Aligned::zeros(OUTPUTS * CHUNK * WIDE),
             filled: [0; OUTPUTS],
         }
@@ -497,8 +644,17 @@ impl<'a> Summing<'a> {
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, output: usize) {
         let values = &self.rows.slice()[output * CHUNK * WIDE..];
-        let rows = Rows { values, stride: WIDE, samples: self.filled[output] };
-        rows.add_squares(simd, &[VECTOR; WIDE / VECTOR], self.raw[output].0.slice_mut(), WIDE);
+        let rows = Rows {
+            values,
+            stride: WIDE,
+            samples: self.filled[output],
+        };
+        rows.add_squares(
+            simd,
+            &[VECTOR; WIDE / VECTOR],
+            self.raw[output].0.slice_mut(),
+            WIDE,
+        );
         self.filled[output] = 0;
     }
 
@@ -577,9 +733,15 @@ impl Sums {
         match Cholesky::new(self.ll.clone()) {
             Some(own) => {
                 let information = &self.ss - self.ls.transpose() * own.solve(&self.ls);
-                (information, &self.gs - self.ls.transpose() * own.solve(&self.gl))
+                (
+                    information,
+                    &self.gs - self.ls.transpose() * own.solve(&self.gl),
+                )
             }
-            None => (DMatrix::zeros(PARAMETERS, PARAMETERS), DVector::zeros(PARAMETERS)),
+            None => (
+                DMatrix::zeros(PARAMETERS, PARAMETERS),
+                DVector::zeros(PARAMETERS),
+            ),
         }
     }
 }
@@ -590,9 +752,16 @@ mod tests {
 
     #[test]
     fn noise_from_sample_to_sample_is_no_gust() {
-        let noise: Vec<f64> = (0_u64..4000).map(|k| (k * k * 7 % 101) as f64 / 50.0 - 1.0).collect();
+        let noise: Vec<f64> = (0_u64..4000)
+            .map(|k| (k * k * 7 % 101) as f64 / 50.0 - 1.0)
+            .collect();
         let gust: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 0.03).sin()).collect();
-        assert!(slow(&noise) < 0.1 * about_mean(&noise), "{} of {}", slow(&noise), about_mean(&noise));
+        assert!(
+            slow(&noise) < 0.1 * about_mean(&noise),
+            "{} of {}",
+            slow(&noise),
+            about_mean(&noise)
+        );
         assert!((slow(&gust) / about_mean(&gust) - 1.0).abs() < 0.01);
     }
 }

@@ -74,5 +74,8 @@ pub fn size(errors: &Errors, instrument: usize, kind: Kind) -> f64 {
 /// Whether the kinematic equations say anything of a parameter at all: they know changes of altitude and heading only,
 /// and the heading's scale is that of a full turn.
 pub fn observable(instrument: usize, kind: Kind) -> bool {
-    !matches!((SIGNALS[instrument], kind), (s::PSI, Kind::Bias | Kind::Scale) | (s::ALTITUDE, Kind::Bias))
+    !matches!(
+        (SIGNALS[instrument], kind),
+        (s::PSI, Kind::Bias | Kind::Scale) | (s::ALTITUDE, Kind::Bias)
+    )
 }

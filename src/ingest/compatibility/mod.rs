@@ -29,7 +29,11 @@ use window::Window;
 /// The signals that are read of a record.
 #[must_use]
 pub fn signals() -> BTreeSet<String> {
-    instruments::SIGNALS.iter().chain(&[signal::X_CG, signal::Y_CG, signal::Z_CG]).map(|s| (*s).to_owned()).collect()
+    instruments::SIGNALS
+        .iter()
+        .chain(&[signal::X_CG, signal::Y_CG, signal::Z_CG])
+        .map(|s| (*s).to_owned())
+        .collect()
 }
 
 /// What a record tells of its instruments; `recorded` are the signals that come from channels. A long record comes in
@@ -46,10 +50,16 @@ pub fn examine(
     if !settings.reconstruct {
         return Findings::default();
     }
-    let share = Compatibility { windows: settings.windows.div_ceil(count.max(1)), ..settings.clone() };
+    let share = Compatibility {
+        windows: settings.windows.div_ceil(count.max(1)),
+        ..settings.clone()
+    };
     let of_part = |record: Record| -> Vec<Window> {
         let stretches = window::choose(&record, &share);
-        stretches.into_iter().map(|w| Window::of(&record, w, aircraft, settings)).collect()
+        stretches
+            .into_iter()
+            .map(|w| Window::of(&record, w, aircraft, settings))
+            .collect()
     };
     let windows: Vec<Window> = parts.flat_map(of_part).collect();
     let errors = fit::fit(&windows, aircraft, settings);

@@ -5,7 +5,10 @@
 //! all that a delay reaches is there, so that no more than that is kept.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(clippy::needless_range_loop, reason = "plain indices become straight code for the vectors")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use std::ops::Range;
 
@@ -61,7 +64,16 @@ pub fn respond(
     let own = |o: usize| std::array::from_fn(|kind| shared[(INPUTS + o) * KINDS + kind]);
     let errors: [[f64; KINDS]; OUTPUTS] = std::array::from_fn(own);
     let taps = errors.map(|e| Taps::at(-e[Kind::Delay as usize] / window.step_s));
-    Arch::new().dispatch(Flight { window, aircraft, local, points: &points, errors, taps, samples, sink })
+    Arch::new().dispatch(Flight {
+        window,
+        aircraft,
+        local,
+        points: &points,
+        errors,
+        taps,
+        samples,
+        sink,
+    })
 }
 
 /// The integration of a window, compiled for the processor at hand.
@@ -97,13 +109,27 @@ impl<K: Sink> WithSimd for Flight<'_, K> {
     fn with_simd<S: Simd>(mut self, simd: S) -> Option<()> {
         const NOTHING: Slopes = [[0.0; WIDE]; STATES];
         let count = self.window.samples;
-        let mut way =
-            Way { x: State::from_column_slice(&self.local[..STATES]), s: NOTHING, stages: [NOTHING; 2], end: NOTHING };
+        let mut way = Way {
+            x: State::from_column_slice(&self.local[..STATES]),
+            s: NOTHING,
+            stages: [NOTHING; 2],
+            end: NOTHING,
+        };
         for i in 0..STATES {
             way.s[i][i] = 1.0;
         }
-        let ahead = self.taps.iter().map(|taps| taps.last().max(0).unsigned_abs()).max().unwrap_or(0);
-        let behind = self.taps.iter().map(|taps| taps.first().min(0).unsigned_abs()).max().unwrap_or(0);
+        let ahead = self
+            .taps
+            .iter()
+            .map(|taps| taps.last().max(0).unsigned_abs())
+            .max()
+            .unwrap_or(0);
+        let behind = self
+            .taps
+            .iter()
+            .map(|taps| taps.first().min(0).unsigned_abs())
+            .max()
+            .unwrap_or(0);
         let mut kept = vec![[[0.0; WIDE]; OUTPUTS]; (ahead + behind + 1).next_power_of_two()];
         for k in 0..count + ahead {
             if k < count {
@@ -131,17 +157,25 @@ impl<K: Sink> Flight<'_, K> {
     #[inline(always)]
     fn advance<S: Simd>(&self, simd: S, k: usize, way: &mut Way) {
         let h = self.window.step_s;
-        let (ahead_s, part_s) = ([0.5 * h, 0.5 * h, h, 0.0], [h / 6.0, h / 3.0, h / 3.0, h / 6.0]);
+        let (ahead_s, part_s) = (
+            [0.5 * h, 0.5 * h, h, 0.0],
+            [h / 6.0, h / 3.0, h / 3.0, h / 6.0],
+        );
         let Way { x, s, stages, end } = way;
         let (mut at, mut x_end) = (*x, *x);
         *end = *s;
         for stage in 0..STAGES {
             let sample = if POINT[stage] == 2 { k + 1 } else { k };
             let [even, odd] = &mut *stages;
-            let (here, next) = if stage % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
+            let (here, next) = if stage % 2 == 0 {
+                (&*even, odd)
+            } else {
+                (&*odd, even)
+            };
             let slopes = if stage == 0 { &*s } else { here };
             let point = &self.points[2 * k + POINT[stage]];
-            let mut rates = equations::rates(&at, &point.map(|p| p.value), &self.window.known[sample]);
+            let mut rates =
+                equations::rates(&at, &point.map(|p| p.value), &self.window.known[sample]);
             let to_body = &self.window.known[sample].to_body;
             for i in 0..WIND {
                 for j in 0..WIND {
@@ -149,7 +183,10 @@ impl<K: Sink> Flight<'_, K> {
                 }
             }
             let along = along(point);
-            let (part, ahead) = (simd.splat_f64s(part_s[stage]), simd.splat_f64s(ahead_s[stage]));
+            let (part, ahead) = (
+                simd.splat_f64s(part_s[stage]),
+                simd.splat_f64s(ahead_s[stage]),
+            );
             for i in 0..STATES {
                 let (s, end, next) = (&s[i], &mut end[i], &mut next[i]);
                 for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
@@ -168,7 +205,11 @@ impl<K: Sink> Flight<'_, K> {
                     slope.each(|lane, slope| {
                         let so_far = load::<S>(end, lane);
                         store::<S>(end, lane, simd.mul_add_f64s(part, slope, so_far));
-                        store::<S>(next, lane, simd.mul_add_f64s(ahead, slope, load::<S>(s, lane)));
+                        store::<S>(
+                            next,
+                            lane,
+                            simd.mul_add_f64s(ahead, slope, load::<S>(s, lane)),
+                        );
                     });
                 }
             }
@@ -182,7 +223,12 @@ impl<K: Sink> Flight<'_, K> {
     #[inline(always)]
     fn read<S: Simd>(&self, simd: S, k: usize, way: &Way, cells: &mut Cells) {
         let point = &self.points[2 * k];
-        let at = equations::readings(self.aircraft, &way.x, &point.map(|p| p.value), &self.window.known[k]);
+        let at = equations::readings(
+            self.aircraft,
+            &way.x,
+            &point.map(|p| p.value),
+            &self.window.known[k],
+        );
         let along = along(point);
         for o in 0..OUTPUTS {
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
@@ -209,7 +255,10 @@ impl<K: Sink> Flight<'_, K> {
             let [bias, scale, _] = self.errors[o];
             let (mut value, mut by_shift, gain) = (0.0, 0.0, 1.0 + scale);
             let mut taps = [(0.0, &kept[0][o]); 4];
-            for (tap, (sample, weight, slope)) in taps.iter_mut().zip(self.taps[o].each(k, self.window.samples)) {
+            for (tap, (sample, weight, slope)) in taps
+                .iter_mut()
+                .zip(self.taps[o].each(k, self.window.samples))
+            {
                 let cell = &kept[sample & (kept.len() - 1)][o];
                 value += weight * cell[DRIVING];
                 by_shift += slope * cell[DRIVING];
@@ -252,14 +301,21 @@ struct Sum<S: Simd> {
 impl<S: Simd> Sum<S> {
     #[inline(always)]
     fn zero(simd: S, first: usize) -> Self {
-        Sum { first, lanes: [simd.splat_f64s(0.0); SIDE_BY_SIDE] }
+        Sum {
+            first,
+            lanes: [simd.splat_f64s(0.0); SIDE_BY_SIDE],
+        }
     }
 
     #[inline(always)]
     fn add(&mut self, simd: S, factor: f64, row: &Row) {
         let factor = simd.splat_f64s(factor);
         for n in 0..SIDE_BY_SIDE {
-            self.lanes[n] = simd.mul_add_f64s(factor, load::<S>(row, self.first + n * S::F64_LANES), self.lanes[n]);
+            self.lanes[n] = simd.mul_add_f64s(
+                factor,
+                load::<S>(row, self.first + n * S::F64_LANES),
+                self.lanes[n],
+            );
         }
     }
 
@@ -287,14 +343,22 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
     let mut points = vec![[Freed::default(); INPUTS]; 2 * window.samples - 1];
     for i in 0..INPUTS {
         let parameter = |kind| shared[place(i, kind)];
-        let (bias, gain, delay) = (parameter(Kind::Bias), 1.0 + parameter(Kind::Scale), parameter(Kind::Delay));
+        let (bias, gain, delay) = (
+            parameter(Kind::Bias),
+            1.0 + parameter(Kind::Scale),
+            parameter(Kind::Delay),
+        );
         let values = &window.inputs[i];
         let unit = factor(i) / gain;
         let halves = [0.0, 0.5].map(|half| Taps::at(delay / window.step_s + half));
         for (j, point) in points.iter_mut().enumerate() {
-            let (sum, by_shift) = halves[j % 2].sum(window.margin + j / 2, values.len(), |k| values[k]);
+            let (sum, by_shift) =
+                halves[j % 2].sum(window.margin + j / 2, values.len(), |k| values[k]);
             let value = unit * (sum - bias);
-            point[i] = Freed { value, by: [-unit, -value / gain, unit * by_shift / window.step_s] };
+            point[i] = Freed {
+                value,
+                by: [-unit, -value / gain, unit * by_shift / window.step_s],
+            };
         }
     }
     points
@@ -302,5 +366,9 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
 
 /// Where the columns of an output's row are: among the local parameters first, among the shared ones the rest.
 pub fn shared_place(column: usize, o: usize) -> usize {
-    if column < DRIVING { column - LOCAL } else { (INPUTS + o) * KINDS + column - DRIVING }
+    if column < DRIVING {
+        column - LOCAL
+    } else {
+        (INPUTS + o) * KINDS + column - DRIVING
+    }
 }

@@ -43,7 +43,11 @@ impl Compatibility {
     /// How many times its bound an error is when it counts as a fault.
     pub(super) fn needed(&self, kind: Kind, value: f64) -> f64 {
         let ahead = kind == Kind::Delay && value < 0.0;
-        if ahead { 2.0 * self.fault_standard_errors } else { self.fault_standard_errors }
+        if ahead {
+            2.0 * self.fault_standard_errors
+        } else {
+            self.fault_standard_errors
+        }
     }
 }
 

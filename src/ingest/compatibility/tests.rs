@@ -5,7 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 use pulp::Simd;
 
 use super::equations::{self, Driven, Known, STATES, State, rates, readings};
-use super::instruments::{INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place};
+use super::instruments::{
+    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place,
+};
 use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{self, Window, factor};
 use super::*;
@@ -16,7 +18,11 @@ use crate::simulate::noise::Noise;
 use crate::units::{DEG, G0_FT_S2};
 
 const STEP_S: f64 = 0.025;
-const CG: Position = Position { x_ft: 38.3, y_ft: 0.1, z_ft: 8.7 };
+const CG: Position = Position {
+    x_ft: 38.3,
+    y_ft: 0.1,
+    z_ft: 8.7,
+};
 
 fn aircraft() -> Aircraft {
     let at = |x_ft, y_ft, z_ft| Position { x_ft, y_ft, z_ft };
@@ -31,8 +37,18 @@ fn aircraft() -> Aircraft {
             an: at(31.3, -0.25, 6.9),
             ax: at(31.4, -0.1, 6.95),
             ay: at(31.45, 0.1, 6.85),
-            alpha_vane: Vane { x_ft: 35.4, y_ft: 19.2, z_ft: 7.9, factor: 1.02 },
-            beta_vane: Vane { x_ft: 35.4, y_ft: -19.2, z_ft: 7.9, factor: 0.98 },
+            alpha_vane: Vane {
+                x_ft: 35.4,
+                y_ft: 19.2,
+                z_ft: 7.9,
+                factor: 1.02,
+            },
+            beta_vane: Vane {
+                x_ft: 35.4,
+                y_ft: -19.2,
+                z_ft: 7.9,
+                factor: 0.98,
+            },
             vane_model: VaneModel::Exact,
             thrust_in_ax: true,
         },
@@ -65,15 +81,19 @@ fn slopes_of_the_rates_are_those_of_finite_differences() {
         let (mut up, mut down) = (state(), state());
         up[j] += h;
         down[j] -= h;
-        let numeric = (rates(&up, &INPUT, &known()).rates - rates(&down, &INPUT, &known()).rates) / (2.0 * h);
-        (0..STATES).for_each(|i| assert_abs_diff_eq!(at.by_state[(i, j)], numeric[i], epsilon = 1e-6));
+        let numeric =
+            (rates(&up, &INPUT, &known()).rates - rates(&down, &INPUT, &known()).rates) / (2.0 * h);
+        (0..STATES)
+            .for_each(|i| assert_abs_diff_eq!(at.by_state[(i, j)], numeric[i], epsilon = 1e-6));
     }
     for j in 0..INPUTS {
         let (mut up, mut down) = (INPUT, INPUT);
         up[j] += 1e-5;
         down[j] -= 1e-5;
-        let numeric = (rates(&state(), &up, &known()).rates - rates(&state(), &down, &known()).rates) / 2e-5;
-        (0..STATES).for_each(|i| assert_abs_diff_eq!(at.by_input[(i, j)], numeric[i], epsilon = 1e-6));
+        let numeric =
+            (rates(&state(), &up, &known()).rates - rates(&state(), &down, &known()).rates) / 2e-5;
+        (0..STATES)
+            .for_each(|i| assert_abs_diff_eq!(at.by_input[(i, j)], numeric[i], epsilon = 1e-6));
     }
 }
 
@@ -87,40 +107,82 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
         up[j] += h;
         down[j] -= h;
         let (up, down) = (read(&up, &INPUT).values, read(&down, &INPUT).values);
-        (0..OUTPUTS)
-            .for_each(|o| assert_abs_diff_eq!(at.by_state[(o, j)], (up[o] - down[o]) / (2.0 * h), epsilon = 1e-5));
+        (0..OUTPUTS).for_each(|o| {
+            assert_abs_diff_eq!(
+                at.by_state[(o, j)],
+                (up[o] - down[o]) / (2.0 * h),
+                epsilon = 1e-5
+            )
+        });
     }
     for j in 0..3 {
         let (mut up, mut down) = (INPUT, INPUT);
         up[j] += 1e-6;
         down[j] -= 1e-6;
         let (up, down) = (read(&state(), &up).values, read(&state(), &down).values);
-        (0..OUTPUTS).for_each(|o| assert_abs_diff_eq!(at.by_rates[(o, j)], (up[o] - down[o]) / 2e-6, epsilon = 1e-5));
+        (0..OUTPUTS).for_each(|o| {
+            assert_abs_diff_eq!(
+                at.by_rates[(o, j)],
+                (up[o] - down[o]) / 2e-6,
+                epsilon = 1e-5
+            )
+        });
     }
 }
 
 #[test]
 fn the_patterns_name_every_slope_that_is_not_zero() {
-    let (at, read) = (rates(&state(), &INPUT, &known()), readings(&aircraft(), &state(), &INPUT, &known()));
-    let nonzero = |row: &dyn Fn(usize) -> f64, count: usize| (0..count).filter(|j| row(*j) != 0.0).collect::<Vec<_>>();
+    let (at, read) = (
+        rates(&state(), &INPUT, &known()),
+        readings(&aircraft(), &state(), &INPUT, &known()),
+    );
+    let nonzero = |row: &dyn Fn(usize) -> f64, count: usize| {
+        (0..count).filter(|j| row(*j) != 0.0).collect::<Vec<_>>()
+    };
     for i in 0..STATES {
-        assert_eq!(nonzero(&|j| at.by_state[(i, j)], STATES), equations::RATES_BY_STATE[i], "state {i}");
-        assert_eq!(nonzero(&|j| at.by_input[(i, j)], INPUTS), equations::RATES_BY_INPUT[i], "state {i}");
+        assert_eq!(
+            nonzero(&|j| at.by_state[(i, j)], STATES),
+            equations::RATES_BY_STATE[i],
+            "state {i}"
+        );
+        assert_eq!(
+            nonzero(&|j| at.by_input[(i, j)], INPUTS),
+            equations::RATES_BY_INPUT[i],
+            "state {i}"
+        );
     }
     for o in 0..OUTPUTS {
-        assert_eq!(nonzero(&|j| read.by_state[(o, j)], STATES), equations::READINGS_BY_STATE[o], "output {o}");
-        assert_eq!(nonzero(&|j| read.by_rates[(o, j)], 3), equations::READINGS_BY_RATES[o], "output {o}");
+        assert_eq!(
+            nonzero(&|j| read.by_state[(o, j)], STATES),
+            equations::READINGS_BY_STATE[o],
+            "output {o}"
+        );
+        assert_eq!(
+            nonzero(&|j| read.by_rates[(o, j)], 3),
+            equations::READINGS_BY_RATES[o],
+            "output {o}"
+        );
     }
 }
 
 #[test]
 fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_changes() {
     let (phi, speed): (f64, f64) = (0.6, 500.0);
-    let known = Known { earth: Vector3::zeros(), horizon: Vector3::zeros(), arms: [[0.0; 3]; 3], ..known() };
+    let known = Known {
+        earth: Vector3::zeros(),
+        horizon: Vector3::zeros(),
+        arms: [[0.0; 3]; 3],
+        ..known()
+    };
     let turn = known.gravity * phi.tan() / speed;
     let lift = known.gravity / phi.cos();
     let input = [0.0, turn * phi.sin(), turn * phi.cos(), 0.0, 0.0, -lift];
-    let at = rates(&State::from([speed, 0.0, 0.0, phi, 0.0, 0.0, 0.0]), &input, &known).rates;
+    let at = rates(
+        &State::from([speed, 0.0, 0.0, phi, 0.0, 0.0, 0.0]),
+        &input,
+        &known,
+    )
+    .rates;
     for (i, expected) in [0.0, 0.0, 0.0, 0.0, 0.0, turn, 0.0].into_iter().enumerate() {
         assert_abs_diff_eq!(at[i], expected, epsilon = 1e-12);
     }
@@ -129,8 +191,17 @@ fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_chang
 #[test]
 fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
     let horizon = Vector3::new(6e-5, 0.0, -4e-5);
-    let known = Known { earth: horizon, horizon, ..known() };
-    let at = rates(&State::zeros(), &[6e-5, 0.0, -4e-5, 0.0, 0.0, -known.gravity], &known).rates;
+    let known = Known {
+        earth: horizon,
+        horizon,
+        ..known()
+    };
+    let at = rates(
+        &State::zeros(),
+        &[6e-5, 0.0, -4e-5, 0.0, 0.0, -known.gravity],
+        &known,
+    )
+    .rates;
     // The c.g. goes around the sensors, by a hundred-thousandth of a foot per second.
     assert!(at.norm() < 1e-4, "{at}");
 }
@@ -146,8 +217,11 @@ fn an_accelerometer_off_the_c_g_feels_the_turning_without_any_rate_being_differe
         ..known()
     };
     let (r, r_dot) = (0.3, 0.2);
-    let at =
-        rates(&State::from([0.0, 7.0 * r, 0.0, 0.0, 0.0, 0.0, 0.0]), &[0.0, 0.0, r, 0.0, 7.0 * r_dot, 0.0], &known);
+    let at = rates(
+        &State::from([0.0, 7.0 * r, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        &[0.0, 0.0, r, 0.0, 7.0 * r_dot, 0.0],
+        &known,
+    );
     assert_abs_diff_eq!(at.rates[1], 7.0 * r_dot, epsilon = 1e-12);
     assert_abs_diff_eq!(at.rates[6], 0.0, epsilon = 1e-12);
 }
@@ -176,7 +250,11 @@ fn flight(seconds: f64) -> Record {
             for i in 0..INPUTS {
                 columns[i].push(input[i] / factor(i));
             }
-            for (o, value) in readings(&aircraft, &x, &input, &known).values.into_iter().enumerate() {
+            for (o, value) in readings(&aircraft, &x, &input, &known)
+                .values
+                .into_iter()
+                .enumerate()
+            {
                 columns[INPUTS + o].push(value);
             }
         }
@@ -191,14 +269,30 @@ fn flight(seconds: f64) -> Record {
         x += (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0);
     }
     let constants = [(s::X_CG, CG.x_ft), (s::Y_CG, CG.y_ft), (s::Z_CG, CG.z_ft)];
-    let series = |values: Vec<f64>| Series { marks: vec![Mark::Measured; values.len()], values };
-    let mut signals: BTreeMap<String, Series> =
-        SIGNALS.iter().zip(columns).map(|(name, values)| ((*name).to_owned(), series(values))).collect();
+    let series = |values: Vec<f64>| Series {
+        marks: vec![Mark::Measured; values.len()],
+        values,
+    };
+    let mut signals: BTreeMap<String, Series> = SIGNALS
+        .iter()
+        .zip(columns)
+        .map(|(name, values)| ((*name).to_owned(), series(values)))
+        .collect();
     signals.extend(constants.map(|(name, value)| (name.to_owned(), series(vec![value; samples]))));
-    Record { flight_id: "sines".to_owned(), start_s: 0.0, step_s: STEP_S, samples, signals }
+    Record {
+        flight_id: "sines".to_owned(),
+        start_s: 0.0,
+        step_s: STEP_S,
+        samples,
+        signals,
+    }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of samples")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a positive number of samples"
+)]
 fn window_samples(seconds: f64) -> usize {
     (seconds / STEP_S) as usize
 }
@@ -219,22 +313,35 @@ fn steered(t: f64, x: &State, known: &Known) -> Driven {
     let sine = |period: f64, phase: f64| (2.0 * std::f64::consts::PI * t / period + phase).sin();
     let (phi, theta) = (x[3], x[4]);
     let p = 0.35 * sine(4.1, 0.0) + 0.1 * sine(2.3, 1.0) - 0.3 * (phi - 0.5 * sine(61.0, 0.0));
-    let q = 0.08 * sine(5.3, 0.5) + 0.05 * sine(3.1, 0.0) - 0.3 * (theta - 0.25 - 0.1 * sine(47.0, 2.0));
+    let q = 0.08 * sine(5.3, 0.5) + 0.05 * sine(3.1, 0.0)
+        - 0.3 * (theta - 0.25 - 0.1 * sine(47.0, 2.0));
     let r = 0.06 * sine(6.7, 0.3) + 0.03 * sine(2.9, 0.0);
     // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without force.
     let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], known).rates;
-    let wanted = [450.0 + 60.0 * sine(53.0, 0.0), 12.0 * sine(7.3, 0.0), 90.0 + 25.0 * sine(6.1, 1.0)];
-    let force = |i: usize| 0.5 * (wanted[i] - x[i]) - free[i] + 3.0 * sine(3.7 + i as f64, i as f64);
+    let wanted = [
+        450.0 + 60.0 * sine(53.0, 0.0),
+        12.0 * sine(7.3, 0.0),
+        90.0 + 25.0 * sine(6.1, 1.0),
+    ];
+    let force =
+        |i: usize| 0.5 * (wanted[i] - x[i]) - free[i] + 3.0 * sine(3.7 + i as f64, i as f64);
     [p, q, r, force(0), force(1), force(2)]
 }
 
 fn settings() -> Compatibility {
-    Compatibility { windows: 4, window_s: 14.0, ..Compatibility::default() }
+    Compatibility {
+        windows: 4,
+        window_s: 14.0,
+        ..Compatibility::default()
+    }
 }
 
 fn windows(record: &Record) -> Vec<Window> {
     let settings = settings();
-    window::choose(record, &settings).into_iter().map(|w| Window::of(record, w, &aircraft(), &settings)).collect()
+    window::choose(record, &settings)
+        .into_iter()
+        .map(|w| Window::of(record, w, &aircraft(), &settings))
+        .collect()
 }
 
 /// Keeps the outputs of one sample.
@@ -253,12 +360,23 @@ impl Sink for Outputs {
 #[test]
 fn sensitivities_are_those_of_finite_differences() {
     let record = flight(12.0);
-    let short = Compatibility { window_s: 6.0, ..settings() };
-    let window = Window::of(&record, window::choose(&record, &short).remove(0), &aircraft(), &short);
+    let short = Compatibility {
+        window_s: 6.0,
+        ..settings()
+    };
+    let window = Window::of(
+        &record,
+        window::choose(&record, &short).remove(0),
+        &aircraft(),
+        &short,
+    );
     let mut noise = Noise::new(3, "errors");
     let shared: [f64; PARAMETERS] = std::array::from_fn(|_| 0.01 * noise.normal());
     let mut local = [0.0; LOCAL];
-    local.iter_mut().zip(window.start.iter()).for_each(|(l, x)| *l = *x);
+    local
+        .iter_mut()
+        .zip(window.start.iter())
+        .for_each(|(l, x)| *l = *x);
     local[STATES..].copy_from_slice(&[0.05, -0.1, 0.08]);
     let (k, h) = (window.samples - 40, 1e-6);
     let outputs = |local: &Local, shared: &[f64; PARAMETERS]| {
@@ -267,16 +385,21 @@ fn sensitivities_are_those_of_finite_differences() {
         outputs.0
     };
     let at = outputs(&local, &shared);
-    let compare =
-        |column: usize, compared: &dyn Fn(usize) -> bool, size: f64, change: &dyn Fn(f64) -> [(f64, Row); OUTPUTS]| {
-            let (up, down) = (change(h * size), change(-h * size));
-            for o in (0..OUTPUTS).filter(|o| compared(*o)) {
-                let numeric = (up[o].0 - down[o].0) / (2.0 * h * size);
-                let exact = at[o].1[column];
-                let scale = numeric.abs().max(1.0);
-                assert!((exact - numeric).abs() < 2e-4 * scale, "output {o}, column {column}: {exact} not {numeric}");
-            }
-        };
+    let compare = |column: usize,
+                   compared: &dyn Fn(usize) -> bool,
+                   size: f64,
+                   change: &dyn Fn(f64) -> [(f64, Row); OUTPUTS]| {
+        let (up, down) = (change(h * size), change(-h * size));
+        for o in (0..OUTPUTS).filter(|o| compared(*o)) {
+            let numeric = (up[o].0 - down[o].0) / (2.0 * h * size);
+            let exact = at[o].1[column];
+            let scale = numeric.abs().max(1.0);
+            assert!(
+                (exact - numeric).abs() < 2e-4 * scale,
+                "output {o}, column {column}: {exact} not {numeric}"
+            );
+        }
+    };
     for j in 0..LOCAL {
         let size = local[j].abs().max(1.0);
         compare(j, &|_| true, size, &|d| {
@@ -309,8 +432,9 @@ fn perfect_instruments_of_a_perfect_flight_have_no_errors() {
 }
 
 /// White noise of each instrument, in its unit.
-const NOISE: [f64; INSTRUMENTS] =
-    [0.1, 0.05, 0.05, 0.003, 0.005, 0.01, 0.1, 0.1, 0.6, 0.05, 0.05, 0.05, 4.0, 0.15, 0.0008];
+const NOISE: [f64; INSTRUMENTS] = [
+    0.1, 0.05, 0.05, 0.003, 0.005, 0.01, 0.1, 0.1, 0.6, 0.05, 0.05, 0.05, 4.0, 0.15, 0.0008,
+];
 
 /// What instruments with these errors (bias, scale, delay) record of an exact flight. A delay is a whole number of samples.
 fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
@@ -319,7 +443,8 @@ fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
         let mut noise = Noise::new(seed, name);
         let values = &mut record.signals.get_mut(*name).unwrap().values;
         let before = values.clone();
-        let [bias, scale, delay] = [Kind::Bias, Kind::Scale, Kind::Delay].map(|kind| errors[place(i, kind)]);
+        let [bias, scale, delay] =
+            [Kind::Bias, Kind::Scale, Kind::Delay].map(|kind| errors[place(i, kind)]);
         for (k, value) in values.iter_mut().enumerate() {
             let late = k.saturating_sub(window_samples(delay + 1e-9));
             *value = (1.0 + scale) * before[late] + bias + NOISE[i] * noise.normal();
@@ -336,18 +461,34 @@ fn channels() -> (BTreeMap<String, Channel>, Vec<String>) {
         scale: 1.0,
         wraps_at: None,
     };
-    let channels = SIGNALS.iter().map(|name| ((*name).to_owned(), channel(name))).collect();
-    (channels, SIGNALS.iter().map(|name| (*name).to_owned()).collect())
+    let channels = SIGNALS
+        .iter()
+        .map(|name| ((*name).to_owned(), channel(name)))
+        .collect();
+    (
+        channels,
+        SIGNALS.iter().map(|name| (*name).to_owned()).collect(),
+    )
 }
 
 fn examined(record: &Record, settings: &Compatibility) -> Findings {
     let (channels, names) = channels();
-    examine(std::iter::once(record.clone()), 1, &channels, &names, &aircraft(), settings)
+    examine(
+        std::iter::once(record.clone()),
+        1,
+        &channels,
+        &names,
+        &aircraft(),
+        settings,
+    )
 }
 
 /// The faults of a flight: signal and words.
 fn faults(findings: &Findings) -> Vec<(&'static str, String)> {
-    SIGNALS.into_iter().filter_map(|name| Some((name, findings.verdict(name)?))).collect()
+    SIGNALS
+        .into_iter()
+        .filter_map(|name| Some((name, findings.verdict(name)?)))
+        .collect()
 }
 
 /// Ordinary errors of every instrument, drawn.
@@ -357,7 +498,11 @@ fn ordinary(seed: u64) -> [f64; PARAMETERS] {
     std::array::from_fn(|j| {
         let (i, kind) = (j / 3, instruments::ALL_KINDS[j % 3]);
         let drawn = noise.normal() * instruments::size(&errors, i, kind);
-        if kind == Kind::Delay || !observable(i, kind) { 0.0 } else { 0.5 * drawn }
+        if kind == Kind::Delay || !observable(i, kind) {
+            0.0
+        } else {
+            0.5 * drawn
+        }
     })
 }
 
@@ -388,14 +533,25 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
 #[test]
 fn a_delay_of_a_channel_is_named_and_no_other() {
     let exact = flight(65.0);
-    for name in [s::P, s::AN, s::ALPHA_VANE, s::THETA, s::VELOCITY, s::ALTITUDE] {
+    for name in [
+        s::P,
+        s::AN,
+        s::ALPHA_VANE,
+        s::THETA,
+        s::VELOCITY,
+        s::ALTITUDE,
+    ] {
         let i = SIGNALS.iter().position(|n| *n == name).unwrap();
         let mut errors = ordinary(40 + i as u64);
         errors[place(i, Kind::Delay)] = 0.1;
         let record = recorded(&exact, &errors, 7);
         let findings = examined(&record, &settings());
         let found = faults(&findings);
-        assert!(found.len() == 1 && found[0].0 == SIGNALS[i], "{}: {found:?}", SIGNALS[i]);
+        assert!(
+            found.len() == 1 && found[0].0 == SIGNALS[i],
+            "{}: {found:?}",
+            SIGNALS[i]
+        );
         let delay = findings.0[i].estimates[Kind::Delay as usize].unwrap();
         assert_abs_diff_eq!(delay.value, 0.1, epsilon = 0.01);
     }
@@ -412,11 +568,22 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
         let findings = examined(&record, &settings());
         let found: Vec<&str> = faults(&findings).into_iter().map(|f| f.0).collect();
         assert_eq!(found, [name]);
-        findings.corrections().iter().for_each(|c| c.apply(&mut record));
+        findings
+            .corrections()
+            .iter()
+            .for_each(|c| c.apply(&mut record));
         let (values, truth) = (record.values(name).unwrap(), exact.values(name).unwrap());
         let swing = truth.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let mean = values.iter().zip(truth).map(|(a, b)| (a - b).abs()).sum::<f64>() / values.len() as f64;
-        assert!(mean < 0.02 * swing + 2.0 * NOISE[i], "{name}: {mean} of {swing}");
+        let mean = values
+            .iter()
+            .zip(truth)
+            .map(|(a, b)| (a - b).abs())
+            .sum::<f64>()
+            / values.len() as f64;
+        assert!(
+            mean < 0.02 * swing + 2.0 * NOISE[i],
+            "{name}: {mean} of {swing}"
+        );
     }
 }
 
@@ -427,14 +594,25 @@ fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corre
     let mut errors = ordinary(60);
     errors[j] = 0.2;
     let record = recorded(&exact, &errors, 9);
-    let sure_of_nothing = Compatibility { fault_standard_errors: 1e6, ..settings() };
+    let sure_of_nothing = Compatibility {
+        fault_standard_errors: 1e6,
+        ..settings()
+    };
     let fitted = fit::fit(&windows(&record), &aircraft(), &sure_of_nothing).unwrap();
     assert_abs_diff_eq!(fitted.prior[j], sure_of_nothing.ordinary.vane_deg.scale);
-    assert!(fit::fit(&windows(&record), &aircraft(), &settings()).unwrap().prior[j] > 0.1);
+    assert!(
+        fit::fit(&windows(&record), &aircraft(), &settings())
+            .unwrap()
+            .prior[j]
+            > 0.1
+    );
 
     let findings = examined(&record, &sure_of_nothing);
     let scale = findings.0[vane].estimates[Kind::Scale as usize].unwrap();
-    assert!(scale.value > 0.1 && scale.doubtful && !scale.fault && !scale.applied, "{scale:?}");
+    assert!(
+        scale.value > 0.1 && scale.doubtful && !scale.fault && !scale.applied,
+        "{scale:?}"
+    );
 }
 
 #[test]
@@ -442,18 +620,37 @@ fn of_too_short_a_flight_nothing_is_said() {
     // Too short for the least number of windows.
     let findings = examined(&flight(15.0), &settings());
     assert!(findings.0.iter().all(|f| f.estimates == [None; 3]));
-    assert!(findings.rows("f").iter().all(|r| r.verdict == "not excited" && r.applied.is_empty()));
+    assert!(
+        findings
+            .rows("f")
+            .iter()
+            .all(|r| r.verdict == "not excited" && r.applied.is_empty())
+    );
 }
 
 #[test]
 fn a_window_is_never_cut_across_a_gap_or_a_wrapped_angle() {
     let mut record = flight(65.0);
     record.signals.get_mut(s::Q).unwrap().values[800..810].fill(f64::NAN);
-    record.signals.get_mut(s::PSI).unwrap().values[1700..].iter_mut().for_each(|v| *v += 360.0);
-    let chosen = window::choose(&record, &Compatibility { windows: 50, ..settings() });
+    record.signals.get_mut(s::PSI).unwrap().values[1700..]
+        .iter_mut()
+        .for_each(|v| *v += 360.0);
+    let chosen = window::choose(
+        &record,
+        &Compatibility {
+            windows: 50,
+            ..settings()
+        },
+    );
     assert!(chosen.len() >= 3);
-    assert!(chosen.iter().all(|w| w.end <= 800 || w.start >= 810), "{chosen:?}");
-    assert!(chosen.iter().all(|w| w.end <= 1700 || w.start >= 1700), "{chosen:?}");
+    assert!(
+        chosen.iter().all(|w| w.end <= 800 || w.start >= 810),
+        "{chosen:?}"
+    );
+    assert!(
+        chosen.iter().all(|w| w.end <= 1700 || w.start >= 1700),
+        "{chosen:?}"
+    );
 }
 
 #[test]
@@ -463,17 +660,37 @@ fn an_applied_correction_carries_the_marks_along() {
     marks[5] = Mark::Bridged;
     let mut signals = BTreeMap::new();
     signals.insert(s::THETA.to_owned(), Series { values, marks });
-    let mut record = Record { flight_id: "f".into(), start_s: 0.0, step_s: STEP_S, samples: 8, signals };
-    let fault = |value| Some(Estimate { value, bound: 0.0, fault: true, doubtful: false, applied: true });
+    let mut record = Record {
+        flight_id: "f".into(),
+        start_s: 0.0,
+        step_s: STEP_S,
+        samples: 8,
+        signals,
+    };
+    let fault = |value| {
+        Some(Estimate {
+            value,
+            bound: 0.0,
+            fault: true,
+            doubtful: false,
+            applied: true,
+        })
+    };
     let findings = Findings(vec![Finding {
         signal: s::THETA,
         channel: "theta".into(),
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
     }]);
-    findings.corrections().iter().for_each(|c| c.apply(&mut record));
+    findings
+        .corrections()
+        .iter()
+        .for_each(|c| c.apply(&mut record));
     let series = &record.signals[s::THETA];
     assert_relative_eq!(series.values[1], (3.0 - 1.0) / 2.0);
-    assert_eq!((series.marks[3], series.marks[5]), (Mark::Bridged, Mark::Measured));
+    assert_eq!(
+        (series.marks[3], series.marks[5]),
+        (Mark::Bridged, Mark::Measured)
+    );
 }
 
 #[test]

@@ -43,7 +43,10 @@ pub struct Window {
 /// The stretches of a record that say most, in order of time.
 pub fn choose(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     let usable = stretches(record, settings);
-    let activity: Vec<Vec<f64>> = SIGNALS.iter().map(|name| ranked(record, name, &usable)).collect();
+    let activity: Vec<Vec<f64>> = SIGNALS
+        .iter()
+        .map(|name| ranked(record, name, &usable))
+        .collect();
     let mut chosen = vec![false; usable.len()];
     let mut count = 0;
     // Each signal in turn proposes the window, of those left, in which it moves most.
@@ -54,7 +57,8 @@ pub fn choose(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
                 break 'rounds;
             }
             let left = (0..usable.len()).filter(|&i| !chosen[i] && ranks[i] > 0.0);
-            if let Some(best) = left.max_by(|&a, &b| ranks[a].total_cmp(&ranks[b]).then(b.cmp(&a))) {
+            if let Some(best) = left.max_by(|&a, &b| ranks[a].total_cmp(&ranks[b]).then(b.cmp(&a)))
+            {
                 chosen[best] = true;
                 count += 1;
             }
@@ -63,11 +67,20 @@ pub fn choose(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
             break;
         }
     }
-    usable.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(range, _)| range).collect()
+    usable
+        .into_iter()
+        .zip(chosen)
+        .filter(|(_, chosen)| *chosen)
+        .map(|(range, _)| range)
+        .collect()
 }
 
 fn samples(seconds: f64, step_s: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number of samples")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive number of samples"
+    )]
     let samples = (seconds / step_s).round().max(0.0) as usize;
     samples
 }
@@ -97,9 +110,15 @@ fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
 /// The longest runs of samples in which every input is known and the attitude is away from the singularity.
 fn runs(record: &Record) -> Vec<Range<usize>> {
     let values = |name: &str| record.values(name).unwrap_or_default();
-    let needed = SIGNALS[..INPUTS].iter().chain(&[s::PHI, s::X_CG, s::Y_CG, s::Z_CG, s::ALTITUDE]);
+    let needed = SIGNALS[..INPUTS]
+        .iter()
+        .chain(&[s::PHI, s::X_CG, s::Y_CG, s::Z_CG, s::ALTITUDE]);
     let finite: Vec<&[f64]> = needed.map(|name| values(name)).collect();
-    let (theta, alpha, beta) = (values(s::THETA), values(s::ALPHA_VANE), values(s::BETA_VANE));
+    let (theta, alpha, beta) = (
+        values(s::THETA),
+        values(s::ALPHA_VANE),
+        values(s::BETA_VANE),
+    );
     let (velocity, phi, psi) = (values(s::VELOCITY), values(s::PHI), record.values(s::PSI));
     let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
     let sound = |k: usize| {
@@ -110,11 +129,16 @@ fn runs(record: &Record) -> Vec<Range<usize>> {
             && at(velocity, k) > SLOWEST_FT_S
             && psi.is_none_or(|psi| at(psi, k).is_finite())
     };
-    let jumps = |values: &[f64], k: usize| k > 0 && (at(values, k) - at(values, k - 1)).abs() > TURN_DEG;
+    let jumps =
+        |values: &[f64], k: usize| k > 0 && (at(values, k) - at(values, k - 1)).abs() > TURN_DEG;
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in (0..record.samples).filter(|k| sound(*k)) {
         match runs.last_mut() {
-            Some(run) if run.end == k && !jumps(phi, k) && !psi.is_some_and(|psi| jumps(psi, k)) => run.end = k + 1,
+            Some(run)
+                if run.end == k && !jumps(phi, k) && !psi.is_some_and(|psi| jumps(psi, k)) =>
+            {
+                run.end = k + 1
+            }
             _ => runs.push(k..k + 1),
         }
     }
@@ -127,8 +151,13 @@ fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
     let values = record.values(name).unwrap_or_default();
     let moved = |range: &Range<usize>| {
         let values = values.get(range.clone()).unwrap_or_default();
-        let changes = values.iter().zip(values.get(reach..).unwrap_or_default()).map(|(a, b)| (b - a).powi(2));
-        let (sum, count) = changes.filter(|c| c.is_finite()).fold((0.0, 0_usize), |(s, n), c| (s + c, n + 1));
+        let changes = values
+            .iter()
+            .zip(values.get(reach..).unwrap_or_default())
+            .map(|(a, b)| (b - a).powi(2));
+        let (sum, count) = changes
+            .filter(|c| c.is_finite())
+            .fold((0.0, 0_usize), |(s, n), c| (s + c, n + 1));
         sum / count.max(1) as f64
     };
     stretches.iter().map(moved).collect()
@@ -136,23 +165,43 @@ fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
 
 impl Window {
     /// What a stretch of the record holds, at the pace of the windows.
-    pub fn of(record: &Record, range: Range<usize>, aircraft: &Aircraft, settings: &Compatibility) -> Window {
+    pub fn of(
+        record: &Record,
+        range: Range<usize>,
+        aircraft: &Aircraft,
+        settings: &Compatibility,
+    ) -> Window {
         let pace = pace(record.step_s);
         let step_s = pace as f64 * record.step_s;
         let (margin, samples) = (margin(settings, step_s), range.len() / pace);
         let first = range.start.saturating_sub(margin * pace);
         let wide = first..first + (samples + 2 * margin) * pace;
         let range = range.start..range.start + samples * pace;
-        let input =
-            |i: usize| paced(record.values(SIGNALS[i]).and_then(|v| v.get(wide.clone())).unwrap_or_default(), pace);
+        let input = |i: usize| {
+            paced(
+                record
+                    .values(SIGNALS[i])
+                    .and_then(|v| v.get(wide.clone()))
+                    .unwrap_or_default(),
+                pace,
+            )
+        };
         let output = |o: usize| paced(&measured(record, SIGNALS[INPUTS + o], &range), pace);
         let centres: Vec<usize> = range.clone().step_by(pace).map(|k| k + pace / 2).collect();
-        let known: Vec<Known> = centres.iter().map(|k| known(record, *k, aircraft)).collect();
+        let known: Vec<Known> = centres
+            .iter()
+            .map(|k| known(record, *k, aircraft))
+            .collect();
         Window {
             step_s,
             samples,
             margin,
-            start: start(record, centres.first().copied().unwrap_or(range.start), aircraft, known.first()),
+            start: start(
+                record,
+                centres.first().copied().unwrap_or(range.start),
+                aircraft,
+                known.first(),
+            ),
             known,
             inputs: std::array::from_fn(input),
             outputs: std::array::from_fn(output),
@@ -172,18 +221,27 @@ impl Window {
 /// aircraft has no more to say than 25 samples a second tell.
 fn pace(step_s: f64) -> usize {
     const SLOWEST_STEP_S: f64 = 0.04;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small positive number"
+    )]
     let pace = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
     pace
 }
 
 fn paced(values: &[f64], pace: usize) -> Vec<f64> {
-    values.chunks_exact(pace).map(|v| v.iter().sum::<f64>() / pace as f64).collect()
+    values
+        .chunks_exact(pace)
+        .map(|v| v.iter().sum::<f64>() / pace as f64)
+        .collect()
 }
 
 /// A signal over a stretch; NaN where it is marked or was not recorded.
 fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
-    let Some(series) = record.signals.get(name) else { return vec![f64::NAN; range.len()] };
+    let Some(series) = record.signals.get(name) else {
+        return vec![f64::NAN; range.len()];
+    };
     let sample = |k: usize| match series.marks.get(k) {
         Some(Mark::Measured) => series.values[k],
         _ => f64::NAN,
@@ -192,10 +250,24 @@ fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
 }
 
 fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
-    let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied().unwrap_or(0.0);
-    let cg = Position { x_ft: at(s::X_CG), y_ft: at(s::Y_CG), z_ft: at(s::Z_CG) };
+    let at = |name: &str| {
+        record
+            .values(name)
+            .and_then(|v| v.get(k))
+            .copied()
+            .unwrap_or(0.0)
+    };
+    let cg = Position {
+        x_ft: at(s::X_CG),
+        y_ft: at(s::Y_CG),
+        z_ft: at(s::Z_CG),
+    };
     let sensors = &aircraft.sensors;
-    let (alpha, beta, speed) = (at(s::ALPHA_VANE) / DEG, at(s::BETA_VANE) / DEG, at(s::VELOCITY));
+    let (alpha, beta, speed) = (
+        at(s::ALPHA_VANE) / DEG,
+        at(s::BETA_VANE) / DEG,
+        at(s::VELOCITY),
+    );
     Known {
         gravity: gravity_ft_s2(aircraft.latitude_deg, at(s::ALTITUDE)),
         arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
@@ -203,7 +275,11 @@ fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
         ..turning(
             aircraft,
             [s::PHI, s::THETA, s::PSI].map(|name| at(name) / DEG),
-            Vector3::new(alpha.cos() * beta.cos(), beta.sin(), alpha.sin() * beta.cos()) * speed,
+            Vector3::new(
+                alpha.cos() * beta.cos(),
+                beta.sin(),
+                alpha.sin() * beta.cos(),
+            ) * speed,
             record.values(s::PSI).is_some(),
         )
     }
@@ -211,17 +287,30 @@ fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
 
 /// The turning of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a heading only that
 /// part of it is known which does not depend on it.
-pub fn turning(aircraft: &Aircraft, [phi, theta, psi]: [f64; 3], along: Vector3<f64>, heading: bool) -> Known {
+pub fn turning(
+    aircraft: &Aircraft,
+    [phi, theta, psi]: [f64; 3],
+    along: Vector3<f64>,
+    heading: bool,
+) -> Known {
     let to_body = to_body(phi, theta, psi);
     let latitude = aircraft.latitude_deg / DEG;
     let pole = Vector3::new(latitude.cos(), 0.0, -latitude.sin()) * EARTH_RATE;
     let ground = to_body.transpose() * along;
     let round = Vector3::new(ground.y, -ground.x, -ground.y * latitude.tan()) / EARTH_RADIUS_FT;
-    let earth = if heading { to_body * pole } else { Vector3::zeros() };
+    let earth = if heading {
+        to_body * pole
+    } else {
+        Vector3::zeros()
+    };
     Known {
         gravity: 0.0,
         arms: [[0.0; 3]; 3],
-        cg: Position { x_ft: 0.0, y_ft: 0.0, z_ft: 0.0 },
+        cg: Position {
+            x_ft: 0.0,
+            y_ft: 0.0,
+            z_ft: 0.0,
+        },
         earth,
         horizon: earth + to_body * round,
         to_body,
@@ -246,16 +335,41 @@ fn to_body(phi: f64, theta: f64, psi: f64) -> Matrix3<f64> {
 
 /// The state that the first sample measures.
 fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) -> State {
-    let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied().unwrap_or(0.0);
-    let Some(known) = known else { return State::zeros() };
+    let at = |name: &str| {
+        record
+            .values(name)
+            .and_then(|v| v.get(k))
+            .copied()
+            .unwrap_or(0.0)
+    };
+    let Some(known) = known else {
+        return State::zeros();
+    };
     let rates = [at(s::P) / DEG, at(s::Q) / DEG, at(s::R) / DEG];
-    let read = Flow { alpha: at(s::ALPHA_VANE) / DEG, beta: at(s::BETA_VANE) / DEG, velocity: at(s::VELOCITY), rates };
+    let read = Flow {
+        alpha: at(s::ALPHA_VANE) / DEG,
+        beta: at(s::BETA_VANE) / DEG,
+        velocity: at(s::VELOCITY),
+        rates,
+    };
     let flow = aircraft.sensors.flow_at_cg(&read, known.cg);
     let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
-    let velocity = [flow.velocity * ca * cb, flow.velocity * sb, flow.velocity * sa * cb];
+    let velocity = [
+        flow.velocity * ca * cb,
+        flow.velocity * sb,
+        flow.velocity * sa * cb,
+    ];
     let omega = Vector3::from(rates);
     let swung = |i: usize| velocity[i] + omega.cross(&Vector3::from(known.arms[i]))[i];
-    State::from([swung(0), swung(1), swung(2), at(s::PHI) / DEG, at(s::THETA) / DEG, at(s::PSI) / DEG, at(s::ALTITUDE)])
+    State::from([
+        swung(0),
+        swung(1),
+        swung(2),
+        at(s::PHI) / DEG,
+        at(s::THETA) / DEG,
+        at(s::PSI) / DEG,
+        at(s::ALTITUDE),
+    ])
 }
 
 /// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).

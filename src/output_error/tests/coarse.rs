@@ -35,7 +35,12 @@ fn gradient_is_the_slope_of_the_cost<const NX: usize, E: Equations<NX>>() {
             at(&moved).weighted_square
         };
         let numeric = -(moved(h) - moved(-h)) / (4.0 * h);
-        assert_relative_eq!(gradient[j], numeric, max_relative = 1e-4, epsilon = 1e-6 * gradient.amax());
+        assert_relative_eq!(
+            gradient[j],
+            numeric,
+            max_relative = 1e-4,
+            epsilon = 1e-6 * gradient.amax()
+        );
     }
 }
 
@@ -52,27 +57,49 @@ fn coarse_sums_count_as_much_as_those_of_all_samples_and_say_about_the_same() {
     let (mut coarse, mut whole) = (case.response(), case.response());
     Likelihood::respond(&case, Detail::Coarse, &off, &mut coarse).unwrap();
     Likelihood::respond(&case, Detail::Whole, &off, &mut whole).unwrap();
-    let [coarse, whole] = [coarse, whole].map(|response| Likelihood::sums(&case, &response, &TABLE));
+    let [coarse, whole] =
+        [coarse, whole].map(|response| Likelihood::sums(&case, &response, &TABLE));
     assert_eq!(coarse.count, whole.count);
     assert_relative_eq!(coarse.cost(), whole.cost(), max_relative = 0.02);
     for j in 0..parameters.len() {
-        assert_relative_eq!(coarse.information[(j, j)], whole.information[(j, j)], max_relative = 0.05);
+        assert_relative_eq!(
+            coarse.information[(j, j)],
+            whole.information[(j, j)],
+            max_relative = 0.05
+        );
     }
 }
 
 fn same_minimum<const NX: usize, E: Equations<NX>>() {
     let (case, parameters) = flown::<NX, E>(20_261_123);
     let start: Vec<f64> = parameters.iter().map(|value| 1.2 * value).collect();
-    let settings = Settings { tolerance: 1e-13, ..Settings::default() };
+    let settings = Settings {
+        tolerance: 1e-13,
+        ..Settings::default()
+    };
     let approached = minimise(&case, start.clone(), TABLE, &settings);
     let alone = descend(&case, start.clone(), TABLE, &settings, case.response());
-    assert_eq!((approached.outcome, alone.outcome), (Outcome::Converged, Outcome::Converged));
+    assert_eq!(
+        (approached.outcome, alone.outcome),
+        (Outcome::Converged, Outcome::Converged)
+    );
     let information = Likelihood::sums(&case, &alone.response, &TABLE).information;
     // In standard deviations, squared, of those noises that the weights stand for.
-    let apart = DVector::from_iterator(start.len(), approached.values.iter().zip(&alone.values).map(|(a, b)| a - b));
+    let apart = DVector::from_iterator(
+        start.len(),
+        approached
+            .values
+            .iter()
+            .zip(&alone.values)
+            .map(|(a, b)| a - b),
+    );
     let distance = (&information * &apart).dot(&apart);
     assert!(distance < 1e-6, "{}: {distance:e}", E::AXIS.name());
-    assert_relative_eq!(approached.final_cost.unwrap(), alone.final_cost.unwrap(), max_relative = 1e-11);
+    assert_relative_eq!(
+        approached.final_cost.unwrap(),
+        alone.final_cost.unwrap(),
+        max_relative = 1e-11
+    );
 }
 
 #[test]

@@ -10,7 +10,8 @@ type Longitudinals = Case<3, Longitudinal>;
 
 /// A maneuver of true derivatives and of biases of its own, measured with noise.
 fn flown(seed: u64, biases_g: [f64; 2]) -> (Longitudinals, Vec<f64>) {
-    let (mut case, mut parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &biases(Axis::Longitudinal));
+    let (mut case, mut parameters) =
+        case::<3, Longitudinal>(&truth(Axis::Longitudinal), &biases(Axis::Longitudinal));
     let first = case.derivatives();
     parameters[first..first + 2].copy_from_slice(&biases_g);
     measure(&mut case, &parameters, &mut Noise(seed), 0.0);
@@ -18,11 +19,21 @@ fn flown(seed: u64, biases_g: [f64; 2]) -> (Longitudinals, Vec<f64>) {
 }
 
 fn precise() -> Settings {
-    Settings { tolerance: 1e-13, ..Settings::default() }
+    Settings {
+        tolerance: 1e-13,
+        ..Settings::default()
+    }
 }
 
 fn fit_of<D: Likelihood>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
-    let fit = estimate(data, start, TABLE, Weights::Table, [1e-6; OUTPUTS], &precise());
+    let fit = estimate(
+        data,
+        start,
+        TABLE,
+        Weights::Table,
+        [1e-6; OUTPUTS],
+        &precise(),
+    );
     assert_eq!(fit.outcome, Outcome::Converged, "{}", fit.reason);
     fit
 }
@@ -31,11 +42,17 @@ fn fit_of<D: Likelihood>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
 fn one_maneuver_joined_is_the_maneuver_alone() {
     let (case, parameters) = flown(3, [0.01, 0.02]);
     let joint = Joint::new([("only", &case)], |_| false).unwrap();
-    let (alone, joined) = (fit_of(&case, parameters.clone()), fit_of(&joint, parameters));
+    let (alone, joined) = (
+        fit_of(&case, parameters.clone()),
+        fit_of(&joint, parameters),
+    );
     assert_eq!(alone.values, joined.values);
     assert_eq!(alone.covariance, joined.covariance);
     assert_eq!(alone.covariance_corrected, joined.covariance_corrected);
-    assert_eq!((alone.iterations, alone.final_cost), (joined.iterations, joined.final_cost));
+    assert_eq!(
+        (alone.iterations, alone.final_cost),
+        (joined.iterations, joined.final_cost)
+    );
 }
 
 #[test]
@@ -44,17 +61,32 @@ fn two_copies_of_a_maneuver_have_its_estimates_and_bounds_smaller_by_the_root_of
     let alone = fit_of(&case, parameters.clone());
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
     let shared = case.derivatives();
-    let start = joint.assemble(&parameters[..shared], &[parameters.clone(), parameters.clone()]);
+    let start = joint.assemble(
+        &parameters[..shared],
+        &[parameters.clone(), parameters.clone()],
+    );
     let both = fit_of(&joint, start);
     // Shared parameters take less out of two maneuvers' noise than out of one's, which the corrected bound counts.
     for (one, two, max_relative) in [
         (alone.covariance.unwrap(), both.covariance.unwrap(), 1e-4),
-        (alone.covariance_corrected.unwrap(), both.covariance_corrected.unwrap(), 6e-2),
+        (
+            alone.covariance_corrected.unwrap(),
+            both.covariance_corrected.unwrap(),
+            6e-2,
+        ),
     ] {
         for j in 0..shared {
-            assert_relative_eq!(two[(j, j)].sqrt(), one[(j, j)].sqrt() / 2f64.sqrt(), max_relative = max_relative);
+            assert_relative_eq!(
+                two[(j, j)].sqrt(),
+                one[(j, j)].sqrt() / 2f64.sqrt(),
+                max_relative = max_relative
+            );
             let sd = one[(j, j)].sqrt();
-            assert!((both.values[j] - alone.values[j]).abs() < 1e-3 * sd, "{}", case.names[j]);
+            assert!(
+                (both.values[j] - alone.values[j]).abs() < 1e-3 * sd,
+                "{}",
+                case.names[j]
+            );
         }
     }
 }
@@ -69,7 +101,9 @@ fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
     }
     let mut response = joint.response();
     let mut sums = |parameters: &[f64]| {
-        joint.respond(Detail::Whole, parameters, &mut response).unwrap();
+        joint
+            .respond(Detail::Whole, parameters, &mut response)
+            .unwrap();
         Likelihood::sums(&joint, &response, &TABLE)
     };
     let gradient = sums(&at).gradient;
@@ -82,7 +116,12 @@ fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
         let down = sums(&moved).weighted_square;
         let numeric = -(up - down) / (4.0 * h);
         let size = gradient[j].abs().max(1e-6 * gradient.amax());
-        assert!((gradient[j] - numeric).abs() < 1e-3 * size, "{}: {} {numeric}", joint.names()[j], gradient[j]);
+        assert!(
+            (gradient[j] - numeric).abs() < 1e-3 * size,
+            "{}: {} {numeric}",
+            joint.names()[j],
+            gradient[j]
+        );
     }
 }
 
@@ -98,8 +137,16 @@ fn shared_derivatives_and_each_maneuver_s_biases_come_back_within_their_bounds()
         let z = (fit.values[j] - truth[j]).abs() / covariance[(j, j)].sqrt();
         assert!(z < 4.5, "{name} is {z:.1} bounds from the truth");
     }
-    let bias = joint.names().iter().position(|n| n == "Q_bias of b").unwrap();
-    assert!((fit.values[bias] - 0.3).abs() < 0.05, "{}", fit.values[bias]);
+    let bias = joint
+        .names()
+        .iter()
+        .position(|n| n == "Q_bias of b")
+        .unwrap();
+    assert!(
+        (fit.values[bias] - 0.3).abs() < 0.05,
+        "{}",
+        fit.values[bias]
+    );
     assert!(covariance[(0, 0)] < fit_of(&a, at_a).covariance.unwrap()[(0, 0)]);
 }
 
@@ -108,18 +155,37 @@ fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
     let truth = truth(Axis::Longitudinal);
     let (wide, parameters) = flown(3, [0.0, 0.0]);
     let model = Model {
-        free: truth.iter().map(|(d, _)| d).filter(|d| d.name != "Cm_de").collect(),
-        held: truth.iter().filter(|(d, _)| d.name == "Cm_de").map(|(d, v)| (d, *v)).collect(),
+        free: truth
+            .iter()
+            .map(|(d, _)| d)
+            .filter(|d| d.name != "Cm_de")
+            .collect(),
+        held: truth
+            .iter()
+            .filter(|(d, _)| d.name == "Cm_de")
+            .map(|(d, v)| (d, *v))
+            .collect(),
         ..Model::default()
     };
     let case = Longitudinals::new(&aircraft(), &window(), wide.measurements.clone(), &model);
-    let values: BTreeMap<&str, f64> = wide.names.iter().map(String::as_str).zip(parameters).collect();
+    let values: BTreeMap<&str, f64> = wide
+        .names
+        .iter()
+        .map(String::as_str)
+        .zip(parameters)
+        .collect();
     let start: Vec<f64> = case.names.iter().map(|n| values[n.as_str()]).collect();
     let uncertainties = [("Cm_de", 1e-4)].into();
     let mut alone = fit_of(&case, start.clone());
     cramer_rao::consider(&case, &wide, &values, &uncertainties, &mut alone);
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
-    let mut both = fit_of(&joint, joint.assemble(&start[..case.derivatives()], &[start.clone(), start.clone()]));
+    let mut both = fit_of(
+        &joint,
+        joint.assemble(
+            &start[..case.derivatives()],
+            &[start.clone(), start.clone()],
+        ),
+    );
     let considered = [0, 1].map(|i| Considered {
         case: &case,
         wide: &wide,
@@ -127,7 +193,10 @@ fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
         places: joint.places(i).to_vec(),
     });
     cramer_rao::consider_together(&considered, &uncertainties, &mut both);
-    let (one, two) = (alone.covariance_held.unwrap(), both.covariance_held.unwrap());
+    let (one, two) = (
+        alone.covariance_held.unwrap(),
+        both.covariance_held.unwrap(),
+    );
     for j in 0..case.derivatives() {
         assert_relative_eq!(two[(j, j)], one[(j, j)], max_relative = 1e-6);
     }

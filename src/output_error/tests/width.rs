@@ -14,11 +14,17 @@ fn bits<S: Simd, const NX: usize, E: Equations<NX>>(
 ) -> Vec<u64> {
     let mut response = case.response();
     response.normal.clear(stride);
-    let mut summing = Summing { normal: &mut response.normal, measurements: &case.measurements };
-    simd.vectorize(case.prepared(at, stride, &mut response.outputs, &mut summing)).unwrap();
+    let mut summing = Summing {
+        normal: &mut response.normal,
+        measurements: &case.measurements,
+    };
+    simd.vectorize(case.prepared(at, stride, &mut response.outputs, &mut summing))
+        .unwrap();
     let sums = super::super::cost::sums(&response, &TABLE);
     let outputs = response.outputs.iter().flatten().copied();
-    let numbers = outputs.chain(sums.gradient.iter().copied()).chain(sums.information.iter().copied());
+    let numbers = outputs
+        .chain(sums.gradient.iter().copied())
+        .chain(sums.information.iter().copied());
     numbers.map(f64::to_bits).collect()
 }
 
@@ -31,10 +37,16 @@ fn alike<const NX: usize, E: Equations<NX>>() {
         #[cfg(target_arch = "x86_64")]
         {
             if let Some(simd) = pulp::x86::V3::try_new() {
-                assert!(bits(simd, &case, &parameters, stride) == narrow, "four lanes, every {stride}");
+                assert!(
+                    bits(simd, &case, &parameters, stride) == narrow,
+                    "four lanes, every {stride}"
+                );
             }
             if let Some(simd) = pulp::x86::V4::try_new() {
-                assert!(bits(simd, &case, &parameters, stride) == narrow, "eight lanes, every {stride}");
+                assert!(
+                    bits(simd, &case, &parameters, stride) == narrow,
+                    "eight lanes, every {stride}"
+                );
             }
         }
     }

@@ -15,14 +15,32 @@ fn groups() -> Groups {
 
 /// A record of so many samples at 40 Hz in which everything moves but the rudder.
 fn record(samples: usize) -> Record {
-    let names = flight_signals(&groups()).into_iter().map(|s| s.0.to_owned()).collect::<Vec<_>>();
+    let names = flight_signals(&groups())
+        .into_iter()
+        .map(|s| s.0.to_owned())
+        .collect::<Vec<_>>();
     let series = |name: &str| {
         let moves = name != "dr_deg";
-        let values = (0..samples).map(|k| if moves { (k as f64 * 0.7).sin() } else { 0.001 * (k % 2) as f64 });
-        Series { values: values.collect(), marks: vec![Mark::Measured; samples] }
+        let values = (0..samples).map(|k| {
+            if moves {
+                (k as f64 * 0.7).sin()
+            } else {
+                0.001 * (k % 2) as f64
+            }
+        });
+        Series {
+            values: values.collect(),
+            marks: vec![Mark::Measured; samples],
+        }
     };
     let signals: BTreeMap<String, Series> = names.iter().map(|n| (n.clone(), series(n))).collect();
-    Record { flight_id: "f".into(), start_s: 0.0, step_s: 0.025, samples, signals }
+    Record {
+        flight_id: "f".into(),
+        start_s: 0.0,
+        step_s: 0.025,
+        samples,
+        signals,
+    }
 }
 
 fn maneuver_at(start_s: f64) -> Maneuver {
@@ -98,18 +116,34 @@ fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> S
 fn history(record: &Record) -> History {
     let output = |o: crate::aero::Output| {
         let measured = record.values(o.signal()).expect("recorded")[800..=1200].to_vec();
-        let measured: Vec<f64> =
-            measured.into_iter().enumerate().map(|(k, v)| if k == 200 { -9e3 } else { v }).collect();
-        let computed = measured.iter().map(|v| if *v < -1e3 { 0.0 } else { v - 0.1 }).collect();
+        let measured: Vec<f64> = measured
+            .into_iter()
+            .enumerate()
+            .map(|(k, v)| if k == 200 { -9e3 } else { v })
+            .collect();
+        let computed = measured
+            .iter()
+            .map(|v| if *v < -1e3 { 0.0 } else { v - 0.1 })
+            .collect();
         let marked = (0..401).map(|k| k == 200).collect();
-        HistoryOutput { label: o.signal().into(), unit: "deg".into(), measured, computed, marked }
+        HistoryOutput {
+            label: o.signal().into(),
+            unit: "deg".into(),
+            measured,
+            computed,
+            marked,
+        }
     };
     History {
         maneuver_id: "f_t00020".into(),
         class: "STEPS".into(),
         alpha_deg: 10.0,
         time_s: (0..401).map(|k| 0.025 * f64::from(k)).collect(),
-        outputs: Axis::Longitudinal.outputs().into_iter().map(output).collect(),
+        outputs: Axis::Longitudinal
+            .outputs()
+            .into_iter()
+            .map(output)
+            .collect(),
         controls: vec![],
     }
 }
@@ -117,7 +151,9 @@ fn history(record: &Record) -> History {
 #[test]
 fn ten_hours_with_two_hundred_maneuvers_are_less_than_a_megabyte() {
     let record = record(1_440_000);
-    let maneuvers: Vec<Maneuver> = (0..200).map(|i| maneuver_at(100.0 + 170.0 * f64::from(i))).collect();
+    let maneuvers: Vec<Maneuver> = (0..200)
+        .map(|i| maneuver_at(100.0 + 170.0 * f64::from(i)))
+        .collect();
     let svg = drawn(&record, &maneuvers, &[]);
     assert!(svg.len() < 1_000_000, "{}", svg.len());
     assert_eq!(svg.matches("class=\"window\"").count(), 200);
@@ -130,7 +166,9 @@ fn a_flight_has_a_strip_per_signal_and_says_what_is_not_recorded() {
     let svg = drawn(&record, &[maneuver_at(20.0)], &[]);
     assert_eq!(svg.matches("class=\"strip\"").count(), record.signals.len());
     assert!(svg.contains("Not recorded: psi.") && svg.contains("STEPS f_t00020"));
-    assert!(svg.contains(">deg/s</text>") && svg.contains(">ft/s</text>") && svg.contains("time, s"));
+    assert!(
+        svg.contains(">deg/s</text>") && svg.contains(">ft/s</text>") && svg.contains("time, s")
+    );
 }
 
 #[test]
@@ -143,8 +181,16 @@ fn marks_are_drawn_where_there_are_some_and_explained() {
     series.marks[3000..3500].fill(Mark::Missing);
     series.values[3000..3500].fill(f64::NAN);
     let svg = drawn(&record, &[], &[]);
-    for (kind, word) in [("bridged", "bridged"), ("despiked", "spike replaced"), ("missing", "missing")] {
-        assert_eq!(svg.matches(&format!("class=\"mark {kind}\"")).count(), 1, "{kind}");
+    for (kind, word) in [
+        ("bridged", "bridged"),
+        ("despiked", "spike replaced"),
+        ("missing", "missing"),
+    ] {
+        assert_eq!(
+            svg.matches(&format!("class=\"mark {kind}\"")).count(),
+            1,
+            "{kind}"
+        );
         assert!(svg.contains(&format!(">{word}</text>")), "{word}");
     }
 }
@@ -164,7 +210,13 @@ fn the_analyst_s_events_stand_over_what_was_found() {
     let events = [row(Some("STEPS"), Some("OTHER"), "other class")];
     let svg = drawn(&record(4000), &[maneuver_at(20.0)], &events);
     assert!(svg.contains("STEPS f_t00020, other class"));
-    assert_eq!((svg.matches("data-lane=\"given\"").count(), svg.matches("data-lane=\"found\"").count()), (1, 1));
+    assert_eq!(
+        (
+            svg.matches("data-lane=\"given\"").count(),
+            svg.matches("data-lane=\"found\"").count()
+        ),
+        (1, 1)
+    );
     assert!(svg.contains("found: OTHER, 20.5 to 31.0 s"));
 }
 
@@ -174,9 +226,16 @@ fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() 
     let svg = drawn_maneuver(&record, &fit("converged", "done"), Some(&history(&record)));
     assert_eq!(svg.matches(">residual</text>").count(), 5);
     assert!(svg.contains("left out of the cost") && svg.contains("5 iterations"));
-    assert_eq!(svg.matches("class=\"window\"").count(), 1, "the other maneuver is minutes away");
+    assert_eq!(
+        svg.matches("class=\"window\"").count(),
+        1,
+        "the other maneuver is minutes away"
+    );
     assert!(svg.contains("hardly moved: dr."));
-    assert!(!svg.contains("000</text>"), "a sample that was left out has no residual and stretches no scale");
+    assert!(
+        !svg.contains("000</text>"),
+        "a sample that was left out has no residual and stretches no scale"
+    );
 
     let svg = drawn_maneuver(&record, &fit("rejected", "too many marked samples"), None);
     assert!(!svg.contains("residual") && svg.contains("too many marked samples"));
@@ -185,10 +244,18 @@ fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() 
 
 #[test]
 fn every_scale_has_two_numbers() {
-    for (low, high) in [(-0.009, 0.009), (0.0, 0.0), (12.99, 13.01), (-33.0, 4.0), (0.0, 1e5)] {
+    for (low, high) in [
+        (-0.009, 0.009),
+        (0.0, 0.0),
+        (12.99, 13.01),
+        (-33.0, 4.0),
+        (0.0, 1e5),
+    ] {
         for steps in [1.6, 2.0, 3.0] {
             let scale = scale(low, high, steps);
-            let ticks = (scale.max / scale.step + 1e-9).floor() - (scale.min / scale.step - 1e-9).ceil() + 1.0;
+            let ticks = (scale.max / scale.step + 1e-9).floor()
+                - (scale.min / scale.step - 1e-9).ceil()
+                + 1.0;
             assert!((2.0..=6.0).contains(&ticks), "{low} {high}: {scale:?}");
         }
     }

@@ -75,10 +75,20 @@ pub fn draw(stack: &Stack) -> String {
         id = stack.id,
     );
     for (i, column) in stack.columns.iter().enumerate() {
-        let names = column.iter().flat_map(|s| [s.name.chars().count(), s.unit.chars().count()]).max().unwrap_or(0);
+        let names = column
+            .iter()
+            .flat_map(|s| [s.name.chars().count(), s.unit.chars().count()])
+            .max()
+            .unwrap_or(0);
         let left = i as f64 * (width + GAP) + LETTER * TEXT * names as f64 + TICKS;
         let right = i as f64 * (width + GAP) + width;
-        Column { left, right, from: i as f64 * (width + GAP), time: stack.time }.draw(&mut svg, column);
+        Column {
+            left,
+            right,
+            from: i as f64 * (width + GAP),
+            time: stack.time,
+        }
+        .draw(&mut svg, column);
     }
     svg.push_str("</svg>");
     svg
@@ -123,11 +133,21 @@ impl Column {
             );
         }
         let (middle, below) = (0.5 * (self.left + self.right), bottom + 28.0);
-        let _ =
-            write!(texts, r#"<text x="{}" y="{}" text-anchor="middle">time, s</text>"#, short(middle), short(below));
-        let _ = write!(svg, r##"<path d="{grid}" stroke="#cccccc" stroke-width=".5" fill="none"/>"##);
+        let _ = write!(
+            texts,
+            r#"<text x="{}" y="{}" text-anchor="middle">time, s</text>"#,
+            short(middle),
+            short(below)
+        );
+        let _ = write!(
+            svg,
+            r##"<path d="{grid}" stroke="#cccccc" stroke-width=".5" fill="none"/>"##
+        );
         svg.push_str(&lines);
-        let _ = write!(svg, r##"<path d="{frame}" stroke="#000000" stroke-width=".8" fill="none"/>"##);
+        let _ = write!(
+            svg,
+            r##"<path d="{frame}" stroke="#000000" stroke-width=".8" fill="none"/>"##
+        );
         svg.push_str(&texts);
     }
 
@@ -144,41 +164,84 @@ impl Column {
             let _ = write!(frame, "M{} {y}h-3", short(self.left));
         }
         for (value, _) in ticks(self.time) {
-            let _ = write!(grid, "M{} {}v{}", short(self.x(value)), short(top), short(strip.height));
+            let _ = write!(
+                grid,
+                "M{} {}v{}",
+                short(self.x(value)),
+                short(top),
+                short(strip.height)
+            );
         }
-        let (x, y, width, height) = (short(self.left), short(top), short(width), short(strip.height));
+        let (x, y, width, height) = (
+            short(self.left),
+            short(top),
+            short(width),
+            short(strip.height),
+        );
         let _ = write!(frame, "M{x} {y}h{width}v{height}h-{width}z");
     }
 
     fn labels(&self, texts: &mut String, strip: &Strip, top: f64) {
         for (value, label) in ticks(strip.scale) {
-            let (x, y) = (short(self.left - 5.0), short(place(strip, top, value) + 0.36 * TEXT));
-            let _ = write!(texts, r#"<text x="{x}" y="{y}" text-anchor="end">{label}</text>"#);
+            let (x, y) = (
+                short(self.left - 5.0),
+                short(place(strip, top, value) + 0.36 * TEXT),
+            );
+            let _ = write!(
+                texts,
+                r#"<text x="{x}" y="{y}" text-anchor="end">{label}</text>"#
+            );
         }
         let (x, middle) = (short(self.from), top + 0.5 * strip.height);
-        let base = if strip.unit.is_empty() { middle + 0.36 * TEXT } else { middle - 1.5 };
-        let _ = write!(texts, r#"<text x="{x}" y="{}">{}</text>"#, short(base), escaped(&strip.name));
+        let base = if strip.unit.is_empty() {
+            middle + 0.36 * TEXT
+        } else {
+            middle - 1.5
+        };
+        let _ = write!(
+            texts,
+            r#"<text x="{x}" y="{}">{}</text>"#,
+            short(base),
+            escaped(&strip.name)
+        );
         if !strip.unit.is_empty() {
             let (y, unit) = (short(middle + TEXT), escaped(&strip.unit));
-            let _ = write!(texts, r##"<text x="{x}" y="{y}" fill="#555555">{unit}</text>"##);
+            let _ = write!(
+                texts,
+                r##"<text x="{x}" y="{y}" fill="#555555">{unit}</text>"##
+            );
         }
     }
 
     fn lines(&self, svg: &mut String, strip: &Strip, top: f64) {
         for line in &strip.lines {
-            let points = line.points.iter().map(|&(t, value)| (self.x(t), place(strip, top, value)));
+            let points = line
+                .points
+                .iter()
+                .map(|&(t, value)| (self.x(t), place(strip, top, value)));
             let d = trace(points);
             if d.is_empty() {
                 continue;
             }
-            let dash =
-                if line.dash.is_empty() { String::new() } else { format!(r#" stroke-dasharray="{}""#, line.dash) };
+            let dash = if line.dash.is_empty() {
+                String::new()
+            } else {
+                format!(r#" stroke-dasharray="{}""#, line.dash)
+            };
             let (colour, width) = (line.colour, line.width);
-            let _ = write!(svg, r#"<path d="{d}" stroke="{colour}" stroke-width="{width}"{dash} fill="none"/>"#);
+            let _ = write!(
+                svg,
+                r#"<path d="{d}" stroke="{colour}" stroke-width="{width}"{dash} fill="none"/>"#
+            );
         }
         let mut dots = String::new();
         for &(t, value) in &strip.dots {
-            let _ = write!(dots, "M{} {}h4v4h-4z", short(self.x(t) - 2.0), short(place(strip, top, value) - 2.0));
+            let _ = write!(
+                dots,
+                "M{} {}h4v4h-4z",
+                short(self.x(t) - 2.0),
+                short(place(strip, top, value) - 2.0)
+            );
         }
         if !dots.is_empty() {
             let _ = write!(svg, r#"<path d="{dots}" fill="{LEFT_OUT_COLOUR}"/>"#);
@@ -228,7 +291,10 @@ fn trace(points: impl Iterator<Item = (f64, f64)>) -> String {
     d
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "places in a drawing are small")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "places in a drawing are small"
+)]
 fn tenths(value: f64) -> i64 {
     (10.0 * value).round() as i64
 }
@@ -251,7 +317,12 @@ fn short(value: f64) -> String {
 /// A solid line in the ink of what was computed.
 #[must_use]
 pub fn ink(points: Vec<(f64, f64)>, width: f64) -> StripLine {
-    StripLine { points, colour: INK, width, dash: "" }
+    StripLine {
+        points,
+        colour: INK,
+        width,
+        dash: "",
+    }
 }
 
 #[cfg(test)]
@@ -259,8 +330,14 @@ mod tests {
     use super::*;
 
     fn stack() -> Stack {
-        let scale = Scale { min: -1.0, max: 1.0, step: 1.0 };
-        let points = (0..20).map(|i| (f64::from(i) * 0.5, (f64::from(i) * 0.7).sin())).collect();
+        let scale = Scale {
+            min: -1.0,
+            max: 1.0,
+            step: 1.0,
+        };
+        let points = (0..20)
+            .map(|i| (f64::from(i) * 0.5, (f64::from(i) * 0.7).sin()))
+            .collect();
         let strip = Strip {
             name: "q <x>".into(),
             unit: "deg/s".into(),
@@ -275,7 +352,11 @@ mod tests {
             title: "rates".into(),
             description: "a & b".into(),
             width: 400.0,
-            time: Scale { min: 0.0, max: 10.0, step: 5.0 },
+            time: Scale {
+                min: 0.0,
+                max: 10.0,
+                step: 5.0,
+            },
             columns: vec![vec![strip.clone(), strip.clone()], vec![strip]],
         }
     }
@@ -284,9 +365,18 @@ mod tests {
     fn a_stack_is_well_formed_and_says_what_it_shows() {
         let svg = draw(&stack());
         let document = roxmltree::Document::parse(&svg).expect("well-formed");
-        let said: Vec<&str> = document.root_element().children().filter_map(|n| n.text()).take(2).collect();
+        let said: Vec<&str> = document
+            .root_element()
+            .children()
+            .filter_map(|n| n.text())
+            .take(2)
+            .collect();
         assert_eq!(said, ["rates", "a & b"]);
-        assert_eq!(svg.matches("time, s").count(), 2, "each column has its axis");
+        assert_eq!(
+            svg.matches("time, s").count(),
+            2,
+            "each column has its axis"
+        );
         assert_eq!(svg.matches(r#"<g data-class="c1">"#).count(), 3);
     }
 
@@ -299,8 +389,15 @@ mod tests {
 
     #[test]
     fn ticks_are_the_multiples_of_the_step_inside() {
-        let labels = |min, max, step| ticks(Scale { min, max, step }).map(|t| t.1).collect::<Vec<_>>();
-        assert_eq!(labels(-1.0, 1.2, 0.5), ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]);
+        let labels = |min, max, step| {
+            ticks(Scale { min, max, step })
+                .map(|t| t.1)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            labels(-1.0, 1.2, 0.5),
+            ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]
+        );
         assert!(labels(f64::NAN, 1.0, 0.5).is_empty());
     }
 }

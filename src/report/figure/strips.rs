@@ -132,7 +132,12 @@ pub fn draw(chart: &Chart) -> String {
     y = labels(&mut scene, chart, &place, y);
     let top = y;
     y += LANE * (1 + chart.lanes.len()) as f64 + 3.0;
-    let bottom = y + chart.strips.iter().map(|s| s.height + 2.0 * ROOM).sum::<f64>() - ROOM;
+    let bottom = y + chart
+        .strips
+        .iter()
+        .map(|s| s.height + 2.0 * ROOM)
+        .sum::<f64>()
+        - ROOM;
     windows(&mut scene, chart, &place, (top, bottom));
     lanes(&mut scene, chart, &place, top);
     for (i, strip) in chart.strips.iter().enumerate() {
@@ -158,11 +163,31 @@ struct Place {
 
 impl Place {
     fn of(chart: &Chart) -> Place {
-        let names = chart.strips.iter().flat_map(|s| [&s.name, &s.unit]).chain(chart.lanes.iter().map(|l| &l.name));
-        let widest = names.map(|n| text_width(n)).fold(text_width("maneuvers"), f64::max);
+        let names = chart
+            .strips
+            .iter()
+            .flat_map(|s| [&s.name, &s.unit])
+            .chain(chart.lanes.iter().map(|l| &l.name));
+        let widest = names
+            .map(|n| text_width(n))
+            .fold(text_width("maneuvers"), f64::max);
         let left = EDGE + widest + TICKS;
-        let time = axes(chart.time, Scale { min: 0.0, max: 1.0, step: 1.0 }, left, chart.width, 50.0);
-        Place { left, width: chart.width, time: ComputedLayout::from_layout(&time) }
+        let time = axes(
+            chart.time,
+            Scale {
+                min: 0.0,
+                max: 1.0,
+                step: 1.0,
+            },
+            left,
+            chart.width,
+            50.0,
+        );
+        Place {
+            left,
+            width: chart.width,
+            time: ComputedLayout::from_layout(&time),
+        }
     }
 
     fn right(&self) -> f64 {
@@ -221,12 +246,37 @@ fn header(scene: &mut Scene, chart: &Chart, place: &Place) -> f64 {
 
 fn put_key(scene: &mut Scene, key: Key, x: f64, y: f64) {
     let primitive = match key {
-        Key::Window => path(format!("M{x:.1} {:.1}h20v12h-20z", y - 6.0), FAINT, 0.8, Some("#dddddd")),
+        Key::Window => path(
+            format!("M{x:.1} {:.1}h20v12h-20z", y - 6.0),
+            FAINT,
+            0.8,
+            Some("#dddddd"),
+        ),
         Key::Given => dashed(format!("M{x:.1} {:.1}h20v12h-20z", y - 6.0)),
-        Key::Bridged => path(bridged(x + 10.0, x + 12.0, y + 4.0), "none", 0.0, Some(LEFT_OUT_COLOUR)),
-        Key::Despiked => path(despiked(x + 11.0, y - 4.0), "none", 0.0, Some(LEFT_OUT_COLOUR)),
-        Key::Missing => path(missing(x + 1.0, x + 19.0, y + 2.0), LEFT_OUT_COLOUR, 0.8, Some("#ffffff")),
-        Key::Dot => path(format!("M{:.1} {:.1}h4v4h-4z", x + 8.0, y - 2.0), "none", 0.0, Some(LEFT_OUT_COLOUR)),
+        Key::Bridged => path(
+            bridged(x + 10.0, x + 12.0, y + 4.0),
+            "none",
+            0.0,
+            Some(LEFT_OUT_COLOUR),
+        ),
+        Key::Despiked => path(
+            despiked(x + 11.0, y - 4.0),
+            "none",
+            0.0,
+            Some(LEFT_OUT_COLOUR),
+        ),
+        Key::Missing => path(
+            missing(x + 1.0, x + 19.0, y + 2.0),
+            LEFT_OUT_COLOUR,
+            0.8,
+            Some("#ffffff"),
+        ),
+        Key::Dot => path(
+            format!("M{:.1} {:.1}h4v4h-4z", x + 8.0, y - 2.0),
+            "none",
+            0.0,
+            Some(LEFT_OUT_COLOUR),
+        ),
         Key::Line(colour, width) => path(format!("M{x:.1} {y:.1}h20"), colour, width, None),
     };
     scene.elements.push(primitive);
@@ -234,17 +284,41 @@ fn put_key(scene: &mut Scene, key: Key, x: f64, y: f64) {
 
 /// Labels that do not fit into their windows, upright over them, pushed apart where they would touch.
 fn labels(scene: &mut Scene, chart: &Chart, place: &Place, y: f64) -> f64 {
-    if chart.windows.iter().all(|w| fits(place, w.start_s, w.end_s, &w.label)) {
+    if chart
+        .windows
+        .iter()
+        .all(|w| fits(place, w.start_s, w.end_s, &w.label))
+    {
         return y;
     }
-    let longest = chart.windows.iter().map(|w| text_width(&w.label)).fold(0.0, f64::max);
+    let longest = chart
+        .windows
+        .iter()
+        .map(|w| text_width(&w.label))
+        .fold(0.0, f64::max);
     let bottom = y + longest;
-    let centres: Vec<f64> = chart.windows.iter().map(|w| place.x(0.5 * (w.start_s + w.end_s))).collect();
+    let centres: Vec<f64> = chart
+        .windows
+        .iter()
+        .map(|w| place.x(0.5 * (w.start_s + w.end_s)))
+        .collect();
     let mut leaders = String::new();
-    for ((window, at), x) in chart.windows.iter().zip(apart(&centres, PITCH, place.right())).zip(&centres) {
-        scene.elements.push(text(at + 4.5, bottom, &window.label, INK, Some(-90.0)));
+    for ((window, at), x) in chart
+        .windows
+        .iter()
+        .zip(apart(&centres, PITCH, place.right()))
+        .zip(&centres)
+    {
+        scene
+            .elements
+            .push(text(at + 4.5, bottom, &window.label, INK, Some(-90.0)));
         // Writing into a String cannot fail.
-        let _ = write!(leaders, "M{at:.1} {:.1}L{x:.1} {:.1}", bottom + 3.0, bottom + 13.0);
+        let _ = write!(
+            leaders,
+            "M{at:.1} {:.1}L{x:.1} {:.1}",
+            bottom + 3.0,
+            bottom + 13.0
+        );
     }
     scene.elements.push(path(leaders, FAINT, 0.6, None));
     bottom + 13.0
@@ -272,16 +346,26 @@ fn fits(place: &Place, start_s: f64, end_s: f64, label: &str) -> bool {
 
 /// Each maneuver as a shade through all strips, which says its name to a pointer that rests on it.
 fn windows(scene: &mut Scene, chart: &Chart, place: &Place, (top, bottom): (f64, f64)) {
-    scene.elements.push(text(EDGE, top + 14.0, "maneuvers", FAINT, None));
+    scene
+        .elements
+        .push(text(EDGE, top + 14.0, "maneuvers", FAINT, None));
     for window in &chart.windows {
         let (id, class) = (escaped(&window.maneuver_id), escaped(&window.class));
         let (start_s, end_s) = (window.start_s, window.end_s);
         scene.elements.push(Primitive::GroupStart {
             transform: None,
-            title: Some(format!("{} {}, {start_s:.1} to {end_s:.1} s", window.class, window.maneuver_id)),
-            extra_attrs: Some(format!(r#"class="window" data-maneuver="{id}" data-class="{class}""#)),
+            title: Some(format!(
+                "{} {}, {start_s:.1} to {end_s:.1} s",
+                window.class, window.maneuver_id
+            )),
+            extra_attrs: Some(format!(
+                r#"class="window" data-maneuver="{id}" data-class="{class}""#
+            )),
         });
-        let (x, width) = (place.x(start_s), (place.x(end_s) - place.x(start_s)).max(1.0));
+        let (x, width) = (
+            place.x(start_s),
+            (place.x(end_s) - place.x(start_s)).max(1.0),
+        );
         let rect = |y: f64, height: f64, opacity: f64| Primitive::Rect {
             x,
             y,
@@ -294,9 +378,16 @@ fn windows(scene: &mut Scene, chart: &Chart, place: &Place, (top, bottom): (f64,
         };
         scene.elements.push(rect(top, bottom - top, 0.09));
         scene.elements.push(rect(top, LANE - 3.0, 0.12));
-        scene.elements.push(path(format!("M{x:.1} {top:.1}V{bottom:.1}m{width:.1} 0V{top:.1}"), FAINT, 0.5, None));
+        scene.elements.push(path(
+            format!("M{x:.1} {top:.1}V{bottom:.1}m{width:.1} 0V{top:.1}"),
+            FAINT,
+            0.5,
+            None,
+        ));
         if fits(place, start_s, end_s, &window.label) {
-            scene.elements.push(text(x + 4.0, top + 13.0, &window.label, INK, None));
+            scene
+                .elements
+                .push(text(x + 4.0, top + 13.0, &window.label, INK, None));
         }
         scene.elements.push(Primitive::GroupEnd);
     }
@@ -306,18 +397,30 @@ fn windows(scene: &mut Scene, chart: &Chart, place: &Place, (top, bottom): (f64,
 fn lanes(scene: &mut Scene, chart: &Chart, place: &Place, top: f64) {
     for (i, lane) in chart.lanes.iter().enumerate() {
         let y = top + LANE * (i + 1) as f64;
-        scene.elements.push(text(EDGE, y + 13.0, &lane.name, FAINT, None));
+        scene
+            .elements
+            .push(text(EDGE, y + 13.0, &lane.name, FAINT, None));
         for item in &lane.boxes {
             let (x, end) = (place.x(item.start_s), place.x(item.end_s));
             scene.elements.push(Primitive::GroupStart {
                 transform: None,
-                title: Some(format!("{}: {}, {:.1} to {:.1} s", lane.name, item.label, item.start_s, item.end_s)),
-                extra_attrs: Some(format!(r#"class="event" data-lane="{}""#, escaped(&lane.name))),
+                title: Some(format!(
+                    "{}: {}, {:.1} to {:.1} s",
+                    lane.name, item.label, item.start_s, item.end_s
+                )),
+                extra_attrs: Some(format!(
+                    r#"class="event" data-lane="{}""#,
+                    escaped(&lane.name)
+                )),
             });
             let (width, height) = (end - x, LANE - 4.0);
-            scene.elements.push(dashed(format!("M{x:.1} {y:.1}h{width:.1}v{height:.1}h-{width:.1}z")));
+            scene.elements.push(dashed(format!(
+                "M{x:.1} {y:.1}h{width:.1}v{height:.1}h-{width:.1}z"
+            )));
             if fits(place, item.start_s, item.end_s, &item.label) {
-                scene.elements.push(text(x + 4.0, y + 12.0, &item.label, INK, None));
+                scene
+                    .elements
+                    .push(text(x + 4.0, y + 12.0, &item.label, INK, None));
             }
             scene.elements.push(Primitive::GroupEnd);
         }
@@ -325,35 +428,74 @@ fn lanes(scene: &mut Scene, chart: &Chart, place: &Place, top: f64) {
 }
 
 /// One strip with its top at `y`; the last bears the numbers of the time axis.
-fn put_strip(scene: &mut Scene, chart: &Chart, place: &Place, strip: &Strip, y: f64, is_last: bool) {
-    let mut layout = axes(chart.time, strip.scale, place.left, place.width, strip.height);
+fn put_strip(
+    scene: &mut Scene,
+    chart: &Chart,
+    place: &Place,
+    strip: &Strip,
+    y: f64,
+    is_last: bool,
+) {
+    let mut layout = axes(
+        chart.time,
+        strip.scale,
+        place.left,
+        place.width,
+        strip.height,
+    );
     if !is_last {
-        layout = layout.with_x_label("").with_x_tick_format(TickFormat::Custom(std::sync::Arc::new(|_| String::new())));
+        layout = layout
+            .with_x_label("")
+            .with_x_tick_format(TickFormat::Custom(std::sync::Arc::new(|_| String::new())));
     }
     let own = ComputedLayout::from_layout(&layout);
     scene.elements.push(Primitive::GroupStart {
         transform: Some(format!("translate(0,{:.1})", y - ROOM)),
         title: None,
-        extra_attrs: Some(format!(r#"class="strip" data-signal="{}""#, escaped(&strip.name))),
+        extra_attrs: Some(format!(
+            r#"class="strip" data-signal="{}""#,
+            escaped(&strip.name)
+        )),
     });
     let is_wanted = |e: &Primitive| match e {
         Primitive::Text { content, .. } => !content.is_empty(),
         Primitive::ClipStart { .. } | Primitive::ClipEnd => false,
         _ => true,
     };
-    scene.elements.extend(render_multiple(vec![nothing()], layout).elements.into_iter().filter(is_wanted));
+    scene.elements.extend(
+        render_multiple(vec![nothing()], layout)
+            .elements
+            .into_iter()
+            .filter(is_wanted),
+    );
     let middle = ROOM + 0.5 * strip.height;
-    scene.elements.push(text(EDGE, middle - 2.0, &strip.name, INK, None));
-    scene.elements.push(text(EDGE, middle + 14.0, &strip.unit, FAINT, None));
+    scene
+        .elements
+        .push(text(EDGE, middle - 2.0, &strip.name, INK, None));
+    scene
+        .elements
+        .push(text(EDGE, middle + 14.0, &strip.unit, FAINT, None));
     let y = |value: f64| own.map_y(value.clamp(strip.scale.min, strip.scale.max));
     for trace in &strip.traces {
-        scene.elements.push(path(line(&trace.pieces, place, y), trace.colour, trace.width, None));
+        scene.elements.push(path(
+            line(&trace.pieces, place, y),
+            trace.colour,
+            trace.width,
+            None,
+        ));
     }
     let mut dots = String::new();
     for &(time_s, value) in &strip.dots {
-        let _ = write!(dots, "M{:.1} {:.1}h4v4h-4z", place.x(time_s) - 2.0, y(value) - 2.0);
+        let _ = write!(
+            dots,
+            "M{:.1} {:.1}h4v4h-4z",
+            place.x(time_s) - 2.0,
+            y(value) - 2.0
+        );
     }
-    scene.elements.push(path(dots, "none", 0.0, Some(LEFT_OUT_COLOUR)));
+    scene
+        .elements
+        .push(path(dots, "none", 0.0, Some(LEFT_OUT_COLOUR)));
     put_marks(scene, strip, place);
     scene.elements.push(Primitive::GroupEnd);
 }
@@ -377,11 +519,28 @@ fn put_marks(scene: &mut Scene, strip: &Strip, place: &Place) {
     let (top, bottom) = (ROOM, ROOM + strip.height);
     let centre = |run: &(f64, f64)| place.x(0.5 * (run.0 + run.1));
     let ends = |run: &(f64, f64)| (place.x(run.0), place.x(run.1));
-    let of_bridged = strip.marks.bridged.iter().map(|r| bridged(ends(r).0, ends(r).1, bottom));
-    let of_despiked = strip.marks.despiked.iter().map(|r| despiked(centre(r), top));
-    let of_missing = strip.marks.missing.iter().map(|r| missing(ends(r).0, ends(r).1, bottom));
+    let of_bridged = strip
+        .marks
+        .bridged
+        .iter()
+        .map(|r| bridged(ends(r).0, ends(r).1, bottom));
+    let of_despiked = strip
+        .marks
+        .despiked
+        .iter()
+        .map(|r| despiked(centre(r), top));
+    let of_missing = strip
+        .marks
+        .missing
+        .iter()
+        .map(|r| missing(ends(r).0, ends(r).1, bottom));
     let kinds = [
-        ("bridged", of_bridged.collect::<String>(), "none", LEFT_OUT_COLOUR),
+        (
+            "bridged",
+            of_bridged.collect::<String>(),
+            "none",
+            LEFT_OUT_COLOUR,
+        ),
         ("despiked", of_despiked.collect(), "none", LEFT_OUT_COLOUR),
         ("missing", of_missing.collect(), LEFT_OUT_COLOUR, "#ffffff"),
     ];
@@ -481,7 +640,11 @@ mod tests {
             description: "two & more".into(),
             heading: vec!["word ".repeat(60)],
             legend: vec![(Key::Window, "maneuver".into())],
-            time: Scale { min: 100.0, max: 300.0, step: 50.0 },
+            time: Scale {
+                min: 100.0,
+                max: 300.0,
+                step: 50.0,
+            },
             width: 800.0,
             windows: vec![Window {
                 maneuver_id: "f_t00150".into(),
@@ -495,10 +658,22 @@ mod tests {
                 name: "alpha".into(),
                 unit: "deg".into(),
                 height: 50.0,
-                scale: Scale { min: 0.0, max: 4.0, step: 2.0 },
-                traces: vec![Trace { pieces: line, colour: INK, width: 1.0 }],
+                scale: Scale {
+                    min: 0.0,
+                    max: 4.0,
+                    step: 2.0,
+                },
+                traces: vec![Trace {
+                    pieces: line,
+                    colour: INK,
+                    width: 1.0,
+                }],
                 dots: vec![],
-                marks: Marks { bridged: vec![(120.0, 130.0)], despiked: vec![(140.0, 140.0)], missing: vec![] },
+                marks: Marks {
+                    bridged: vec![(120.0, 130.0)],
+                    despiked: vec![(140.0, 140.0)],
+                    missing: vec![],
+                },
             }],
             notes: vec![],
         }
@@ -506,9 +681,13 @@ mod tests {
 
     /// The first number after a piece of text.
     fn after(svg: &str, what: &str, attribute: &str) -> f64 {
-        let rest = &svg[svg.find(what).unwrap_or_else(|| panic!("{what} is not in {svg}"))..];
+        let rest = &svg[svg
+            .find(what)
+            .unwrap_or_else(|| panic!("{what} is not in {svg}"))..];
         let rest = &rest[rest.find(attribute).expect(attribute) + attribute.len()..];
-        let end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.')).expect("an end");
+        let end = rest
+            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .expect("an end");
         rest[..end].parse().expect("a number")
     }
 
@@ -519,11 +698,26 @@ mod tests {
         let left = Place::of(&chart).left;
         let x = |time_s: f64| left + (time_s - 100.0) / 200.0 * 800.0;
         let near = |a: f64, b: f64| assert!((a - b).abs() < 0.1, "{a} for {b}");
-        near(after(&svg, "data-maneuver=\"f_t00150\"", "<rect x=\""), x(150.0));
-        near(after(&svg, "data-maneuver=\"f_t00150\"", " width=\""), x(160.0) - x(150.0));
-        near(after(&svg, "class=\"mark bridged\"", "<path d=\"M"), x(120.0));
-        near(after(&svg, "class=\"mark despiked\"", "<path d=\"M") + 4.0, x(140.0));
-        assert!(svg.contains(&format!("M{:.1} ", x(100.0))) && svg.contains(&format!("L{:.1} ", x(200.0))));
+        near(
+            after(&svg, "data-maneuver=\"f_t00150\"", "<rect x=\""),
+            x(150.0),
+        );
+        near(
+            after(&svg, "data-maneuver=\"f_t00150\"", " width=\""),
+            x(160.0) - x(150.0),
+        );
+        near(
+            after(&svg, "class=\"mark bridged\"", "<path d=\"M"),
+            x(120.0),
+        );
+        near(
+            after(&svg, "class=\"mark despiked\"", "<path d=\"M") + 4.0,
+            x(140.0),
+        );
+        assert!(
+            svg.contains(&format!("M{:.1} ", x(100.0)))
+                && svg.contains(&format!("L{:.1} ", x(200.0)))
+        );
         assert!(!svg.contains("class=\"mark missing\""));
     }
 
@@ -546,6 +740,9 @@ mod tests {
     #[test]
     fn long_lines_are_broken_between_words() {
         let lines = wrapped(&["word ".repeat(60)], 400.0);
-        assert!(lines.len() > 4 && lines.iter().all(|l| text_width(l) <= 400.0), "{lines:?}");
+        assert!(
+            lines.len() > 4 && lines.iter().all(|l| text_width(l) <= 400.0),
+            "{lines:?}"
+        );
     }
 }

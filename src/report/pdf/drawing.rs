@@ -42,10 +42,21 @@ impl Style {
                 "stroke-width" => style.width = value.parse().unwrap_or(style.width),
                 "stroke-dasharray" => style.dash = dashes(value),
                 "fill-opacity" | "opacity" => style.opacity = percent(value),
-                "font-size" => style.size = value.trim_end_matches("px").parse().unwrap_or(style.size),
-                "font-weight" => style.weight = if value == "bold" { Weight::Bold } else { Weight::Regular },
+                "font-size" => {
+                    style.size = value.trim_end_matches("px").parse().unwrap_or(style.size)
+                }
+                "font-weight" => {
+                    style.weight = if value == "bold" {
+                        Weight::Bold
+                    } else {
+                        Weight::Regular
+                    }
+                }
                 "text-anchor" => {
-                    style.anchor = [("middle", 0.5), ("end", 1.0)].iter().find(|a| a.0 == value).map_or(0.0, |a| a.1);
+                    style.anchor = [("middle", 0.5), ("end", 1.0)]
+                        .iter()
+                        .find(|a| a.0 == value)
+                        .map_or(0.0, |a| a.1);
                 }
                 _ => {}
             }
@@ -58,7 +69,9 @@ impl Style {
 fn colour(value: &str) -> Option<[u8; 3]> {
     let hex = |digits: &str| u8::from_str_radix(digits, 16).unwrap_or(0);
     match value.strip_prefix('#') {
-        Some(d) if d.len() == 6 && d.is_ascii() => Some([hex(&d[..2]), hex(&d[2..4]), hex(&d[4..])]),
+        Some(d) if d.len() == 6 && d.is_ascii() => {
+            Some([hex(&d[..2]), hex(&d[2..4]), hex(&d[4..])])
+        }
         Some(d) if d.len() == 3 && d.is_ascii() => Some([0, 1, 2].map(|i| 17 * hex(&d[i..=i]))),
         _ if value == "none" => None,
         _ if value == "white" => Some([255; 3]),
@@ -68,30 +81,47 @@ fn colour(value: &str) -> Option<[u8; 3]> {
 
 fn dashes(value: &str) -> String {
     let numbers: Vec<f32> = numbers(value).collect();
-    numbers.iter().map(|n| number(*n)).collect::<Vec<_>>().join(" ")
+    numbers
+        .iter()
+        .map(|n| number(*n))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 to 100")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to 0 to 100"
+)]
 fn percent(value: &str) -> u8 {
-    (100.0 * value.parse::<f32>().unwrap_or(1.0)).round().clamp(0.0, 100.0) as u8
+    (100.0 * value.parse::<f32>().unwrap_or(1.0))
+        .round()
+        .clamp(0.0, 100.0) as u8
 }
 
 /// The numbers of a list, whatever stands between them.
 fn numbers(text: &str) -> impl Iterator<Item = f32> {
-    text.split([' ', ',', '\n', '\t']).filter_map(|n| n.parse().ok())
+    text.split([' ', ',', '\n', '\t'])
+        .filter_map(|n| n.parse().ok())
 }
 
 /// A number as short as a PDF may have it: two decimals at most.
 pub fn number(value: f32) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.is_empty() || text == "-0" || !value.is_finite() { "0".to_owned() } else { text.to_owned() }
+    if text.is_empty() || text == "-0" || !value.is_finite() {
+        "0".to_owned()
+    } else {
+        text.to_owned()
+    }
 }
 
 /// The drawing of an `svg` element.
 pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
     let of = |name: &str| svg.attribute(name).and_then(|v| v.parse::<f32>().ok());
-    let view: Vec<f32> = svg.attribute("viewBox").map_or_else(Vec::new, |v| numbers(v).collect());
+    let view: Vec<f32> = svg
+        .attribute("viewBox")
+        .map_or_else(Vec::new, |v| numbers(v).collect());
     let [width, height] = match view[..] {
         [_, _, width, height] => [width, height],
         _ => [of("width").unwrap_or(0.0), of("height").unwrap_or(0.0)],
@@ -104,7 +134,10 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         opacities: BTreeSet::new(),
         size: [width, height],
     };
-    for clip in svg.descendants().filter(|n| n.has_tag_name("clipPath") || n.tag_name().name() == "clipPath") {
+    for clip in svg
+        .descendants()
+        .filter(|n| n.has_tag_name("clipPath") || n.tag_name().name() == "clipPath")
+    {
         if let (Some(id), Some(rect)) = (clip.attribute("id"), clip.first_element_child()) {
             pen.clips.insert(id.to_owned(), pen.rectangle(rect));
         }
@@ -120,7 +153,12 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         anchor: 0.0,
     };
     pen.children(svg, &Style::of(svg, &style));
-    Drawing { width, height, operators: pen.out, opacities: pen.opacities }
+    Drawing {
+        width,
+        height,
+        operators: pen.out,
+        opacities: pen.opacities,
+    }
 }
 
 struct Pen<'a> {
@@ -141,7 +179,11 @@ impl Pen<'_> {
     }
 
     fn element(&mut self, node: Node, style: &Style) {
-        let of = |name: &str| node.attribute(name).and_then(|v| v.parse::<f32>().ok()).unwrap_or(0.0);
+        let of = |name: &str| {
+            node.attribute(name)
+                .and_then(|v| v.parse::<f32>().ok())
+                .unwrap_or(0.0)
+        };
         match node.tag_name().name() {
             "g" | "a" => self.group(node, style),
             "rect" => {
@@ -150,7 +192,13 @@ impl Pen<'_> {
             }
             "line" => {
                 let [x1, y1, x2, y2] = ["x1", "y1", "x2", "y2"].map(|name| number(of(name)));
-                self.paint(&format!("{x1} {y1} m {x2} {y2} l"), &Style { fill: None, ..style.clone() });
+                self.paint(
+                    &format!("{x1} {y1} m {x2} {y2} l"),
+                    &Style {
+                        fill: None,
+                        ..style.clone()
+                    },
+                );
             }
             "path" => {
                 let outline = path(node.attribute("d").unwrap_or(""));
@@ -162,9 +210,13 @@ impl Pen<'_> {
     }
 
     fn group(&mut self, node: Node, style: &Style) {
-        let clip = node.attribute("clip-path").and_then(|c| c.strip_prefix("url(#")?.strip_suffix(')'));
+        let clip = node
+            .attribute("clip-path")
+            .and_then(|c| c.strip_prefix("url(#")?.strip_suffix(')'));
         let clip = clip.and_then(|id| self.clips.get(id)).cloned();
-        let moved = node.attribute("transform").and_then(|t| t.strip_prefix("translate(")?.strip_suffix(')'));
+        let moved = node
+            .attribute("transform")
+            .and_then(|t| t.strip_prefix("translate(")?.strip_suffix(')'));
         if clip.is_none() && moved.is_none() {
             return self.children(node, style);
         }
@@ -190,7 +242,12 @@ impl Pen<'_> {
             Some(value) => value.parse().unwrap_or(0.0),
             None => 0.0,
         };
-        let sides = [("x", 0.0), ("y", 0.0), ("width", self.size[0]), ("height", self.size[1])];
+        let sides = [
+            ("x", 0.0),
+            ("y", 0.0),
+            ("width", self.size[0]),
+            ("height", self.size[1]),
+        ];
         let [x, y, width, height] = sides.map(|(name, whole)| number(of(name, whole)));
         format!("{x} {y} {width} {height} re")
     }
@@ -217,7 +274,13 @@ impl Pen<'_> {
             let _ = writeln!(state, "{} rg", rgb(fill));
         }
         if let Some(stroke) = style.stroke {
-            let _ = writeln!(state, "{} RG {} w [{}] 0 d", rgb(stroke), number(style.width), style.dash);
+            let _ = writeln!(
+                state,
+                "{} RG {} w [{}] 0 d",
+                rgb(stroke),
+                number(style.width),
+                style.dash
+            );
         }
         if state != self.set {
             self.out.push_str(&state);
@@ -226,18 +289,30 @@ impl Pen<'_> {
     }
 
     fn text(&mut self, node: Node, style: &Style, x: f32, y: f32) {
-        let text: String = node.descendants().filter(Node::is_text).filter_map(|n| n.text()).collect();
+        let text: String = node
+            .descendants()
+            .filter(Node::is_text)
+            .filter_map(|n| n.text())
+            .collect();
         let back = style.anchor * self.fonts.width(style.weight, style.size, &text);
-        let is_upright = node.attribute("transform").is_some_and(|t| t.starts_with("rotate(-90"));
+        let is_upright = node
+            .attribute("transform")
+            .is_some_and(|t| t.starts_with("rotate(-90"));
         let place = if is_upright {
             format!("0 -1 -1 0 {} {}", number(x), number(y + back))
         } else {
             format!("1 0 0 -1 {} {}", number(x - back), number(y))
         };
-        self.state(&Style { stroke: None, ..style.clone() });
+        self.state(&Style {
+            stroke: None,
+            ..style.clone()
+        });
         let (font, size) = (style.weight.resource(), number(style.size));
         let encoded = self.fonts.encoded(style.weight, &text);
-        let _ = writeln!(self.out, "BT /{font} {size} Tf {place} Tm <{encoded}> Tj ET");
+        let _ = writeln!(
+            self.out,
+            "BT /{font} {size} Tf {place} Tm <{encoded}> Tj ET"
+        );
     }
 }
 
@@ -280,12 +355,21 @@ struct Trace {
 
 impl Trace {
     fn run(&mut self, command: char, numbers: &[f32]) {
-        let from = |at: [f32; 2]| if command.is_ascii_lowercase() { at } else { [0.0, 0.0] };
+        let from = |at: [f32; 2]| {
+            if command.is_ascii_lowercase() {
+                at
+            } else {
+                [0.0, 0.0]
+            }
+        };
         match command.to_ascii_lowercase() {
             'm' | 'l' => {
                 for (i, pair) in numbers.chunks_exact(2).enumerate() {
                     let base = from(self.at);
-                    self.to([base[0] + pair[0], base[1] + pair[1]], command.eq_ignore_ascii_case(&'m') && i == 0);
+                    self.to(
+                        [base[0] + pair[0], base[1] + pair[1]],
+                        command.eq_ignore_ascii_case(&'m') && i == 0,
+                    );
                 }
             }
             'h' => {
@@ -317,7 +401,12 @@ impl Trace {
         if !self.out.is_empty() {
             self.out.push(' ');
         }
-        let _ = write!(self.out, "{} {} {operator}", number(point[0]), number(point[1]));
+        let _ = write!(
+            self.out,
+            "{} {} {operator}",
+            number(point[0]),
+            number(point[1])
+        );
         self.at = point;
         if is_move {
             self.start = point;
@@ -334,7 +423,12 @@ impl Trace {
         let a = [x - centre[0], y - centre[1]];
         let b = [a[1], -a[0]];
         for (u, v) in [(a, b), (b, [-a[0], -a[1]])] {
-            let at = |p: f32, q: f32| [centre[0] + p * u[0] + q * v[0], centre[1] + p * u[1] + q * v[1]];
+            let at = |p: f32, q: f32| {
+                [
+                    centre[0] + p * u[0] + q * v[0],
+                    centre[1] + p * u[1] + q * v[1],
+                ]
+            };
             for point in [at(1.0, HANDLE), at(HANDLE, 1.0), at(0.0, 1.0)] {
                 let _ = write!(self.out, " {} {}", number(point[0]), number(point[1]));
             }

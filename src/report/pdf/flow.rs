@@ -29,7 +29,10 @@ pub struct Flow<'a> {
 
 impl<'a> Flow<'a> {
     pub fn new(fonts: &'a Fonts) -> Self {
-        Flow { fonts, waiting: Vec::new() }
+        Flow {
+            fonts,
+            waiting: Vec::new(),
+        }
     }
 
     /// The items of an element's children, in a column of this width.
@@ -39,21 +42,45 @@ impl<'a> Flow<'a> {
         for child in node.children() {
             if child.is_element() && is_block(child) {
                 let words = std::mem::replace(&mut reader, Reader::new(self.fonts)).words();
-                self.put(lines(&words, Setting { width, size: style.size, align: 0.0 }, self.fonts), &mut items);
+                self.put(
+                    lines(
+                        &words,
+                        Setting {
+                            width,
+                            size: style.size,
+                            align: 0.0,
+                        },
+                        self.fonts,
+                    ),
+                    &mut items,
+                );
                 let block = self.block(child, width, style);
                 items.extend(block);
             } else {
                 reader.read(child, style, None);
             }
         }
-        self.put(lines(&reader.words(), Setting { width, size: style.size, align: 0.0 }, self.fonts), &mut items);
+        self.put(
+            lines(
+                &reader.words(),
+                Setting {
+                    width,
+                    size: style.size,
+                    align: 0.0,
+                },
+                self.fonts,
+            ),
+            &mut items,
+        );
         items
     }
 
     /// Adds items, the first of them with the anchors that wait for one.
     fn put(&mut self, mut new: Vec<Item>, items: &mut Vec<Item>) {
         if let Some(first) = new.iter_mut().find(|i| !i.is_room) {
-            first.marks.extend(self.waiting.drain(..).map(|id| Mark::Anchor { id }));
+            first
+                .marks
+                .extend(self.waiting.drain(..).map(|id| Mark::Anchor { id }));
         }
         items.append(&mut new);
     }
@@ -84,26 +111,51 @@ impl<'a> Flow<'a> {
             "h2" => (self.heading(node, width, 13.0, Some(0)), 3.0),
             "h3" => (self.heading(node, width, 10.5, Some(1)), 2.0),
             "h4" | "summary" => (self.heading(node, width, TEXT, None), 1.0),
-            "nav" => {
-                (vec![Item { marks: vec![Mark::Heading { level: 9, title: String::new() }], ..Item::default() }], 0.0)
-            }
-            "p" if has_class(node, "note") => {
-                (self.children(node, width, Style { colour: SOFT, ..Style::of_size(SMALL) }), 4.0)
-            }
+            "nav" => (
+                vec![Item {
+                    marks: vec![Mark::Heading {
+                        level: 9,
+                        title: String::new(),
+                    }],
+                    ..Item::default()
+                }],
+                0.0,
+            ),
+            "p" if has_class(node, "note") => (
+                self.children(
+                    node,
+                    width,
+                    Style {
+                        colour: SOFT,
+                        ..Style::of_size(SMALL)
+                    },
+                ),
+                4.0,
+            ),
             "p" => (self.children(node, width, style), 5.0),
             "ul" => (self.list(node, width, style), 4.0),
             "dl" => (self.definitions(node, width, style), 5.0),
             "pre" => (self.code(node, width), 5.0),
-            "table" => {
-                (table::rows(node, width, self.fonts, has_class(node, "triangle") || has_class(node, "dense")), 6.0)
-            }
+            "table" => (
+                table::rows(
+                    node,
+                    width,
+                    self.fonts,
+                    has_class(node, "triangle") || has_class(node, "dense"),
+                ),
+                6.0,
+            ),
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, Style::of_size(SMALL)), 1.0),
             "figure" => (vec![together(&self.children(node, width, style))], 8.0),
             "div" if has_class(node, "legend") || has_class(node, "keys") => {
                 (self.children(node, width, Style::of_size(SMALL)), 2.0)
             }
-            "div" if ["figures", "panels", "triangles"].iter().any(|c| has_class(node, c)) => {
+            "div"
+                if ["figures", "panels", "triangles"]
+                    .iter()
+                    .any(|c| has_class(node, c)) =>
+            {
                 (self.side_by_side(node, width, style), 2.0)
             }
             _ => (self.children(node, width, style), 0.0),
@@ -118,7 +170,13 @@ impl<'a> Flow<'a> {
         if let (Some(first), Some(level)) = (heading.first_mut(), level) {
             first.marks.push(Mark::Heading { level, title });
             if level == 0 {
-                first.marks.push(Mark::Fill { x: 0.0, y: -3.0, width, height: 0.9, colour: super::item::INK });
+                first.marks.push(Mark::Fill {
+                    x: 0.0,
+                    y: -3.0,
+                    width,
+                    height: 0.9,
+                    colour: super::item::INK,
+                });
             }
         }
         for line in &mut heading {
@@ -135,7 +193,12 @@ impl<'a> Flow<'a> {
             let mut own = indented(self.children(entry, width - INDENT, style), INDENT);
             if let Some(first) = own.first_mut() {
                 let y = style.size * 1.02;
-                first.marks.push(Mark::Text { x: 2.0, y, style, text: "\u{2022}".to_owned() });
+                first.marks.push(Mark::Text {
+                    x: 2.0,
+                    y,
+                    style,
+                    text: "\u{2022}".to_owned(),
+                });
             }
             own.push(Item::room(1.5));
             items.extend(own);
@@ -148,9 +211,19 @@ impl<'a> Flow<'a> {
         const INDENT: f32 = 90.0;
         let mut items: Vec<Item> = Vec::new();
         let mut term: Option<Item> = None;
-        for entry in node.descendants().filter(|n| n.has_tag_name("dt") || n.has_tag_name("dd")) {
+        for entry in node
+            .descendants()
+            .filter(|n| n.has_tag_name("dt") || n.has_tag_name("dd"))
+        {
             if entry.has_tag_name("dt") {
-                let words = self.children(entry, INDENT - 6.0, Style { colour: SOFT, ..style });
+                let words = self.children(
+                    entry,
+                    INDENT - 6.0,
+                    Style {
+                        colour: SOFT,
+                        ..style
+                    },
+                );
                 term = Some(together(&words));
                 continue;
             }
@@ -158,7 +231,10 @@ impl<'a> Flow<'a> {
             if let Some(term) = term.take() {
                 let missing = term.height - own.iter().map(|i| i.height).sum::<f32>();
                 if own.is_empty() || missing > 0.0 {
-                    own.push(Item { height: missing.max(0.0), ..Item::default() });
+                    own.push(Item {
+                        height: missing.max(0.0),
+                        ..Item::default()
+                    });
                 }
                 if let Some(first) = own.first_mut() {
                     first.absorb(&term, 0.0, 0.0);
@@ -176,15 +252,32 @@ impl<'a> Flow<'a> {
         for child in node.children() {
             reader.read(child, style, None);
         }
-        lines(&reader.words(), Setting { width, size: CODE, align: 0.0 }, self.fonts)
+        lines(
+            &reader.words(),
+            Setting {
+                width,
+                size: CODE,
+                align: 0.0,
+            },
+            self.fonts,
+        )
     }
 
     fn drawing(&mut self, node: Node, width: f32) -> Vec<Item> {
         let drawing = drawing::drawing(node, self.fonts);
         let scale = (width / drawing.width.max(1.0)).min(LARGEST);
         let height = drawing.height * scale;
-        let mark = Mark::Drawing { x: 0.0, y: 0.0, scale, drawing: Arc::new(drawing) };
-        vec![Item { height, marks: vec![mark], ..Item::default() }]
+        let mark = Mark::Drawing {
+            x: 0.0,
+            y: 0.0,
+            scale,
+            drawing: Arc::new(drawing),
+        };
+        vec![Item {
+            height,
+            marks: vec![mark],
+            ..Item::default()
+        }]
     }
 
     /// Two by two, each pair as high as the higher of the two.
@@ -193,8 +286,14 @@ impl<'a> Flow<'a> {
         let children: Vec<Node> = node.children().filter(Node::is_element).collect();
         let mut items = Vec::new();
         for pair in children.chunks(2) {
-            let cells: Vec<Item> = pair.iter().map(|child| together(&self.block(*child, column, style))).collect();
-            let mut row = Item { height: cells.iter().map(|c| c.height).fold(0.0, f32::max), ..Item::default() };
+            let cells: Vec<Item> = pair
+                .iter()
+                .map(|child| together(&self.block(*child, column, style)))
+                .collect();
+            let mut row = Item {
+                height: cells.iter().map(|c| c.height).fold(0.0, f32::max),
+                ..Item::default()
+            };
             for (cell, x) in cells.iter().zip([0.0, column + GAP]) {
                 row.absorb(cell, x, 0.0);
             }
@@ -226,7 +325,9 @@ fn indented(mut items: Vec<Item>, by: f32) -> Vec<Item> {
 pub fn plain(node: Node) -> String {
     let mut text = String::new();
     for part in node.descendants().filter(Node::is_text) {
-        let is_kept = part.ancestors().all(|a| !a.is_element() || !(is_for_screens(a) || a.has_tag_name("small")));
+        let is_kept = part
+            .ancestors()
+            .all(|a| !a.is_element() || !(is_for_screens(a) || a.has_tag_name("small")));
         if let (Some(part), true) = (part.text(), is_kept) {
             text.push_str(part);
         }
@@ -235,11 +336,14 @@ pub fn plain(node: Node) -> String {
 }
 
 pub fn has_class(node: Node, class: &str) -> bool {
-    node.attribute("class").is_some_and(|c| c.split(' ').any(|c| c == class))
+    node.attribute("class")
+        .is_some_and(|c| c.split(' ').any(|c| c == class))
 }
 
 fn is_block(node: Node) -> bool {
-    let inline = ["a", "b", "i", "em", "strong", "small", "sub", "span", "br", "code", "title", "desc"];
+    let inline = [
+        "a", "b", "i", "em", "strong", "small", "sub", "span", "br", "code", "title", "desc",
+    ];
     let name = node.tag_name().name();
     let is_key = name == "svg" && (has_class(node, "key") || has_class(node, "strip"));
     !inline.contains(&name) && !is_key

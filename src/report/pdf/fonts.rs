@@ -55,7 +55,10 @@ impl Fonts {
     /// # Errors
     /// None for the faces that are built in.
     pub fn load() -> Result<Fonts, String> {
-        Ok(Fonts { regular: Cut::read("Arimo", REGULAR)?, bold: Cut::read("Arimo-Bold", BOLD)? })
+        Ok(Fonts {
+            regular: Cut::read("Arimo", REGULAR)?,
+            bold: Cut::read("Arimo-Bold", BOLD)?,
+        })
     }
 
     fn cut(&self, weight: Weight) -> &Cut {
@@ -82,7 +85,13 @@ impl Fonts {
     }
 
     /// Writes a face as the objects that begin with `first`; it takes five.
-    pub fn write(&self, pdf: &mut Pdf, weight: Weight, first: Ref, compressed: &dyn Fn(&[u8]) -> Vec<u8>) {
+    pub fn write(
+        &self,
+        pdf: &mut Pdf,
+        weight: Weight,
+        first: Ref,
+        compressed: &dyn Fn(&[u8]) -> Vec<u8>,
+    ) {
         self.cut(weight).write(pdf, first, compressed);
     }
 }
@@ -91,10 +100,19 @@ impl Cut {
     fn read(name: &'static str, file: &'static [u8]) -> Result<Cut, String> {
         let face = Face::parse(file, 0).map_err(|e| format!("the font {name}: {e}"))?;
         let unit = 1000.0 / f32::from(face.units_per_em());
-        let width = |glyph: u16| f32::from(face.glyph_hor_advance(ttf_parser::GlyphId(glyph)).unwrap_or(0)) * unit;
+        let width = |glyph: u16| {
+            f32::from(
+                face.glyph_hor_advance(ttf_parser::GlyphId(glyph))
+                    .unwrap_or(0),
+            ) * unit
+        };
         let mut glyphs = BTreeMap::new();
-        for subtable in
-            face.tables().cmap.into_iter().flat_map(|t| t.subtables).filter(ttf_parser::cmap::Subtable::is_unicode)
+        for subtable in face
+            .tables()
+            .cmap
+            .into_iter()
+            .flat_map(|t| t.subtables)
+            .filter(ttf_parser::cmap::Subtable::is_unicode)
         {
             subtable.codepoints(|code| {
                 if let (Some(c), Some(glyph)) = (char::from_u32(code), subtable.glyph_index(code)) {
@@ -109,7 +127,12 @@ impl Cut {
             file,
             glyphs,
             widths: (0..face.number_of_glyphs()).map(width).collect(),
-            bounds: Rect::new(scaled(b.x_min), scaled(b.y_min), scaled(b.x_max), scaled(b.y_max)),
+            bounds: Rect::new(
+                scaled(b.x_min),
+                scaled(b.y_min),
+                scaled(b.x_max),
+                scaled(b.y_max),
+            ),
             ascent: scaled(face.ascender()),
             descent: scaled(face.descender()),
         })
@@ -129,10 +152,18 @@ impl Cut {
             .encoding_predefined(Name(b"Identity-H"))
             .descendant_font(cid)
             .to_unicode(unicode);
-        let system = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
+        let system = SystemInfo {
+            registry: Str(b"Adobe"),
+            ordering: Str(b"Identity"),
+            supplement: 0,
+        };
         let mut font = pdf.cid_font(cid);
-        font.subtype(CidFontType::Type2).base_font(name).system_info(system).font_descriptor(descriptor);
-        font.default_width(0.0).cid_to_gid_map_predefined(Name(b"Identity"));
+        font.subtype(CidFontType::Type2)
+            .base_font(name)
+            .system_info(system)
+            .font_descriptor(descriptor);
+        font.default_width(0.0)
+            .cid_to_gid_map_predefined(Name(b"Identity"));
         font.widths().consecutive(0, self.widths.iter().copied());
         font.finish();
         pdf.font_descriptor(descriptor)
@@ -143,11 +174,17 @@ impl Cut {
             .ascent(self.ascent)
             .descent(self.descent)
             .cap_height(688.0)
-            .stem_v(if self.name.ends_with("Bold") { 140.0 } else { 80.0 })
+            .stem_v(if self.name.ends_with("Bold") {
+                140.0
+            } else {
+                80.0
+            })
             .font_file2(file);
         let bytes = compressed(self.file);
         let length = i32::try_from(self.file.len()).unwrap_or(i32::MAX);
-        pdf.stream(file, &bytes).filter(Filter::FlateDecode).pair(Name(b"Length1"), length);
+        pdf.stream(file, &bytes)
+            .filter(Filter::FlateDecode)
+            .pair(Name(b"Length1"), length);
         let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
         // A hyphen and one that may be left out look alike: what is read is the former, which comes first.
         let mut known = BTreeSet::new();
@@ -156,6 +193,7 @@ impl Cut {
                 map.pair(*glyph, *c);
             }
         }
-        pdf.cmap(unicode, &compressed(&map.finish())).filter(Filter::FlateDecode);
+        pdf.cmap(unicode, &compressed(&map.finish()))
+            .filter(Filter::FlateDecode);
     }
 }

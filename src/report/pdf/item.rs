@@ -26,11 +26,20 @@ pub struct Style {
 
 impl Style {
     pub const fn of_size(size: f32) -> Style {
-        Style { weight: Weight::Regular, size, rise: 0.0, slanted: false, colour: INK }
+        Style {
+            weight: Weight::Regular,
+            size,
+            rise: 0.0,
+            slanted: false,
+            colour: INK,
+        }
     }
 
     pub fn bold(self) -> Style {
-        Style { weight: Weight::Bold, ..self }
+        Style {
+            weight: Weight::Bold,
+            ..self
+        }
     }
 }
 
@@ -38,17 +47,45 @@ impl Style {
 #[derive(Clone, Debug)]
 pub enum Mark {
     /// A text from its base line's left end.
-    Text { x: f32, y: f32, style: Style, text: String },
+    Text {
+        x: f32,
+        y: f32,
+        style: Style,
+        text: String,
+    },
     /// A drawing from its upper left corner, so many times as large as it is.
-    Drawing { x: f32, y: f32, scale: f32, drawing: Arc<Drawing> },
+    Drawing {
+        x: f32,
+        y: f32,
+        scale: f32,
+        drawing: Arc<Drawing>,
+    },
     /// A filled rectangle.
-    Fill { x: f32, y: f32, width: f32, height: f32, colour: Colour },
+    Fill {
+        x: f32,
+        y: f32,
+        width: f32,
+        height: f32,
+        colour: Colour,
+    },
     /// What leads to an anchor when it is pointed at.
-    Link { x: f32, y: f32, width: f32, height: f32, target: String },
+    Link {
+        x: f32,
+        y: f32,
+        width: f32,
+        height: f32,
+        target: String,
+    },
     /// Where links lead.
     Anchor { id: String },
     /// The page of an anchor, after a sign, with its right end here.
-    PageOf { x: f32, y: f32, style: Style, prefix: &'static str, target: String },
+    PageOf {
+        x: f32,
+        y: f32,
+        style: Style,
+        prefix: &'static str,
+        target: String,
+    },
     /// A heading for the outline: level from 0.
     Heading { level: usize, title: String },
 }
@@ -70,16 +107,25 @@ pub struct Item {
 
 impl Item {
     pub fn room(height: f32) -> Item {
-        Item { height, is_room: true, ..Item::default() }
+        Item {
+            height,
+            is_room: true,
+            ..Item::default()
+        }
     }
 
     pub fn page_break() -> Item {
-        Item { breaks: true, is_room: true, ..Item::default() }
+        Item {
+            breaks: true,
+            is_room: true,
+            ..Item::default()
+        }
     }
 
     /// The marks of another item moved by so much.
     pub fn absorb(&mut self, other: &Item, dx: f32, dy: f32) {
-        self.marks.extend(other.marks.iter().map(|mark| mark.moved(dx, dy)));
+        self.marks
+            .extend(other.marks.iter().map(|mark| mark.moved(dx, dy)));
     }
 }
 

@@ -32,15 +32,32 @@ use pages::{HEIGHT, Heading, MARGIN, Pages, WIDTH};
 /// Where the page is no well-formed XML: a template of the analyst's own need not be.
 pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
     // No element of a page is nested without end; a large report has a million nodes.
-    let options = ParsingOptions { allow_dtd: true, nodes_limit: u32::MAX, ..ParsingOptions::default() };
+    let options = ParsingOptions {
+        allow_dtd: true,
+        nodes_limit: u32::MAX,
+        ..ParsingOptions::default()
+    };
     let document = Document::parse_with_options(html, options).map_err(|e| e.to_string())?;
     let fonts = Fonts::load()?;
     let root = document.root_element();
-    let title = root.descendants().find(|n| n.has_tag_name("title")).and_then(|n| n.text()).unwrap_or_default().trim();
-    let body = root.children().find(|n| n.has_tag_name("body")).unwrap_or(root);
+    let title = root
+        .descendants()
+        .find(|n| n.has_tag_name("title"))
+        .and_then(|n| n.text())
+        .unwrap_or_default()
+        .trim();
+    let body = root
+        .children()
+        .find(|n| n.has_tag_name("body"))
+        .unwrap_or(root);
     let items = Flow::new(&fonts).children(body, WIDTH - 2.0 * MARGIN, Style::of_size(flow::TEXT));
     let pages = pages::paginate(items, &fonts);
-    Ok(Writer { fonts: &fonts, title, pages: &pages }.write())
+    Ok(Writer {
+        fonts: &fonts,
+        title,
+        pages: &pages,
+    }
+    .write())
 }
 
 /// Numbers of the objects.
@@ -68,7 +85,14 @@ fn page_ref(page: usize) -> Ref {
 }
 
 fn font_ref(weight: Weight) -> Ref {
-    Ref::new(FIRST_FONT + if weight == Weight::Regular { 0 } else { FONT_OBJECTS })
+    Ref::new(
+        FIRST_FONT
+            + if weight == Weight::Regular {
+                0
+            } else {
+                FONT_OBJECTS
+            },
+    )
 }
 
 impl Writer<'_> {
@@ -76,15 +100,29 @@ impl Writer<'_> {
         let mut pdf = Pdf::new();
         let total = self.pages.sheets.len();
         let mut catalog = pdf.catalog(Ref::new(CATALOG));
-        catalog.pages(Ref::new(TREE)).outlines(Ref::new(OUTLINE)).page_mode(PageMode::UseOutlines).lang(TextStr("en"));
-        catalog.viewer_preferences().pair(Name(b"DisplayDocTitle"), true);
+        catalog
+            .pages(Ref::new(TREE))
+            .outlines(Ref::new(OUTLINE))
+            .page_mode(PageMode::UseOutlines)
+            .lang(TextStr("en"));
+        catalog
+            .viewer_preferences()
+            .pair(Name(b"DisplayDocTitle"), true);
         catalog.finish();
-        pdf.document_info(Ref::new(INFO)).title(TextStr(self.title)).producer(TextStr("harvest"));
-        pdf.pages(Ref::new(TREE)).count(count(total)).kids((1..=total).map(page_ref));
+        pdf.document_info(Ref::new(INFO))
+            .title(TextStr(self.title))
+            .producer(TextStr("harvest"));
+        pdf.pages(Ref::new(TREE))
+            .count(count(total))
+            .kids((1..=total).map(page_ref));
         for weight in Weight::ALL {
-            self.fonts.write(&mut pdf, weight, font_ref(weight), &compressed);
+            self.fonts
+                .write(&mut pdf, weight, font_ref(weight), &compressed);
         }
-        let set: Vec<Set> = (1..=total).into_par_iter().map(|page| self.set(page)).collect();
+        let set: Vec<Set> = (1..=total)
+            .into_par_iter()
+            .map(|page| self.set(page))
+            .collect();
         for (page, set) in (1..).zip(set) {
             Self::page(&mut pdf, page, set);
         }
@@ -94,14 +132,40 @@ impl Writer<'_> {
 
     /// What stands on a page.
     fn set(&self, number: usize) -> Set {
-        let mut content = Content { fonts: self.fonts, out: String::new(), opacities: BTreeSet::from([100]) };
+        let mut content = Content {
+            fonts: self.fonts,
+            out: String::new(),
+            opacities: BTreeSet::from([100]),
+        };
         let mut links = Vec::new();
-        for mark in self.pages.sheets.get(number - 1).map_or(&[][..], |p| &p.marks) {
+        for mark in self
+            .pages
+            .sheets
+            .get(number - 1)
+            .map_or(&[][..], |p| &p.marks)
+        {
             match mark {
-                Mark::Link { x, y, width, height, target } => {
-                    links.extend(self.pages.anchors.get(target).map(|to| ([*x, *y, *width, *height], *to)));
+                Mark::Link {
+                    x,
+                    y,
+                    width,
+                    height,
+                    target,
+                } => {
+                    links.extend(
+                        self.pages
+                            .anchors
+                            .get(target)
+                            .map(|to| ([*x, *y, *width, *height], *to)),
+                    );
                 }
-                Mark::PageOf { x, y, style, prefix, target } => {
+                Mark::PageOf {
+                    x,
+                    y,
+                    style,
+                    prefix,
+                    target,
+                } => {
                     if let Some((page, _)) = self.pages.anchors.get(target) {
                         content.right(*x, *y, *style, &format!("{prefix}{page}"));
                     }
@@ -110,13 +174,19 @@ impl Writer<'_> {
             }
         }
         self.footer(&mut content, number);
-        Set { content: compressed(content.out.as_bytes()), opacities: content.opacities, links }
+        Set {
+            content: compressed(content.out.as_bytes()),
+            opacities: content.opacities,
+            links,
+        }
     }
 
     fn page(pdf: &mut Pdf, number: usize, set: Set) {
         let (id, content_id) = (page_ref(number), Ref::new(page_ref(number).get() + 1));
         let mut page = pdf.page(id);
-        page.media_box(Rect::new(0.0, 0.0, WIDTH, HEIGHT)).parent(Ref::new(TREE)).contents(content_id);
+        page.media_box(Rect::new(0.0, 0.0, WIDTH, HEIGHT))
+            .parent(Ref::new(TREE))
+            .contents(content_id);
         let mut resources = page.resources();
         let mut fonts = resources.fonts();
         for weight in Weight::ALL {
@@ -137,20 +207,34 @@ impl Writer<'_> {
         if !set.links.is_empty() {
             let mut annotations = page.insert(Name(b"Annots")).array();
             for ([x, y, width, height], (target, top)) in set.links {
-                let mut link = annotations.push().start::<pdf_writer::writers::Annotation>();
-                link.subtype(AnnotationType::Link).rect(Rect::new(x, HEIGHT - y - height, x + width, HEIGHT - y));
+                let mut link = annotations
+                    .push()
+                    .start::<pdf_writer::writers::Annotation>();
+                link.subtype(AnnotationType::Link).rect(Rect::new(
+                    x,
+                    HEIGHT - y - height,
+                    x + width,
+                    HEIGHT - y,
+                ));
                 link.border(0.0, 0.0, 0.0, None);
                 let mut action = link.action();
                 action.action_type(ActionType::GoTo);
-                action.destination().page(page_ref(target)).xyz(0.0, HEIGHT - top + 6.0, None);
+                action
+                    .destination()
+                    .page(page_ref(target))
+                    .xyz(0.0, HEIGHT - top + 6.0, None);
             }
         }
         page.finish();
-        pdf.stream(content_id, &set.content).filter(Filter::FlateDecode);
+        pdf.stream(content_id, &set.content)
+            .filter(Filter::FlateDecode);
     }
 
     fn footer(&self, content: &mut Content, page: usize) {
-        let style = Style { colour: SOFT, ..Style::of_size(7.5) };
+        let style = Style {
+            colour: SOFT,
+            ..Style::of_size(7.5)
+        };
         let y = HEIGHT - 28.0;
         content.mark(&Mark::Fill {
             x: MARGIN,
@@ -159,8 +243,18 @@ impl Writer<'_> {
             height: 0.4,
             colour: item::RULE,
         });
-        content.mark(&Mark::Text { x: MARGIN, y, style, text: self.title.to_owned() });
-        content.right(WIDTH - MARGIN, y, style, &format!("page {page} of {}", self.pages.sheets.len()));
+        content.mark(&Mark::Text {
+            x: MARGIN,
+            y,
+            style,
+            text: self.title.to_owned(),
+        });
+        content.right(
+            WIDTH - MARGIN,
+            y,
+            style,
+            &format!("page {page} of {}", self.pages.sheets.len()),
+        );
     }
 
     /// The headings as a tree of two levels, the second folded.
@@ -168,10 +262,14 @@ impl Writer<'_> {
         let headings = &self.pages.headings;
         let first = FIRST_PAGE + 2 * count(self.pages.sheets.len());
         let id = |i: usize| Ref::new(first + count(i));
-        let chapters: Vec<usize> = (0..headings.len()).filter(|i| headings[*i].level == 0).collect();
+        let chapters: Vec<usize> = (0..headings.len())
+            .filter(|i| headings[*i].level == 0)
+            .collect();
         let mut root = pdf.outline(Ref::new(OUTLINE));
         if let (Some(from), Some(to)) = (chapters.first(), chapters.last()) {
-            root.first(id(*from)).last(id(*to)).count(count(chapters.len()));
+            root.first(id(*from))
+                .last(id(*to))
+                .count(count(chapters.len()));
         }
         root.finish();
         for (place, &chapter) in chapters.iter().enumerate() {
@@ -186,7 +284,9 @@ impl Writer<'_> {
                 item.next(id(end));
             }
             if end > chapter + 1 {
-                item.first(id(chapter + 1)).last(id(end - 1)).count(-count(end - chapter - 1));
+                item.first(id(chapter + 1))
+                    .last(id(end - 1))
+                    .count(-count(end - chapter - 1));
             }
             item.finish();
             for (part, heading) in headings.iter().enumerate().take(end).skip(chapter + 1) {
@@ -205,7 +305,9 @@ impl Writer<'_> {
 
 fn describe(item: &mut pdf_writer::writers::OutlineItem, heading: &Heading, parent: Ref) {
     item.title(TextStr(&heading.title)).parent(parent);
-    item.dest().page(page_ref(heading.page)).xyz(0.0, HEIGHT - heading.y + 6.0, None);
+    item.dest()
+        .page(page_ref(heading.page))
+        .xyz(0.0, HEIGHT - heading.y + 6.0, None);
 }
 
 /// The operators of one page.
@@ -232,10 +334,17 @@ impl Content<'_> {
                 let [x, y, size] = [*x, HEIGHT - y, style.size].map(number);
                 let encoded = self.fonts.encoded(style.weight, text);
                 let (colour, font) = (rgb(style.colour), style.weight.resource());
-                let _ =
-                    writeln!(self.out, "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET");
+                let _ = writeln!(
+                    self.out,
+                    "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET"
+                );
             }
-            Mark::Drawing { x, y, scale, drawing } => {
+            Mark::Drawing {
+                x,
+                y,
+                scale,
+                drawing,
+            } => {
                 let [x, y] = [*x, HEIGHT - y].map(number);
                 // Four decimals: the scale of a drawing is multiplied by its width.
                 let _ = writeln!(self.out, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
@@ -243,18 +352,36 @@ impl Content<'_> {
                 self.out.push_str("Q\n");
                 self.opacities.extend(&drawing.opacities);
             }
-            Mark::Fill { x, y, width, height, colour } => {
+            Mark::Fill {
+                x,
+                y,
+                width,
+                height,
+                colour,
+            } => {
                 let [x, y, width, height] = [*x, HEIGHT - y - height, *width, *height].map(number);
-                let _ = writeln!(self.out, "{} rg {x} {y} {width} {height} re f", rgb(*colour));
+                let _ = writeln!(
+                    self.out,
+                    "{} rg {x} {y} {width} {height} re f",
+                    rgb(*colour)
+                );
             }
-            Mark::Link { .. } | Mark::Anchor { .. } | Mark::PageOf { .. } | Mark::Heading { .. } => {}
+            Mark::Link { .. }
+            | Mark::Anchor { .. }
+            | Mark::PageOf { .. }
+            | Mark::Heading { .. } => {}
         }
     }
 
     /// A text that ends at `x`.
     fn right(&mut self, x: f32, y: f32, style: Style, text: &str) {
         let x = x - self.fonts.width(style.weight, style.size, text);
-        self.mark(&Mark::Text { x, y, style, text: text.to_owned() });
+        self.mark(&Mark::Text {
+            x,
+            y,
+            style,
+            text: text.to_owned(),
+        });
     }
 }
 

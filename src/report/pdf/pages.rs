@@ -44,7 +44,10 @@ const MOST_ENTRIES: usize = 400;
 /// Puts the items on pages.
 pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
     let items = with_contents(items, fonts);
-    let mut pages = Pages { sheets: vec![Page::default()], ..Pages::default() };
+    let mut pages = Pages {
+        sheets: vec![Page::default()],
+        ..Pages::default()
+    };
     let mut y = TOP;
     for (i, item) in items.iter().enumerate() {
         let is_full = y + item.height + kept(&items, i) > HEIGHT - BOTTOM;
@@ -77,7 +80,11 @@ fn kept(items: &[Item], i: usize) -> f32 {
         last = Some(next);
     }
     // What is higher than a page cannot be kept.
-    if height < 0.8 * (HEIGHT - TOP - BOTTOM) { height } else { 0.0 }
+    if height < 0.8 * (HEIGHT - TOP - BOTTOM) {
+        height
+    } else {
+        0.0
+    }
 }
 
 impl Pages {
@@ -89,7 +96,12 @@ impl Pages {
                     self.anchors.insert(id.clone(), (page, y));
                 }
                 Mark::Heading { level, title } => {
-                    self.headings.push(Heading { level: *level, title: title.clone(), page, y });
+                    self.headings.push(Heading {
+                        level: *level,
+                        title: title.clone(),
+                        page,
+                        y,
+                    });
                 }
                 other => {
                     if let Some(last) = self.sheets.last_mut() {
@@ -103,8 +115,20 @@ impl Pages {
 
 /// The items with a line for each heading where the contents belong, and an anchor at each heading for it.
 fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
-    let is_place = |item: &Item| item.marks.iter().any(|m| matches!(m, Mark::Heading { level: CONTENTS, .. }));
-    let Some(at) = items.iter().position(is_place) else { return items };
+    let is_place = |item: &Item| {
+        item.marks.iter().any(|m| {
+            matches!(
+                m,
+                Mark::Heading {
+                    level: CONTENTS,
+                    ..
+                }
+            )
+        })
+    };
+    let Some(at) = items.iter().position(is_place) else {
+        return items;
+    };
     let mut entries = Vec::new();
     for item in &mut items {
         let found = item.marks.iter().find_map(|m| match m {
@@ -118,12 +142,25 @@ fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
         }
     }
     let few = entries.len() <= MOST_ENTRIES;
-    let lines: Vec<Item> =
-        entries.iter().filter(|e| few || e.0 == 0).map(|(level, title, id)| line(*level, title, id, fonts)).collect();
+    let lines: Vec<Item> = entries
+        .iter()
+        .filter(|e| few || e.0 == 0)
+        .map(|(level, title, id)| line(*level, title, id, fonts))
+        .collect();
     let mut contents = vec![Item::room(8.0)];
     let style = Style::of_size(10.5).bold();
-    let title = Mark::Text { x: 0.0, y: 10.5, style, text: "Contents".to_owned() };
-    contents.push(Item { height: 16.0, marks: vec![title], keep: true, ..Item::default() });
+    let title = Mark::Text {
+        x: 0.0,
+        y: 10.5,
+        style,
+        text: "Contents".to_owned(),
+    };
+    contents.push(Item {
+        height: 16.0,
+        marks: vec![title],
+        keep: true,
+        ..Item::default()
+    });
     contents.extend(in_columns(&lines));
     items.splice(at..=at, contents);
     items
@@ -141,13 +178,34 @@ fn line(level: usize, title: &str, id: &str, fonts: &Fonts) -> Item {
     }
     let target = id.to_owned();
     let height = 11.0;
-    let page = Style { weight: Weight::Regular, colour: SOFT, ..style };
+    let page = Style {
+        weight: Weight::Regular,
+        colour: SOFT,
+        ..style
+    };
     Item {
         height,
         marks: vec![
-            Mark::Text { x, y: 8.5, style, text },
-            Mark::PageOf { x: COLUMN, y: 8.5, style: page, prefix: "", target: target.clone() },
-            Mark::Link { x, y: 0.0, width: COLUMN - x, height, target },
+            Mark::Text {
+                x,
+                y: 8.5,
+                style,
+                text,
+            },
+            Mark::PageOf {
+                x: COLUMN,
+                y: 8.5,
+                style: page,
+                prefix: "",
+                target: target.clone(),
+            },
+            Mark::Link {
+                x,
+                y: 0.0,
+                width: COLUMN - x,
+                height,
+                target,
+            },
         ],
         ..Item::default()
     }

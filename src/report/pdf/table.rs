@@ -52,7 +52,13 @@ pub fn rows(table: Node, width: f32, fonts: &Fonts, is_dense: bool) -> Vec<Item>
         let colour = if *is_head { INK } else { RULE };
         if !is_dense {
             let thickness = if *is_head { 0.8 } else { 0.4 };
-            item.marks.push(Mark::Fill { x: 0.0, y: item.height - 0.4, width: full, height: thickness, colour });
+            item.marks.push(Mark::Fill {
+                x: 0.0,
+                y: item.height - 0.4,
+                width: full,
+                height: thickness,
+                colour,
+            });
         }
         if *is_head {
             item.keep = true;
@@ -69,8 +75,13 @@ fn cells(table: Node, fonts: &Fonts, size: f32) -> Vec<(bool, Vec<Cell>)> {
     let rows = table.descendants().filter(|n| n.has_tag_name("tr"));
     rows.map(|row| {
         let is_head = row.parent().is_some_and(|p| p.has_tag_name("thead"));
-        let own = row.children().filter(|n| (n.has_tag_name("td") || n.has_tag_name("th")) && !is_for_screens(*n));
-        (is_head, own.map(|cell| read(cell, is_head, fonts, size)).collect())
+        let own = row
+            .children()
+            .filter(|n| (n.has_tag_name("td") || n.has_tag_name("th")) && !is_for_screens(*n));
+        (
+            is_head,
+            own.map(|cell| read(cell, is_head, fonts, size)).collect(),
+        )
     })
     .collect()
 }
@@ -88,7 +99,11 @@ fn read(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
     for child in cell.children() {
         reader.read(child, style, None);
     }
-    Cell { words: reader.words(), align: if has_class(cell, "n") { 1.0 } else { 0.0 }, shade: shade.map(|s| s.1) }
+    Cell {
+        words: reader.words(),
+        align: if has_class(cell, "n") { 1.0 } else { 0.0 },
+        shade: shade.map(|s| s.1),
+    }
 }
 
 /// The least and the most that each column can use.
@@ -115,7 +130,11 @@ fn shared(least: &[f32], most: &[f32], room: f32) -> Vec<f32> {
         return least.iter().map(|w| w * room / least_sum).collect();
     }
     let share = (room - least_sum) / (most_sum - least_sum);
-    least.iter().zip(most).map(|(least, most)| least + share * (most - least)).collect()
+    least
+        .iter()
+        .zip(most)
+        .map(|(least, most)| least + share * (most - least))
+        .collect()
 }
 
 /// One row, with so much room above and below its text.
@@ -125,7 +144,15 @@ fn row_item(row: &[Cell], columns: &[f32], size: f32, room: f32, fonts: &Fonts) 
     let mut shades = Vec::new();
     for (cell, width) in row.iter().zip(columns) {
         // A little more than the width, for sums of widths are not exact.
-        let set = lines(&cell.words, Setting { width: width + 0.05, size, align: cell.align }, fonts);
+        let set = lines(
+            &cell.words,
+            Setting {
+                width: width + 0.05,
+                size,
+                align: cell.align,
+            },
+            fonts,
+        );
         let mut y = room;
         for line in &set {
             item.absorb(line, x, y);
@@ -139,7 +166,13 @@ fn row_item(row: &[Cell], columns: &[f32], size: f32, room: f32, fonts: &Fonts) 
     let height = item.height;
     let fills = shades.into_iter().map(|(x, width, colour)| {
         let (x, width) = (x - 0.5 * GAP, width + GAP);
-        Mark::Fill { x, y: 0.0, width, height, colour }
+        Mark::Fill {
+            x,
+            y: 0.0,
+            width,
+            height,
+            colour,
+        }
     });
     item.marks.splice(0..0, fills);
     item

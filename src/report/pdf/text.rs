@@ -51,7 +51,13 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub fn new(fonts: &'a Fonts) -> Self {
-        Reader { fonts, words: Vec::new(), word: Word::default(), space: 0.0, is_preserved: false }
+        Reader {
+            fonts,
+            words: Vec::new(),
+            word: Word::default(),
+            space: 0.0,
+            is_preserved: false,
+        }
     }
 
     pub fn words(mut self) -> Vec<Word> {
@@ -61,7 +67,10 @@ impl<'a> Reader<'a> {
 
     /// Line ends are kept, as in `pre`.
     pub fn preserved(self) -> Self {
-        Reader { is_preserved: true, ..self }
+        Reader {
+            is_preserved: true,
+            ..self
+        }
     }
 
     pub fn read(&mut self, node: Node, style: Style, link: Option<&str>) {
@@ -75,9 +84,20 @@ impl<'a> Reader<'a> {
         let small = style.size * 0.86;
         let style = match name {
             "b" | "strong" | "th" => style.bold(),
-            "i" | "em" => Style { slanted: true, ..style },
-            "small" => Style { size: small, colour: SOFT, ..style },
-            "sub" => Style { size: style.size * 0.75, rise: -0.18 * style.size, ..style },
+            "i" | "em" => Style {
+                slanted: true,
+                ..style
+            },
+            "small" => Style {
+                size: small,
+                colour: SOFT,
+                ..style
+            },
+            "sub" => Style {
+                size: style.size * 0.75,
+                rise: -0.18 * style.size,
+                ..style
+            },
             _ => style,
         };
         match name {
@@ -89,7 +109,9 @@ impl<'a> Reader<'a> {
             }
             _ => {}
         }
-        let target = (name == "a").then(|| node.attribute("href")?.strip_prefix('#')).flatten();
+        let target = (name == "a")
+            .then(|| node.attribute("href")?.strip_prefix('#'))
+            .flatten();
         for child in node.children() {
             self.read(child, style, target.or(link));
         }
@@ -108,7 +130,11 @@ impl<'a> Reader<'a> {
                 self.pause(space);
                 self.word.breaks = self.is_preserved;
             }
-            let indent = if self.is_preserved { line.len() - line.trim_start().len() } else { 0 };
+            let indent = if self.is_preserved {
+                line.len() - line.trim_start().len()
+            } else {
+                0
+            };
             for (i, chunk) in line.split([' ', '\t']).enumerate() {
                 if i > indent {
                     self.pause(space);
@@ -124,7 +150,14 @@ impl<'a> Reader<'a> {
 
     fn push(&mut self, text: &str, style: Style, link: Option<&str>) {
         let width = self.fonts.width(style.weight, style.size, text);
-        self.part(Part::Text { text: text.to_owned(), style }, width, link);
+        self.part(
+            Part::Text {
+                text: text.to_owned(),
+                style,
+            },
+            width,
+            link,
+        );
     }
 
     fn part(&mut self, part: Part, width: f32, link: Option<&str>) {
@@ -144,7 +177,13 @@ impl<'a> Reader<'a> {
     }
 
     fn page_of(&mut self, target: &str, style: Style) {
-        let style = Style { size: 0.72 * style.size, colour: SOFT, weight: Weight::Regular, rise: 0.0, ..style };
+        let style = Style {
+            size: 0.72 * style.size,
+            colour: SOFT,
+            weight: Weight::Regular,
+            rise: 0.0,
+            ..style
+        };
         let width = self.fonts.width(style.weight, style.size, "\u{2192}999 ");
         self.part(Part::PageOf { style, width }, width, Some(target));
     }
@@ -163,8 +202,12 @@ impl<'a> Reader<'a> {
 
 /// What is of use on a screen alone.
 pub fn is_for_screens(node: Node) -> bool {
-    matches!(node.tag_name().name(), "script" | "style" | "head" | "button" | "input" | "label")
-        || node.attribute("class").is_some_and(|c| c.split(' ').any(|c| c == "screen"))
+    matches!(
+        node.tag_name().name(),
+        "script" | "style" | "head" | "button" | "input" | "label"
+    ) || node
+        .attribute("class")
+        .is_some_and(|c| c.split(' ').any(|c| c == "screen"))
 }
 
 /// How words fill a width.
@@ -182,7 +225,11 @@ pub fn widths(words: &[Word]) -> (f32, f32) {
     let mut line = 0.0;
     let mut longest: f32 = 0.0;
     for word in words {
-        line = if word.breaks || line == 0.0 { word.width } else { line + word.space + word.width };
+        line = if word.breaks || line == 0.0 {
+            word.width
+        } else {
+            line + word.space + word.width
+        };
         longest = longest.max(line);
     }
     (widest, longest)
@@ -213,9 +260,15 @@ fn pieces(word: &Word, width: f32, fonts: &Fonts) -> Vec<Word> {
     if word.width <= width {
         return vec![word.clone()];
     }
-    let mut pieces = vec![Word { space: word.space, breaks: word.breaks, ..Word::default() }];
+    let mut pieces = vec![Word {
+        space: word.space,
+        breaks: word.breaks,
+        ..Word::default()
+    }];
     let mut add = |part: Part, link: &Option<String>, of: f32| {
-        let is_full = pieces.last().is_some_and(|p| !p.parts.is_empty() && p.width + of > width);
+        let is_full = pieces
+            .last()
+            .is_some_and(|p| !p.parts.is_empty() && p.width + of > width);
         if is_full {
             pieces.push(Word::default());
         }
@@ -230,7 +283,14 @@ fn pieces(word: &Word, width: f32, fonts: &Fonts) -> Vec<Word> {
                 for c in text.chars() {
                     let text = c.to_string();
                     let of = fonts.width(style.weight, style.size, &text);
-                    add(Part::Text { text, style: *style }, link, of);
+                    add(
+                        Part::Text {
+                            text,
+                            style: *style,
+                        },
+                        link,
+                        of,
+                    );
                 }
             }
             Part::Drawing(drawing) => add(part.clone(), link, drawing.width * PX + 3.0),
@@ -245,18 +305,30 @@ fn set(line: &[Word], setting: Setting, fonts: &Fonts) -> Item {
     let mut x = (setting.width - used).max(0.0) * setting.align;
     let height = setting.size * LEADING;
     let base = setting.size * 1.02;
-    let mut item = Item { height, ..Item::default() };
+    let mut item = Item {
+        height,
+        ..Item::default()
+    };
     // Neighbours that are set alike are one text, so that it can be found and copied whole.
     let mut run: Option<(f32, Style, String)> = None;
     let end = |run: &mut Option<(f32, Style, String)>, item: &mut Item| {
         if let Some((x, style, text)) = run.take() {
-            item.marks.push(Mark::Text { x, y: base - style.rise, style, text });
+            item.marks.push(Mark::Text {
+                x,
+                y: base - style.rise,
+                style,
+                text,
+            });
         }
     };
     for word in line {
-        let blank = run.as_ref().map(|(_, style, _)| fonts.width(style.weight, style.size, " "));
+        let blank = run
+            .as_ref()
+            .map(|(_, style, _)| fonts.width(style.weight, style.size, " "));
         match (&mut run, blank) {
-            (Some((_, _, text)), Some(blank)) if (word.space - blank).abs() < 0.01 => text.push(' '),
+            (Some((_, _, text)), Some(blank)) if (word.space - blank).abs() < 0.01 => {
+                text.push(' ')
+            }
             _ if word.space > 0.0 => end(&mut run, &mut item),
             _ => {}
         }
@@ -277,7 +349,12 @@ fn set(line: &[Word], setting: Setting, fonts: &Fonts) -> Item {
                 Part::Drawing(drawing) => {
                     end(&mut run, &mut item);
                     let y = base - 0.36 * setting.size - 0.5 * drawing.height * PX;
-                    item.marks.push(Mark::Drawing { x, y, scale: PX, drawing: Arc::clone(drawing) });
+                    item.marks.push(Mark::Drawing {
+                        x,
+                        y,
+                        scale: PX,
+                        drawing: Arc::clone(drawing),
+                    });
                     x += drawing.width * PX + 3.0;
                 }
                 Part::PageOf { style, width } => {
@@ -285,12 +362,24 @@ fn set(line: &[Word], setting: Setting, fonts: &Fonts) -> Item {
                     let target = link.clone().unwrap_or_default();
                     x += width;
                     let right = x - fonts.width(style.weight, style.size, " ");
-                    item.marks.push(Mark::PageOf { x: right, y: base, style: *style, prefix: "\u{2192}", target });
+                    item.marks.push(Mark::PageOf {
+                        x: right,
+                        y: base,
+                        style: *style,
+                        prefix: "\u{2192}",
+                        target,
+                    });
                 }
             }
             if let Some(target) = link {
                 let (width, target) = (x - from, target.clone());
-                item.marks.push(Mark::Link { x: from, y: 0.0, width, height, target });
+                item.marks.push(Mark::Link {
+                    x: from,
+                    y: 0.0,
+                    width,
+                    height,
+                    target,
+                });
             }
         }
     }

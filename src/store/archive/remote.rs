@@ -22,14 +22,30 @@ pub(super) fn find(archive: &str) -> Result<BTreeSet<PathBuf>, Error> {
     let place = Path::new(archive);
     let plain = archive.split(['*', '?', '[']).next().unwrap_or_default();
     let is_glob = plain.len() < archive.len();
-    let stem = if is_glob { plain.rsplit_once('/').map_or(plain, |(folder, _)| folder) } else { plain };
+    let stem = if is_glob {
+        plain.rsplit_once('/').map_or(plain, |(folder, _)| folder)
+    } else {
+        plain
+    };
     let glob = Pattern::new(archive.trim_end_matches('/'));
-    let glob = glob.map_err(|e| Error::Archive { place: place.into(), what: format!("not a glob: {e}") })?;
+    let glob = glob.map_err(|e| Error::Archive {
+        place: place.into(),
+        what: format!("not a glob: {e}"),
+    })?;
     let listed = object::list(Path::new(stem)).map_err(|e| e.at(place))?;
     let folder = archive.trim_end_matches('/');
-    let is_meant = |object: &str| if is_glob { matches(&glob, object) } else { is_below(folder, object) };
+    let is_meant = |object: &str| {
+        if is_glob {
+            matches(&glob, object)
+        } else {
+            is_below(folder, object)
+        }
+    };
     let mut found = BTreeSet::new();
-    for (path, about) in listed.into_iter().filter(|(path, _)| path.to_str().is_some_and(is_meant)) {
+    for (path, about) in listed
+        .into_iter()
+        .filter(|(path, _)| path.to_str().is_some_and(is_meant))
+    {
         object::remember(&path, &about).map_err(|e| e.at(place))?;
         found.insert(path);
     }
@@ -39,14 +55,22 @@ pub(super) fn find(archive: &str) -> Result<BTreeSet<PathBuf>, Error> {
 /// Whether an object lies in a folder, or is the one of this name; names that begin with a dot or an underscore are other
 /// programs' own.
 fn is_below(folder: &str, object: &str) -> bool {
-    let Some(rest) = object.strip_prefix(folder) else { return false };
-    let is_flight = || rest.rsplit_once('.').is_some_and(|(_, e)| e.eq_ignore_ascii_case("parquet"));
+    let Some(rest) = object.strip_prefix(folder) else {
+        return false;
+    };
+    let is_flight = || {
+        rest.rsplit_once('.')
+            .is_some_and(|(_, e)| e.eq_ignore_ascii_case("parquet"))
+    };
     rest.is_empty() || rest.starts_with('/') && is_flight() && !rest.split('/').any(is_hidden)
 }
 
 /// Whether a glob matches an object, or a folder that it lies in.
 fn matches(glob: &Pattern, object: &str) -> bool {
-    let options = MatchOptions { require_literal_separator: true, ..MatchOptions::new() };
+    let options = MatchOptions {
+        require_literal_separator: true,
+        ..MatchOptions::new()
+    };
     let mut folders = object.match_indices('/').map(|(at, _)| &object[..at]);
     glob.matches_with(object, options)
         || folders.any(|folder| glob.matches_with(folder, options) && is_below(folder, object))
@@ -59,7 +83,11 @@ pub(super) fn why(path: &Path, error: &ParquetError) -> String {
 
 /// The bytes of an object that these rows of a column take: of each row group the column's pages that hold them, where the
 /// file tells its pages, else all of the column; and the dictionary before them.
-pub(super) fn stretches(metadata: &ParquetMetaData, column: usize, rows: &Range<usize>) -> Vec<Range<u64>> {
+pub(super) fn stretches(
+    metadata: &ParquetMetaData,
+    column: usize,
+    rows: &Range<usize>,
+) -> Vec<Range<u64>> {
     let mut stretches = Vec::new();
     let mut end = 0;
     for (index, group) in metadata.row_groups().iter().enumerate() {
@@ -70,17 +98,28 @@ pub(super) fn stretches(metadata: &ParquetMetaData, column: usize, rows: &Range<
         }
         let (from, length) = group.column(column).byte_range();
         let whole = from..from.saturating_add(length);
-        let pages = metadata.offset_index().and_then(|i| i.get(index)?.get(column));
+        let pages = metadata
+            .offset_index()
+            .and_then(|i| i.get(index)?.get(column));
         let pages = pages.map(OffsetIndexMetaData::page_locations);
         let Some(pages) = pages.filter(|pages| !pages.is_empty()) else {
             stretches.push(whole);
             continue;
         };
-        let row =
-            |at: usize| pages.get(at).map_or(end, |p| start + usize::try_from(p.first_row_index).unwrap_or_default());
-        let needed: Vec<usize> =
-            (0..pages.len()).filter(|&at| row(at) < rows.end && rows.start < row(at + 1)).collect();
-        let begin = |at: usize| pages.get(at).and_then(|p| u64::try_from(p.offset).ok()).unwrap_or(whole.end);
+        let row = |at: usize| {
+            pages.get(at).map_or(end, |p| {
+                start + usize::try_from(p.first_row_index).unwrap_or_default()
+            })
+        };
+        let needed: Vec<usize> = (0..pages.len())
+            .filter(|&at| row(at) < rows.end && rows.start < row(at + 1))
+            .collect();
+        let begin = |at: usize| {
+            pages
+                .get(at)
+                .and_then(|p| u64::try_from(p.offset).ok())
+                .unwrap_or(whole.end)
+        };
         if let (Some(first), Some(last)) = (needed.first(), needed.last()) {
             stretches.push(whole.start..begin(0));
             stretches.push(begin(*first)..begin(last + 1));
@@ -114,7 +153,11 @@ mod tests {
     #[test]
     fn a_folder_holds_what_lies_below_it_and_is_not_hidden() {
         let folder = "s3://b/flights";
-        for inside in ["s3://b/flights/f1.parquet", "s3://b/flights/flight=007/part-0.PARQUET", "s3://b/flights"] {
+        for inside in [
+            "s3://b/flights/f1.parquet",
+            "s3://b/flights/flight=007/part-0.PARQUET",
+            "s3://b/flights",
+        ] {
             assert!(is_below(folder, inside), "{inside}");
         }
         for outside in [
@@ -130,42 +173,87 @@ mod tests {
     #[test]
     fn a_glob_matches_objects_and_folders_of_them() {
         let is_match = |glob: &str, object: &str| matches(&Pattern::new(glob).unwrap(), object);
-        assert!(is_match("s3://b/flights/*.parquet", "s3://b/flights/f1.parquet"));
-        assert!(!is_match("s3://b/flights/*.parquet", "s3://b/flights/old/f1.parquet"));
-        assert!(is_match("s3://b/**/*.parquet", "s3://b/flights/old/f1.parquet"));
-        assert!(is_match("s3://b/flights/flight=00*", "s3://b/flights/flight=007/part-0.parquet"));
-        assert!(!is_match("s3://b/flights/flight=00*", "s3://b/flights/flight=007/notes.txt"));
-        assert!(!is_match("s3://b/flights/flight=00?", "s3://b/flights/flight=010/part-0.parquet"));
+        assert!(is_match(
+            "s3://b/flights/*.parquet",
+            "s3://b/flights/f1.parquet"
+        ));
+        assert!(!is_match(
+            "s3://b/flights/*.parquet",
+            "s3://b/flights/old/f1.parquet"
+        ));
+        assert!(is_match(
+            "s3://b/**/*.parquet",
+            "s3://b/flights/old/f1.parquet"
+        ));
+        assert!(is_match(
+            "s3://b/flights/flight=00*",
+            "s3://b/flights/flight=007/part-0.parquet"
+        ));
+        assert!(!is_match(
+            "s3://b/flights/flight=00*",
+            "s3://b/flights/flight=007/notes.txt"
+        ));
+        assert!(!is_match(
+            "s3://b/flights/flight=00?",
+            "s3://b/flights/flight=010/part-0.parquet"
+        ));
     }
 
     /// A file of two row groups of 1000 rows in pages of 100, with or without the places of its pages.
     fn metadata(pages: PageIndexPolicy) -> ArrowReaderMetadata {
-        let schema = Arc::new(Schema::new(["a", "b"].map(|name| Field::new(name, DataType::Float64, false)).to_vec()));
+        let schema = Arc::new(Schema::new(
+            ["a", "b"]
+                .map(|name| Field::new(name, DataType::Float64, false))
+                .to_vec(),
+        ));
         let properties = WriterProperties::builder().set_max_row_group_row_count(Some(1000));
-        let properties = properties.set_data_page_row_count_limit(100).set_write_batch_size(100);
+        let properties = properties
+            .set_data_page_row_count_limit(100)
+            .set_write_batch_size(100);
         let values: ArrayRef = Arc::new((0..2000_i32).map(f64::from).collect::<Float64Array>());
         let batch = RecordBatch::try_new(schema.clone(), vec![values.clone(), values]).unwrap();
-        let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties.build())).unwrap();
+        let mut writer =
+            ArrowWriter::try_new(Vec::new(), schema, Some(properties.build())).unwrap();
         writer.write(&batch).unwrap();
         let bytes = bytes::Bytes::from(writer.into_inner().unwrap());
-        ArrowReaderMetadata::load(&bytes, ArrowReaderOptions::default().with_offset_index_policy(pages)).unwrap()
+        ArrowReaderMetadata::load(
+            &bytes,
+            ArrowReaderOptions::default().with_offset_index_policy(pages),
+        )
+        .unwrap()
     }
 
     #[test]
     fn only_the_pages_that_hold_the_rows_are_wanted() {
-        let (told, untold) = (metadata(PageIndexPolicy::Required), metadata(PageIndexPolicy::Skip));
+        let (told, untold) = (
+            metadata(PageIndexPolicy::Required),
+            metadata(PageIndexPolicy::Skip),
+        );
         let column = |group: usize| {
             let (from, length) = told.metadata().row_group(group).column(1).byte_range();
             from..from + length
         };
-        assert_eq!(stretches(untold.metadata(), 1, &(950..1050)), [column(0), column(1)]);
-        assert_eq!(stretches(told.metadata(), 1, &(0..2000)), [column(0), column(1)]);
+        assert_eq!(
+            stretches(untold.metadata(), 1, &(950..1050)),
+            [column(0), column(1)]
+        );
+        assert_eq!(
+            stretches(told.metadata(), 1, &(0..2000)),
+            [column(0), column(1)]
+        );
         let few = stretches(told.metadata(), 1, &(1310..1390));
         let bytes: u64 = few.iter().map(|s| s.end - s.start).sum();
         let whole = column(1);
         // The dictionary, which holds the thousand values, and one page of ten.
-        assert!(few.iter().all(|s| whole.start <= s.start && s.end <= whole.end), "{few:?} in {whole:?}");
-        assert!(few.len() == 2 && bytes < whole.end - whole.start, "{few:?} in {whole:?}");
+        assert!(
+            few.iter()
+                .all(|s| whole.start <= s.start && s.end <= whole.end),
+            "{few:?} in {whole:?}"
+        );
+        assert!(
+            few.len() == 2 && bytes < whole.end - whole.start,
+            "{few:?} in {whole:?}"
+        );
         assert_eq!(stretches(told.metadata(), 1, &(500..500)), []);
     }
 }

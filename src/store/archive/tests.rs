@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, StringArray, TimestampMillisecondArray,
+    ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, StringArray,
+    TimestampMillisecondArray,
 };
 use arrow::datatypes::Schema;
 use parquet::arrow::ArrowWriter;
@@ -17,9 +18,15 @@ type Column = (&'static str, Option<&'static str>, ArrayRef);
 fn parquet(columns: Vec<Column>) -> Vec<u8> {
     let field = |(name, unit, array): &Column| {
         let field = Field::new(*name, array.data_type().clone(), true);
-        field.with_metadata(unit.map(|u| (UNIT.to_owned(), u.to_owned())).into_iter().collect())
+        field.with_metadata(
+            unit.map(|u| (UNIT.to_owned(), u.to_owned()))
+                .into_iter()
+                .collect(),
+        )
     };
-    let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<Field>>()));
+    let schema = Arc::new(Schema::new(
+        columns.iter().map(field).collect::<Vec<Field>>(),
+    ));
     let arrays = columns.into_iter().map(|c| c.2).collect();
     let batch = RecordBatch::try_new(schema.clone(), arrays).unwrap();
     let mut bytes = Vec::new();
@@ -34,15 +41,32 @@ fn floats(values: &[f64]) -> ArrayRef {
 }
 
 fn simple(times: &[f64]) -> Vec<u8> {
-    parquet(vec![("time", Some("s"), floats(times)), ("q", Some("deg/s"), floats(times))])
+    parquet(vec![
+        ("time", Some("s"), floats(times)),
+        ("q", Some("deg/s"), floats(times)),
+    ])
 }
 
 fn channels() -> BTreeMap<String, Channel> {
     let channel = |name: &str, signal: &str, unit: &str| {
         let (signal, unit) = (signal.to_owned(), unit.to_owned());
-        (name.to_owned(), Channel { signal, unit, sign: 1.0, scale: 1.0, wraps_at: None })
+        (
+            name.to_owned(),
+            Channel {
+                signal,
+                unit,
+                sign: 1.0,
+                scale: 1.0,
+                wraps_at: None,
+            },
+        )
     };
-    [channel("time", "time_s", "s"), channel("q", "q_deg_s", "deg/s"), channel("obes", "obes", "0/1")].into()
+    [
+        channel("time", "time_s", "s"),
+        channel("q", "q_deg_s", "deg/s"),
+        channel("obes", "obes", "0/1"),
+    ]
+    .into()
 }
 
 /// An archive of these files, and the text that names it.
@@ -64,11 +88,23 @@ fn read_one(bytes: &[u8]) -> Result<RawFlight, Problem> {
 
 #[test]
 fn a_folder_gives_its_parquet_files_sorted_by_flight() {
-    let (_folder, text) =
-        archive(&[("b.parquet", b""), ("sub/a.parquet", b""), ("notes.txt", b""), ("_x.parquet", b"")]);
-    let ids: Vec<String> = find(&text).unwrap().into_iter().map(|f| f.flight_id).collect();
+    let (_folder, text) = archive(&[
+        ("b.parquet", b""),
+        ("sub/a.parquet", b""),
+        ("notes.txt", b""),
+        ("_x.parquet", b""),
+    ]);
+    let ids: Vec<String> = find(&text)
+        .unwrap()
+        .into_iter()
+        .map(|f| f.flight_id)
+        .collect();
     assert_eq!(ids, ["a", "b"]);
-    let ids: Vec<String> = find(&format!("{text}/b*")).unwrap().into_iter().map(|f| f.flight_id).collect();
+    let ids: Vec<String> = find(&format!("{text}/b*"))
+        .unwrap()
+        .into_iter()
+        .map(|f| f.flight_id)
+        .collect();
     assert_eq!(ids, ["b"]);
 }
 
@@ -83,24 +119,44 @@ fn the_files_of_a_hive_folder_are_one_flight_in_the_order_of_their_names() {
     let ids: Vec<&str> = found.iter().map(|f| f.flight_id.as_str()).collect();
     assert_eq!(ids, ["007", "008"]);
     let files = read(&found[0], &channels()).unwrap();
-    assert_eq!(files.iter().map(|f| f.columns["time"].values.clone()).collect::<Vec<_>>(), [[0.0, 1.0], [2.0, 3.0]]);
+    assert_eq!(
+        files
+            .iter()
+            .map(|f| f.columns["time"].values.clone())
+            .collect::<Vec<_>>(),
+        [[0.0, 1.0], [2.0, 3.0]]
+    );
 }
 
 #[test]
 fn a_second_record_of_one_name_is_the_first_s_rival() {
-    let (_folder, text) = archive(&[("one/f.parquet", b""), ("two/f.parquet", b""), ("two/g.parquet", b"")]);
+    let (_folder, text) = archive(&[
+        ("one/f.parquet", b""),
+        ("two/f.parquet", b""),
+        ("two/g.parquet", b""),
+    ]);
     let found = find(&text).unwrap();
     assert_eq!(found.len(), 2);
-    assert!(found[0].files[0].ends_with("one/f.parquet") && found[0].rivals[0].ends_with("two/f.parquet"));
+    assert!(
+        found[0].files[0].ends_with("one/f.parquet")
+            && found[0].rivals[0].ends_with("two/f.parquet")
+    );
     assert!(found[1].rivals.is_empty());
 }
 
 #[test]
 fn an_empty_archive_says_what_was_looked_for() {
     let (_folder, text) = archive(&[("notes.txt", b"")]);
-    for nothing in [text.clone(), format!("{text}/*.parquet"), format!("{text}/nowhere")] {
+    for nothing in [
+        text.clone(),
+        format!("{text}/*.parquet"),
+        format!("{text}/nowhere"),
+    ] {
         let error = find(&nothing).unwrap_err().to_string();
-        assert!(error.starts_with(&nothing) && error.contains("*.parquet"), "{error}");
+        assert!(
+            error.starts_with(&nothing) && error.contains("*.parquet"),
+            "{error}"
+        );
     }
 }
 
@@ -117,14 +173,26 @@ fn every_kind_of_number_becomes_a_number_and_a_null_none() {
         ("obes", None, obes),
     ]))
     .unwrap();
-    assert_eq!(flight.columns.keys().collect::<Vec<_>>(), ["obes", "q", "time"]);
+    assert_eq!(
+        flight.columns.keys().collect::<Vec<_>>(),
+        ["obes", "q", "time"]
+    );
     assert_eq!(flight.columns["time"].values, [1.0, 2.0, 3.0]);
     let q = &flight.columns["q"];
     assert_eq!(q.unit.as_deref(), Some("deg/s"));
-    assert_eq!((q.values[0], q.values[1].is_nan(), q.values[2]), (0.5, true, 1.5));
+    assert_eq!(
+        (q.values[0], q.values[1].is_nan(), q.values[2]),
+        (0.5, true, 1.5)
+    );
     assert_eq!(flight.columns["obes"].values, [1.0, 0.0, 1.0]);
     let small: ArrayRef = Arc::new(Int8Array::from(vec![0, 1]));
-    assert_eq!(read_one(&parquet(vec![("obes", None, small)])).unwrap().columns["obes"].values, [0.0, 1.0]);
+    assert_eq!(
+        read_one(&parquet(vec![("obes", None, small)]))
+            .unwrap()
+            .columns["obes"]
+            .values,
+        [0.0, 1.0]
+    );
 }
 
 #[test]
@@ -137,7 +205,11 @@ fn timestamps_become_seconds() {
 #[test]
 fn a_column_of_text_is_named_with_the_type_found_and_expected() {
     let q: ArrayRef = Arc::new(StringArray::from(vec!["1.0", "2.0"]));
-    let problem = read_one(&parquet(vec![("time", None, floats(&[0.0, 1.0])), ("q", None, q)])).unwrap_err();
+    let problem = read_one(&parquet(vec![
+        ("time", None, floats(&[0.0, 1.0])),
+        ("q", None, q),
+    ]))
+    .unwrap_err();
     assert_eq!(problem.flight_id, "f");
     assert!(problem.place.ends_with("f.parquet"));
     let expected = "column `q` (signal `q_deg_s`) is of type Utf8; expected a number (float, integer or boolean)";
@@ -148,16 +220,29 @@ fn a_column_of_text_is_named_with_the_type_found_and_expected() {
 fn a_timestamp_where_no_time_is_meant_is_refused() {
     let q: ArrayRef = Arc::new(TimestampMillisecondArray::from(vec![1]));
     let problem = read_one(&parquet(vec![("q", None, q)])).unwrap_err();
-    assert!(problem.reason.contains("is of type Timestamp"), "{}", problem.reason);
+    assert!(
+        problem.reason.contains("is of type Timestamp"),
+        "{}",
+        problem.reason
+    );
 }
 
 #[test]
 fn truncated_and_other_files_are_named_with_the_reason() {
     let whole = simple(&[0.0, 1.0, 2.0]);
-    for bytes in [&whole[..whole.len() - 10], &whole[..20], b"", b"time,q\n0,1\n"] {
+    for bytes in [
+        &whole[..whole.len() - 10],
+        &whole[..20],
+        b"",
+        b"time,q\n0,1\n",
+    ] {
         let problem = read_one(bytes).unwrap_err();
         assert!(problem.place.ends_with("f.parquet"));
-        assert!(problem.reason.starts_with("not a readable Parquet file"), "{}", problem.reason);
+        assert!(
+            problem.reason.starts_with("not a readable Parquet file"),
+            "{}",
+            problem.reason
+        );
     }
 }
 
@@ -171,17 +256,28 @@ fn rows_are_read_from_the_middle_of_row_groups_and_pages() {
         .build();
     let mut bytes = Vec::new();
     let mut writer = ArrowWriter::try_new(&mut bytes, schema.clone(), Some(properties)).unwrap();
-    let values: Vec<Option<f64>> = (0..5000_i32).map(|k| (k % 7 != 0).then_some(f64::from(k))).collect();
-    writer.write(&RecordBatch::try_new(schema, vec![Arc::new(Float64Array::from(values))]).unwrap()).unwrap();
+    let values: Vec<Option<f64>> = (0..5000_i32)
+        .map(|k| (k % 7 != 0).then_some(f64::from(k)))
+        .collect();
+    writer
+        .write(&RecordBatch::try_new(schema, vec![Arc::new(Float64Array::from(values))]).unwrap())
+        .unwrap();
     writer.close().unwrap();
     let (_folder, text) = archive(&[("f.parquet", &bytes)]);
     let opened = open(&find(&text).unwrap()[0], &channels()).unwrap();
     assert_eq!((opened.files(), opened.rows(0)), (1, 5000));
     let mut read = Vec::new();
-    opened.read(0, "q", 950..3100, &mut |v| read.extend_from_slice(v)).unwrap();
+    opened
+        .read(0, "q", 950..3100, &mut |v| read.extend_from_slice(v))
+        .unwrap();
     assert_eq!(read.len(), 2150);
-    let right =
-        |row: usize, v: f64| if row.is_multiple_of(7) { v.is_nan() } else { v.to_bits() == (row as f64).to_bits() };
+    let right = |row: usize, v: f64| {
+        if row.is_multiple_of(7) {
+            v.is_nan()
+        } else {
+            v.to_bits() == (row as f64).to_bits()
+        }
+    };
     assert!(read.iter().enumerate().all(|(i, v)| right(950 + i, *v)));
     assert!(opened.read(0, "q", 4900..5001, &mut |_| {}).is_err());
 }

@@ -13,7 +13,8 @@ use object_store::aws::{AmazonS3, AmazonS3Builder};
 use object_store::list::{PaginatedListOptions, PaginatedListStore};
 use object_store::path::Path as Key;
 use object_store::{
-    BackoffConfig, Error, GetOptions, GetRange, MultipartUpload, ObjectMeta, ObjectStore, ObjectStoreExt, RetryConfig,
+    BackoffConfig, Error, GetOptions, GetRange, MultipartUpload, ObjectMeta, ObjectStore,
+    ObjectStoreExt, RetryConfig,
 };
 use tokio::runtime::Runtime;
 
@@ -58,11 +59,17 @@ struct Trouble {
 impl std::fmt::Debug for Client {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // Nothing more: the rest knows the credentials.
-        f.debug_struct("Client").field("bucket", &self.bucket).field("endpoint", &self.endpoint).finish_non_exhaustive()
+        f.debug_struct("Client")
+            .field("bucket", &self.bucket)
+            .field("endpoint", &self.endpoint)
+            .finish_non_exhaustive()
     }
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "as where there are no object stores")]
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "as where there are no object stores"
+)]
 pub fn available() -> Result<(), Failure> {
     Ok(())
 }
@@ -79,47 +86,71 @@ fn refuse_environment() -> Result<(), Failure> {
                     AWS_SESSION_TOKEN, AWS_ENDPOINT_URL where they are needed)";
         return Err(Failure::Lasting(what.to_owned()));
     }
-    let allowed =
-        set("AWS_ALLOW_HTTP").is_some_and(|v| matches!(v.to_lowercase().as_str(), "true" | "1" | "yes" | "on"));
+    let allowed = set("AWS_ALLOW_HTTP")
+        .is_some_and(|v| matches!(v.to_lowercase().as_str(), "true" | "1" | "yes" | "on"));
     match ENDPOINTS.iter().find_map(|name| set(name)) {
-        Some(endpoint) if endpoint.starts_with("http://") && !allowed => Err(Failure::Lasting(format!(
-            "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true where nobody listens"
-        ))),
+        Some(endpoint) if endpoint.starts_with("http://") && !allowed => {
+            Err(Failure::Lasting(format!(
+                "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true where nobody listens"
+            )))
+        }
         _ => Ok(()),
     }
 }
 
 /// An error and what caused it, each once.
 fn words(error: &dyn std::error::Error) -> Vec<String> {
-    std::iter::successors(Some(error), |e| e.source()).map(ToString::to_string).collect()
+    std::iter::successors(Some(error), |e| e.source())
+        .map(ToString::to_string)
+        .collect()
 }
 
 /// What S3 calls an error.
 fn code(text: &str) -> Option<&str> {
-    text.split_once("<Code>")?.1.split_once("</Code>").map(|(code, _)| code)
+    text.split_once("<Code>")?
+        .1
+        .split_once("</Code>")
+        .map(|(code, _)| code)
 }
 
 impl Client {
     pub fn open(bucket: &str) -> Result<Client, Failure> {
         refuse_environment()?;
-        let backoff = BackoffConfig { max_backoff: Duration::from_secs(5), ..BackoffConfig::default() };
-        let retry = RetryConfig { max_retries: 6, retry_timeout: PATIENCE, backoff };
-        let store = AmazonS3Builder::from_env().with_bucket_name(bucket).with_retry(retry).build();
+        let backoff = BackoffConfig {
+            max_backoff: Duration::from_secs(5),
+            ..BackoffConfig::default()
+        };
+        let retry = RetryConfig {
+            max_retries: 6,
+            retry_timeout: PATIENCE,
+            backoff,
+        };
+        let store = AmazonS3Builder::from_env()
+            .with_bucket_name(bucket)
+            .with_retry(retry)
+            .build();
         let store = store.map_err(|e| {
             Failure::Lasting(format!(
                 "cannot connect as the environment's AWS_ variables say: {}",
                 words(&e).join(": ")
             ))
         })?;
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build();
         let runtime = runtime.map_err(|e| Failure::Passing(format!("cannot connect: {e}")))?;
         let region = || {
             format!(
                 "Amazon S3 in {}",
-                set("AWS_REGION").or_else(|| set("AWS_DEFAULT_REGION")).unwrap_or("us-east-1".to_owned())
+                set("AWS_REGION")
+                    .or_else(|| set("AWS_DEFAULT_REGION"))
+                    .unwrap_or("us-east-1".to_owned())
             )
         };
-        let endpoint = ENDPOINTS.iter().find_map(|name| set(name)).unwrap_or_else(region);
+        let endpoint = ENDPOINTS
+            .iter()
+            .find_map(|name| set(name))
+            .unwrap_or_else(region);
         Ok(Client {
             runtime,
             store,
@@ -131,7 +162,11 @@ impl Client {
     }
 
     /// The answer to a request about a key; none where there is no such object.
-    fn ask<T>(&self, key: &str, request: impl Future<Output = Result<T, Error>>) -> Result<Option<T>, Failure> {
+    fn ask<T>(
+        &self,
+        key: &str,
+        request: impl Future<Output = Result<T, Error>>,
+    ) -> Result<Option<T>, Failure> {
         let trouble = || self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
         let unanswered = |what: String| {
             trouble().failed.insert(key.to_owned(), what.clone());
@@ -172,29 +207,37 @@ impl Client {
         let (words, endpoint, bucket) = (words(error), &self.endpoint, &self.bucket);
         let text = words.join("\n");
         let code = code(&text);
-        let status = text.split_once("status code: ").map(|(_, rest)| rest.get(..3).unwrap_or_default());
-        let said = code.map(str::to_owned).or(status.map(|s| format!("status {s}"))).unwrap_or_default();
+        let status = text
+            .split_once("status code: ")
+            .map(|(_, rest)| rest.get(..3).unwrap_or_default());
+        let said = code
+            .map(str::to_owned)
+            .or(status.map(|s| format!("status {s}")))
+            .unwrap_or_default();
         let refused = |what: String| Told::Refused(Failure::Lasting(what));
         match (error, status) {
-            _ if code == Some("NoSuchBucket") => {
-                refused(format!("there is no bucket `{bucket}` at {endpoint}: create it, or name another"))
-            }
+            _ if code == Some("NoSuchBucket") => refused(format!(
+                "there is no bucket `{bucket}` at {endpoint}: create it, or name another"
+            )),
             (Error::NotFound { .. }, _) | (_, Some("404")) => Told::Missing,
-            (Error::Precondition { .. }, _) => {
-                Told::Refused(Failure::Passing("was replaced while it was read; the next run will read it".to_owned()))
-            }
-            (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) | (_, Some("401" | "403")) => {
-                refused(format!(
-                    "{endpoint} denies it ({said}): look at AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN \
+            (Error::Precondition { .. }, _) => Told::Refused(Failure::Passing(
+                "was replaced while it was read; the next run will read it".to_owned(),
+            )),
+            (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _)
+            | (_, Some("401" | "403")) => refused(format!(
+                "{endpoint} denies it ({said}): look at AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN \
                      in the environment, at AWS_REGION, and at what they may do in bucket `{bucket}`"
-                ))
-            }
+            )),
             (_, Some(status)) if status.starts_with(['3', '4']) => refused(format!(
                 "{endpoint} does not take the request ({said}): look at AWS_REGION and AWS_ENDPOINT_URL in the environment"
             )),
             _ => {
                 let last = words.last().map(String::as_str).unwrap_or_default();
-                let said = if said.is_empty() { last.to_owned() } else { said };
+                let said = if said.is_empty() {
+                    last.to_owned()
+                } else {
+                    said
+                };
                 Told::Nothing(format!(
                     "{endpoint} does not answer ({said}): look at AWS_ENDPOINT_URL and AWS_REGION in the environment, and at \
                      the network"
@@ -208,22 +251,40 @@ impl Client {
     }
 
     pub fn failed(&self, key: &str) -> Option<String> {
-        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).failed.get(key).cloned()
+        self.trouble
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .failed
+            .get(key)
+            .cloned()
     }
 
     /// All objects whose keys begin with this.
     pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, About>, Failure> {
         let (mut found, mut page_token) = (BTreeMap::new(), None);
         loop {
-            let options = PaginatedListOptions { page_token, ..PaginatedListOptions::default() };
+            let options = PaginatedListOptions {
+                page_token,
+                ..PaginatedListOptions::default()
+            };
             let prefix = (!prefix.is_empty()).then_some(prefix);
-            let page = self.ask(prefix.unwrap_or_default(), self.store.list_paginated(prefix, options))?;
+            let page = self.ask(
+                prefix.unwrap_or_default(),
+                self.store.list_paginated(prefix, options),
+            )?;
             let Some(page) = page else {
-                let what =
-                    format!("there is no bucket `{}` at {}: create it, or name another", self.bucket, self.endpoint);
+                let what = format!(
+                    "there is no bucket `{}` at {}: create it, or name another",
+                    self.bucket, self.endpoint
+                );
                 return Err(Failure::Lasting(what));
             };
-            found.extend(page.result.objects.into_iter().map(|o| (o.location.to_string(), about(&o))));
+            found.extend(
+                page.result
+                    .objects
+                    .into_iter()
+                    .map(|o| (o.location.to_string(), about(&o))),
+            );
             page_token = page.page_token;
             if page_token.is_none() {
                 return Ok(found);
@@ -232,11 +293,18 @@ impl Client {
     }
 
     pub fn remember(&self, key: String, about: About) {
-        self.listed.lock().unwrap_or_else(PoisonError::into_inner).insert(key, about);
+        self.listed
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(key, about);
     }
 
     pub fn listed(&self, key: &str) -> Option<About> {
-        self.listed.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned()
+        self.listed
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(key)
+            .cloned()
     }
 
     pub fn about(&self, key: &str) -> Result<Option<About>, Failure> {
@@ -258,18 +326,25 @@ impl Client {
             if_match: tag.map(str::to_owned),
             ..GetOptions::default()
         };
-        let bytes = self.ask(key, async { self.store.get_opts(&path, options).await?.bytes().await })?;
-        let gone = || Failure::Passing("vanished while it was read; the next run will see".to_owned());
+        let bytes = self.ask(key, async {
+            self.store.get_opts(&path, options).await?.bytes().await
+        })?;
+        let gone =
+            || Failure::Passing("vanished while it was read; the next run will see".to_owned());
         let bytes = bytes.ok_or_else(gone)?;
         if bytes.len() as u64 == expected {
             return Ok(bytes);
         }
-        Err(Failure::Passing(format!("gave {} bytes where {expected} were asked for", bytes.len())))
+        Err(Failure::Passing(format!(
+            "gave {} bytes where {expected} were asked for",
+            bytes.len()
+        )))
     }
 
     pub fn put(&self, key: &str, bytes: Vec<u8>) -> Result<(), Failure> {
         let path = Self::key(key)?;
-        self.written(self.ask(key, self.store.put(&path, bytes.into()))?).map(|_| ())
+        self.written(self.ask(key, self.store.put(&path, bytes.into()))?)
+            .map(|_| ())
     }
 
     pub fn remove(&self, key: &str) -> Result<(), Failure> {
@@ -312,7 +387,12 @@ impl Client {
 
     /// What is written is missing only where its bucket is.
     fn written<T>(&self, answer: Option<T>) -> Result<T, Failure> {
-        let what = || format!("there is no bucket `{}` at {}: create it, or name another", self.bucket, self.endpoint);
+        let what = || {
+            format!(
+                "there is no bucket `{}` at {}: create it, or name another",
+                self.bucket, self.endpoint
+            )
+        };
         answer.ok_or_else(|| Failure::Lasting(what()))
     }
 }
@@ -326,5 +406,8 @@ enum Told {
 }
 
 fn about(object: &ObjectMeta) -> About {
-    About { bytes: object.size, tag: object.e_tag.clone() }
+    About {
+        bytes: object.size,
+        tag: object.e_tag.clone(),
+    }
 }

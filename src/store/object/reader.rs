@@ -37,10 +37,21 @@ impl Reader {
     /// Begins to read an object; none where there is none.
     pub(super) fn of(path: &Path) -> Result<Option<Reader>, Failure> {
         let (client, key) = at(path)?;
-        let Some(about) = client.about(&key)? else { return Ok(None) };
+        let Some(about) = client.about(&key)? else {
+            return Ok(None);
+        };
         let wanted = std::iter::once(0..about.bytes).collect();
-        let source = Source { client, key, about, wanted, held: Mutex::default() };
-        Ok(Some(Reader { source: Arc::new(source), position: 0 }))
+        let source = Source {
+            client,
+            key,
+            about,
+            wanted,
+            held: Mutex::default(),
+        };
+        Ok(Some(Reader {
+            source: Arc::new(source),
+            position: 0,
+        }))
     }
 
     /// Begins to read an object that must be there.
@@ -48,7 +59,8 @@ impl Reader {
     /// # Errors
     /// Why it cannot be read.
     pub fn open(path: &Path) -> Result<Reader, Failure> {
-        Reader::of(path)?.ok_or_else(|| Failure::Passing("there is no such object (any more)".to_owned()))
+        Reader::of(path)?
+            .ok_or_else(|| Failure::Passing("there is no such object (any more)".to_owned()))
     }
 
     /// What is known of the object that is being read.
@@ -60,9 +72,20 @@ impl Reader {
     /// The same object, of which only these stretches are read.
     #[must_use]
     pub fn of_stretches(&self, wanted: Vec<Range<u64>>) -> Reader {
-        let Source { client, key, about, .. } = &*self.source;
+        let Source {
+            client, key, about, ..
+        } = &*self.source;
         let (client, key, about) = (client.clone(), key.clone(), about.clone());
-        Reader { source: Arc::new(Source { client, key, about, wanted, held: Mutex::default() }), position: 0 }
+        Reader {
+            source: Arc::new(Source {
+                client,
+                key,
+                about,
+                wanted,
+                held: Mutex::default(),
+            }),
+            position: 0,
+        }
     }
 }
 
@@ -76,10 +99,16 @@ impl Source {
         if !(*from <= start && end <= until) {
             let stretch = self.wanted.iter().find(|wanted| wanted.contains(&start));
             let ahead = stretch.map_or(end, |wanted| wanted.end.min(start.saturating_add(AHEAD)));
-            *held = (start, self.client.range(&self.key, start..ahead.max(end), self.about.tag.as_deref())?);
+            *held = (
+                start,
+                self.client
+                    .range(&self.key, start..ahead.max(end), self.about.tag.as_deref())?,
+            );
         }
         let (from, bytes) = &*held;
-        let skipped = usize::try_from(start - from).unwrap_or(usize::MAX).min(bytes.len());
+        let skipped = usize::try_from(start - from)
+            .unwrap_or(usize::MAX)
+            .min(bytes.len());
         Ok(bytes.slice(skipped..))
     }
 }
@@ -89,7 +118,10 @@ impl Read for Reader {
         if self.position >= self.source.about.bytes || out.is_empty() {
             return Ok(0);
         }
-        let bytes = self.source.bytes(self.position, 1).map_err(io::Error::other)?;
+        let bytes = self
+            .source
+            .bytes(self.position, 1)
+            .map_err(io::Error::other)?;
         let count = bytes.len().min(out.len());
         bytes.slice(..count).copy_to_slice(&mut out[..count]);
         self.position += count as u64;
@@ -107,13 +139,21 @@ impl ChunkReader for Reader {
     type T = Reader;
 
     fn get_read(&self, start: u64) -> Result<Reader, ParquetError> {
-        Ok(Reader { source: self.source.clone(), position: start })
+        Ok(Reader {
+            source: self.source.clone(),
+            position: start,
+        })
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
-        let bytes = self.source.bytes(start, length as u64).map_err(|e| ParquetError::External(Box::new(e)))?;
+        let bytes = self
+            .source
+            .bytes(start, length as u64)
+            .map_err(|e| ParquetError::External(Box::new(e)))?;
         if bytes.len() < length {
-            return Err(ParquetError::EOF(format!("{length} bytes from {start} on are beyond the object's end")));
+            return Err(ParquetError::EOF(format!(
+                "{length} bytes from {start} on are beyond the object's end"
+            )));
         }
         Ok(bytes.slice(..length))
     }

@@ -34,20 +34,35 @@ pub(super) fn rows(
     third: Option<&str>,
     wanted: impl Fn(&str) -> bool,
 ) -> Result<Vec<(usize, TunnelRow)>, Wrong> {
-    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options)
-        .map_err(|e| (usize::try_from(e.pos().row).ok(), format!("not readable as XML: {e}")))?;
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options).map_err(|e| {
+        (
+            usize::try_from(e.pos().row).ok(),
+            format!("not readable as XML: {e}"),
+        )
+    })?;
     let file = File::new(&document, third);
     if document.root_element().tag_name().name() != "DAVEfunc" {
-        return Err((Some(1), "not DAVE-ML: the outermost element must be `DAVEfunc`".into()));
+        return Err((
+            Some(1),
+            "not DAVE-ML: the outermost element must be `DAVEfunc`".into(),
+        ));
     }
     let mut rows = Vec::new();
     for function in children(document.root_element(), "function") {
-        let dependent = child(function, "dependentVarRef").or_else(|| child(function, "dependentVarPts"));
-        let name = dependent.and_then(|d| d.attribute("varID")).unwrap_or_default();
+        let dependent =
+            child(function, "dependentVarRef").or_else(|| child(function, "dependentVarPts"));
+        let name = dependent
+            .and_then(|d| d.attribute("varID"))
+            .unwrap_or_default();
         if wanted(name) {
             let line = file.line(function).unwrap_or(0);
-            rows.extend(rows_of(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)));
+            rows.extend(
+                rows_of(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)),
+            );
         }
     }
     if rows.is_empty() {
@@ -68,7 +83,10 @@ struct File<'a, 'input> {
     third: Option<&'a str>,
 }
 
-fn children<'a, 'input>(node: Node<'a, 'input>, name: &'static str) -> impl Iterator<Item = Node<'a, 'input>> {
+fn children<'a, 'input>(
+    node: Node<'a, 'input>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'input>> {
     node.children().filter(move |n| n.tag_name().name() == name)
 }
 
@@ -78,14 +96,21 @@ fn child<'a, 'input>(node: Node<'a, 'input>, name: &'static str) -> Option<Node<
 
 /// A name without what authors put between words.
 fn plain(name: &str) -> String {
-    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+    name.chars()
+        .filter(|c| c.is_alphanumeric())
+        .flat_map(char::to_lowercase)
+        .collect()
 }
 
 impl<'a, 'input> File<'a, 'input> {
     fn new(document: &'a Document<'input>, third: Option<&'a str>) -> File<'a, 'input> {
         let by_id = |name: &'static str, id: &'static str| {
-            let nodes = document.descendants().filter(move |n| n.tag_name().name() == name);
-            nodes.filter_map(move |n| Some((n.attribute(id)?, n))).collect::<BTreeMap<_, _>>()
+            let nodes = document
+                .descendants()
+                .filter(move |n| n.tag_name().name() == name);
+            nodes
+                .filter_map(move |n| Some((n.attribute(id)?, n)))
+                .collect::<BTreeMap<_, _>>()
         };
         File {
             document,
@@ -105,27 +130,47 @@ impl<'a, 'input> File<'a, 'input> {
     }
 
     fn unit(&self, variable: &str) -> &'a str {
-        self.variables.get(variable).and_then(|v| v.attribute("units")).unwrap_or("nd")
+        self.variables
+            .get(variable)
+            .and_then(|v| v.attribute("units"))
+            .unwrap_or("nd")
     }
 
     /// What the independent variable of a reference is.
     fn variable(&self, reference: Node) -> Result<Variable, Wrong> {
         let id = reference.attribute("varID").unwrap_or_default();
         let definition = self.variables.get(id);
-        let names = [Some(id), definition.and_then(|d| d.attribute("name"))].map(|n| plain(n.unwrap_or_default()));
+        let names = [Some(id), definition.and_then(|d| d.attribute("name"))]
+            .map(|n| plain(n.unwrap_or_default()));
         let is = |known: &[&str]| names.iter().any(|name| known.contains(&name.as_str()));
-        let is_third = self.third.is_some_and(|third| names.contains(&plain(third)));
-        if let Some(other) = reference.attribute("interpolate").filter(|i| *i != "linear") {
+        let is_third = self
+            .third
+            .is_some_and(|third| names.contains(&plain(third)));
+        if let Some(other) = reference
+            .attribute("interpolate")
+            .filter(|i| *i != "linear")
+        {
             let what = format!(
                 "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml says (tunnel: interpolation:)"
             );
             return Err(self.wrong(reference, what));
         }
-        if is(&["alpha", "alphadeg", "alpharad", "aoa", "angleofattack", "angleofattackdeg", "angleofattackrad"]) {
+        if is(&[
+            "alpha",
+            "alphadeg",
+            "alpharad",
+            "aoa",
+            "angleofattack",
+            "angleofattackdeg",
+            "angleofattackrad",
+        ]) {
             match self.unit(id) {
                 "deg" => Ok(Variable::Alpha { in_rad: false }),
                 "rad" => Ok(Variable::Alpha { in_rad: true }),
-                other => Err(self.wrong(reference, format!("angle of attack in `{other}`: deg or rad"))),
+                other => Err(self.wrong(
+                    reference,
+                    format!("angle of attack in `{other}`: deg or rad"),
+                )),
             }
         } else if is(&["mach", "machnumber"]) {
             Ok(Variable::Mach)
@@ -145,12 +190,22 @@ impl<'a, 'input> File<'a, 'input> {
             let axis = |p: &Node<'a, 'input>| Ok((self.variable(*p)?, self.numbers(*p)?));
             let axes = points.iter().map(axis).collect::<Result<_, Wrong>>()?;
             let source = child(function, "description").map(content);
-            return self.whole(function, Grid { axes, values: self.numbers(values)?, uncertainties: None, source });
+            return self.whole(
+                function,
+                Grid {
+                    axes,
+                    values: self.numbers(values)?,
+                    uncertainties: None,
+                    source,
+                },
+            );
         }
-        let definition = child(function, "functionDefn").ok_or_else(|| self.wrong(function, "no `functionDefn`"))?;
+        let definition = child(function, "functionDefn")
+            .ok_or_else(|| self.wrong(function, "no `functionDefn`"))?;
         let table = self.table(definition)?;
-        let variables: Vec<Variable> =
-            children(function, "independentVarRef").map(|r| self.variable(r)).collect::<Result<_, _>>()?;
+        let variables: Vec<Variable> = children(function, "independentVarRef")
+            .map(|r| self.variable(r))
+            .collect::<Result<_, _>>()?;
         let breakpoints: Vec<Vec<f64>> = children(table, "breakpointRefs")
             .flat_map(|refs| children(refs, "bpRef"))
             .map(|reference| self.breakpoints(reference))
@@ -158,16 +213,27 @@ impl<'a, 'input> File<'a, 'input> {
         if variables.len() != breakpoints.len() {
             return Err(self.wrong(
                 table,
-                format!("{} independent variables and {} breakpoints", variables.len(), breakpoints.len()),
+                format!(
+                    "{} independent variables and {} breakpoints",
+                    variables.len(),
+                    breakpoints.len()
+                ),
             ));
         }
         let data = child(table, "dataTable").ok_or_else(|| self.wrong(table, "no `dataTable`"))?;
         let values = self.numbers(data)?;
         let uncertainties = self.uncertainties(table, values.len())?;
-        let source = child(table, "description").or(child(function, "description")).map(content);
+        let source = child(table, "description")
+            .or(child(function, "description"))
+            .map(content);
         self.whole(
             table,
-            Grid { axes: variables.into_iter().zip(breakpoints).collect(), values, uncertainties, source },
+            Grid {
+                axes: variables.into_iter().zip(breakpoints).collect(),
+                values,
+                uncertainties,
+                source,
+            },
         )
     }
 
@@ -178,54 +244,90 @@ impl<'a, 'input> File<'a, 'input> {
             let what = format!("{} values for {expected} grid points", grid.values.len());
             return Err(self.wrong(at, what));
         }
-        if grid.axes.iter().any(|(_, points)| points.windows(2).any(|w| w[0] >= w[1])) {
+        if grid
+            .axes
+            .iter()
+            .any(|(_, points)| points.windows(2).any(|w| w[0] >= w[1]))
+        {
             return Err(self.wrong(at, "breakpoints must ascend"));
         }
-        if !grid.axes.iter().any(|(v, _)| matches!(v, Variable::Alpha { .. })) {
+        if !grid
+            .axes
+            .iter()
+            .any(|(v, _)| matches!(v, Variable::Alpha { .. }))
+        {
             return Err(self.wrong(at, "the table does not depend on angle of attack"));
         }
         Ok(grid)
     }
 
     fn table(&self, definition: Node<'a, 'input>) -> Result<Node<'a, 'input>, Wrong> {
-        let inline = child(definition, "griddedTableDef").or_else(|| child(definition, "griddedTable"));
+        let inline =
+            child(definition, "griddedTableDef").or_else(|| child(definition, "griddedTable"));
         if let Some(table) = inline {
             return Ok(table);
         }
-        let reference = child(definition, "griddedTableRef")
-            .ok_or_else(|| self.wrong(definition, "ungridded tables are not read: give the function over a grid"))?;
+        let reference = child(definition, "griddedTableRef").ok_or_else(|| {
+            self.wrong(
+                definition,
+                "ungridded tables are not read: give the function over a grid",
+            )
+        })?;
         let id = reference.attribute("gtID").unwrap_or_default();
-        self.tables.get(id).copied().ok_or_else(|| self.wrong(reference, format!("there is no table `{id}`")))
+        self.tables
+            .get(id)
+            .copied()
+            .ok_or_else(|| self.wrong(reference, format!("there is no table `{id}`")))
     }
 
     fn breakpoints(&self, reference: Node) -> Result<Vec<f64>, Wrong> {
         let id = reference.attribute("bpID").unwrap_or_default();
         let values = self.breakpoints.get(id).and_then(|b| child(*b, "bpVals"));
-        let values = values.ok_or_else(|| self.wrong(reference, format!("there are no breakpoints `{id}`")))?;
+        let values = values
+            .ok_or_else(|| self.wrong(reference, format!("there are no breakpoints `{id}`")))?;
         self.numbers(values)
     }
 
     /// Standard uncertainties, where the table states additive normal ones.
     fn uncertainties(&self, table: Node<'a, 'input>, n: usize) -> Result<Option<Vec<f64>>, Wrong> {
-        let Some(uncertainty) = child(table, "uncertainty") else { return Ok(None) };
+        let Some(uncertainty) = child(table, "uncertainty") else {
+            return Ok(None);
+        };
         let normal = child(uncertainty, "normalPDF");
-        let Some(normal) = normal.filter(|_| uncertainty.attribute("effect") == Some("additive")) else {
+        let Some(normal) = normal.filter(|_| uncertainty.attribute("effect") == Some("additive"))
+        else {
             return Err(self.wrong(uncertainty, "only additive normal uncertainties are read"));
         };
-        let sigmas: f64 = normal.attribute("numSigmas").and_then(|s| s.trim().parse().ok()).unwrap_or(1.0);
+        let sigmas: f64 = normal
+            .attribute("numSigmas")
+            .and_then(|s| s.trim().parse().ok())
+            .unwrap_or(1.0);
         let bounds = child(normal, "bounds").ok_or_else(|| self.wrong(normal, "no `bounds`"))?;
         let values = self.numbers(child(bounds, "dataTable").unwrap_or(bounds))?;
-        let values = if values.len() == 1 { vec![values[0]; n] } else { values };
+        let values = if values.len() == 1 {
+            vec![values[0]; n]
+        } else {
+            values
+        };
         if values.len() != n {
-            return Err(self.wrong(bounds, format!("{} uncertainties for {n} values", values.len())));
+            return Err(self.wrong(
+                bounds,
+                format!("{} uncertainties for {n} values", values.len()),
+            ));
         }
         Ok(Some(values.into_iter().map(|v| v / sigmas).collect()))
     }
 
     /// The numbers in an element's text, between commas and blanks.
     fn numbers(&self, node: Node) -> Result<Vec<f64>, Wrong> {
-        let text: String = node.children().filter(Node::is_text).filter_map(|n| n.text()).collect();
-        let words = text.split([',', ' ', '\n', '\t', '\r']).filter(|w| !w.is_empty());
+        let text: String = node
+            .children()
+            .filter(Node::is_text)
+            .filter_map(|n| n.text())
+            .collect();
+        let words = text
+            .split([',', ' ', '\n', '\t', '\r'])
+            .filter(|w| !w.is_empty());
         let number = |word: &str| {
             let number = word.parse::<f64>().ok().filter(|v| v.is_finite());
             number.ok_or_else(|| self.wrong(node, format!("`{word}` is no number")))
@@ -235,7 +337,11 @@ impl<'a, 'input> File<'a, 'input> {
 }
 
 /// A grid's points as rows of a tunnel's table.
-fn rows_of<'g>(name: &'g str, grid: &'g Grid, unit: &'g str) -> impl Iterator<Item = TunnelRow> + use<'g> {
+fn rows_of<'g>(
+    name: &'g str,
+    grid: &'g Grid,
+    unit: &'g str,
+) -> impl Iterator<Item = TunnelRow> + use<'g> {
     (0..grid.values.len()).map(move |i| {
         let mut row = TunnelRow {
             derivative: name.to_owned(),
@@ -262,5 +368,9 @@ fn rows_of<'g>(name: &'g str, grid: &'g Grid, unit: &'g str) -> impl Iterator<It
 }
 
 fn content(node: Node) -> String {
-    node.text().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+    node.text()
+        .unwrap_or_default()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }

@@ -4,7 +4,11 @@ use approx::assert_relative_eq;
 
 use super::*;
 
-fn read(name: &str, content: &[u8], third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>, String> {
+fn read(
+    name: &str,
+    content: &[u8],
+    third: Option<&str>,
+) -> Result<Vec<(usize, TunnelRow)>, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, content).unwrap();
@@ -18,9 +22,12 @@ fn csv_error(content: &str) -> String {
 
 #[test]
 fn a_number_that_is_none_is_named_by_line_and_column() {
-    let e = csv_error("derivative,alpha_deg,value,unit\nCN_q,5,4.0,per_rad\nCN_q,ten,4.0,per_rad\n");
+    let e =
+        csv_error("derivative,alpha_deg,value,unit\nCN_q,5,4.0,per_rad\nCN_q,ten,4.0,per_rad\n");
     assert_eq!(e, "tunnel.csv:3: column `alpha_deg`: invalid float literal");
-    let e = csv_error("derivative,alpha_deg,value,unit,altitude_ft\nCN_q,5,4.0,per_rad,\nCN_q,6,4.0,per_rad,high\n");
+    let e = csv_error(
+        "derivative,alpha_deg,value,unit,altitude_ft\nCN_q,5,4.0,per_rad,\nCN_q,6,4.0,per_rad,high\n",
+    );
     assert_eq!(e, "tunnel.csv:3: column `altitude_ft`: `high` is no number");
 }
 
@@ -32,7 +39,8 @@ fn a_missing_column_is_named() {
 
 #[test]
 fn the_third_variable_is_a_column_of_its_name() {
-    let content = b"derivative,alpha_deg,mach,value,unit,altitude_ft\nCN_q,5,0.3,4.0,per_rad,20000\n";
+    let content =
+        b"derivative,alpha_deg,mach,value,unit,altitude_ft\nCN_q,5,0.3,4.0,per_rad,20000\n";
     let rows = read("tunnel.csv", content, Some("altitude_ft")).unwrap();
     assert_eq!((rows[0].1.mach, rows[0].1.third), (Some(0.3), Some(20e3)));
     assert_eq!(read("tunnel.csv", content, None).unwrap()[0].1.third, None);
@@ -51,14 +59,22 @@ fn parquet_says_what_csv_says() {
     let mut frame = DataFrame::new(2, columns).unwrap();
     let mut bytes = Vec::new();
     ParquetWriter::new(&mut bytes).finish(&mut frame).unwrap();
-    let csv = b"derivative,alpha_deg,mach,value,unit\nCN_q,5,0.25,0.1,per_rad\nCN_q,10,,0.3,per_rad\n";
-    let rows = |found: Vec<(usize, TunnelRow)>| found.into_iter().map(|(_, row)| row).collect::<Vec<_>>();
-    assert_eq!(rows(read("t.parquet", &bytes, None).unwrap()), rows(read("t.csv", csv, None).unwrap()));
+    let csv =
+        b"derivative,alpha_deg,mach,value,unit\nCN_q,5,0.25,0.1,per_rad\nCN_q,10,,0.3,per_rad\n";
+    let rows =
+        |found: Vec<(usize, TunnelRow)>| found.into_iter().map(|(_, row)| row).collect::<Vec<_>>();
+    assert_eq!(
+        rows(read("t.parquet", &bytes, None).unwrap()),
+        rows(read("t.csv", csv, None).unwrap())
+    );
     let mut lacking = frame.drop("value").unwrap();
     bytes.clear();
     ParquetWriter::new(&mut bytes).finish(&mut lacking).unwrap();
     let e = read("t.parquet", &bytes, None).unwrap_err();
-    assert_eq!(e, "t.parquet:1: column `value` has no value here, or is missing");
+    assert_eq!(
+        e,
+        "t.parquet:1: column `value` has no value here, or is missing"
+    );
 }
 
 const DAVEML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -89,13 +105,25 @@ const DAVEML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 fn daveml_s_last_breakpoint_varies_fastest_and_radians_become_degrees() {
     let rows = read("t.dml", DAVEML.as_bytes(), None).unwrap();
     let half = 0.5_f64.to_degrees();
-    let expected =
-        [(0.2, 0.0, 1.0), (0.2, half, 2.0), (0.4, 0.0, 3.0), (0.4, half, 4.0), (0.6, 0.0, 5.0), (0.6, half, 6.0)];
+    let expected = [
+        (0.2, 0.0, 1.0),
+        (0.2, half, 2.0),
+        (0.4, 0.0, 3.0),
+        (0.4, half, 4.0),
+        (0.6, 0.0, 5.0),
+        (0.6, half, 6.0),
+    ];
     assert_eq!(rows.len(), expected.len());
     for ((line, row), (mach, alpha_deg, value)) in rows.iter().zip(expected) {
-        assert_eq!((*line, row.mach, row.value, row.uncertainty), (18, Some(mach), value, Some(0.25)));
+        assert_eq!(
+            (*line, row.mach, row.value, row.uncertainty),
+            (18, Some(mach), value, Some(0.25))
+        );
         assert_relative_eq!(row.alpha_deg, alpha_deg, max_relative = 1e-15);
-        assert_eq!((row.unit.as_str(), row.source.as_deref()), ("1/rad", Some("a tunnel")));
+        assert_eq!(
+            (row.unit.as_str(), row.source.as_deref()),
+            ("1/rad", Some("a tunnel"))
+        );
     }
 }
 
@@ -105,19 +133,43 @@ fn daveml_s_mistakes_are_named_by_line() {
         assert!(DAVEML.contains(from));
         read("t.dml", DAVEML.replace(from, to).as_bytes(), None).unwrap_err()
     };
-    assert_eq!(error("3, 4, 5, 6", "3, 4, 5"), "t.dml:10: 5 values for 6 grid points");
-    assert_eq!(error("1, 2, <", "1, two, <"), "t.dml:14: `two` is no number");
-    assert_eq!(error("0.2 0.4 0.6", "0.4 0.2 0.6"), "t.dml:10: breakpoints must ascend");
-    assert_eq!(error("bpRef bpID=\"A\"", "bpRef bpID=\"B\""), "t.dml:12: there are no breakpoints `B`");
-    assert!(
-        error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"beta\"/>")
-            .starts_with("t.dml:19: a table over `beta`")
+    assert_eq!(
+        error("3, 4, 5, 6", "3, 4, 5"),
+        "t.dml:10: 5 values for 6 grid points"
+    );
+    assert_eq!(
+        error("1, 2, <", "1, two, <"),
+        "t.dml:14: `two` is no number"
+    );
+    assert_eq!(
+        error("0.2 0.4 0.6", "0.4 0.2 0.6"),
+        "t.dml:10: breakpoints must ascend"
+    );
+    assert_eq!(
+        error("bpRef bpID=\"A\"", "bpRef bpID=\"B\""),
+        "t.dml:12: there are no breakpoints `B`"
     );
     assert!(
-        error("<independentVarRef varID=\"mach\"/>", "<independentVarRef varID=\"mach\" interpolate=\"cubicSpline\"/>")
-            .starts_with("t.dml:19: `interpolate")
+        error(
+            "<independentVarRef varID=\"mach\"/>",
+            "<independentVarRef varID=\"beta\"/>"
+        )
+        .starts_with("t.dml:19: a table over `beta`")
     );
-    assert!(error("effect=\"additive\"", "effect=\"percentage\"").starts_with("t.dml:13: only additive"));
+    assert!(
+        error(
+            "<independentVarRef varID=\"mach\"/>",
+            "<independentVarRef varID=\"mach\" interpolate=\"cubicSpline\"/>"
+        )
+        .starts_with("t.dml:19: `interpolate")
+    );
+    assert!(
+        error("effect=\"additive\"", "effect=\"percentage\"")
+            .starts_with("t.dml:13: only additive")
+    );
     assert!(error("</DAVEfunc>", "").starts_with("t.dml:"));
-    assert!(error("varID=\"CNalpha\"", "varID=\"lift\"").contains("no function of the file gives a derivative"));
+    assert!(
+        error("varID=\"CNalpha\"", "varID=\"lift\"")
+            .contains("no function of the file gives a derivative")
+    );
 }
