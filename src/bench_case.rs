@@ -14,7 +14,8 @@ use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Output, Regressor};
-use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel, gravity_ft_s2};
+use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
+use crate::earth::gravity_ft_s2;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::error::{Error, Result};

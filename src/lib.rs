@@ -4,8 +4,9 @@
 
 // Vocabulary: what the words mean.
 pub mod units;
-pub mod trig;
+pub mod numerics;
 pub mod error;
+pub mod earth;
 pub mod flight;
 pub mod aircraft;
 pub mod aero;
@@ -28,6 +29,7 @@ pub mod trend;
 pub mod compare;
 pub mod overnight;
 pub mod export;
+pub mod pdf;
 pub mod report;
 
 // Studies: is what the stages say of themselves true?

@@ -9,8 +9,11 @@ pub const DEG: f64 = 180.0 / std::f64::consts::PI;
 /// Radians in a degree: where every sample is converted, a product is a fraction of a quotient's work.
 pub const RAD: f64 = std::f64::consts::PI / 180.0;
 
-/// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is [`crate::aircraft`]'s.
+/// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is [`crate::earth`]'s.
 pub const G0_FT_S2: f64 = 32.174_049;
+
+/// Metres in a foot, exactly (international foot of 1959).
+pub const M_PER_FT: f64 = 0.304_8;
 
 /// What a unit measures: two units convert into each other when they share it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +57,7 @@ const fn unit(
     }
 }
 
-const FT: f64 = 1.0 / 0.3048;
+const FT: f64 = 1.0 / M_PER_FT;
 const LBF: f64 = 1.0 / 4.448_221_615_260_5;
 const SLUG: f64 = 1.0 / 14.593_902_937_206;
 
@@ -75,7 +78,7 @@ const UNITS: &[Unit] = &[
     unit("m", None, Quantity::Length, FT),
     unit("lbf/ft2", Some("_psf"), Quantity::Pressure, 1.0),
     unit("psf", None, Quantity::Pressure, 1.0),
-    unit("Pa", None, Quantity::Pressure, LBF * 0.3048 * 0.3048),
+    unit("Pa", None, Quantity::Pressure, LBF * M_PER_FT * M_PER_FT),
     unit("lbf", Some("_lbf"), Quantity::Force, 1.0),
     unit("N", None, Quantity::Force, LBF),
     unit("slug", Some("_slug"), Quantity::Mass, 1.0),

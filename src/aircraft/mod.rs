@@ -2,10 +2,8 @@
 //!
 //! Positions are in ft, positive aft (x), right (y) and above (z) of a reference point about 5 ft ahead of the nose.
 
-mod earth;
 mod vanes;
 
-pub use earth::{gravity_at, gravity_ft_s2};
 pub use vanes::{Flow, Reading};
 
 use serde::{Deserialize, Serialize};

@@ -10,7 +10,7 @@
 )]
 
 use super::{Position, Sensors, Vane, VaneModel};
-use crate::trig::sin_cos;
+use crate::numerics::trig::sin_cos;
 
 /// The flow at the c.g. and the rotation: angles in rad, velocity in ft/s, body rates in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,7 +15,7 @@ use super::lever::lever;
 use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
-use crate::trig::sin_cos;
+use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
 /// The longitudinal axis.

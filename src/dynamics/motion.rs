@@ -14,7 +14,8 @@ use std::sync::Arc;
 use pulp::Arch;
 
 use super::lever::lever;
-use crate::aircraft::{Aircraft, Flow, Position, gravity_at};
+use crate::aircraft::{Aircraft, Flow, Position};
+use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
 use crate::units::{G0_FT_S2, RAD};
 

@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::Checks;
-use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::aircraft::{Aircraft, Flow, Position};
+use crate::earth::gravity_ft_s2;
 use crate::flight::{Correction, signal};
-use crate::units::{DEG, G0_FT_S2};
+use crate::units::{DEG, G0_FT_S2, M_PER_FT};
 
 /// The signals that the relations use.
 const USED: &[&str] = &[
@@ -315,10 +316,9 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
 pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
-    const FT: f64 = 0.304_8;
     const KG_M3: f64 = 515.378_818;
     const GAS: f64 = 287.052_87;
-    let h = altitude_ft * FT;
+    let h = altitude_ft * M_PER_FT;
     let temperature = (288.15 - 0.006_5 * h).max(216.65);
     let pressure = if h < 11_000.0 {
         101_325.0 * (temperature / 288.15).powf(5.255_88)
@@ -327,7 +327,7 @@ pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
     };
     (
         pressure / (GAS * temperature) / KG_M3,
-        (1.4 * GAS * temperature).sqrt() / FT,
+        (1.4 * GAS * temperature).sqrt() / M_PER_FT,
     )
 }
 

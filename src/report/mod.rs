@@ -1,5 +1,5 @@
 //! The report stage: one self-contained HTML page (inline SVG, style and a light script that it does without, nothing
-//! loaded) that a flight-test review board reads, and the same page on paper ([`pdf`]). Words and numbers are put together
+//! loaded) that a flight-test review board reads, and the same page on paper ([`crate::pdf`]). Words and numbers are put together
 //! here, the looks are the template's.
 
 mod as_flown;
@@ -13,7 +13,6 @@ mod marks;
 mod notation;
 mod overnight;
 pub mod pages;
-pub mod pdf;
 mod predictions;
 mod provenance;
 mod reduce;

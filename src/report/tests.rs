@@ -264,7 +264,7 @@ fn numbers_that_are_none_do_not_break_the_page() {
 #[test]
 fn the_same_campaign_is_the_same_bytes() {
     assert_eq!(render(&campaign()), render(&campaign()));
-    let printed = || pdf::pdf(&render(&campaign())).expect("a PDF");
+    let printed = || crate::pdf::pdf(&render(&campaign())).expect("a PDF");
     assert!(printed() == printed());
 }
 

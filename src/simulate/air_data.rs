@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 
-use super::atmosphere::air;
+use crate::earth::air;
 
 /// The flow at the c.g.; angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 //! attitude as a quaternion, and the engines' angular momentum h along +x.
 //!
 //! Written from Newton's and Euler's laws in vector form, and not from the estimator's equations of α, β and V: each is a
-//! check of the other. The earth is flat and does not turn; gravity is that of [`crate::aircraft::gravity_ft_s2`].
+//! check of the other. The earth is flat and does not turn; gravity is that of [`crate::earth::gravity_ft_s2`].
 
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::atmosphere::air;
+use crate::earth::air;
 
 /// All engines together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,6 @@
 pub mod actuators;
 pub mod aerodynamics;
 pub mod air_data;
-pub mod atmosphere;
 pub mod body;
 pub mod cards;
 pub mod control;

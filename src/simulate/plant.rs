@@ -6,7 +6,8 @@ use super::aerodynamics::Aerodynamics;
 use super::air_data::AirData;
 use super::body::{self, Action, Slope, State};
 use super::loading::Loading;
-use crate::aircraft::{Aircraft, gravity_ft_s2};
+use crate::aircraft::Aircraft;
+use crate::earth::gravity_ft_s2;
 
 /// What is given at an instant besides the state.
 #[derive(Clone, Debug, PartialEq)]

@@ -190,7 +190,7 @@ impl Search<'_> {
     fn solve(&self) -> Result<Trim, String> {
         let gravity = 32.17;
         let weight = self.point.mass_slug * gravity;
-        let density = super::atmosphere::air(self.point.altitude_ft).density_slug_ft3;
+        let density = crate::earth::air(self.point.altitude_ft).density_slug_ft3;
         let speed = (2.0 * weight / (density * self.plant.aircraft.wing_area_ft2)).sqrt();
         let second = if self.power == Power::Level {
             0.3 * weight

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use approx::assert_abs_diff_eq;
-use harvest::aircraft::gravity_ft_s2;
+use harvest::earth::gravity_ft_s2;
 use harvest::config::Simulation;
 use harvest::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use harvest::estimate::{self, Basis, Estimated};

@@ -17,7 +17,7 @@ use super::instruments::{INPUTS, OUTPUTS};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
 use crate::ingest::motion::atmosphere;
-use crate::trig::sin_cos;
+use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 
 /// States: three velocities at the sensors (ft/s), φ, θ, ψ (rad), altitude (ft).

@@ -301,7 +301,7 @@ fn window_samples(seconds: f64) -> usize {
 fn on_the_way(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> Known {
     let along = Vector3::new(x[0], x[1], x[2]);
     Known {
-        gravity: crate::aircraft::gravity_ft_s2(aircraft.latitude_deg, x[6]),
+        gravity: crate::earth::gravity_ft_s2(aircraft.latitude_deg, x[6]),
         arms,
         cg: CG,
         ..window::turning(aircraft, [x[3], x[4], x[5]], along, true)

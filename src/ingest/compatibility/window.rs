@@ -7,7 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::Compatibility;
 use super::equations::{Known, State};
 use super::instruments::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
-use crate::aircraft::{Aircraft, Flow, Position, gravity_ft_s2};
+use crate::aircraft::{Aircraft, Flow, Position};
+use crate::earth::gravity_ft_s2;
 use crate::flight::{Mark, Record, signal as s};
 use crate::units::{DEG, G0_FT_S2};
 

@@ -1,9 +1,6 @@
 //! Gravity at the aircraft: normal gravity on the WGS 84 ellipsoid (Somigliana) with the free-air term.
 
-use crate::units::DEG;
-
-/// Metres in a foot.
-const M_PER_FT: f64 = 0.3048;
+use crate::units::{DEG, M_PER_FT};
 
 /// Gravity in ft/s² at a geodetic latitude and a height above the ellipsoid; it contains the centrifugal part, so it is
 /// what a body at rest on the rotating earth feels.

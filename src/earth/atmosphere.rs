@@ -1,5 +1,7 @@
 //! The standard atmosphere (ISA, 1976) to 65,000 ft: ρ = p/(R T) with a linear and then a constant temperature.
 
+use crate::units::M_PER_FT;
+
 /// Density and speed of sound at a height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
@@ -7,7 +9,6 @@ pub struct Air {
     pub sound_ft_s: f64,
 }
 
-const FT: f64 = 0.3048;
 /// kg/m³ in a slug/ft³.
 const DENSITY: f64 = 515.378_818_393_2;
 /// J/(kg K).
@@ -21,7 +22,7 @@ const LAPSE: f64 = 0.006_5;
 /// Air at a geometric height, ft.
 #[must_use]
 pub fn air(altitude_ft: f64) -> Air {
-    let geometric = altitude_ft * FT;
+    let geometric = altitude_ft * M_PER_FT;
     // The tables' variable is the geopotential height.
     let h = geometric * RADIUS_M / (RADIUS_M + geometric);
     let temperature = 288.15 - LAPSE * h.min(TROPOPAUSE_M);
@@ -30,7 +31,7 @@ pub fn air(altitude_ft: f64) -> Air {
     let pressure = troposphere * (-GRAVITY * above / (GAS * temperature)).exp();
     Air {
         density_slug_ft3: pressure / (GAS * temperature) / DENSITY,
-        sound_ft_s: (1.4 * GAS * temperature).sqrt() / FT,
+        sound_ft_s: (1.4 * GAS * temperature).sqrt() / M_PER_FT,
     }
 }
 

@@ -586,7 +586,7 @@ impl Run<'_> {
         let named = |e| Error::store(&config.reports.join(REPORT), &e);
         let html = report::html(&contents, config.template.as_deref()).map_err(named)?;
         self.place_tonight(REPORT, html.as_bytes())?;
-        match report::pdf::pdf(&html) {
+        match crate::pdf::pdf(&html) {
             Ok(bytes) => self.place_tonight(PRINTED, &bytes)?,
             Err(why) => {
                 let reason = format!("not made: the template's page is no well-formed XML: {why}");

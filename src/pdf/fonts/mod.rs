@@ -8,8 +8,8 @@ use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
 use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use ttf_parser::Face;
 
-const REGULAR: &[u8] = include_bytes!("fonts/Arimo-Regular.ttf");
-const BOLD: &[u8] = include_bytes!("fonts/Arimo-Bold.ttf");
+const REGULAR: &[u8] = include_bytes!("Arimo-Regular.ttf");
+const BOLD: &[u8] = include_bytes!("Arimo-Bold.ttf");
 
 /// How a text is set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

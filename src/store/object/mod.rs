@@ -5,7 +5,7 @@
 //! option holds a secret. An object is replaced by a single request or not at all, so none is ever half written.
 
 #[cfg(not(feature = "s3"))]
-#[path = "object/absent.rs"]
+#[path = "absent.rs"]
 mod client;
 #[cfg(feature = "s3")]
 mod client;

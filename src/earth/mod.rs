@@ -1,0 +1,7 @@
+//! The earth around the aircraft: gravity and the standard atmosphere.
+
+mod atmosphere;
+mod gravity;
+
+pub use atmosphere::{Air, air};
+pub use gravity::{gravity_at, gravity_ft_s2};

@@ -1,0 +1,3 @@
+//! Numerical methods that several stages share.
+
+pub mod trig;
