@@ -1,7 +1,9 @@
-//! The estimation kernel on the standard case: one pass against a plain scalar one of the same equations, side by side in
-//! one run, and its distance from what the processor could do at best: `cargo bench --bench kernel`.
+//! The estimation kernel on the standard case: one pass against a plain scalar one of the same
+//! equations, side by side in one run, and its distance from what the processor could do at best:
+//! `cargo bench --bench kernel`.
 //!
-//! The plain one takes each parameter by itself: no vectors, no regressors shared, sums by three nested loops.
+//! The plain one takes each parameter by itself: no vectors, no regressors shared, sums by three
+//! nested loops.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -209,13 +211,15 @@ fn fused_s(chained: bool) -> (f64, usize) {
 fn floors(samples: usize, lanes: usize, pass_s: f64) {
     let (throughput_s, vector) = fused_s(false);
     let (latency_s, _) = fused_s(true);
-    // Of a lane and sample: its regressor at four stages, Φ s, Γ r (of the last stage one entry), outputs C s + D r.
+    // Of a lane and sample: its regressor at four stages, Φ s, Γ r (of the last stage one entry),
+    // outputs C s + D r.
     let lane = 4 + NX * NX + 3 * NX + 1 + Longitudinal::OUTPUTS_BY_STATE.len() + 2;
     // The residual is a lane more. Half of the symmetric matrix.
     let squares = OUTPUTS * (lanes + 1) * (lanes + 2) / 2;
     let operations = samples * (lanes * lane + squares);
     let floor_s = operations as f64 / vector as f64 * throughput_s;
-    // A stage waits for sine and cosine (7 fused multiplications one after the other), the rate (4) and the state (1).
+    // A stage waits for sine and cosine (7 fused multiplications one after the other), the rate (4)
+    // and the state (1).
     let waiting_s = (samples * 4 * 12) as f64 * latency_s;
     println!("{samples} samples, {lanes} lanes, vectors of {vector}");
     println!(

@@ -1,7 +1,8 @@
 //! How long the stages take on the demonstration campaign, side by side in one run: `make bench`.
 //!
-//! The machine's speed drifts, so quote ratios of lines of one run, not times: exact sensitivities against a response
-//! alone (finite differences would cost one response per parameter), and the stages against reading the flight.
+//! The machine's speed drifts, so quote ratios of lines of one run, not times: exact sensitivities
+//! against a response alone (finite differences would cost one response per parameter), and the
+//! stages against reading the flight.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +19,8 @@ use harvest::output_error::{Case, Measurements, Model};
 use harvest::store::archive;
 use harvest::{ingest, segment};
 
-/// A flight of the demonstration campaign with one maneuver in which every surface of its axis moves.
+/// A flight of the demonstration campaign with one maneuver in which every surface of its axis
+/// moves.
 struct Bench {
     config: Config,
     record: Record,

@@ -1,8 +1,10 @@
-//! How fast an archive streams through ingest and segment, against polars reading the same columns and nothing else.
+//! How fast an archive streams through ingest and segment, against polars reading the same columns
+//! and nothing else.
 //!
-//! `cargo bench --bench streaming` takes the demonstration campaign; with an archive as argument, `cargo bench --bench
-//! streaming -- <folder>`, that one: a long flight says more. Each is done once before it is timed, so that the files are
-//! in the system's cache for both, and the best of three counts. The last line is the highest memory of the process.
+//! `cargo bench --bench streaming` takes the demonstration campaign; with an archive as argument,
+//! `cargo bench --bench streaming -- <folder>`, that one: a long flight says more. Each is done
+//! once before it is timed, so that the files are in the system's cache for both, and the best of
+//! three counts. The last line is the highest memory of the process.
 
 #![expect(clippy::print_stdout, reason = "a benchmark's own output")]
 
@@ -72,7 +74,8 @@ fn main() -> anyhow::Result<()> {
         decoded = 0.0;
         for path in flights.iter().flat_map(|f| &f.files) {
             let schema = ParquetReader::new(File::open(path)?).schema()?;
-            // Polars as it is built here has no columns of small integers: flags are left to harvest.
+            // Polars as it is built here has no columns of small integers: flags are left to
+            // harvest.
             let small = [
                 ArrowDataType::Int8,
                 ArrowDataType::Int16,

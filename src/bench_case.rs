@@ -1,8 +1,10 @@
-//! The standard case by which estimators are timed against each other: one longitudinal maneuver as JSON (constants, held
-//! values, start, weights) with its record as CSV beside it, estimated again and again.
+//! The standard case by which estimators are timed against each other: one longitudinal maneuver as
+//! JSON (constants, held values, start, weights) with its record as CSV beside it, estimated again
+//! and again.
 //!
-//! Its conventions are brought to ours, not ours to it: the record is written in our signals, and what its equations
-//! leave out or count in another unit is a known part of the measured outputs ([`Given::measurements`]).
+//! Its conventions are brought to ours, not ours to it: the record is written in our signals, and
+//! what its equations leave out or count in another unit is a known part of the measured outputs
+//! ([`Given::measurements`]).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,9 +17,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Output, Regressor};
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
-use crate::earth::gravity_ft_s2;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Longitudinal, OUTPUTS};
+use crate::earth::gravity_ft_s2;
 use crate::error::{Error, Result};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
@@ -75,8 +77,8 @@ pub struct Timed {
     pub theta: BTreeMap<String, f64>,
     /// Standard errors for white residuals, scaled by their variance.
     pub std: BTreeMap<String, f64>,
-    /// Standard errors with the residuals' autocorrelation and the surfaces' noise counted: the bounds of the table
-    /// `estimates`, which no peer has.
+    /// Standard errors with the residuals' autocorrelation and the surfaces' noise counted: the
+    /// bounds of the table `estimates`, which no peer has.
     pub std_corrected: BTreeMap<String, f64>,
     pub cost: Option<f64>,
     pub iterations: usize,
@@ -84,7 +86,8 @@ pub struct Timed {
     pub import_s: f64,
     /// The first estimate, with what happens only once.
     pub first_s: f64,
-    /// One entry per repetition of the estimate: from the record in memory to estimates and standard errors.
+    /// One entry per repetition of the estimate: from the record in memory to estimates and
+    /// standard errors.
     pub wall_s: Vec<f64>,
     pub cpu_s: Vec<f64>,
     /// Of these the part that lays the maneuver out before the first iteration.
@@ -252,7 +255,8 @@ struct Estimated {
 }
 
 impl Estimated {
-    /// Standard errors with autocorrelation and the surfaces' noise counted; none where the data determine none.
+    /// Standard errors with autocorrelation and the surfaces' noise counted; none where the data
+    /// determine none.
     fn corrected(&mut self, subject: &Subject) -> Option<Vec<f64>> {
         let names = &self.case.names;
         let mut free: Vec<&Derivative> = subject.free.iter().collect();
@@ -380,7 +384,8 @@ fn bias(name: &str) -> Option<Bias> {
     })
 }
 
-/// Coefficient, then `0`, `a`, `q` or the column of a surface; that of a thrust-vectoring vane ends in `v`.
+/// Coefficient, then `0`, `a`, `q` or the column of a surface; that of a thrust-vectoring vane ends
+/// in `v`.
 fn derivative(name: &str) -> Result<Derivative, String> {
     let coefficients = Axis::Longitudinal.coefficients();
     let of = |c: &Coefficient| name.strip_prefix(format!("{c:?}").as_str());
@@ -489,7 +494,8 @@ impl Given {
         [alpha, q, theta, an * unit * unit, ax * unit * unit]
     }
 
-    /// The outputs, with the products of two different rates that 2.7 and 2.8 drop and we keep added to what was measured.
+    /// The outputs, with the products of two different rates that 2.7 and 2.8 drop and we keep
+    /// added to what was measured.
     fn measurements(&self, record: &Record) -> Measurements {
         let c = &self.constants;
         let values = |name: &str| record.values(name).unwrap_or_default();
@@ -534,8 +540,9 @@ const RECORDED: [(&str, &str); 14] = [
     (signal::RPM_LEFT, "rpm"),
 ];
 
-/// Peers stop after a step that lowered the cost by less than `ftol` of it; ours before a step that would. So that it takes the
-/// step that peers take last, its tolerance is smaller by what a step does near the minimum.
+/// Peers stop after a step that lowered the cost by less than `ftol` of it; ours before a step that
+/// would. So that it takes the step that peers take last, its tolerance is smaller by what a step
+/// does near the minimum.
 const STEPS_AHEAD: f64 = 0.01;
 
 const LATITUDE_DEG: f64 = 45.0;

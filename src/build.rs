@@ -1,4 +1,5 @@
-//! The build script: a fingerprint of the sources, so that a published table says which code made it.
+//! The build script: a fingerprint of the sources, so that a published table says which code made
+//! it.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,8 @@ fn main() {
     for file in &files {
         let name = file.to_string_lossy().replace('\\', "/");
         for byte in name.bytes().chain(std::fs::read(file).unwrap_or_default()) {
-            // Fowler, Noll and Vo: no guard against malice, and none is needed to tell one state of the code from another.
+            // Fowler, Noll and Vo: no guard against malice, and none is needed to tell one state of
+            // the code from another.
             hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
         }
     }

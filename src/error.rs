@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-/// An error that stops the whole run (exit code 1). What spoils one flight or one maneuver is data: a [`Problem`].
+/// An error that stops the whole run (exit code 1). What spoils one flight or one maneuver is data:
+/// a [`Problem`].
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The analyst's configuration is wrong: file, line where known, what, and what was probably meant.
+    /// The analyst's configuration is wrong: file, line where known, what, and what was probably
+    /// meant.
     #[error("{}{}: {what}", file.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Config {
         file: PathBuf,
@@ -47,7 +49,8 @@ impl Error {
         }
     }
 
-    /// Whether the same may go well another time: a disk or a file server that says no, a store in use.
+    /// Whether the same may go well another time: a disk or a file server that says no, a store in
+    /// use.
     #[must_use]
     pub fn is_passing(&self) -> bool {
         matches!(self, Error::Io { .. } | Error::Store { .. })
@@ -60,7 +63,8 @@ impl Error {
     }
 }
 
-/// What spoiled one flight, channel or maneuver while the rest of the campaign went on: a row of the `problems` table.
+/// What spoiled one flight, channel or maneuver while the rest of the campaign went on: a row of
+/// the `problems` table.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Problem {
     /// The stage that found it: `ingest`, `segment`, `estimate`, `trend`.

@@ -1,6 +1,7 @@
 //! harvest: flight-test archives in, trusted aerodynamic derivatives out.
 //!
-//! The modules in order; a module uses only modules listed above it (`tests/stages/house.rs` holds that).
+//! The modules in order; a module uses only modules listed above it (`tests/stages/house.rs` holds
+//! that).
 
 // Vocabulary: what the words mean.
 pub mod units;

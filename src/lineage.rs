@@ -1,5 +1,5 @@
-//! Lineage: what decides a published night, and what tells two of them apart. Code, configuration and input, each part with
-//! the first stage that reads it.
+//! Lineage: what decides a published night, and what tells two of them apart. Code, configuration
+//! and input, each part with the first stage that reads it.
 
 use std::collections::BTreeMap;
 
@@ -207,7 +207,8 @@ fn code(before: &Code, now: &Code) -> Vec<Cause> {
     if (&before.version, &before.source) != (&now.version, &now.source) {
         let name = |c: &Code| format!("{} ({})", c.version, c.source);
         let words = format!("the program changed from {} to {}", name(before), name(now));
-        // Stages with artefacts state their methods' versions; what is made anew each time may differ by any change.
+        // Stages with artefacts state their methods' versions; what is made anew each time may
+        // differ by any change.
         causes.push(Cause {
             stage: Stage::Trend,
             origin: Origin::Code,

@@ -1,8 +1,9 @@
-//! The conductor of a simulated campaign: flies its cards, flight by flight in parallel, and writes what a recorder and an
-//! all-knowing tunnel would leave: the archive, a wind-tunnel database, the truth.
+//! The conductor of a simulated campaign: flies its cards, flight by flight in parallel, and writes
+//! what a recorder and an all-knowing tunnel would leave: the archive, a wind-tunnel database, the
+//! truth.
 //!
-//! Between two cards of a flight the recorder is off. Each flight's random numbers come from the seed and its name, so the
-//! same cards are the same bytes whatever the number of threads.
+//! Between two cards of a flight the recorder is off. Each flight's random numbers come from the
+//! seed and its name, so the same cards are the same bytes whatever the number of threads.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,7 +24,8 @@ use crate::store::files::TunnelRow;
 use crate::store::{atomic, files, recorder};
 use crate::units::Unit;
 
-/// The record's time of a flight's first sample, and how long the recorder is off between two cards, s.
+/// The record's time of a flight's first sample, and how long the recorder is off between two
+/// cards, s.
 const FIRST_S: f64 = 100.0;
 const OFF_S: f64 = 30.0;
 
@@ -159,7 +161,8 @@ fn cards(simulation: &Simulation, flight_id: &str, flight: &FlightCard, seed: u6
     points.enumerate().filter_map(card).collect()
 }
 
-/// The columns that the recorder writes of some records, one after another: the channel map backwards.
+/// The columns that the recorder writes of some records, one after another: the channel map
+/// backwards.
 fn recording(
     channels: &BTreeMap<String, Channel>,
     records: &[Record],
@@ -193,8 +196,8 @@ fn recording(
     channels.iter().map(column).collect()
 }
 
-/// The truth as a tunnel would have measured it: each derivative wrong by a share of its size over the whole table, each
-/// point by another; and the sums that a tunnel tabulates, of its own values.
+/// The truth as a tunnel would have measured it: each derivative wrong by a share of its size over
+/// the whole table, each point by another; and the sums that a tunnel tabulates, of its own values.
 fn wind_tunnel(simulation: &Simulation) -> Vec<TunnelRow> {
     let (settings, seed) = (&simulation.cards.wind_tunnel, simulation.cards.seed);
     let source = Some("simulated tunnel: the truth with stated errors".to_owned());

@@ -1,6 +1,7 @@
-//! The rows of the published tables, one struct per table. Field names are column names; a value that does not exist is
-//! `None` (a null in Parquet, an empty field in CSV). The `maneuvers` table's row is [`crate::maneuver::Maneuver`], the
-//! `problems` table's is [`crate::error::Problem`].
+//! The rows of the published tables, one struct per table. Field names are column names; a value
+//! that does not exist is `None` (a null in Parquet, an empty field in CSV). The `maneuvers`
+//! table's row is [`crate::maneuver::Maneuver`], the `problems` table's is
+//! [`crate::error::Problem`].
 
 use std::collections::BTreeMap;
 
@@ -20,7 +21,8 @@ pub struct ChannelRow {
     pub rate_hz: Option<f64>,
     /// Of the samples: on the line between two samples of a slower channel.
     pub between: usize,
-    /// Bridged over short dropouts and lost frames, replaced single-sample spikes, and left missing.
+    /// Bridged over short dropouts and lost frames, replaced single-sample spikes, and left
+    /// missing.
     pub bridged: usize,
     pub despiked: usize,
     pub missing: usize,
@@ -28,11 +30,12 @@ pub struct ChannelRow {
     pub stuck: usize,
     /// How often the value wrapped around.
     pub wraps: usize,
-    /// The step of the recorder's numbers and the standard deviation of the noise, in the signal's unit. Of the clock: the
-    /// jitter of its time stamps, s.
+    /// The step of the recorder's numbers and the standard deviation of the noise, in the signal's
+    /// unit. Of the clock: the jitter of its time stamps, s.
     pub quantisation: Option<f64>,
     pub noise: Option<f64>,
-    /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in words.
+    /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in
+    /// words.
     pub verdict: String,
 }
 
@@ -44,15 +47,16 @@ pub struct CheckRow {
     pub relation: String,
     /// The signals it ties together, separated by spaces.
     pub signals: String,
-    /// Least-squares slope of what is measured on what the other signals predict: 1 when units and signs are right.
+    /// Least-squares slope of what is measured on what the other signals predict: 1 when units and
+    /// signs are right.
     pub slope: Option<f64>,
     pub correlation: Option<f64>,
     /// `ok`, `not excited`, `wrong sign`, `wrong scale`, `does not agree`.
     pub verdict: String,
 }
 
-/// `instruments`: what the kinematic equations say of one instrument of one flight, y = (scale) x(t − delay) + bias. Empty
-/// where the flight does not tell it.
+/// `instruments`: what the kinematic equations say of one instrument of one flight, y = (scale) x(t
+/// − delay) + bias. Empty where the flight does not tell it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentRow {
     pub flight_id: String,
@@ -75,8 +79,8 @@ pub struct InstrumentRow {
 }
 
 impl InstrumentRow {
-    /// The verdict on an instrument that is not known to be off and whose delay the flight does not tell, for it moves it too
-    /// little.
+    /// The verdict on an instrument that is not known to be off and whose delay the flight does not
+    /// tell, for it moves it too little.
     pub const NO_DELAY: &str = "ok; its delay is not told";
 }
 
@@ -103,7 +107,8 @@ pub struct FitRow {
     pub outcome: String,
     /// Why it ended so, in words.
     pub reason: String,
-    /// Where the iteration that led to it began: `equation error`, `wind tunnel`, `single estimates`.
+    /// Where the iteration that led to it began: `equation error`, `wind tunnel`, `single
+    /// estimates`.
     pub start: Option<String>,
     pub iterations: usize,
     /// J of eq. 1.2 at the start of the iteration and at the end.
@@ -113,13 +118,16 @@ pub struct FitRow {
     pub condition_number: Option<f64>,
     /// Share of the output samples that were marked and left out of the cost.
     pub left_out: Option<f64>,
-    /// Ratio of the lengths of the best and the worst determined direction: the root of the condition number.
+    /// Ratio of the lengths of the best and the worst determined direction: the root of the
+    /// condition number.
     pub largest_condition_index: Option<f64>,
-    /// Groups of parameters that the data hardly tell apart, worst first: `CN_0 CN_alpha; Cm_de Cm_dpv`.
+    /// Groups of parameters that the data hardly tell apart, worst first: `CN_0 CN_alpha; Cm_de
+    /// Cm_dpv`.
     pub confounded: Option<String>,
 }
 
-/// Columns of `fits` beside those of [`FitRow`]: how well the derivatives of others predict the maneuver.
+/// Columns of `fits` beside those of [`FitRow`]: how well the derivatives of others predict the
+/// maneuver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PredictedRow {
     /// `predicted`, or why it was not; none for maneuvers joined.
@@ -128,7 +136,8 @@ pub struct PredictedRow {
     pub predicted_from: Option<usize>,
     /// J of eq. 1.2 of the prediction, to be held against `final_cost`.
     pub predicted_cost: Option<f64>,
-    /// Theil's inequality coefficient over all outputs, weighted as in the cost, and the shares of its parts.
+    /// Theil's inequality coefficient over all outputs, weighted as in the cost, and the shares of
+    /// its parts.
     pub theil: Option<f64>,
     pub theil_bias: Option<f64>,
     pub theil_variance: Option<f64>,
@@ -194,21 +203,24 @@ pub struct EstimateRow {
     pub status: String,
     /// The estimate, or the value it was held at; none when inactive.
     pub value: Option<f64>,
-    /// Cramér-Rao bound in its sandwich form, with the uncertainty of the held values propagated; none unless estimated
-    /// and determined by the data.
+    /// Cramér-Rao bound in its sandwich form, with the uncertainty of the held values propagated;
+    /// none unless estimated and determined by the data.
     pub bound: Option<f64>,
     /// The part of both bounds that comes from the uncertainty of the held values.
     pub bound_held: Option<f64>,
     /// The part of the corrected bound that comes from errors of calibration.
     pub bound_calibration: Option<f64>,
-    /// The bound with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted: half the
-    /// width of a 95 % interval over 1.96, by Student's t as far as the autocorrelation is known from little.
+    /// The bound with the residuals' autocorrelation, noise of the surfaces and errors of
+    /// calibration counted: half the width of a 95 % interval over 1.96, by Student's t as far as
+    /// the autocorrelation is known from little.
     pub bound_corrected: Option<f64>,
     /// The tunnel's value at the maneuver's α and Mach.
     pub wind_tunnel: Option<f64>,
-    /// By what factor the other parameters raise the estimate's variance above what it would be if they were known.
+    /// By what factor the other parameters raise the estimate's variance above what it would be if
+    /// they were known.
     pub variance_inflation: Option<f64>,
-    /// Root mean square of the regressor about its mean: deg, or rad of a reduced rate; none for a constant.
+    /// Root mean square of the regressor about its mean: deg, or rad of a reduced rate; none for a
+    /// constant.
     pub excitation: Option<f64>,
     /// Root mean square of derivative × regressor about its mean, in percent of the coefficient's.
     pub contribution_pct: Option<f64>,
@@ -300,7 +312,8 @@ pub struct ComparisonRow {
     pub verdict: String,
 }
 
-/// `maneuver_comparison`: one derivative of one maneuver against the tunnel at the maneuver's own α and Mach number.
+/// `maneuver_comparison`: one derivative of one maneuver against the tunnel at the maneuver's own α
+/// and Mach number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManeuverComparisonRow {
     pub maneuver_id: String,
@@ -322,7 +335,8 @@ pub struct ManeuverComparisonRow {
     pub verdict: String,
 }
 
-/// `verdicts`: neighbouring angles of attack at which one derivative has the same verdict, in words.
+/// `verdicts`: neighbouring angles of attack at which one derivative has the same verdict, in
+/// words.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerdictRow {
     /// `wind tunnel`, or the folder of an earlier campaign.
@@ -378,12 +392,14 @@ pub struct ChangeRow {
     pub verdict: String,
 }
 
-/// A number of a published table; one that does not exist is an empty field there, and no number here.
+/// A number of a published table; one that does not exist is an empty field there, and no number
+/// here.
 fn published<'de, D: Deserializer<'de>>(field: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
 }
 
-/// A row of published `trends`, as far as it is compared with: an earlier campaign's or another night's.
+/// A row of published `trends`, as far as it is compared with: an earlier campaign's or another
+/// night's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PublishedTrend {
     pub derivative: String,
@@ -462,7 +478,8 @@ pub struct BeyondRow {
     pub derivatives: String,
 }
 
-/// The time histories of one maneuver, measured against computed, as in the paper's Figures 4 and 12.
+/// The time histories of one maneuver, measured against computed, as in the paper's Figures 4 and
+/// 12.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct History {
     pub maneuver_id: String,
@@ -511,7 +528,8 @@ pub struct CoverageRow {
     pub bias: f64,
     pub scatter: f64,
     pub bias_over_scatter: f64,
-    /// Scatter over the root mean square of `bound`, and how often ±1 and ±1.96 of it hold the truth.
+    /// Scatter over the root mean square of `bound`, and how often ±1 and ±1.96 of it hold the
+    /// truth.
     pub scatter_over_bound: f64,
     pub coverage_68: f64,
     pub coverage_95: f64,
@@ -531,6 +549,7 @@ pub struct StartRow {
     pub records: usize,
     /// Reached from there.
     pub alone: usize,
-    /// Reached as the program does it: from the equation error's solution where it does not converge from there.
+    /// Reached as the program does it: from the equation error's solution where it does not
+    /// converge from there.
     pub reached: usize,
 }

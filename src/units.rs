@@ -1,15 +1,19 @@
-//! Units at the border: what a channel, a signal name or a table column is measured in, and the factors between them.
+//! Units at the border: what a channel, a signal name or a table column is measured in, and the
+//! factors between them.
 //!
-//! Inside the equations angles are radians and everything else is foot, slug, second, pound-force. A signal's unit is
-//! the end of its name (`alpha_vane_deg`, `qbar_psf`); a channel's unit is what the recorder says.
+//! Inside the equations angles are radians and everything else is foot, slug, second, pound-force.
+//! A signal's unit is the end of its name (`alpha_vane_deg`, `qbar_psf`); a channel's unit is what
+//! the recorder says.
 
 /// Degrees in a radian, the paper's R.
 pub const DEG: f64 = 180.0 / std::f64::consts::PI;
 
-/// Radians in a degree: where every sample is converted, a product is a fraction of a quotient's work.
+/// Radians in a degree: where every sample is converted, a product is a fraction of a quotient's
+/// work.
 pub const RAD: f64 = std::f64::consts::PI / 180.0;
 
-/// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is [`crate::earth`]'s.
+/// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is
+/// [`crate::earth`]'s.
 pub const G0_FT_S2: f64 = 32.174_049;
 
 /// Metres in a foot, exactly (international foot of 1959).
@@ -36,7 +40,8 @@ pub enum Quantity {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     pub name: &'static str,
-    /// The end of a signal's name that stands for this unit, for the unit in which signals of the quantity are kept.
+    /// The end of a signal's name that stands for this unit, for the unit in which signals of the
+    /// quantity are kept.
     pub suffix: Option<&'static str>,
     pub quantity: Quantity,
     /// Multiply a value in this unit by it to get the value in the quantity's own unit.
@@ -96,7 +101,8 @@ const UNITS: &[Unit] = &[
 ];
 
 impl Unit {
-    /// The unit that a recorder or an analyst spells so; spaces, `^` and a middle dot do not matter.
+    /// The unit that a recorder or an analyst spells so; spaces, `^` and a middle dot do not
+    /// matter.
     ///
     /// # Errors
     /// The names of all units, when none is spelled so.
@@ -116,7 +122,8 @@ impl Unit {
             })
     }
 
-    /// The unit in which the signal of this name is kept: the longest suffix that fits, a pure number without one.
+    /// The unit in which the signal of this name is kept: the longest suffix that fits, a pure
+    /// number without one.
     #[must_use]
     pub fn of_signal(signal: &str) -> Unit {
         let number = unit("-", None, Quantity::Number, 1.0);

@@ -1,5 +1,5 @@
-//! The conductor of the study of bounds: flies the test points of the cards, records them many times, and writes the
-//! tables and the page that say what the bounds are worth.
+//! The conductor of the study of bounds: flies the test points of the cards, records them many
+//! times, and writes the tables and the page that say what the bounds are worth.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -62,7 +62,8 @@ pub fn run(
             }
         }
     }
-    // Held values are true and instruments calibrated: what bounds count of either is nothing that the scatter could show.
+    // Held values are true and instruments calibrated: what bounds count of either is nothing that
+    // the scatter could show.
     let settings = estimate::Settings {
         held_uncertainty_pct: 0.0,
         calibration: BTreeMap::new(),

@@ -1,11 +1,12 @@
-//! The build-up of the six coefficients: the list of derivatives, the sensor biases estimated with them, and the sums
-//! that the wind tunnel tabulates instead of their parts.
+//! The build-up of the six coefficients: the list of derivatives, the sensor biases estimated with
+//! them, and the sums that the wind tunnel tabulates instead of their parts.
 
 use serde::{Deserialize, Serialize};
 
 use super::derivative::{Axis, Derivative, DerivativeUnit, Output};
 
-/// A constant error of one measured output, estimated with the derivatives: `an_bias` in g, `q_bias` in deg/s.
+/// A constant error of one measured output, estimated with the derivatives: `an_bias` in g,
+/// `q_bias` in deg/s.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bias {
     pub name: String,

@@ -161,8 +161,9 @@ pub enum Regressor {
     YawRate,
     /// A control surface or any other recorded signal, in its own unit (deg).
     Surface(String),
-    /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in ft·lbf/deg over q̄S and
-    /// the reference length (the bracketed terms of 2.10, 2.12, 2.13, 3.9, 3.12, 3.13).
+    /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in
+    /// ft·lbf/deg over q̄S and the reference length (the bracketed terms of 2.10, 2.12, 2.13, 3.9,
+    /// 3.12, 3.13).
     Vane(String),
 }
 
@@ -213,8 +214,9 @@ impl DerivativeUnit {
         }
     }
 
-    /// The factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`, `nd`) to values in this
-    /// one; exactly one for its own name, none where the two do not measure the same.
+    /// The factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`,
+    /// `nd`) to values in this one; exactly one for its own name, none where the two do not measure
+    /// the same.
     #[must_use]
     pub fn factor_from(self, written: &str) -> Option<f64> {
         let (quantity, factor, angle) = spelled(written)?;
@@ -234,7 +236,8 @@ fn per_degree(angle: &str) -> f64 {
     if angle == "rad" { 1.0 / DEG } else { 1.0 }
 }
 
-/// A derivative's unit taken apart: what it measures, the factor to that quantity's own unit, and the angle it is per.
+/// A derivative's unit taken apart: what it measures, the factor to that quantity's own unit, and
+/// the angle it is per.
 fn spelled(written: &str) -> Option<(&'static str, f64, Option<&'static str>)> {
     let plain: String = written
         .trim()

@@ -1,9 +1,10 @@
-//! Reading a table between its points: linear, or the monotone cubic of Fritsch and Carlson (1980) with the slopes of
-//! Fritsch and Butland (1984), which never overshoots the points on either side.
+//! Reading a table between its points: linear, or the monotone cubic of Fritsch and Carlson (1980)
+//! with the slopes of Fritsch and Butland (1984), which never overshoots the points on either side.
 //!
-//! On an interval of length h with the values y₀, y₁ and the slopes d₀, d₁ the cubic is Hermite's. A slope at a point
-//! between the chords δ₋ (length h₋) and δ₊ (length h₊) is their weighted harmonic mean, zero where they differ in sign:
-//! 1/d = (w₁/δ₋ + w₂/δ₊)/(w₁ + w₂), w₁ = 2h₊ + h₋, w₂ = h₊ + 2h₋. At an end it is the three-point slope, kept monotone.
+//! On an interval of length h with the values y₀, y₁ and the slopes d₀, d₁ the cubic is Hermite's.
+//! A slope at a point between the chords δ₋ (length h₋) and δ₊ (length h₊) is their weighted
+//! harmonic mean, zero where they differ in sign: 1/d = (w₁/δ₋ + w₂/δ₊)/(w₁ + w₂), w₁ = 2h₊ + h₋,
+//! w₂ = h₊ + 2h₋. At an end it is the three-point slope, kept monotone.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +17,8 @@ pub enum Interpolation {
     MonotoneCubic,
 }
 
-/// Where `x` lies among `n` ascending points: the interval below it (`low`, `low + 1`) and how far along it, 0 to 1.
-/// Beyond the ends it is the end; a point by itself is an interval of no length.
+/// Where `x` lies among `n` ascending points: the interval below it (`low`, `low + 1`) and how far
+/// along it, 0 to 1. Beyond the ends it is the end; a point by itself is an interval of no length.
 pub(super) fn place(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f64) {
     let last = n.saturating_sub(1);
     let (mut low, mut high) = (0, last);
@@ -90,8 +91,8 @@ fn inner_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {
     (w0 + w1) / (w0 / chord0 + w1 / chord1)
 }
 
-/// The three-point slope at an end, `chord0` next to it; never against the chord nor steeper than three of it where the
-/// table turns.
+/// The three-point slope at an end, `chord0` next to it; never against the chord nor steeper than
+/// three of it where the table turns.
 fn end_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {
     let slope = ((2.0 * h0 + h1) * chord0 - h0 * chord1) / (h0 + h1);
     if slope * chord0 <= 0.0 {

@@ -1,5 +1,5 @@
-//! The aerodynamic model as data: which derivatives make up which coefficient (eqs. 2.10-2.12, 3.9-3.11), and the
-//! wind-tunnel database they start from, are held at, and are compared with.
+//! The aerodynamic model as data: which derivatives make up which coefficient (eqs. 2.10-2.12,
+//! 3.9-3.11), and the wind-tunnel database they start from, are held at, and are compared with.
 
 pub mod buildup;
 pub mod derivative;

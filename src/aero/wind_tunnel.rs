@@ -1,9 +1,10 @@
-//! The wind-tunnel database: derivatives tabulated over angle of attack and, where the tunnel has them, Mach number and a
-//! third variable.
+//! The wind-tunnel database: derivatives tabulated over angle of attack and, where the tunnel has
+//! them, Mach number and a third variable.
 //!
-//! A table is read along α at the Mach numbers and third values on either side, then across Mach, then across the third
-//! variable, linearly or by a monotone cubic ([`super::interpolation`]). Beyond its ends it stays as at the end (clamped)
-//! or has no value (refused), as the analyst decides; [`WindTunnel::beyond`] tells where that was so.
+//! A table is read along α at the Mach numbers and third values on either side, then across Mach,
+//! then across the third variable, linearly or by a monotone cubic ([`super::interpolation`]).
+//! Beyond its ends it stays as at the end (clamped) or has no value (refused), as the analyst
+//! decides; [`WindTunnel::beyond`] tells where that was so.
 
 use std::collections::BTreeMap;
 
@@ -70,8 +71,9 @@ pub enum Extrapolation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Third {
-    /// Its column in CSV and Parquet, its variable in DAVE-ML. A mean flight condition of the maneuvers (`altitude_ft`,
-    /// `qbar_psf`, `velocity_ft_s`, `mass_slug`, `x_cg_ft`) is read at each maneuver's own.
+    /// Its column in CSV and Parquet, its variable in DAVE-ML. A mean flight condition of the
+    /// maneuvers (`altitude_ft`, `qbar_psf`, `velocity_ft_s`, `mass_slug`, `x_cg_ft`) is read at
+    /// each maneuver's own.
     pub name: String,
     /// Where the tables are read otherwise, in the variable's own unit.
     pub at: f64,
@@ -95,7 +97,8 @@ struct Entry {
     point: TunnelPoint,
 }
 
-/// The tables, by derivative name. Names are compared without underscores, so a database may write `CNalpha`.
+/// The tables, by derivative name. Names are compared without underscores, so a database may write
+/// `CNalpha`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WindTunnel {
     /// Entries sorted by the third variable, then Mach, then α.
@@ -187,20 +190,22 @@ impl WindTunnel {
         breakpoints(self.table(derivative), |e| Some(e.point.alpha_deg))
     }
 
-    /// The Mach numbers at which a derivative is tabulated, ascending; empty for one that does not depend on Mach.
+    /// The Mach numbers at which a derivative is tabulated, ascending; empty for one that does not
+    /// depend on Mach.
     #[must_use]
     pub fn machs(&self, derivative: &str) -> Vec<f64> {
         breakpoints(self.table(derivative), |e| e.point.mach)
     }
 
-    /// The values of the third variable at which a derivative is tabulated, ascending; empty for one that does not depend
-    /// on it.
+    /// The values of the third variable at which a derivative is tabulated, ascending; empty for
+    /// one that does not depend on it.
     #[must_use]
     pub fn thirds(&self, derivative: &str) -> Vec<f64> {
         breakpoints(self.table(derivative), |e| e.third)
     }
 
-    /// Root mean square of a derivative's tabulated values: its typical size. Zero for one without a table.
+    /// Root mean square of a derivative's tabulated values: its typical size. Zero for one without
+    /// a table.
     #[must_use]
     pub fn root_mean_square(&self, derivative: &str) -> f64 {
         let table = self.table(derivative);
@@ -221,7 +226,8 @@ impl WindTunnel {
         )
     }
 
-    /// The value at a flight condition; none without a table, or where extrapolation would be needed and is refused.
+    /// The value at a flight condition; none without a table, or where extrapolation would be
+    /// needed and is refused.
     #[must_use]
     pub fn at(&self, derivative: &str, condition: &Condition) -> Option<TunnelValue> {
         let table = self.tables.get(&key(derivative))?;
@@ -264,8 +270,8 @@ impl WindTunnel {
             .unwrap_or(0.0)
     }
 
-    /// In which variables a reading lies beyond a derivative's table: beyond the rows on either side of it, which may be
-    /// of different length.
+    /// In which variables a reading lies beyond a derivative's table: beyond the rows on either
+    /// side of it, which may be of different length.
     #[must_use]
     pub fn beyond(&self, derivative: &str, condition: &Condition) -> Vec<Beyond> {
         let table = self.table(derivative);
@@ -522,7 +528,8 @@ mod tests {
                 max_relative = 1e-14
             );
         }
-        // Closed form for k² at unit spacing between 1 and 2: chords 1, 3, 5 have the slopes 1.5 and 3.75.
+        // Closed form for k² at unit spacing between 1 and 2: chords 1, 3, 5 have the slopes 1.5
+        // and 3.75.
         let expected = 0.5 * (1.0 + 4.0) + (1.5 - 3.75) / 8.0 + 0.2;
         assert_relative_eq!(value(&cubic, 15.0, 0.2), expected, max_relative = 1e-14);
         assert!((value(&straight, 15.0, 0.2) - expected).abs() > 0.1);

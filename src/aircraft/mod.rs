@@ -1,6 +1,8 @@
-//! The aircraft as the equations see it: reference dimensions, engines, sensor positions, and where on earth it flies.
+//! The aircraft as the equations see it: reference dimensions, engines, sensor positions, and where
+//! on earth it flies.
 //!
-//! Positions are in ft, positive aft (x), right (y) and above (z) of a reference point about 5 ft ahead of the nose.
+//! Positions are in ft, positive aft (x), right (y) and above (z) of a reference point about 5 ft
+//! ahead of the nose.
 
 mod vanes;
 
@@ -35,10 +37,12 @@ pub struct Sensors {
     pub ay: Position,
     pub alpha_vane: Vane,
     pub beta_vane: Vane,
-    /// What the vane equations are: `exact` local velocity at the vane, or the paper's small-angle forms 2.9 and 3.8.
+    /// What the vane equations are: `exact` local velocity at the vane, or the paper's small-angle
+    /// forms 2.9 and 3.8.
     #[serde(default)]
     pub vane_model: VaneModel,
-    /// Whether the axial accelerometer feels thrust (it does; `false` reproduces the print of eq. 2.8).
+    /// Whether the axial accelerometer feels thrust (it does; `false` reproduces the print of eq.
+    /// 2.8).
     #[serde(default = "yes")]
     pub thrust_in_ax: bool,
 }
@@ -56,7 +60,8 @@ pub struct Position {
     pub z_ft: f64,
 }
 
-/// A flow vane: where it stands, and the factor by which upwash or sidewash makes it read more than the local angle.
+/// A flow vane: where it stands, and the factor by which upwash or sidewash makes it read more than
+/// the local angle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vane {

@@ -1,9 +1,10 @@
-//! What the flow vanes read (eqs. 2.9 and 3.8 and their exact forms), and the way back to the angles at the c.g.
+//! What the flow vanes read (eqs. 2.9 and 3.8 and their exact forms), and the way back to the
+//! angles at the c.g.
 //!
-//! A vane stands away from the c.g., so rotation adds ω × arm to the velocity that it sees; upwash and sidewash make it
-//! read `k` times the local angle. Exact: the angle of the local velocity. Small-angle, as printed in the paper:
-//! α + (x q + y p)/V and β + (z p − x r)/V, with arms aft, right and above. At tip booms the two differ by up to 0.45°
-//! at α 30° to 50°.
+//! A vane stands away from the c.g., so rotation adds ω × arm to the velocity that it sees; upwash
+//! and sidewash make it read `k` times the local angle. Exact: the angle of the local velocity.
+//! Small-angle, as printed in the paper: α + (x q + y p)/V and β + (z p − x r)/V, with arms aft,
+//! right and above. At tip booms the two differ by up to 0.45° at α 30° to 50°.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -30,7 +31,8 @@ pub struct Reading {
     pub by_rates: [f64; 3],
 }
 
-/// Velocity of the air past a point of the aircraft in body axes, and its slopes along α, β and the rates.
+/// Velocity of the air past a point of the aircraft in body axes, and its slopes along α, β and the
+/// rates.
 struct Local {
     velocity: [f64; 3],
     by_alpha: [f64; 3],
@@ -56,7 +58,8 @@ impl Flow {
     }
 }
 
-/// From an error of a reading this small, rad, one more step of Newton's leaves no more than rounding.
+/// From an error of a reading this small, rad, one more step of Newton's leaves no more than
+/// rounding.
 const CLOSE: f64 = 1e-7;
 
 impl Vane {
@@ -172,8 +175,9 @@ impl Sensors {
         self.beta_vane.beta_reading(self.vane_model, flow, cg)
     }
 
-    /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the small-angle readings
-    /// solved for them, the exact ones inverted by Newton's iteration, for which the readings are almost straight.
+    /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the
+    /// small-angle readings solved for them, the exact ones inverted by Newton's iteration, for
+    /// which the readings are almost straight.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {

@@ -1,4 +1,5 @@
-//! The commands past one machine: a plan, a shard of it, what is missing, the merge, the scheduler's scripts.
+//! The commands past one machine: a plan, a shard of it, what is missing, the merge, the
+//! scheduler's scripts.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -21,7 +22,8 @@ const AGAIN: u8 = 75;
 pub struct PlanOptions {
     #[command(flatten)]
     options: Options,
-    /// What to deal: flights, to be ingested and segmented; or the maneuvers found in them, to be estimated
+    /// What to deal: flights, to be ingested and segmented; or the maneuvers found in them, to be
+    /// estimated
     #[arg(long, value_enum)]
     of: Dealt,
     /// To how many shards [default: the pipeline's `cluster: shards:`]
@@ -41,7 +43,8 @@ enum Dealt {
 /// One shard's share instead of the whole campaign.
 #[derive(Args, Debug)]
 pub struct ShareOptions {
-    /// Compute a shard of this plan into the store, and publish nothing; exit code 75: another try may go well
+    /// Compute a shard of this plan into the store, and publish nothing; exit code 75: another try
+    /// may go well
     #[arg(long, value_name = "FILE", requires = "shard")]
     plan: Option<PathBuf>,
     /// Which shard of how many: 3/24

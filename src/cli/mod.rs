@@ -22,9 +22,10 @@ use crate::{bench_case, simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
-/// harvest reads Parquet flight records, finds the maneuvers in them, estimates the stability and control derivatives of
-/// each by maximum likelihood (output error), fits trends across angle of attack, compares them with a wind-tunnel
-/// database, and writes tables (Parquet and CSV) and a report (HTML).
+/// harvest reads Parquet flight records, finds the maneuvers in them, estimates the stability and
+/// control derivatives of each by maximum likelihood (output error), fits trends across angle of
+/// attack, compares them with a wind-tunnel database, and writes tables (Parquet and CSV) and a
+/// report (HTML).
 #[derive(Debug, Parser)]
 #[command(version, after_long_help = AFTER)]
 struct Cli {
@@ -81,14 +82,16 @@ enum Command {
     Compare(RunOptions),
     /// Write the report
     Report(RunOptions),
-    /// Write the flight-updated derivatives for simulators: DAVE-ML, a JSBSim section, CSV and Parquet
+    /// Write the flight-updated derivatives for simulators: DAVE-ML, a JSBSim section, CSV and
+    /// Parquet
     #[command(after_help = EXPORT_HELP)]
     Export(ExportOptions),
     /// Validate a pipeline's configuration and say what it would do
     Check(Options),
     /// Say per stage what is fresh, stale or failed, and why
     Status(nightly::StatusOptions),
-    /// Tell a maneuver's story: where from, which samples, what was held, how it was fitted, what it depends on
+    /// Tell a maneuver's story: where from, which samples, what was held, how it was fitted, what
+    /// it depends on
     Explain(nightly::ExplainOptions),
     /// Say what changed since the night before, and why
     Diff(nightly::DiffOptions),
@@ -105,20 +108,25 @@ enum Command {
     /// Draw a strip chart of a flight or a maneuver, SVG
     #[command(subcommand)]
     Show(Show),
-    /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel database, and the truth
+    /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel
+    /// database, and the truth
     Simulate(SimulateOptions),
-    /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise, and estimated
+    /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise,
+    /// and estimated
     Validate(ValidateOptions),
-    /// Time the standard case: estimate a maneuver given as JSON with its record as CSV beside it, again and again
+    /// Time the standard case: estimate a maneuver given as JSON with its record as CSV beside it,
+    /// again and again
     BenchCase(BenchCaseOptions),
 }
 
 #[derive(Debug, Subcommand)]
 enum Show {
-    /// A whole flight: motion, surfaces, pilot controls and flags, with maneuvers, repairs and the analyst's events
+    /// A whole flight: motion, surfaces, pilot controls and flags, with maneuvers, repairs and the
+    /// analyst's events
     #[command(after_help = FLIGHT_HELP)]
     Flight(ShowOptions),
-    /// One maneuver: inputs, outputs measured and computed, residuals, with a few seconds before and after
+    /// One maneuver: inputs, outputs measured and computed, residuals, with a few seconds before
+    /// and after
     #[command(after_help = MANEUVER_HELP)]
     Maneuver(ShowOptions),
 }
@@ -251,7 +259,8 @@ impl Patience {
 
 #[derive(Args, Debug)]
 struct BenchCaseOptions {
-    /// The case, JSON, with a CSV of the same name beside it; or a folder of such cases, which are estimated in parallel
+    /// The case, JSON, with a CSV of the same name beside it; or a folder of such cases, which are
+    /// estimated in parallel
     case: PathBuf,
     /// How often each is estimated
     #[arg(long, value_name = "N", default_value_t = 20)]
@@ -266,28 +275,31 @@ struct BenchCaseOptions {
 
 #[derive(Args, Debug)]
 struct Options {
-    /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its name under pipelines/
+    /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its
+    /// name under pipelines/
     #[arg(default_value = "harv")]
     pipeline: PathBuf,
-    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also partitioned as flight=…/; or the
-    /// same in an object store, s3://bucket/prefix
+    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also
+    /// partitioned as flight=…/; or the same in an object store, s3://bucket/prefix
     #[arg(long)]
     archive: Option<String>,
-    /// Wind-tunnel database instead of the pipeline's: DAVE-ML (.dml, .xml), or CSV or Parquet with derivative, alpha_deg,
-    /// value, unit[, mach, uncertainty, source]
+    /// Wind-tunnel database instead of the pipeline's: DAVE-ML (.dml, .xml), or CSV or Parquet with
+    /// derivative, alpha_deg, value, unit[, mach, uncertainty, source]
     #[arg(long, value_name = "FILE")]
     wind_tunnel: Option<PathBuf>,
     /// The analyst's events instead of the pipeline's: CSV with flight_id, class, start_s, end_s
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Folder with the tables of an earlier campaign or night to compare with, besides the tunnel; may be given again
+    /// Folder with the tables of an earlier campaign or night to compare with, besides the tunnel;
+    /// may be given again
     #[arg(long, value_name = "FOLDER")]
     against: Vec<PathBuf>,
-    /// Folder of the intermediate artefacts, or a place in an object store, s3://bucket/prefix [default:
-    /// data/store/<pipeline>]
+    /// Folder of the intermediate artefacts, or a place in an object store, s3://bucket/prefix
+    /// [default: data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     store: Option<PathBuf>,
-    /// Of a store in an object store: the folder that keeps what was fetched or made here [default: data/store/<pipeline>]
+    /// Of a store in an object store: the folder that keeps what was fetched or made here [default:
+    /// data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     store_cache: Option<PathBuf>,
     /// Folder of the tables and the report [default: reports/<pipeline>]
@@ -296,8 +308,8 @@ struct Options {
     /// Number of threads; results do not depend on it [default: all cores]
     #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     threads: Option<usize>,
-    /// What reading flights may hold in memory at once, over all of them, instead of the pipeline's; results do not depend on
-    /// it
+    /// What reading flights may hold in memory at once, over all of them, instead of the
+    /// pipeline's; results do not depend on it
     #[arg(long, value_name = "MB")]
     memory_mb: Option<f64>,
     /// No progress bars and no summary
@@ -597,7 +609,8 @@ fn picture(subject: fn(String) -> Subject, options: &ShowOptions) -> anyhow::Res
 }
 
 impl Options {
-    /// Pipeline and options as they are typed, without those of the terminal: for a script that is to do the same.
+    /// Pipeline and options as they are typed, without those of the terminal: for a script that is
+    /// to do the same.
     fn typed(&self) -> Vec<String> {
         let path = |path: &Path| path.display().to_string();
         let options = [
@@ -731,7 +744,8 @@ fn check(options: &Options) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A progress bar per stage on the terminal, nothing where there is none; and a line per stage in the log.
+/// A progress bar per stage on the terminal, nothing where there is none; and a line per stage in
+/// the log.
 struct Bars<'a> {
     quiet: bool,
     log: Option<&'a Log>,

@@ -1,4 +1,5 @@
-//! The commands of the morning after: what is fresh, a maneuver's story, what changed, whether it still holds, what can go.
+//! The commands of the morning after: what is fresh, a maneuver's story, what changed, whether it
+//! still holds, what can go.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,7 +14,8 @@ use crate::pipeline::{diff, explain, gc, status, verify};
 pub struct StatusOptions {
     #[command(flatten)]
     options: Options,
-    /// Instead, print the shards of this plan of which something is missing, as schedulers write an array: 1,4-7
+    /// Instead, print the shards of this plan of which something is missing, as schedulers write an
+    /// array: 1,4-7
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
 }

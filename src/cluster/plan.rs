@@ -68,8 +68,8 @@ pub struct Plan {
 impl Plan {
     /// Deals items (id, flight, cost), in their order, to shards of about equal cost.
     ///
-    /// A shard has neighbours: the maneuvers of a flight share its record. A shard's cost differs from the mean by no more
-    /// than that of the dearest item.
+    /// A shard has neighbours: the maneuvers of a flight share its record. A shard's cost differs
+    /// from the mean by no more than that of the dearest item.
     #[must_use]
     pub fn deal(
         of: Of,
@@ -108,7 +108,8 @@ impl Plan {
     /// Reads a plan.
     ///
     /// # Errors
-    /// Why the text is none, or none that can be worked by: a plan of another program, an item twice or in no shard.
+    /// Why the text is none, or none that can be worked by: a plan of another program, an item
+    /// twice or in no shard.
     pub fn read(text: &str) -> Result<Plan, String> {
         let plan: Plan =
             serde_json::from_str(text).map_err(|e| format!("is no plan of this program: {e}"))?;

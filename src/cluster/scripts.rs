@@ -1,9 +1,10 @@
-//! The scripts that a batch scheduler runs: an array over flights, the plan of their maneuvers, an array over these, the
-//! merge; each after the one before.
+//! The scripts that a batch scheduler runs: an array over flights, the plan of their maneuvers, an
+//! array over these, the merge; each after the one before.
 //!
-//! Slurm ends every dependency on an array (`afterok`) of which a task was requeued by `RequeueExit`; so a task that wants
-//! to be tried again requeues itself (`scontrol requeue`), which the dependency outlives. PBS has no such command for a
-//! running task: there a task is tried again in its own time.
+//! Slurm ends every dependency on an array (`afterok`) of which a task was requeued by
+//! `RequeueExit`; so a task that wants to be tried again requeues itself (`scontrol requeue`),
+//! which the dependency outlives. PBS has no such command for a running task: there a task is tried
+//! again in its own time.
 
 use super::Settings;
 
@@ -40,7 +41,8 @@ pub struct Script {
 /// The chain's jobs in order.
 const JOBS: [&str; 4] = ["flights", "plan", "maneuvers", "merge"];
 
-/// The largest array that schedulers take unless told otherwise: Slurm's `MaxArraySize` is 1001, which excludes 1001.
+/// The largest array that schedulers take unless told otherwise: Slurm's `MaxArraySize` is 1001,
+/// which excludes 1001.
 pub const LARGEST_ARRAY: usize = 1000;
 
 /// A word that the shell takes as it is.
@@ -123,7 +125,8 @@ fn directives(
             let mut lines = vec![
                 format!("--job-name={name}"),
                 format!("--output={output}"),
-                // A task that is tried again goes on in the same log, and a node that dies costs its tasks a new start.
+                // A task that is tried again goes on in the same log, and a node that dies costs
+                // its tasks a new start.
                 "--open-mode=append".to_owned(),
                 "--requeue".to_owned(),
                 format!("--time={}", s.time),

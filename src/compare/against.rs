@@ -1,8 +1,8 @@
-//! A campaign against an earlier one: the trend that speaks for each derivative beside the earlier trend of the same group,
-//! z = (now − before) / √(standard error now² + standard error before²).
+//! A campaign against an earlier one: the trend that speaks for each derivative beside the earlier
+//! trend of the same group, z = (now − before) / √(standard error now² + standard error before²).
 //!
-//! Where both campaigns share flights their errors are not independent, and z is smaller than it should be: a change that
-//! counts here is one that the data made.
+//! Where both campaigns share flights their errors are not independent, and z is smaller than it
+//! should be: a change that counts here is one that the data made.
 
 use std::path::Path;
 
@@ -27,7 +27,8 @@ impl Earlier {
         }
     }
 
-    /// Value and standard error of a trend, linear between its published α; none outside of them or in another unit.
+    /// Value and standard error of a trend, linear between its published α; none outside of them or
+    /// in another unit.
     fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
         let same = |e: &&PublishedTrend| {
             e.derivative == now.derivative

@@ -1,4 +1,5 @@
-//! Where the tunnel was to be read beyond its tables: at maneuvers, for values held or compared, and at the trends' α.
+//! Where the tunnel was to be read beyond its tables: at maneuvers, for values held or compared,
+//! and at the trends' α.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +8,8 @@ use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::tables::{BeyondRow, ComparisonRow, EstimateRow};
 
-/// One row per maneuver (or α of the comparison), variable and range of tables, with the derivatives it concerns.
+/// One row per maneuver (or α of the comparison), variable and range of tables, with the
+/// derivatives it concerns.
 #[must_use]
 pub fn beyond(
     estimates: &[EstimateRow],

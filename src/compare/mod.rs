@@ -1,9 +1,11 @@
-//! Compare sets flight against the wind tunnel, derivative by derivative: the trend that speaks for it at the tunnel's own
-//! breakpoints, and each maneuver at its own α and Mach number; and against earlier campaigns.
+//! Compare sets flight against the wind tunnel, derivative by derivative: the trend that speaks for
+//! it at the tunnel's own breakpoints, and each maneuver at its own α and Mach number; and against
+//! earlier campaigns.
 //!
-//! Where the tunnel has no breakpoint inside a trend it is read at the trend's α, else only at its own. The Mach number is
-//! the mean at which the group's maneuvers were flown there. The difference is judged by its standard error,
-//! z = (flight − tunnel) / √(standard error² + tunnel's uncertainty²), with the tunnel's uncertainty where it states one.
+//! Where the tunnel has no breakpoint inside a trend it is read at the trend's α, else only at its
+//! own. The Mach number is the mean at which the group's maneuvers were flown there. The difference
+//! is judged by its standard error, z = (flight − tunnel) / √(standard error² + tunnel's
+//! uncertainty²), with the tunnel's uncertainty where it states one.
 
 pub mod against;
 pub mod beyond;
@@ -23,14 +25,17 @@ use crate::trend;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Derivatives whose tunnel values, where the database holds any, are no measurements to compare with.
+    /// Derivatives whose tunnel values, where the database holds any, are no measurements to
+    /// compare with.
     #[serde(default)]
     pub not_comparable: BTreeSet<String>,
-    /// Flight and tunnel agree when they differ by no more than this many standard errors. Default 2.
+    /// Flight and tunnel agree when they differ by no more than this many standard errors. Default
+    /// 2.
     #[serde(default = "default_agreement_z")]
     pub agreement_z: f64,
-    /// They agree as well when they differ by no more than this share of the tunnel's value, in percent, however well
-    /// the difference is determined. Default 5, about as well as tunnel tests repeat each other.
+    /// They agree as well when they differ by no more than this share of the tunnel's value, in
+    /// percent, however well the difference is determined. Default 5, about as well as tunnel tests
+    /// repeat each other.
     #[serde(default = "default_agreement_pct")]
     pub agreement_pct: f64,
     /// How many of the worst disagreements the table `disagreements` has at most. Default 20.
@@ -69,13 +74,13 @@ impl Settings {
     }
 }
 
-/// One row per derivative and α of the trend of the derivative's group, in the order of the trends: at the tunnel's
-/// breakpoints where it has some there.
+/// One row per derivative and α of the trend of the derivative's group, in the order of the trends:
+/// at the tunnel's breakpoints where it has some there.
 ///
-/// Verdicts: `no tunnel value`; `sign differs` where both are non-zero beyond their uncertainty and on different sides of
-/// zero; `agrees` within `agreement_z` standard errors or `agreement_pct` percent; else `flight higher` or `flight
-/// lower`, in the algebraic sense: −0.3 is lower than −0.2. `difference_pct` is of the tunnel value's magnitude, so its
-/// sign says the same.
+/// Verdicts: `no tunnel value`; `sign differs` where both are non-zero beyond their uncertainty and
+/// on different sides of zero; `agrees` within `agreement_z` standard errors or `agreement_pct`
+/// percent; else `flight higher` or `flight lower`, in the algebraic sense: −0.3 is lower than
+/// −0.2. `difference_pct` is of the tunnel value's magnitude, so its sign says the same.
 #[must_use]
 pub fn comparison(
     trends: &[TrendRow],
@@ -134,8 +139,9 @@ pub fn comparison(
     trends.iter().filter_map(row).collect()
 }
 
-/// One row per maneuver and derivative that it estimates with a bound, in the order of the estimates: the tunnel at the
-/// maneuver's own mean flight condition. The error of the flight's value is its corrected bound, else its bound.
+/// One row per maneuver and derivative that it estimates with a bound, in the order of the
+/// estimates: the tunnel at the maneuver's own mean flight condition. The error of the flight's
+/// value is its corrected bound, else its bound.
 #[must_use]
 pub fn of_maneuvers(
     estimates: &[EstimateRow],
@@ -184,7 +190,8 @@ pub fn of_maneuvers(
         .collect()
 }
 
-/// Mean flight condition of the maneuvers within half a step of α, or else of the nearest one, at that α.
+/// Mean flight condition of the maneuvers within half a step of α, or else of the nearest one, at
+/// that α.
 pub(crate) fn condition_near<'a>(
     maneuvers: impl Iterator<Item = &'a Maneuver>,
     tunnel: &WindTunnel,
@@ -489,8 +496,8 @@ mod tests {
         };
         let trends = [of("A", 20.0), of("B", 20.0), of("A", 30.0)];
         let rows = comparison(&trends, &maneuvers, &tunnel, &groups, &Settings::default());
-        // The trend of class B does not speak for the derivative; no maneuver is within half a step of 30°,
-        // and the nearest is that at 21°.
+        // The trend of class B does not speak for the derivative; no maneuver is within half a step
+        // of 30°, and the nearest is that at 21°.
         assert_eq!(rows.len(), 2);
         assert_relative_eq!(
             rows[0].wind_tunnel.expect("tunnel"),

@@ -1,5 +1,6 @@
-//! Verdicts in words: neighbouring angles of attack with the same verdict become one range and one sentence, and the
-//! ranges that disagree are ranked by how much of the derivative's size they are apart.
+//! Verdicts in words: neighbouring angles of attack with the same verdict become one range and one
+//! sentence, and the ranges that disagree are ranked by how much of the derivative's size they are
+//! apart.
 
 use super::Settings;
 use crate::aero::WindTunnel;
@@ -192,8 +193,8 @@ fn words(
     }
 }
 
-/// By how much: the median in percent of the other's magnitude, with its extremes where they are far from it; in the
-/// derivative's unit where the other is zero.
+/// By how much: the median in percent of the other's magnitude, with its extremes where they are
+/// far from it; in the derivative's unit where the other is zero.
 fn by(run: &[Place]) -> String {
     let mut shares: Vec<f64> = run
         .iter()

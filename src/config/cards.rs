@@ -1,4 +1,5 @@
-//! Test cards for the simulator: YAML as written, checked against the pipeline whose aircraft flies them.
+//! Test cards for the simulator: YAML as written, checked against the pipeline whose aircraft flies
+//! them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -26,7 +27,8 @@ impl Simulation {
     /// Reads and checks a file of cards and its pipeline.
     ///
     /// # Errors
-    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first thing that is wrong.
+    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first
+    /// thing that is wrong.
     pub fn load(file: &Path) -> Result<Simulation> {
         let source = Source::read(file.to_owned())?;
         let cards: Cards = source.parse()?;
@@ -61,8 +63,8 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// The card of one maneuver of a class: its program at an angle of attack, in still air, derivatives frozen, for
-    /// studies. `None` for a class without program.
+    /// The card of one maneuver of a class: its program at an angle of attack, in still air,
+    /// derivatives frozen, for studies. `None` for a class without program.
     #[must_use]
     pub fn card(&self, class: &str, alpha_deg: f64) -> Option<Card> {
         let axis = self.config.class(class)?.axis;

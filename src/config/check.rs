@@ -1,4 +1,5 @@
-//! The checks of a configuration that its types cannot make: names resolve, units fit, nothing is missing.
+//! The checks of a configuration that its types cannot make: names resolve, units fit, nothing is
+//! missing.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -66,7 +67,8 @@ pub(super) fn tunnel(
     Ok(tunnel)
 }
 
-/// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's derivatives and sums.
+/// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's
+/// derivatives and sums.
 pub(super) fn tunnel_rows(
     path: &Path,
     buildup: &Buildup,
@@ -86,7 +88,8 @@ fn plain(name: &str) -> String {
     name.replace('_', "")
 }
 
-/// What the tunnel's rows have given so far: each point once, and of each derivative always the same variables.
+/// What the tunnel's rows have given so far: each point once, and of each derivative always the
+/// same variables.
 #[derive(Default)]
 struct Seen {
     points: BTreeSet<(String, [Option<u64>; 3])>,

@@ -1,7 +1,8 @@
 //! Configuration: YAML as written, checked whole before any flight is opened, as checked types.
 //!
-//! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages), `aircraft.yaml` (geometry,
-//! sensors, channel map), `model.yaml` (the build-up) and `maneuvers/*.yaml` (one class per file).
+//! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages),
+//! `aircraft.yaml` (geometry, sensors, channel map), `model.yaml` (the build-up) and
+//! `maneuvers/*.yaml` (one class per file).
 
 mod cards;
 mod check;
@@ -28,7 +29,8 @@ pub struct Config {
     /// Name of the pipeline: its folder's.
     pub name: String,
     pub title: String,
-    /// Folder or glob of the flight archive, in the file system or in an object store (`s3://bucket/prefix`).
+    /// Folder or glob of the flight archive, in the file system or in an object store
+    /// (`s3://bucket/prefix`).
     pub archive: String,
     /// The wind-tunnel table's file, as the report names it.
     pub wind_tunnel: PathBuf,
@@ -77,7 +79,8 @@ impl Config {
     /// Reads and checks a pipeline's folder.
     ///
     /// # Errors
-    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first thing that is wrong.
+    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first
+    /// thing that is wrong.
     pub fn load(folder: &Path, overrides: Overrides) -> Result<Config> {
         let files = source::Files::read(folder)?;
         let pipeline = files.pipeline()?;
@@ -144,7 +147,8 @@ impl Config {
         self.classes.iter().find(|c| c.name == name)
     }
 
-    /// Names of derivatives and combined sums in the order of the model, as trends and figures have them.
+    /// Names of derivatives and combined sums in the order of the model, as trends and figures have
+    /// them.
     #[must_use]
     pub fn derivative_names(&self) -> Vec<String> {
         let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
@@ -155,7 +159,8 @@ impl Config {
     }
 }
 
-/// The comparison's settings with the earlier campaigns that the command line names, where it names some.
+/// The comparison's settings with the earlier campaigns that the command line names, where it names
+/// some.
 fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
     if named.is_empty() {
         settings

@@ -6,7 +6,8 @@ use super::source::Source;
 use crate::error::{Error, Result};
 use crate::store::object;
 
-/// The store's folder, and the place in an object store that it is the cache of, where there is one.
+/// The store's folder, and the place in an object store that it is the cache of, where there is
+/// one.
 pub(super) fn store(
     store: Option<PathBuf>,
     cache: Option<PathBuf>,
@@ -29,7 +30,8 @@ pub(super) fn store(
     Ok((store.unwrap_or(default), None))
 }
 
-/// Checks that a place in an object store is one, and that this program knows such; nobody is asked.
+/// Checks that a place in an object store is one, and that this program knows such; nobody is
+/// asked.
 pub(super) fn reachable(place: &Path) -> Result<()> {
     if object::is_object(place) {
         object::check(place).map_err(|e| e.at(place))

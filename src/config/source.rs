@@ -1,4 +1,5 @@
-//! The text of a pipeline's files: parsed with errors that name file and line, and searched for the line of a name.
+//! The text of a pipeline's files: parsed with errors that name file and line, and searched for the
+//! line of a name.
 
 use std::path::{Path, PathBuf};
 
@@ -54,7 +55,8 @@ impl Source {
         Error::config(&self.path, self.line_of(name, 0), what)
     }
 
-    /// An error about a name in the section under a key: a word may stand elsewhere in another meaning.
+    /// An error about a name in the section under a key: a word may stand elsewhere in another
+    /// meaning.
     pub fn error_under(&self, key: &str, name: &str, what: impl Into<String>) -> Error {
         let begins = |line: &str| {
             line.trim_start()
@@ -90,8 +92,8 @@ fn without_comment(line: &str) -> &str {
     }
 }
 
-/// What the parser says, without the place (the error begins with it) and, for an unknown key or word, with the one that
-/// was probably meant.
+/// What the parser says, without the place (the error begins with it) and, for an unknown key or
+/// word, with the one that was probably meant.
 fn said(parser: &str) -> String {
     let what = parser
         .rsplit_once(" at line ")

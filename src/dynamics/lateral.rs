@@ -1,9 +1,11 @@
-//! Lateral-directional equations: states β, p, r, φ (3.1-3.4); outputs β at the vane, p, r, φ, `a_y` (3.7, 3.8).
+//! Lateral-directional equations: states β, p, r, φ (3.1-3.4); outputs β at the vane, p, r, φ,
+//! `a_y` (3.7, 3.8).
 //!
-//! Forces: V β̇ = f_y cos β − sin β (f_x cos α + f_z sin α) + g-terms + V (p sin α − r cos α), with f_y = q̄S CY/m.
-//! The longitudinal specific forces f_x, f_z are taken as measured, brought to the c.g.; in 3.1 they stand as C_D sin β
-//! and T cos α sin β (minus: thrust pulls the nose back into the wind's direction). Moments: Euler's equations about x and
-//! z for a symmetric airframe with the engines' momentum H along +x, whose yawing moment is +q H.
+//! Forces: V β̇ = f_y cos β − sin β (f_x cos α + f_z sin α) + g-terms + V (p sin α − r cos α), with
+//! f_y = q̄S CY/m. The longitudinal specific forces f_x, f_z are taken as measured, brought to the
+//! c.g.; in 3.1 they stand as C_D sin β and T cos α sin β (minus: thrust pulls the nose back into
+//! the wind's direction). Moments: Euler's equations about x and z for a symmetric airframe with
+//! the engines' momentum H along +x, whose yawing moment is +q H.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -33,12 +35,14 @@ pub struct Known {
     sin_theta: f64,
     cos_theta: f64,
     tan_theta: f64,
-    /// f_x cos α + f_z sin α, ft/s²: the measured specific force along the wind's projection on the plane of symmetry.
+    /// f_x cos α + f_z sin α, ft/s²: the measured specific force along the wind's projection on the
+    /// plane of symmetry.
     along: f64,
     /// q̄S/m, ft/s².
     force: f64,
     gravity: f64,
-    /// q̄Sb times the inverse of the inertia matrix [I_x −I_xz; −I_xz I_z]: rows ṗ, ṙ; columns Cl, Cn.
+    /// q̄Sb times the inverse of the inertia matrix [I_x −I_xz; −I_xz I_z]: rows ṗ, ṙ; columns Cl,
+    /// Cn.
     moment: [[f64; 2]; 2],
     /// ṗ, ṙ = `coupling` (p, r) + `gyroscopic`, rad/s².
     coupling: [[f64; 2]; 2],
@@ -135,7 +139,8 @@ impl Equations<4> for Lateral {
             [m.ixz / determinant, m.ix / determinant],
         ];
         let q = m.rates[1];
-        // Moments of the rotation itself: L = q r (I_y − I_z) + p q I_xz, N = p q (I_x − I_y) − q r I_xz.
+        // Moments of the rotation itself: L = q r (I_y − I_z) + p q I_xz, N = p q (I_x − I_y) − q r
+        // I_xz.
         let turning = [
             [q * m.ixz, q * (m.iy - m.iz)],
             [q * (m.ix - m.iy), -q * m.ixz],

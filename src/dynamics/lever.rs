@@ -1,7 +1,8 @@
-//! What an accelerometer away from the c.g. feels besides the specific force at the c.g.: ω̇ × r + ω × (ω × r).
+//! What an accelerometer away from the c.g. feels besides the specific force at the c.g.: ω̇ × r +
+//! ω × (ω × r).
 //!
-//! Eqs. 2.7, 2.8 and 3.7 are this with the products of two different rates dropped; those reach 0.005 g at high roll rate,
-//! so they are kept.
+//! Eqs. 2.7, 2.8 and 3.7 are this with the products of two different rates dropped; those reach
+//! 0.005 g at high roll rate, so they are kept.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -15,7 +16,8 @@ pub(crate) struct Lever {
     pub by_accelerations: [f64; 3],
 }
 
-/// Component `i` (0 forward, 1 right, 2 down) at an arm in body axes (ft), for ω in rad/s and ω̇ in rad/s².
+/// Component `i` (0 forward, 1 right, 2 down) at an arm in body axes (ft), for ω in rad/s and ω̇ in
+/// rad/s².
 #[inline(always)]
 pub(crate) fn lever(i: usize, arm: [f64; 3], rates: [f64; 3], accelerations: [f64; 3]) -> Lever {
     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -69,7 +71,8 @@ mod tests {
 
     #[test]
     fn the_lever_has_the_printed_terms_of_2_7_2_8_and_3_7() {
-        // Arms aft, right and above, as in the paper; the printed forms have no products of two different rates.
+        // Arms aft, right and above, as in the paper; the printed forms have no products of two
+        // different rates.
         let (x, y, z) = (-ARM[0], ARM[1], -ARM[2]);
         let only = |i: usize, w: f64| {
             let mut rates = [0.0; 3];

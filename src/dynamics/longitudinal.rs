@@ -1,9 +1,11 @@
-//! Longitudinal equations: states α, q, θ (2.1-2.3); outputs α at the vane, q, θ, `a_n`, `a_x` (2.7-2.9).
+//! Longitudinal equations: states α, q, θ (2.1-2.3); outputs α at the vane, q, θ, `a_n`, `a_x`
+//! (2.7-2.9).
 //!
-//! Forces: with f the specific force in body axes and gravity g, V cos β α̇ = f_z cos α − f_x sin α + g-terms +
-//! V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S CA)/m. The paper's 2.1 with
-//! C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y for a symmetric airframe (I_xy = I_yz = 0) with
-//! the engines' momentum H along +x, whose moment is −r H.
+//! Forces: with f the specific force in body axes and gravity g, V cos β α̇ = f_z cos α − f_x sin α
+//! + g-terms + V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S
+//! CA)/m. The paper's 2.1 with C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y
+//! for a symmetric airframe (I_xy = I_yz = 0) with the engines' momentum H along +x, whose moment
+//! is −r H.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -103,7 +105,8 @@ impl Equations<3> for Longitudinal {
     fn known(aircraft: &Aircraft, m: &Motion) -> Known {
         let [p, _, r] = m.rates;
         let [(sin_beta, cos_beta), (sin_phi, cos_phi)] = sin_cos([m.beta, m.phi]);
-        // Divisions are most of what laying out a maneuver costs: one for each denominator, here and below.
+        // Divisions are most of what laying out a maneuver costs: one for each denominator, here
+        // and below.
         let (per_speed, per_mass, per_iy) =
             (1.0 / (m.velocity * cos_beta), 1.0 / m.mass, 1.0 / m.iy);
         let tan_beta = sin_beta * m.velocity * per_speed;

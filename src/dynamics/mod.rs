@@ -1,11 +1,13 @@
-//! The equations of motion (2.1-2.3, 3.1-3.4) and of the sensors (2.7-2.9, 3.7, 3.8) with their exact slopes, and their
-//! integration with sensitivities.
+//! The equations of motion (2.1-2.3, 3.1-3.4) and of the sensors (2.7-2.9, 3.7, 3.8) with their
+//! exact slopes, and their integration with sensitivities.
 //!
-//! Each axis integrates its own states and takes everything else as measured. What the estimation needs of an axis is
-//! [`Equations`]: the rates of the states and the outputs as functions of the states x and the axis's three coefficients
-//! c, with the slopes along both. How c follows from x and the derivatives is the build-up's business.
+//! Each axis integrates its own states and takes everything else as measured. What the estimation
+//! needs of an axis is [`Equations`]: the rates of the states and the outputs as functions of the
+//! states x and the axis's three coefficients c, with the slopes along both. How c follows from x
+//! and the derivatives is the build-up's business.
 //!
-//! Units inside: rad, rad/s, ft, slug, lbf, s. Outputs are in the units of the signals: deg, deg/s, g.
+//! Units inside: rad, rad/s, ft, slug, lbf, s. Outputs are in the units of the signals: deg, deg/s,
+//! g.
 
 mod lateral;
 mod lever;
@@ -35,7 +37,8 @@ pub struct Rates<const NX: usize> {
     pub by_coefficient: SMatrix<f64, NX, COEFFICIENTS>,
 }
 
-/// Outputs as the sensors read them (deg, deg/s, g), and their slopes along states and coefficients.
+/// Outputs as the sensors read them (deg, deg/s, g), and their slopes along states and
+/// coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs<const NX: usize> {
     pub outputs: SVector<f64, OUTPUTS>,
@@ -56,7 +59,8 @@ pub trait Equations<const NX: usize> {
 
     /// The states that regressors can be proportional to.
     const FOLLOWED: &'static [usize];
-    /// Where the slopes of the rates along states can be other than zero, also through coefficients: (rate, state).
+    /// Where the slopes of the rates along states can be other than zero, also through
+    /// coefficients: (rate, state).
     const RATES_BY_STATE: &'static [(usize, usize)];
     /// Where those along coefficients can be: (rate, coefficient).
     const RATES_BY_COEFFICIENT: &'static [(usize, usize)];

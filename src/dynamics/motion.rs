@@ -1,7 +1,8 @@
-//! The measured motion: everything that an axis's equations take as known, at the samples and halfway between them.
+//! The measured motion: everything that an axis's equations take as known, at the samples and
+//! halfway between them.
 //!
-//! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs them at its two ends
-//! and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
+//! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs
+//! them at its two ends and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -48,7 +49,8 @@ pub struct Motion {
     pub cg: Position,
 }
 
-/// Whether mass, c.g. and inertias are taken sample by sample or as their means over the maneuver (the paper's choice).
+/// Whether mass, c.g. and inertias are taken sample by sample or as their means over the maneuver
+/// (the paper's choice).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MassProperties {
@@ -144,7 +146,8 @@ impl Window {
             .map_or(&[], |points| points.as_slice())
     }
 
-    /// The same window as a sensor in error would have recorded it: a signal's values times `1 + scale`, plus `bias`.
+    /// The same window as a sensor in error would have recorded it: a signal's values times `1 +
+    /// scale`, plus `bias`.
     #[must_use]
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
@@ -337,11 +340,13 @@ fn constant(values: &[f64]) -> Vec<f64> {
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }
 
-/// Samples on each side of the local straight line whose slope stands for the derivative: 0.1 s at 40 Hz, short against
-/// the airframe's modes, long enough to hold the gyros' noise under the accelerometers' when it meets an arm.
+/// Samples on each side of the local straight line whose slope stands for the derivative: 0.1 s at
+/// 40 Hz, short against the airframe's modes, long enough to hold the gyros' noise under the
+/// accelerometers' when it meets an arm.
 pub const SLOPE_REACH: usize = 4;
 
-/// Slope per second of a signal over a range of the record, by local least squares on up to nine samples.
+/// Slope per second of a signal over a range of the record, by local least squares on up to nine
+/// samples.
 fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
     const WHOLE: usize = 2 * SLOPE_REACH + 1;
     let at = |k: usize| {

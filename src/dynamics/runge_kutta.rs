@@ -1,7 +1,8 @@
 //! The classical fourth-order Runge-Kutta step, for a state and for its sensitivities alike.
 //!
-//! The sensitivities are those of the discrete integration, not of the continuous equation: each stage's slope is
-//! differentiated where the state's own was taken, so a Gauss-Newton step sees the exact gradient of what was integrated.
+//! The sensitivities are those of the discrete integration, not of the continuous equation: each
+//! stage's slope is differentiated where the state's own was taken, so a Gauss-Newton step sees the
+//! exact gradient of what was integrated.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -11,8 +12,8 @@
 pub const STAGES: usize = 4;
 /// Which of start (0), middle (1) and end (2) of the step each slope is taken at.
 pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
-/// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and `along(x, h, slope)` is
-/// x + h slope.
+/// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and
+/// `along(x, h, slope)` is x + h slope.
 #[inline(always)]
 pub fn step<X: Copy>(
     x: X,
@@ -80,7 +81,8 @@ mod tests {
 
     #[test]
     fn sensitivities_are_those_of_the_discrete_integration() {
-        // With only three steps the discrete slope differs from the continuous 1/(1 − a)² by more than the tolerance.
+        // With only three steps the discrete slope differs from the continuous 1/(1 − a)² by more
+        // than the tolerance.
         let h = 1e-6;
         let numeric = (integrate(0.4 + h, 3).0 - integrate(0.4 - h, 3).0) / (2.0 * h);
         let (_, exact) = integrate(0.4, 3);

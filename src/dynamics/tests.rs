@@ -153,8 +153,8 @@ fn lateral_slopes_are_those_of_finite_differences() {
     slopes_match::<4, Lateral>();
 }
 
-/// Slopes that are not zero stand where the axis says they can, those through coefficients that follow every regressor
-/// among them.
+/// Slopes that are not zero stand where the axis says they can, those through coefficients that
+/// follow every regressor among them.
 fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
     let (known, sensed) = (
         E::known(&aircraft(), &lively()),
@@ -481,7 +481,8 @@ fn the_engines_turning_clockwise_yaw_the_nose_right_when_it_comes_up() {
 
 #[test]
 fn a_spinning_body_keeps_energy_and_momentum() {
-    // Without moments and without engines: I ω·ω̇ = 0 and (I ω)·(I ω̇) = 0 for the three axes together.
+    // Without moments and without engines: I ω·ω̇ = 0 and (I ω)·(I ω̇) = 0 for the three axes
+    // together.
     let m = Motion {
         rates: [0.5, 0.3, -0.4],
         engine_momentum: 0.0,
@@ -544,7 +545,8 @@ fn rate_regressors_are_in_radians_over_the_reference_length() {
     );
 }
 
-/// The motion that the equations themselves produce with coefficients `C`, with matching accelerations and forces.
+/// The motion that the equations themselves produce with coefficients `C`, with matching
+/// accelerations and forces.
 fn produced<const NX: usize, E: Equations<NX>>(
     forces: [f64; 3],
     accelerations: impl Fn(&SVector<f64, NX>) -> [f64; 3],

@@ -1,4 +1,5 @@
-//! The standard atmosphere (ISA, 1976) to 65,000 ft: ρ = p/(R T) with a linear and then a constant temperature.
+//! The standard atmosphere (ISA, 1976) to 65,000 ft: ρ = p/(R T) with a linear and then a constant
+//! temperature.
 
 use crate::units::M_PER_FT;
 

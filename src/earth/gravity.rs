@@ -1,11 +1,13 @@
-//! Gravity at the aircraft: normal gravity on the WGS 84 ellipsoid (Somigliana) with the free-air term.
+//! Gravity at the aircraft: normal gravity on the WGS 84 ellipsoid (Somigliana) with the free-air
+//! term.
 
 use crate::units::{DEG, M_PER_FT};
 
-/// Gravity in ft/s² at a geodetic latitude and a height above the ellipsoid; it contains the centrifugal part, so it is
-/// what a body at rest on the rotating earth feels.
+/// Gravity in ft/s² at a geodetic latitude and a height above the ellipsoid; it contains the
+/// centrifugal part, so it is what a body at rest on the rotating earth feels.
 ///
-/// At 25,000 ft it is 0.3% under the accelerometers' unit of 32.174 ft/s²: over a maneuver that is 0.2 to 0.4° of θ.
+/// At 25,000 ft it is 0.3% under the accelerometers' unit of 32.174 ft/s²: over a maneuver that is
+/// 0.2 to 0.4° of θ.
 #[must_use]
 pub fn gravity_ft_s2(latitude_deg: f64, altitude_ft: f64) -> f64 {
     gravity_at(latitude_deg)(altitude_ft)

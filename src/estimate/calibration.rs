@@ -27,8 +27,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What one standard deviation of each error of calibration does to the gradient, in the order of the maneuver's
-    /// parameters.
+    /// What one standard deviation of each error of calibration does to the gradient, in the order
+    /// of the maneuver's parameters.
     pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
         &self,
         ready: &Ready<'a, NX, E>,

@@ -1,10 +1,11 @@
-//! Hold by evidence: instead of Tables 1 and 3 each maneuver decides which of its derivatives are held at the tunnel's
-//! values.
+//! Hold by evidence: instead of Tables 1 and 3 each maneuver decides which of its derivatives are
+//! held at the tunnel's values.
 //!
-//! Candidates are all derivatives that the class estimates or holds, except constants: those take up trim and what errors
-//! of held values do there. All are free at first; [`holding`](crate::output_error::holding) says which are better held,
-//! the maneuver is fitted with these held, and asked again at that solution until the choice stands. What noise there is the
-//! least restricted fit that the data determine says.
+//! Candidates are all derivatives that the class estimates or holds, except constants: those take
+//! up trim and what errors of held values do there. All are free at first;
+//! [`holding`](crate::output_error::holding) says which are better held, the maneuver is fitted
+//! with these held, and asked again at that solution until the choice stands. What noise there is
+//! the least restricted fit that the data determine says.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +25,8 @@ pub(super) struct Choice {
     pub held_because: BTreeMap<String, String>,
 }
 
-/// Rounds of fitting and choosing; each but the last holds or frees a derivative, and none is freed twice.
+/// Rounds of fitting and choosing; each but the last holds or frees a derivative, and none is freed
+/// twice.
 const ROUNDS: usize = 10;
 
 impl Choice {
@@ -151,7 +153,8 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
                     held = fitted.unwrap_or(held);
                     break;
                 }
-                // With everything free the maneuver cannot be fitted: begin with what the table holds.
+                // With everything free the maneuver cannot be fitted: begin with what the table
+                // holds.
                 held = self
                     .wide
                     .names
@@ -167,7 +170,8 @@ impl<'r, 'a, const NX: usize, E: Equations<NX>> Choosing<'r, 'a, NX, E> {
             else {
                 break;
             };
-            // A fit that the data do not determine says nothing of the noise: fit again before judging bounds.
+            // A fit that the data do not determine says nothing of the noise: fit again before
+            // judging bounds.
             let next = match noise {
                 Some(_) => candidates.settle(candidates.determined(held.clone()), &mut released),
                 None => candidates.determined(held.clone()),
@@ -197,8 +201,9 @@ impl Run<'_> {
         Choosing::<NX, E>::new(self)?.choose()
     }
 
-    /// How well the tunnel knows a derivative that may be held: none for constants, biases and initial states, for a
-    /// derivative without a table, and for one whose table is all zero and states no uncertainty.
+    /// How well the tunnel knows a derivative that may be held: none for constants, biases and
+    /// initial states, for a derivative without a table, and for one whose table is all zero and
+    /// states no uncertainty.
     fn known_to(&self, name: &str) -> Option<f64> {
         let derivative = self.basis.buildup.derivative(name)?;
         let known = derivative.regressor != Regressor::Constant && self.tunnel(name).is_some();
@@ -207,7 +212,8 @@ impl Run<'_> {
             .filter(|u| *u > 0.0)
     }
 
-    /// Why evidence could not mend a fit that the data do not determine: what has nothing to be held at.
+    /// Why evidence could not mend a fit that the data do not determine: what has nothing to be
+    /// held at.
     pub(super) fn without_tunnel<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,

@@ -1,13 +1,15 @@
-//! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives, while each keeps its
-//! biases and initial states.
+//! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives,
+//! while each keeps its biases and initial states.
 //!
-//! Constants (`CN_0`) are biases as well: they take up the zero errors of vanes and surfaces, which are others in each
-//! flight, and the trim. Unless `share_constants` says otherwise each maneuver keeps its own.
+//! Constants (`CN_0`) are biases as well: they take up the zero errors of vanes and surfaces, which
+//! are others in each flight, and the trim. Unless `share_constants` says otherwise each maneuver
+//! keeps its own.
 //!
-//! Which derivatives are free and what the outputs weigh is decided at the mean angle of attack of the maneuvers, or they
-//! could not share anything. A held derivative acts at the tunnel's value at each maneuver's own angle of attack and Mach
-//! number, as it does when the maneuver is estimated alone: the tunnel knows how it changes between them, and to hold one
-//! value for all would charge that change to the shared derivatives. The tunnel's error is one and the same for all.
+//! Which derivatives are free and what the outputs weigh is decided at the mean angle of attack of
+//! the maneuvers, or they could not share anything. A held derivative acts at the tunnel's value at
+//! each maneuver's own angle of attack and Mach number, as it does when the maneuver is estimated
+//! alone: the tunnel knows how it changes between them, and to hold one value for all would charge
+//! that change to the shared derivatives. The tunnel's error is one and the same for all.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -25,14 +27,16 @@ use crate::tables::{EstimateRow, JointRow};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Widest spread of mean angles of attack among maneuvers that are joined. Default 2.5°: half the usual distance of
-    /// test points, over which a fighter's derivatives change by less than they are known.
+    /// Widest spread of mean angles of attack among maneuvers that are joined. Default 2.5°: half
+    /// the usual distance of test points, over which a fighter's derivatives change by less than
+    /// they are known.
     pub alpha_bin_deg: f64,
-    /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`; where none are given they
-    /// are parted at the widest gaps until no group is wider than `alpha_bin_deg`.
+    /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`;
+    /// where none are given they are parted at the widest gaps until no group is wider than
+    /// `alpha_bin_deg`.
     pub centres_deg: Vec<f64>,
-    /// Whether constants are shared too. Default false: a vane's zero error of a few tenths of a degree, another one in
-    /// each flight, would otherwise be charged to the slopes.
+    /// Whether constants are shared too. Default false: a vane's zero error of a few tenths of a
+    /// degree, another one in each flight, would otherwise be charged to the slopes.
     pub share_constants: bool,
 }
 
@@ -87,7 +91,8 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
     bins
 }
 
-/// Parts maneuvers, sorted by angle of attack, at the widest gap until none of the groups is wider than `widest_deg`.
+/// Parts maneuvers, sorted by angle of attack, at the widest gap until none of the groups is wider
+/// than `widest_deg`.
 fn parted(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, widest_deg: f64) -> Vec<Vec<usize>> {
     let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
         return vec![];
@@ -125,15 +130,16 @@ fn around(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, settings: &Settings) 
     (0..centres.len()).map(of).collect()
 }
 
-/// What joint estimation gives: rows as of a maneuver, and a row for each maneuver that was to be joined.
+/// What joint estimation gives: rows as of a maneuver, and a row for each maneuver that was to be
+/// joined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joined {
     pub estimated: Estimated,
     pub members: Vec<JointRow>,
 }
 
-/// Estimates maneuvers together; `class` is theirs. Whatever goes wrong is in the outcome; a maneuver that fails alone is
-/// left out and named in the reason.
+/// Estimates maneuvers together; `class` is theirs. Whatever goes wrong is in the outcome; a
+/// maneuver that fails alone is left out and named in the reason.
 #[must_use]
 pub fn estimate(
     joint_id: &str,
@@ -291,7 +297,8 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     Ok((estimated, costs))
 }
 
-/// The mean of the maneuvers' own derivatives, weighted by their covariances; plain where these do not exist.
+/// The mean of the maneuvers' own derivatives, weighted by their covariances; plain where these do
+/// not exist.
 fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>], shared: &[usize]) -> Vec<f64> {
     let n = shared.len();
     let values =
@@ -345,8 +352,9 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
     );
 }
 
-/// Adds what errors of calibration do to the shared derivatives. An error of a signal is common to all its maneuvers: so
-/// it is where they are of one flight, and where flights have errors of their own this is on the safe side.
+/// Adds what errors of calibration do to the shared derivatives. An error of a signal is common to
+/// all its maneuvers: so it is where they are of one flight, and where flights have errors of their
+/// own this is on the safe side.
 fn miscalibrate<const NX: usize, E: Equations<NX>>(
     parts: &[Part<NX, E>],
     joint: &Joint<NX, E>,

@@ -1,5 +1,5 @@
-//! What a maneuver could tell: excitation, correlations, variance inflation, groups that it does not tell apart, and the
-//! same derivatives by equation error. Added to the rows of a fit.
+//! What a maneuver could tell: excitation, correlations, variance inflation, groups that it does
+//! not tell apart, and the same derivatives by equation error. Added to the rows of a fit.
 
 use nalgebra::DMatrix;
 
@@ -123,7 +123,8 @@ impl Run<'_> {
         flown.collect()
     }
 
-    /// Excitation of every row, and what it contributes at the row's value to its coefficient's motion.
+    /// Excitation of every row, and what it contributes at the row's value to its coefficient's
+    /// motion.
     fn add_excitation(&self, flown: &[Flown], rows: &mut [EstimateRow]) {
         let value = |name: &str, rows: &[EstimateRow]| {
             let row = rows.iter().find(|r| r.derivative == name);
@@ -157,7 +158,8 @@ impl Run<'_> {
         }
     }
 
-    /// Correlations among the distinct regressors of the derivatives that the class estimates or holds.
+    /// Correlations among the distinct regressors of the derivatives that the class estimates or
+    /// holds.
     fn regressors(&self, flown: &[Flown], window: &Window) -> Vec<CorrelationRow> {
         let mut seen: Vec<(String, Vec<f64>)> = Vec::new();
         for one in flown {

@@ -29,12 +29,13 @@ use crate::output_error::{cramer_rao, equation_error};
 use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
-/// What an inactive surface that moves a little all the same (feedback stays closed) does to the aircraft.
+/// What an inactive surface that moves a little all the same (feedback stays closed) does to the
+/// aircraft.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InactiveSurfaces {
-    /// Its small motion acts at the wind-tunnel value, where there is one. Left out, feedback motion in step with a rate
-    /// would be charged to that rate's derivative.
+    /// Its small motion acts at the wind-tunnel value, where there is one. Left out, feedback
+    /// motion in step with a rate would be charged to that rate's derivative.
     #[default]
     WindTunnel,
     /// Nothing (the paper).
@@ -45,8 +46,8 @@ pub enum InactiveSurfaces {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// At the derivatives that the measured accelerations imply. An airframe that is unstable without its feedback
-    /// diverges within seconds from a tunnel's values; from these it does not.
+    /// At the derivatives that the measured accelerations imply. An airframe that is unstable
+    /// without its feedback diverges within seconds from a tunnel's values; from these it does not.
     #[default]
     EquationError,
     /// At the tunnel's values (the paper).
@@ -57,7 +58,8 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Hold {
-    /// The class (Tables 1 and 3). Maneuvers that are to share derivatives (`joint`) need it: they must hold the same.
+    /// The class (Tables 1 and 3). Maneuvers that are to share derivatives (`joint`) need it: they
+    /// must hold the same.
     #[default]
     Table,
     /// The maneuver: what the tunnel knows better than the maneuver can tell.
@@ -85,19 +87,21 @@ pub struct Settings {
     pub inactive_surfaces: InactiveSurfaces,
     pub start: Start,
     pub hold: Hold,
-    /// Standard uncertainty of a held value where the database states none, in percent of the root mean square of its
-    /// derivative's table: a tunnel errs by a share of a derivative's size, also where the derivative crosses zero.
+    /// Standard uncertainty of a held value where the database states none, in percent of the root
+    /// mean square of its derivative's table: a tunnel errs by a share of a derivative's size, also
+    /// where the derivative crosses zero.
     pub held_uncertainty_pct: f64,
     /// What calibration leaves unknown of signals; those not named are believed.
     pub calibration: BTreeMap<String, Calibration>,
-    /// A maneuver with a larger share of faulty samples (bridged, despiked, missing, stuck), over its outputs together or in
-    /// one of its surfaces, is rejected.
+    /// A maneuver with a larger share of faulty samples (bridged, despiked, missing, stuck), over
+    /// its outputs together or in one of its surfaces, is rejected.
     pub max_marked_share: f64,
     /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
     pub resolution: BTreeMap<Output, f64>,
     pub iteration: newton_raphson::Settings,
-    /// Maneuvers of one class and angle of attack estimated together as well; none unless asked for. Neither this nor
-    /// `prediction` changes the estimate of a maneuver alone, so neither is among what decides it (fingerprints).
+    /// Maneuvers of one class and angle of attack estimated together as well; none unless asked
+    /// for. Neither this nor `prediction` changes the estimate of a maneuver alone, so neither is
+    /// among what decides it (fingerprints).
     #[serde(skip_serializing)]
     pub joint: Option<joint::Settings>,
     /// Each maneuver predicted with the derivatives of others.
@@ -134,7 +138,8 @@ pub struct Basis<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub tunnel: &'a WindTunnel,
-    /// The table that starting values are read from: the tunnel's, but for studies of the iteration.
+    /// The table that starting values are read from: the tunnel's, but for studies of the
+    /// iteration.
     pub start: &'a WindTunnel,
     pub settings: &'a Settings,
 }
@@ -158,7 +163,8 @@ impl<'a> Basis<'a> {
     }
 }
 
-/// The covariance of a maneuver's parameters in the units of the tables; initial states in rad and rad/s.
+/// The covariance of a maneuver's parameters in the units of the tables; initial states in rad and
+/// rad/s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     pub names: Vec<String>,
@@ -350,8 +356,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Refuses a maneuver of which too much is repaired or missing. Samples between those of a slow channel do not count:
-    /// nothing is wrong with them, and the cost leaves them out.
+    /// Refuses a maneuver of which too much is repaired or missing. Samples between those of a slow
+    /// channel do not count: nothing is wrong with them, and the cost leaves them out.
     fn refuse_marked(&self, surfaces: &[&str]) -> Result<(), String> {
         let Maneuver { start_s, end_s, .. } = *self.maneuver;
         let most = self.basis.settings.max_marked_share;
@@ -451,7 +457,8 @@ impl<'a> Run<'a> {
             .collect()
     }
 
-    /// Standard uncertainty of a held value: the database's, or the configured share of the derivative's size.
+    /// Standard uncertainty of a held value: the database's, or the configured share of the
+    /// derivative's size.
     fn held_uncertainty(&self, derivative: &Derivative) -> f64 {
         let tunnel = self.basis.tunnel;
         let stated = tunnel.at(&derivative.name, &self.maneuver.condition(tunnel));

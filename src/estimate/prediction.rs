@@ -1,11 +1,12 @@
-//! Validation on data not used: a maneuver is predicted with derivatives estimated from the others of its class and angle
-//! of attack.
+//! Validation on data not used: a maneuver is predicted with derivatives estimated from the others
+//! of its class and angle of attack.
 //!
-//! The others' derivatives are averaged with their whole covariances as weights. The predicted maneuver keeps them fixed;
-//! its biases and initial states, which belong to it and to no other, are fitted by output error with its own weights; so
-//! are, unless `share_constants` says otherwise, its constants (`CN_0`), which take up the zero errors of the flight's
-//! vanes and surfaces.
-//! What is left between measured and computed is then the derivatives' doing, and is told by Theil's coefficient and R².
+//! The others' derivatives are averaged with their whole covariances as weights. The predicted
+//! maneuver keeps them fixed; its biases and initial states, which belong to it and to no other,
+//! are fitted by output error with its own weights; so are, unless `share_constants` says
+//! otherwise, its constants (`CN_0`), which take up the zero errors of the flight's vanes and
+//! surfaces. What is left between measured and computed is then the derivatives' doing, and is told
+//! by Theil's coefficient and R².
 
 use std::collections::BTreeMap;
 
@@ -26,8 +27,8 @@ use crate::units::Unit;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Largest difference of mean angles of attack. Default 2.5°: half the usual distance of test points, over which a
-    /// fighter's derivatives change by less than they are known.
+    /// Largest difference of mean angles of attack. Default 2.5°: half the usual distance of test
+    /// points, over which a fighter's derivatives change by less than they are known.
     pub alpha_distance_deg: f64,
     /// Whether constants are the others' too. Default false.
     pub share_constants: bool,
@@ -66,7 +67,8 @@ impl Predicted {
     }
 }
 
-/// For each maneuver the others of its class and angle of attack whose fits converged; `None` for one that did not.
+/// For each maneuver the others of its class and angle of attack whose fits converged; `None` for
+/// one that did not.
 #[must_use]
 pub fn others(
     maneuvers: &[Maneuver],
@@ -196,8 +198,8 @@ fn predict<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// The derivatives that are free in the predicted maneuver, as the others have them; the tunnel's value where none of the
-/// others estimates one.
+/// The derivatives that are free in the predicted maneuver, as the others have them; the tunnel's
+/// value where none of the others estimates one.
 fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<f64>, String> {
     let covered = |d: &&&Derivative| others.iter().any(|o| value(o, &d.name).is_some());
     let wanted: Vec<&str> = free

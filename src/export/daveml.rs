@@ -1,5 +1,5 @@
-//! The build-up as DAVE-ML (ANSI/AIAA S-119-2011, DAVEfunc 2.0): a gridded function per derivative, a second one that says
-//! where it is flight's, and the coefficients as their sums.
+//! The build-up as DAVE-ML (ANSI/AIAA S-119-2011, DAVEfunc 2.0): a gridded function per derivative,
+//! a second one that says where it is flight's, and the coefficients as their sums.
 
 use super::xml::{Xml, escaped};
 use super::{COEFFICIENTS, Contents, Table, terms};
@@ -185,7 +185,8 @@ fn third<'a>(contents: &'a Contents, tables: &[Table]) -> Option<&'a str> {
         .map(|third| third.name.as_str())
 }
 
-/// A coefficient without vanes as the sum of its terms, and the load of its vanes where it has some.
+/// A coefficient without vanes as the sum of its terms, and the load of its vanes where it has
+/// some.
 fn coefficients(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
     let name = format!("{coefficient:?}");
     let load = if coefficient.is_moment() {
@@ -258,7 +259,8 @@ fn breakpoints<'a>(
     tables.iter().flat_map(of).collect()
 }
 
-/// Which variables a table depends on, slowest first: the name of its breakpoints and the variable's identifier.
+/// Which variables a table depends on, slowest first: the name of its breakpoints and the
+/// variable's identifier.
 fn variables<'a>(table: &Table, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
     let mut variables = Vec::new();
     if !table.thirds.is_empty() {

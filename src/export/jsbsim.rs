@@ -1,9 +1,10 @@
 //! The build-up as a JSBSim aerodynamics section.
 //!
-//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are those of CN, CA and CY: its body forces are −AXIAL, SIDE,
-//! −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose right, as Cl, Cm, Cn. α and β are read in
-//! degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel` q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are
-//! forces in lbf and moments in ft lbf and are not multiplied by q̄S.
+//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are those of CN, CA and CY: its body
+//! forces are −AXIAL, SIDE, −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose
+//! right, as Cl, Cm, Cn. α and β are read in degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel`
+//! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft
+//! lbf and are not multiplied by q̄S.
 
 use super::xml::Xml;
 use super::{COEFFICIENTS, Contents, Table, terms};
@@ -251,8 +252,8 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
     xml.close();
 }
 
-/// A table of two variables: the columns' breakpoints, then each row's with its values. The rows' variable varies fastest
-/// in `values`.
+/// A table of two variables: the columns' breakpoints, then each row's with its values. The rows'
+/// variable varies fastest in `values`.
 fn plane(rows: &[f64], columns: &[f64], values: &[f64]) -> Vec<String> {
     let words = |values: Vec<f64>| {
         values

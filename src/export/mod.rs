@@ -1,10 +1,12 @@
-//! Export writes the flight-updated derivatives for simulators: the trend where there is data, the tunnel elsewhere, each
-//! value marked with its source; as rows (CSV, Parquet), as DAVE-ML and as a JSBSim aerodynamics section.
+//! Export writes the flight-updated derivatives for simulators: the trend where there is data, the
+//! tunnel elsewhere, each value marked with its source; as rows (CSV, Parquet), as DAVE-ML and as a
+//! JSBSim aerodynamics section.
 //!
-//! A derivative's breakpoints are those of the tunnel and of the trend together. Flight was flown at some Mach numbers
-//! only: where the tunnel depends on Mach (or a third variable), the lowest and the highest flown are breakpoints too,
-//! flight's value stands between them, and the tunnel's beyond. The constants of sums are exported so that the sums
-//! (`CN_ba = CN_0 + CN_alpha α`), which flight tells best, come out as flown.
+//! A derivative's breakpoints are those of the tunnel and of the trend together. Flight was flown
+//! at some Mach numbers only: where the tunnel depends on Mach (or a third variable), the lowest
+//! and the highest flown are breakpoints too, flight's value stands between them, and the tunnel's
+//! beyond. The constants of sums are exported so that the sums (`CN_ba = CN_0 + CN_alpha α`), which
+//! flight tells best, come out as flown.
 
 pub mod daveml;
 pub mod jsbsim;
@@ -29,12 +31,14 @@ use crate::trend;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Who answers for the model: DAVE-ML demands a name, an organisation and a date, and no clock decides what is written.
+    /// Who answers for the model: DAVE-ML demands a name, an organisation and a date, and no clock
+    /// decides what is written.
     pub author: String,
     pub organisation: String,
     /// ISO 8601: 2026-11-21.
     pub date: String,
-    /// JSBSim's property for a signal of model.yaml, in the signal's unit and sign; `harvest/<signal>` where none is given.
+    /// JSBSim's property for a signal of model.yaml, in the signal's unit and sign;
+    /// `harvest/<signal>` where none is given.
     pub jsbsim_properties: BTreeMap<String, String>,
 }
 
@@ -94,7 +98,8 @@ struct Flown {
     third: Option<(f64, f64)>,
 }
 
-/// The tables of all derivatives and combined sums that have a value anywhere, in the order of the model.
+/// The tables of all derivatives and combined sums that have a value anywhere, in the order of the
+/// model.
 #[must_use]
 pub fn tables(contents: &Contents) -> Vec<Table> {
     let derivatives = contents.buildup.derivatives.iter().map(|d| &d.name);
@@ -108,8 +113,9 @@ pub fn tables(contents: &Contents) -> Vec<Table> {
     tables
 }
 
-/// Where flight has the sum of a constant and a slope, the constant is what makes the exported sum come out: the data tell
-/// the sum well and its parts, strongly correlated, badly; trends through each part on its own would not add up to it.
+/// Where flight has the sum of a constant and a slope, the constant is what makes the exported sum
+/// come out: the data tell the sum well and its parts, strongly correlated, badly; trends through
+/// each part on its own would not add up to it.
 fn keep_sum(tables: &mut [Table], sum: &Combined) {
     let named = |name: &str| tables.iter().find(|t| t.derivative == name);
     let (Some(whole), Some(slope), Some(constant)) =
@@ -312,8 +318,8 @@ impl Table {
         self.points().find(there).map(|(_, cell)| cell)
     }
 
-    /// Where each source stands, in words: `flight, trend of all: 10° to 40°; wind tunnel: 5°, 45° to 60°`. Of a table
-    /// over Mach numbers: at those that were flown.
+    /// Where each source stands, in words: `flight, trend of all: 10° to 40°; wind tunnel: 5°, 45°
+    /// to 60°`. Of a table over Mach numbers: at those that were flown.
     #[must_use]
     pub fn sources(&self) -> String {
         let n = self.alphas_deg.len();

@@ -1,4 +1,5 @@
-//! A channel is what the recorder wrote: a column name, a unit, a sign. The channel map says which signal it is.
+//! A channel is what the recorder wrote: a column name, a unit, a sign. The channel map says which
+//! signal it is.
 
 use std::collections::BTreeMap;
 
@@ -27,15 +28,16 @@ fn one() -> f64 {
     1.0
 }
 
-/// A column as it lies in the file: the unit that its metadata states, where it states one, and the values as numbers
-/// (a null is a NaN).
+/// A column as it lies in the file: the unit that its metadata states, where it states one, and the
+/// values as numbers (a null is a NaN).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawColumn {
     pub unit: Option<String>,
     pub values: Vec<f64>,
 }
 
-/// A flight as recorded: the columns of the channel map, still on the recorder's clock, in its units and signs.
+/// A flight as recorded: the columns of the channel map, still on the recorder's clock, in its
+/// units and signs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawFlight {
     pub flight_id: String,

@@ -61,8 +61,8 @@ impl Correction {
             .collect()
     }
 
-    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples; a mark travels with its sample, and a fault outweighs
-    /// none.
+    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples; a mark travels with its sample,
+    /// and a fault outweighs none.
     fn corrected(&self, old: &Series, delay: f64) -> Series {
         let (taps, count) = (Taps::at(delay), old.values.len());
         let mark = |k: usize, value: f64| {

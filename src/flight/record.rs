@@ -1,4 +1,5 @@
-//! A record: the signals of one flight on one uniform clock, each sample marked where it is not what the recorder wrote.
+//! A record: the signals of one flight on one uniform clock, each sample marked where it is not
+//! what the recorder wrote.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -19,7 +20,8 @@ pub enum Mark {
     Missing = 3,
     /// The channel stood still where it should have moved: the value is NaN.
     Stuck = 4,
-    /// Between two samples of a channel that is recorded more slowly than the record: on the line through them.
+    /// Between two samples of a channel that is recorded more slowly than the record: on the line
+    /// through them.
     Between = 5,
 }
 
@@ -37,8 +39,8 @@ impl Mark {
         }
     }
 
-    /// Whether something went wrong with the sample. A slow channel's in-between samples are no measurements, but
-    /// nothing is wrong with them.
+    /// Whether something went wrong with the sample. A slow channel's in-between samples are no
+    /// measurements, but nothing is wrong with them.
     #[must_use]
     pub fn is_fault(self) -> bool {
         !matches!(self, Mark::Measured | Mark::Between)
@@ -52,7 +54,8 @@ pub struct Series {
     pub marks: Vec<Mark>,
 }
 
-/// The signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's own time.
+/// The signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's
+/// own time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
     pub flight_id: String,
@@ -89,8 +92,8 @@ impl Record {
         self.signals.get(signal).map(|s| s.values.as_slice())
     }
 
-    /// The share of samples, among all of these signals from one time to another, with which something went wrong; a
-    /// signal that the record does not have counts as missing throughout.
+    /// The share of samples, among all of these signals from one time to another, with which
+    /// something went wrong; a signal that the record does not have counts as missing throughout.
     #[must_use]
     pub fn marked_share<'a>(
         &self,
@@ -114,7 +117,8 @@ impl Record {
         faults as f64 / all.max(1) as f64
     }
 
-    /// A range of samples of some signals, or of all; signals that the record does not have are left out.
+    /// A range of samples of some signals, or of all; signals that the record does not have are
+    /// left out.
     #[must_use]
     pub fn cut(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Record {
         let cut = |s: &Series| Series {
@@ -136,8 +140,9 @@ impl Record {
         }
     }
 
-    /// The part of the record from one time to another, with a few samples more on each side: slopes of signals at the
-    /// ends of the part are those of the whole. Sample times are unchanged.
+    /// The part of the record from one time to another, with a few samples more on each side:
+    /// slopes of signals at the ends of the part are those of the whole. Sample times are
+    /// unchanged.
     #[must_use]
     pub fn part(&self, start_s: f64, end_s: f64) -> Record {
         const MARGIN: usize = 10;

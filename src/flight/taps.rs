@@ -1,5 +1,6 @@
-//! A recorded signal between its samples: the cubic through two samples with the slopes of their neighbours (Catmull and
-//! Rom), which has a continuous slope, so that a delay can be estimated with the exact derivative of what was computed.
+//! A recorded signal between its samples: the cubic through two samples with the slopes of their
+//! neighbours (Catmull and Rom), which has a continuous slope, so that a delay can be estimated
+//! with the exact derivative of what was computed.
 
 /// Four samples, their weights at a shift and the weights' slopes along it, per sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +37,8 @@ impl Taps {
         }
     }
 
-    /// Σ weight · value(sample) at sample `k` of `samples`, and the same with the slopes, per sample; a tap beyond an end
-    /// takes the end.
+    /// Σ weight · value(sample) at sample `k` of `samples`, and the same with the slopes, per
+    /// sample; a tap beyond an end takes the end.
     pub fn sum(&self, k: usize, samples: usize, value: impl Fn(usize) -> f64) -> (f64, f64) {
         let (mut sum, mut slope) = (0.0, 0.0);
         for (sample, weight, by_shift) in self.each(k, samples) {

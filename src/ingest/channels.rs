@@ -1,5 +1,5 @@
-//! A channel of the map against what the files have: its unit, the factor into the signal's, what is said when it is not
-//! there, holds nothing or is stuck.
+//! A channel of the map against what the files have: its unit, the factor into the signal's, what
+//! is said when it is not there, holds nothing or is stuck.
 
 use std::collections::BTreeMap;
 

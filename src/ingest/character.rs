@@ -1,21 +1,24 @@
-//! What a channel is like over a spell of samples: how often it is recorded, its noise, its quantisation, and how long it
-//! may stand still by chance.
+//! What a channel is like over a spell of samples: how often it is recorded, its noise, its
+//! quantisation, and how long it may stand still by chance.
 //!
-//! A spell is a fixed number of samples, so the character of a channel does not depend on the pieces in which a flight is
-//! read. Where a spell says nothing, the channel is as it was in the spell before.
+//! A spell is a fixed number of samples, so the character of a channel does not depend on the
+//! pieces in which a flight is read. Where a spell says nothing, the channel is as it was in the
+//! spell before.
 
 use std::ops::Range;
 
 use super::Stuck;
 use super::spikes;
 
-/// The samples of a spell: some minutes of a usual recorder, long enough for statistics, short against a flight.
+/// The samples of a spell: some minutes of a usual recorder, long enough for statistics, short
+/// against a flight.
 pub const SPELL: usize = 1 << 14;
 
 /// The longest period of a slow channel in samples of the record.
 pub const LONGEST_PERIOD: usize = 40;
 
-/// Of the distances between recorded samples, or of the changes of a held one, this share must fit a period.
+/// Of the distances between recorded samples, or of the changes of a held one, this share must fit
+/// a period.
 const FITS: f64 = 0.95;
 
 /// Fewer changes of value than this do not tell how often a channel is recorded.
@@ -24,11 +27,12 @@ const FEW_CHANGES: usize = 20;
 /// Fewer samples than this do not tell how a channel's noise repeats values.
 const FEW_SAMPLES: usize = 200;
 
-/// White noise turns around at two of three samples; motion that is recorded without noise hardly ever does. Half of that is
-/// noise enough on a channel that moves.
+/// White noise turns around at two of three samples; motion that is recorded without noise hardly
+/// ever does. Half of that is noise enough on a channel that moves.
 const LEAST_TURNS: f64 = 1.0 / 3.0;
 
-/// What noise centred on a step of the recorder repeats, in shares of what it repeats on the average.
+/// What noise centred on a step of the recorder repeats, in shares of what it repeats on the
+/// average.
 const CENTRED: f64 = 1.5;
 
 /// Standing still is chance unless it is less likely than this in one place.
@@ -42,7 +46,8 @@ const MOST_RUNS: usize = 3;
 pub struct Rate {
     /// Samples of the record from one recorded value to the next.
     pub period: usize,
-    /// Where the value is repeated until the next one: the sample, modulo the period, in which it is new.
+    /// Where the value is repeated until the next one: the sample, modulo the period, in which it
+    /// is new.
     pub held: Option<usize>,
 }
 
@@ -58,13 +63,15 @@ impl Rate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Character {
     pub rate: Rate,
-    /// What a spike is measured against: the noise's standard deviation, or what rounding makes of it.
+    /// What a spike is measured against: the noise's standard deviation, or what rounding makes of
+    /// it.
     pub floor: f64,
     /// Standard deviation of the noise, in the signal's unit.
     pub noise: f64,
     /// The step of the recorder's numbers, where they have one.
     pub quantisation: Option<f64>,
-    /// Recorded values that are the same as often as this, one after the other, are a channel that is stuck.
+    /// Recorded values that are the same as often as this, one after the other, are a channel that
+    /// is stuck.
     pub stuck: Option<usize>,
 }
 
@@ -180,8 +187,8 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
     changes
 }
 
-/// The distance that nearly all recorded samples have, where it is more than one; a clock of its own makes it one more
-/// now and then.
+/// The distance that nearly all recorded samples have, where it is more than one; a clock of its
+/// own makes it one more now and then.
 fn between_nulls(distances: &[usize]) -> Option<usize> {
     let total: usize = distances.iter().sum();
     let (period, _) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
@@ -196,7 +203,8 @@ fn between_nulls(distances: &[usize]) -> Option<usize> {
         .then_some(period)
 }
 
-/// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one of so many chances.
+/// A held channel that hardly ever changes is as well a coarse one at full rate: it changes at one
+/// of so many chances.
 const CHANCES: usize = 4;
 
 /// The shortest period of a slow channel in samples of the record.
@@ -211,7 +219,8 @@ fn has_room(changes: usize, span: usize, period: usize) -> bool {
 fn held(changes: &[usize]) -> Option<Rate> {
     let span = changes.last()? - changes.first()?;
     let of_period = |period: usize| {
-        // Too few to tell, or more than there is room for in one phase: most channels are recorded in every sample.
+        // Too few to tell, or more than there is room for in one phase: most channels are recorded
+        // in every sample.
         if CHANCES * changes.len() * period < span || !has_room(changes.len(), span, period) {
             return None;
         }
@@ -228,8 +237,8 @@ fn held(changes: &[usize]) -> Option<Rate> {
     (SHORTEST_PERIOD..=LONGEST_PERIOD).rev().find_map(of_period)
 }
 
-/// The runs of one value in at least so many samples, one after the other. Not every sample is looked at: a run that is
-/// long enough holds one of every `least`.
+/// The runs of one value in at least so many samples, one after the other. Not every sample is
+/// looked at: a run that is long enough holds one of every `least`.
 pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut from = 0;
@@ -246,8 +255,8 @@ pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     runs
 }
 
-/// How many recorded values may be the same one after the other: only a channel whose noise changes most of them can be
-/// stuck.
+/// How many recorded values may be the same one after the other: only a channel whose noise changes
+/// most of them can be stuck.
 fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> Option<usize> {
     let least = super::clock::index(settings.least_s / step_s).max(4);
     let known = values.iter().filter(|v| v.is_finite()).count();
@@ -312,7 +321,8 @@ const CHANGES: usize = 512;
 /// How far a change may be off a whole number of steps, in steps.
 const OFF_GRID: f64 = 0.05;
 
-/// The step of the recorder's numbers: the smallest change between neighbours, where all changes are multiples of it.
+/// The step of the recorder's numbers: the smallest change between neighbours, where all changes
+/// are multiples of it.
 fn quantisation(values: &[f64]) -> Option<f64> {
     let every = (values.len() / (4 * CHANGES)).max(1);
     let change = |pair: &[f64]| (pair[1] - pair[0]).abs();

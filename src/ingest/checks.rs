@@ -74,7 +74,8 @@ pub struct Fit {
     pub correlation: f64,
     /// Root mean square of the predicting side.
     pub size: f64,
-    /// Root mean square of measured minus predicted over that of the larger side, where the record jumps too.
+    /// Root mean square of measured minus predicted over that of the larger side, where the record
+    /// jumps too.
     pub misfit: f64,
 }
 
@@ -115,9 +116,9 @@ impl Sides {
         }
     }
 
-    /// How the relation comes out, `jumped` being the windows in which any relation sees the record jump: where it does so
-    /// in what one compares, it does so in all. But a channel that is wrong makes jumps too, and must not hide in them where
-    /// it shows its sign or its unit.
+    /// How the relation comes out, `jumped` being the windows in which any relation sees the record
+    /// jump: where it does so in what one compares, it does so in all. But a channel that is wrong
+    /// makes jumps too, and must not hide in them where it shows its sign or its unit.
     fn check(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
         let own = self.without(&self.jumps.iter().copied().collect(), settings);
         let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
@@ -147,7 +148,8 @@ impl Sides {
             };
         }
         let fit = fit(&pairs, &self.pairs);
-        // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a level.
+        // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a
+        // level.
         let dead = match relation.choice {
             Choice::Above(_) => Verdict::DoesNotAgree,
             Choice::Largest { .. } => Verdict::NotExcited,
@@ -168,8 +170,8 @@ pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
     good.flat_map(|c| c.relation.dominant()).copied().collect()
 }
 
-/// The sides of each relation in every window in which both are known. The motion is computed window by
-/// window: that of a whole flight would be the largest thing in memory.
+/// The sides of each relation in every window in which both are known. The motion is computed
+/// window by window: that of a whole flight would be the largest thing in memory.
 fn windows(
     relations: &[Relation],
     blocks: &Blocks,
@@ -206,8 +208,9 @@ fn windows(
     pairs
 }
 
-/// A side over a window of blocks, per second: the change of its state plus the trapezoidal integral of its rate. The mean
-/// over a block smooths states and rates alike, so the two stay consistent.
+/// A side over a window of blocks, per second: the change of its state plus the trapezoidal
+/// integral of its rate. The mean over a block smooths states and rates alike, so the two stay
+/// consistent.
 fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
     let window: Vec<&Motion> = window.iter().map(Option::as_ref).collect::<Option<_>>()?;
     let (first, last) = (window.first()?, window.last()?);
@@ -225,8 +228,8 @@ fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
 /// Where the largest windows are chosen, so many times the least number of them are wanted.
 const SEVERAL: usize = 5;
 
-/// The windows that say something. Where they are the largest of the predicting side, both sides lose their medians: a
-/// bias would otherwise be the largest thing there is.
+/// The windows that say something. Where they are the largest of the predicting side, both sides
+/// lose their medians: a bias would otherwise be the largest thing there is.
 fn chosen(relation: &Relation, mut pairs: Vec<Pair>, settings: &Checks) -> Vec<Pair> {
     match relation.choice {
         Choice::Above(level) => pairs.retain(|p| p.predicted.abs().max(p.measured.abs()) > level),
@@ -251,11 +254,13 @@ fn chosen(relation: &Relation, mut pairs: Vec<Pair>, settings: &Checks) -> Vec<P
     pairs
 }
 
-/// How far a window is off the line through the middle of all, in robust standard deviations, when it holds a jump.
+/// How far a window is off the line through the middle of all, in robust standard deviations, when
+/// it holds a jump.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
-/// The windows that hold a jump of the record: frames lost without a trace, parts that were put together. What a wrong
-/// channel does it does in every window, so where too many windows are off none holds a jump.
+/// The windows that hold a jump of the record: frames lost without a trace, parts that were put
+/// together. What a wrong channel does it does in every window, so where too many windows are off
+/// none holds a jump.
 fn jumps(relation: &Relation, pairs: &[Pair], settings: &Checks) -> Vec<usize> {
     let slope = middle_slope(pairs);
     let off = |p: &Pair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
@@ -270,8 +275,8 @@ fn jumps(relation: &Relation, pairs: &[Pair], settings: &Checks) -> Vec<usize> {
     if few { jumps } else { Vec::new() }
 }
 
-/// The slope that half of what the predicting sides weigh lies below. None weighs more than the middle one: a jump of the
-/// predicting side would otherwise speak for all.
+/// The slope that half of what the predicting sides weigh lies below. None weighs more than the
+/// middle one: a jump of the predicting side would otherwise speak for all.
 fn middle_slope(pairs: &[Pair]) -> f64 {
     let most = median(pairs.iter().map(|p| p.predicted.abs()).collect());
     let moved = pairs.iter().filter(|p| p.predicted != 0.0);
@@ -322,8 +327,9 @@ fn fit(pairs: &[Pair], all: &[Pair]) -> Option<Fit> {
 /// What biases may leave of a relation, as a share of the level from which it counts as excited.
 const BIAS: f64 = 0.5;
 
-/// A verdict needs the slope to be wrong by several standard errors and by more than biases can make it. Correlation counts only where the windows were chosen
-/// by a level that noise does not reach.
+/// A verdict needs the slope to be wrong by several standard errors and by more than biases can
+/// make it. Correlation counts only where the windows were chosen by a level that noise does not
+/// reach.
 fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
     let margin =
         settings.standard_errors * fit.standard_error + BIAS * relation.choice.level() / fit.size;

@@ -1,8 +1,9 @@
 //! The uniform clock of a stretch, and the sample on it that each recorded row is.
 //!
-//! A recorder's time jitters by some tenths of a millisecond, loses frames and runs a little off its nominal rate. Rows
-//! keep their values: they are put into the sample nearest to their time, nothing is interpolated. Rows without a hole
-//! between them are one [`Run`], so a long flight's clock is a short list.
+//! A recorder's time jitters by some tenths of a millisecond, loses frames and runs a little off
+//! its nominal rate. Rows keep their values: they are put into the sample nearest to their time,
+//! nothing is interpolated. Rows without a hole between them are one [`Run`], so a long flight's
+//! clock is a short list.
 
 use super::Settings;
 use super::stretches::{Stretch, Used};
@@ -37,10 +38,12 @@ const SAMPLES_PER_ROW: usize = 10;
 /// How far a configured rate may be from the recorded one, relative.
 const RATE_TOLERANCE: f64 = 0.05;
 
-/// How fast the clock follows a drift of the recorder's phase, per sample: slow against jitter, fast against drift.
+/// How fast the clock follows a drift of the recorder's phase, per sample: slow against jitter,
+/// fast against drift.
 const PHASE_GAIN: f64 = 0.05;
 
-/// A row that is early by less than this share of a step is the next sample, one that is earlier is there twice.
+/// A row that is early by less than this share of a step is the next sample, one that is earlier is
+/// there twice.
 const NEXT: f64 = 0.75;
 
 /// Time stamps that scatter by more than this share of a step do not tell which sample a row is.
@@ -88,7 +91,8 @@ impl Slots {
         let steps = (time - self.clock.start_s) / self.step_s;
         let mut sample = index(steps - self.phase);
         let next = self.clock.samples;
-        // Jitter may put a row a little before its sample: it is the next one, unless there is no time for it.
+        // Jitter may put a row a little before its sample: it is the next one, unless there is no
+        // time for it.
         if sample < next && steps - self.phase > next as f64 - NEXT && time > self.last_s {
             sample = next;
         }

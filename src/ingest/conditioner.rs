@@ -1,8 +1,10 @@
-//! One channel on its way from the recorder's numbers to a signal: converted, made continuous where it wraps around,
-//! cleaned of stuck values and spikes, its gaps bridged or left missing, every sample marked.
+//! One channel on its way from the recorder's numbers to a signal: converted, made continuous where
+//! it wraps around, cleaned of stuck values and spikes, its gaps bridged or left missing, every
+//! sample marked.
 //!
-//! Samples come in pieces of any length and leave as soon as those after them cannot change them any more. What is decided
-//! about a sample depends on its surroundings and on the character of its spell, never on the pieces.
+//! Samples come in pieces of any length and leave as soon as those after them cannot change them
+//! any more. What is decided about a sample depends on its surroundings and on the character of its
+//! spell, never on the pieces.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -16,10 +18,12 @@ use crate::units::{Quantity, Unit};
 /// The unit of a flag: engaged or not, nothing between.
 const FLAG: &str = "0/1";
 
-/// The surroundings that decide about a sample, on either side: longer than any stand-still that must be recognised.
+/// The surroundings that decide about a sample, on either side: longer than any stand-still that
+/// must be recognised.
 const MARGIN: usize = SPELL / 4;
 
-/// Without a `wraps_at`, only a jump of nearly the whole circle from one sample to the next is a wrap.
+/// Without a `wraps_at`, only a jump of nearly the whole circle from one sample to the next is a
+/// wrap.
 const WHOLE_TURN: f64 = 0.9;
 
 /// Samples that are looked at for a wrap at once.
@@ -31,9 +35,11 @@ struct Unwrap {
     period: f64,
     /// A jump by more than this share of the period is a wrap.
     share: f64,
-    /// Whether it is an attitude or a flow angle, which begins within half a turn of zero, and not a heading.
+    /// Whether it is an attitude or a flow angle, which begins within half a turn of zero, and not
+    /// a heading.
     about_zero: bool,
-    /// After more missing samples than this it begins anew: how far it has turned meanwhile nobody knows.
+    /// After more missing samples than this it begins anew: how far it has turned meanwhile nobody
+    /// knows.
     longest: usize,
     missing: usize,
     turns: f64,
@@ -95,7 +101,8 @@ impl Unwrap {
         self.before
     }
 
-    /// What all of these samples are moved by, where none of them is missing or wraps: nearly always.
+    /// What all of these samples are moved by, where none of them is missing or wraps: nearly
+    /// always.
     fn common(&mut self, recorded: &[f64]) -> Option<f64> {
         if self.begins() {
             return None;

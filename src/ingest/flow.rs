@@ -1,5 +1,5 @@
-//! The flow of one channel from its files to settled samples: rows into the samples of the clock, slower or faster streams
-//! brought to it, through the conditioner, piece by piece.
+//! The flow of one channel from its files to settled samples: rows into the samples of the clock,
+//! slower or faster streams brought to it, through the conditioner, piece by piece.
 
 use std::ops::Range;
 
@@ -13,7 +13,8 @@ use super::{Plan, Settings, Spoilt};
 use crate::flight::Channel;
 use crate::flight::record::Series;
 
-/// Rows further apart than this in a file are read one after the other, not through what lies between.
+/// Rows further apart than this in a file are read one after the other, not through what lies
+/// between.
 const FAR: usize = 1 << 16;
 
 /// One channel on its way.
@@ -225,8 +226,9 @@ fn nothing(samples: Range<usize>, sink: &mut dyn FnMut(&[f64])) {
     }
 }
 
-/// Hands over a range of samples of a channel that has a clock of its own: each of its values at the sample nearest to it,
-/// moved along the line to its neighbour by the part of a step between the two.
+/// Hands over a range of samples of a channel that has a clock of its own: each of its values at
+/// the sample nearest to it, moved along the line to its neighbour by the part of a step between
+/// the two.
 fn brought_to(
     source: &(impl Source + ?Sized),
     name: &str,

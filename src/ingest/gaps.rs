@@ -23,9 +23,10 @@ pub fn longest(bridge_s: f64, step_s: f64) -> usize {
     samples
 }
 
-/// Bridges the gaps (NaN) of at most `longest` samples in place and says what every sample is now. A gap at either end
-/// of the record has only one side and stays missing. Where a channel is recorded once in several samples (`period`), a
-/// gap that is no longer is none: it lies between two samples.
+/// Bridges the gaps (NaN) of at most `longest` samples in place and says what every sample is now.
+/// A gap at either end of the record has only one side and stays missing. Where a channel is
+/// recorded once in several samples (`period`), a gap that is no longer is none: it lies between
+/// two samples.
 pub fn fill(
     values: &mut [f64],
     longest: usize,

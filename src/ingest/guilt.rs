@@ -1,9 +1,11 @@
-//! Which channel is wrong when relations fail: the one whose correction by a sign or a unit makes all of them hold.
+//! Which channel is wrong when relations fail: the one whose correction by a sign or a unit makes
+//! all of them hold.
 //!
-//! A wrong channel spoils every relation it is in, so the failed relations alone name too many. Each channel in them is
-//! tried with a reversed sign, with each unit that it could have been recorded in, and with a conversion done twice; the
-//! trial after which every relation holds names the channel and the cause. Where none does, the channels common to the
-//! failed relations and confirmed by no other are named without a cause.
+//! A wrong channel spoils every relation it is in, so the failed relations alone name too many.
+//! Each channel in them is tried with a reversed sign, with each unit that it could have been
+//! recorded in, and with a conversion done twice; the trial after which every relation holds names
+//! the channel and the cause. Where none does, the channels common to the failed relations and
+//! confirmed by no other are named without a cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -52,7 +54,8 @@ pub struct Accusation {
     pub required: bool,
 }
 
-/// Trials whose squared misfit is within this factor of the best explain the failure as well as it does.
+/// Trials whose squared misfit is within this factor of the best explain the failure as well as it
+/// does.
 const AS_GOOD: f64 = 3.0;
 
 /// More independent faults than this are not looked for in one flight.
@@ -114,8 +117,8 @@ pub fn find(
     guilty
 }
 
-/// The instruments that never change while the aircraft flies and most of the others do change: whatever relation they are
-/// in, it may say nothing for want of them.
+/// The instruments that never change while the aircraft flies and most of the others do change:
+/// whatever relation they are in, it may say nothing for want of them.
 fn still(blocks: &Blocks, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
     let instruments: BTreeSet<&'static str> = relations::all(settings)
         .iter()
@@ -219,8 +222,8 @@ fn misfit(checks: &[Check]) -> f64 {
         .sum()
 }
 
-/// The best trial and the best ones of other channels that explain the failure as well: with as small a misfit, and with as
-/// few windows in which the record would have to jump.
+/// The best trial and the best ones of other channels that explain the failure as well: with as
+/// small a misfit, and with as few windows in which the record would have to jump.
 fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     let mut chosen: Vec<&Trial> = Vec::new();
     let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
@@ -238,8 +241,8 @@ fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
     chosen.into_iter().map(|t| t.guilty(alone)).collect()
 }
 
-/// The channels that all failed relations share, without those that another relation confirms; where the failed relations
-/// share none, every unconfirmed channel that dominates one of them.
+/// The channels that all failed relations share, without those that another relation confirms;
+/// where the failed relations share none, every unconfirmed channel that dominates one of them.
 fn common(
     found: &[Check],
     blocks: &Blocks,
@@ -294,7 +297,8 @@ fn accused(
     guilty
 }
 
-/// What the failed checks and the guilty channels amount to; none where nothing failed and none is dead.
+/// What the failed checks and the guilty channels amount to; none where nothing failed and none is
+/// dead.
 pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
     let failed: Vec<String> = found
         .iter()

@@ -1,9 +1,11 @@
-//! Ingest: a flight as recorded becomes records of signals, each on one clock, every repaired sample marked, and the units
-//! and signs of its channels checked against the kinematic equations instead of believed.
+//! Ingest: a flight as recorded becomes records of signals, each on one clock, every repaired
+//! sample marked, and the units and signs of its channels checked against the kinematic equations
+//! instead of believed.
 //!
-//! A flight is read twice: once its time channels alone ([`survey`]), which give the stretches and their clocks, then every
-//! channel by itself, piece by piece ([`Flow`]). So memory does not grow with the length of a flight, but for the clock's
-//! list of runs and the means over short blocks that the kinematic relations compare ([`judge`]).
+//! A flight is read twice: once its time channels alone ([`survey`]), which give the stretches and
+//! their clocks, then every channel by itself, piece by piece ([`Flow`]). So memory does not grow
+//! with the length of a flight, but for the clock's list of runs and the means over short blocks
+//! that the kinematic relations compare ([`judge`]).
 
 mod channels;
 mod character;
@@ -63,7 +65,8 @@ pub struct Ingested {
     pub problems: Vec<Problem>,
 }
 
-/// What ingest reads a flight with: the map of columns to signals, signals that the aircraft does not record, and the rest.
+/// What ingest reads a flight with: the map of columns to signals, signals that the aircraft does
+/// not record, and the rest.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis<'a> {
     pub channels: &'a BTreeMap<String, Channel>,
@@ -72,12 +75,13 @@ pub struct Basis<'a> {
     pub settings: &'a Settings,
 }
 
-/// The record of the first stretch of a flight that is in memory; a flight of any length is read as [`survey`], [`flows`]
-/// and [`judge`] do it.
+/// The record of the first stretch of a flight that is in memory; a flight of any length is read as
+/// [`survey`], [`flows`] and [`judge`] do it.
 ///
 /// # Errors
-/// A problem that refuses this flight and no other: a clock that cannot be followed, a unit in the file that is not the
-/// channel map's, a required channel that is missing, or one that the kinematic relations prove wrong.
+/// A problem that refuses this flight and no other: a clock that cannot be followed, a unit in the
+/// file that is not the channel map's, a required channel that is missing, or one that the
+/// kinematic relations prove wrong.
 pub fn record(
     raw: &RawFlight,
     channels: &BTreeMap<String, Channel>,
@@ -103,8 +107,8 @@ pub fn record(
     })
 }
 
-/// The records of all stretches of a flight that is in memory, read in pieces of so many samples. The problems of the whole
-/// flight are the first stretch's.
+/// The records of all stretches of a flight that is in memory, read in pieces of so many samples.
+/// The problems of the whole flight are the first stretch's.
 ///
 /// # Errors
 /// A problem that refuses the whole flight; inside, one that refuses a stretch.
@@ -192,11 +196,12 @@ pub struct Plan<'a> {
     pub factor: f64,
 }
 
-/// The channels that are to flow, in the order of their signals, and what is wrong with those that are not.
+/// The channels that are to flow, in the order of their signals, and what is wrong with those that
+/// are not.
 ///
 /// # Errors
-/// A problem that refuses the flight: a unit in a file that is not the channel map's, a required channel that is in no
-/// file, a signal with two channels, or a required signal that nobody gives.
+/// A problem that refuses the flight: a unit in a file that is not the channel map's, a required
+/// channel that is in no file, a signal with two channels, or a required signal that nobody gives.
 pub fn flows<'a>(
     source: &(impl Source + ?Sized),
     basis: &Basis<'a>,
@@ -258,11 +263,13 @@ type Read<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
 /// The samples of a long record that are examined at once: under an hour of a usual recorder.
 const PART: usize = 1 << 17;
 
-/// Judges a stretch by what its channels left: counts, the kinematic relations between their means, and what the equations
-/// of motion say of its instruments. `read` gives signals of its record over a range of samples.
+/// Judges a stretch by what its channels left: counts, the kinematic relations between their means,
+/// and what the equations of motion say of its instruments. `read` gives signals of its record over
+/// a range of samples.
 ///
 /// # Errors
-/// A problem that refuses the stretch: a required channel without any number, or one that the relations prove wrong.
+/// A problem that refuses the stretch: a required channel without any number, or one that the
+/// relations prove wrong.
 pub fn judge(
     stretch: &Surveyed,
     flowed: Vec<Flowed>,
@@ -292,7 +299,8 @@ pub fn judge(
         } else {
             problems.extend(channels::stuck(name, &own, clock).map(refused));
             means.extend(averaging.map(|a| (channel.signal.clone(), a)));
-            // An angle that wrapped around is as many turns off as it has made since the record began.
+            // An angle that wrapped around is as many turns off as it has made since the record
+            // began.
             signature.extend((own.wraps == 0 && channel.wraps_at.is_none()).then_some(samples));
         }
         done.push((name, channel, own));
@@ -360,9 +368,9 @@ pub fn judge(
 
 /// Gross faults and instrument errors brought together.
 ///
-/// Where a sign or a unit is wrong the errors of the others are looked for with that set right, and the record is left as
-/// it is. A check that no sign and no unit explains may fail for a delay: where it does not fail any more without it, the
-/// delay is the fault.
+/// Where a sign or a unit is wrong the errors of the others are looked for with that set right, and
+/// the record is left as it is. A check that no sign and no unit explains may fail for a delay:
+/// where it does not fail any more without it, the delay is the fault.
 fn reconciled(
     blocks: &motion::Blocks,
     judge: impl Fn(&motion::Blocks) -> Judged,

@@ -1,6 +1,8 @@
-//! The motion that the channels of a record describe, block by block: what the kinematic relations tie together.
+//! The motion that the channels of a record describe, block by block: what the kinematic relations
+//! tie together.
 //!
-//! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the angles at the c.g.
+//! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the
+//! angles at the c.g.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,7 +35,8 @@ const USED: &[&str] = &[
     signal::Z_CG,
 ];
 
-/// Averages a signal over short blocks as its samples come by; a block with fewer than half of its samples is NaN.
+/// Averages a signal over short blocks as its samples come by; a block with fewer than half of its
+/// samples is NaN.
 #[derive(Clone, Debug)]
 pub struct Averaging {
     length: usize,
@@ -142,8 +145,8 @@ impl Blocks {
             .is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
     }
 
-    /// Whether airspeed, dynamic pressure or Mach number say for most of the record that the aircraft is faster than this,
-    /// ft/s. One of them may be dead.
+    /// Whether airspeed, dynamic pressure or Mach number say for most of the record that the
+    /// aircraft is faster than this, ft/s. One of them may be dead.
     pub fn flies(&self, faster_ft_s: f64) -> bool {
         // Of this velocity at sea level: higher up it takes more of it.
         let (density, sound) = atmosphere(0.0);
@@ -164,7 +167,8 @@ impl Blocks {
         levels.into_iter().any(mostly)
     }
 
-    /// These blocks with one signal multiplied: what the record would say if that channel were wrong by the factor.
+    /// These blocks with one signal multiplied: what the record would say if that channel were
+    /// wrong by the factor.
     pub fn with(&self, signal: &str, factor: f64) -> Blocks {
         let mut changed = self.clone();
         if let Some((_, own)) = changed.values.get_mut(signal) {
@@ -278,7 +282,8 @@ impl Motion {
         [self.ax * G0_FT_S2, self.ay * G0_FT_S2, -self.an * G0_FT_S2]
     }
 
-    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance beside the change of the velocity.
+    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance beside the change of
+    /// the velocity.
     pub fn turning(&self) -> [f64; 3] {
         let turned = cross(self.rates, self.along);
         [
@@ -293,7 +298,8 @@ impl Motion {
         cross(self.rates, cross(self.rates, arm))
     }
 
-    /// ω × arm, ft/s: the velocity of a sensor relative to the c.g.; its change is the sensor's own acceleration.
+    /// ω × arm, ft/s: the velocity of a sensor relative to the c.g.; its change is the sensor's own
+    /// acceleration.
     pub fn swing(&self, arm: [f64; 3]) -> [f64; 3] {
         cross(self.rates, arm)
     }
@@ -314,7 +320,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where it has none.
+/// Density (slug/ft³) and speed of sound (ft/s) of the standard atmosphere up to 20 km; NaN where
+/// it has none.
 pub(super) fn atmosphere(altitude_ft: f64) -> (f64, f64) {
     const KG_M3: f64 = 515.378_818;
     const GAS: f64 = 287.052_87;

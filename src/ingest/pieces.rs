@@ -1,7 +1,9 @@
-//! The times of a file cut into pieces: rows whose clock runs forward. A first pass over the time channel alone makes them.
+//! The times of a file cut into pieces: rows whose clock runs forward. A first pass over the time
+//! channel alone makes them.
 //!
-//! Single rows with a time that cannot be (no number, an outlier, one that stands still) are left out where they stand.
-//! Where time jumps, back or far ahead, a new piece begins; what the jump means is decided when all pieces are known.
+//! Single rows with a time that cannot be (no number, an outlier, one that stands still) are left
+//! out where they stand. Where time jumps, back or far ahead, a new piece begins; what the jump
+//! means is decided when all pieces are known.
 
 /// Rows of one file, one after the other, from the first time to the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +46,8 @@ pub struct Scanned {
 /// The rows from which the recorder's step is first taken.
 const HEAD_ROWS: usize = 1 << 16;
 
-/// A jump ahead by more than this begins a new piece, s: so an outlier among the times is a piece of its own.
+/// A jump ahead by more than this begins a new piece, s: so an outlier among the times is a piece
+/// of its own.
 const JUMP_S: f64 = 1.0;
 
 /// A piece is cut after this many rows, so that a stretch can end there.

@@ -1,7 +1,9 @@
-//! The kinematic relations between channels, each as two sides that are equal whatever the aerodynamics.
+//! The kinematic relations between channels, each as two sides that are equal whatever the
+//! aerodynamics.
 //!
-//! They are compared in integrated form over windows, so that no noise is differentiated: a side is the change of a state
-//! plus the integral of a rate over the window, per second. With `v = (u, v, w)` and `f` the specific force,
+//! They are compared in integrated form over windows, so that no noise is differentiated: a side is
+//! the change of a state plus the integral of a rate over the window, per second. With `v = (u, v,
+//! w)` and `f` the specific force,
 //!
 //! - θ̇ = q cos φ − r sin φ, φ̇ = p + tan θ (q sin φ + r cos φ), ψ̇ = (q sin φ + r cos φ)/cos θ
 //! - v̇ + ω × v − g = f at the c.g.; a sensor adds the acceleration of its arm
@@ -17,8 +19,8 @@ use crate::units::{DEG, G0_FT_S2};
 pub enum Choice {
     /// Those in which either side is larger than this.
     Above(f64),
-    /// This share of the windows, those with the largest deviation of the predicting side from its median; noise reaches
-    /// the level.
+    /// This share of the windows, those with the largest deviation of the predicting side from its
+    /// median; noise reaches the level.
     Largest { share: f64, level: f64 },
 }
 
@@ -32,7 +34,8 @@ impl Choice {
 
 type Term = fn(&Motion) -> f64;
 
-/// One side of a relation: the change of `state` plus the integral of `rate`, per second, times `unit`.
+/// One side of a relation: the change of `state` plus the integral of `rate`, per second, times
+/// `unit`.
 #[derive(Clone, Copy, Debug)]
 pub struct Side {
     pub state: Option<Term>,

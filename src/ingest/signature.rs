@@ -1,5 +1,6 @@
-//! The signature of a record: what was measured at every full ten seconds of its clock. Two records that have some of it in
-//! common hold the same rows, whatever their files are called and wherever they begin.
+//! The signature of a record: what was measured at every full ten seconds of its clock. Two records
+//! that have some of it in common hold the same rows, whatever their files are called and wherever
+//! they begin.
 
 use std::collections::BTreeMap;
 
@@ -87,8 +88,8 @@ impl Signature {
         Signature(all.into_iter().collect())
     }
 
-    /// From when to when (s) two records hold the same rows, and the share of this one's times that is; none where they
-    /// do not.
+    /// From when to when (s) two records hold the same rows, and the share of this one's times that
+    /// is; none where they do not.
     #[must_use]
     pub fn common(&self, other: &Signature) -> Option<(f64, f64, f64)> {
         let others: BTreeMap<i64, u64> = other.0.iter().copied().collect();

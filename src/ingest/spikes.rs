@@ -1,9 +1,10 @@
-//! Single-sample spikes: a sample that stands off its neighbours by far more than the noise, while the samples before it
-//! and those after it agree about what should be there.
+//! Single-sample spikes: a sample that stands off its neighbours by far more than the noise, while
+//! the samples before it and those after it agree about what should be there.
 //!
-//! With `x` the sample, the line through the two samples before it says `2 x₋₁ − x₋₂`, the line through the two after
-//! it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike stands off all three in the same sense. A step, the
-//! reversal of a surface at its full rate, or a stick pulse of two samples stands off at most two of them.
+//! With `x` the sample, the line through the two samples before it says `2 x₋₁ − x₋₂`, the line
+//! through the two after it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike stands
+//! off all three in the same sense. A step, the reversal of a surface at its full rate, or a stick
+//! pulse of two samples stands off at most two of them.
 
 use std::ops::Range;
 
@@ -21,10 +22,12 @@ const EXACT: f64 = 1e-12;
 /// Fewer samples off their neighbours' mean than this do not tell the quantisation.
 const FEW_STEPS: usize = 20;
 
-/// The share of its height off the mean that a spike must stand off each line: the lines are twice as noisy as the mean.
+/// The share of its height off the mean that a spike must stand off each line: the lines are twice
+/// as noisy as the mean.
 const LINES: f64 = 0.75;
 
-/// How far the two lines may miss each other by noise alone, in its standard deviations (the difference has √10).
+/// How far the two lines may miss each other by noise alone, in its standard deviations (the
+/// difference has √10).
 const LINES_NOISE: f64 = 3.0;
 
 /// Every so many samples are enough to tell the noise of thousands.
@@ -44,8 +47,8 @@ pub fn floors(values: &[f64]) -> (f64, f64) {
     (noise.max(rounding(values, roughness)), noise)
 }
 
-/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floors` says for ranges of samples
-/// what a spike is measured against.
+/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floors`
+/// says for ranges of samples what a spike is measured against.
 pub fn remove(
     values: &mut [f64],
     step_s: f64,
@@ -87,7 +90,8 @@ pub fn remove(
     spikes
 }
 
-/// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike does.
+/// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike
+/// does.
 fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Spikes) -> bool {
     let Some(height) = height(values, k) else {
         return false;
@@ -99,7 +103,8 @@ fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Sp
     let lines_meet = |noise: f64| {
         height.lines_miss <= settings.agreement * height.off_mean + LINES_NOISE * noise
     };
-    // The noise around a sample takes long to find; of most samples the least and the largest that it could be tell enough.
+    // The noise around a sample takes long to find; of most samples the least and the largest that
+    // it could be tell enough.
     if !stands_off(floor) || !lines_meet(height.off_mean / settings.deviations) {
         return false;
     }
@@ -128,7 +133,8 @@ struct Height {
     lines_miss: f64,
 }
 
-/// How a sample stands off; none beside a gap. Where only one sample is left on a side, its line is level.
+/// How a sample stands off; none beside a gap. Where only one sample is left on a side, its line is
+/// level.
 fn height(values: &[f64], k: usize) -> Option<Height> {
     let at = |i: Option<usize>| {
         i.and_then(|i| values.get(i))
@@ -147,7 +153,8 @@ fn height(values: &[f64], k: usize) -> Option<Height> {
     })
 }
 
-/// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left out.
+/// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left
+/// out.
 fn local(values: &[f64], k: usize, window: usize) -> f64 {
     let around = k.saturating_sub(window)..(k + window + 1).min(values.len());
     let mut roughness: Vec<f64> = around
@@ -158,9 +165,9 @@ fn local(values: &[f64], k: usize, window: usize) -> f64 {
     MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5)
 }
 
-/// What rounding alone puts a sample off its neighbours' mean: half the recorder's quantisation step, the least that is not
-/// nothing. A low quantile, as a repaired or converted sample may lie off the grid; a channel that hardly ever changes has
-/// too few of them to say.
+/// What rounding alone puts a sample off its neighbours' mean: half the recorder's quantisation
+/// step, the least that is not nothing. A low quantile, as a repaired or converted sample may lie
+/// off the grid; a channel that hardly ever changes has too few of them to say.
 fn rounding(values: &[f64], mut roughness: Vec<f64>) -> f64 {
     let largest = values
         .iter()

@@ -1,7 +1,9 @@
-//! The stretches of a flight: pieces of its files put in the order of their clock, without what is there twice.
+//! The stretches of a flight: pieces of its files put in the order of their clock, without what is
+//! there twice.
 //!
-//! A piece that goes on where another ended belongs to its stretch. One whose times are there already is either the same
-//! rows again, which are left out, or a clock that was started anew, which begins a new stretch; the rows themselves tell.
+//! A piece that goes on where another ended belongs to its stretch. One whose times are there
+//! already is either the same rows again, which are left out, or a clock that was started anew,
+//! which begins a new stretch; the rows themselves tell.
 
 use super::Settings;
 use super::pieces::{Piece, Scanned};
@@ -34,11 +36,12 @@ pub struct Plan {
     pub stray: Vec<Piece>,
 }
 
-/// Fewer rows than this between two jumps of the time are strays if they do not fit where they stand.
+/// Fewer rows than this between two jumps of the time are strays if they do not fit where they
+/// stand.
 const STRAY_ROWS: usize = 3;
 
-/// Puts the pieces of files that hold the same channels in order. `same` says whether rows of the second piece that have
-/// times of the first one are the same rows; `name` names a file.
+/// Puts the pieces of files that hold the same channels in order. `same` says whether rows of the
+/// second piece that have times of the first one are the same rows; `name` names a file.
 ///
 /// # Errors
 /// What `same` cannot read.

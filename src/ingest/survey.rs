@@ -1,8 +1,10 @@
-//! The survey of a flight: its files, their clocks, and the stretches that they make, from the time channels alone.
+//! The survey of a flight: its files, their clocks, and the stretches that they make, from the time
+//! channels alone.
 //!
-//! Files that hold the same channels are one stream: parts of a flight, copies, overlapping pieces. Files that hold other
-//! channels are streams of their own, with clocks and rates of their own. The stream with the most channels gives the
-//! record its clock; the channels of the others are brought to it.
+//! Files that hold the same channels are one stream: parts of a flight, copies, overlapping pieces.
+//! Files that hold other channels are streams of their own, with clocks and rates of their own. The
+//! stream with the most channels gives the record its clock; the channels of the others are brought
+//! to it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

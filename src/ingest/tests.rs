@@ -1,4 +1,5 @@
-//! One flight through ingest: steady level flight, and everything that can be wrong with its channels.
+//! One flight through ingest: steady level flight, and everything that can be wrong with its
+//! channels.
 
 use approx::assert_relative_eq;
 
@@ -42,7 +43,8 @@ fn aircraft() -> Aircraft {
     }
 }
 
-/// Name, signal, unit and value of every channel of steady level flight at 20,000 ft and 600 ft/s with α 20°.
+/// Name, signal, unit and value of every channel of steady level flight at 20,000 ft and 600 ft/s
+/// with α 20°.
 fn steady() -> Vec<(&'static str, &'static str, &'static str, f64)> {
     let (sin, cos) = (20.0 / DEG).sin_cos();
     let mut channels = vec![
@@ -742,7 +744,8 @@ fn a_stuck_channel_is_left_out_from_its_first_repetition_and_named() {
 #[test]
 fn a_control_at_rest_and_a_coarse_channel_are_not_stuck() {
     let mut flight = Flight::noisy();
-    // A stick without noise that moves now and then, and a surface in steps much larger than its noise.
+    // A stick without noise that moves now and then, and a surface in steps much larger than its
+    // noise.
     let moved = |k: usize| {
         if (400..460).contains(&k) {
             (k - 400) as f64 * 0.05

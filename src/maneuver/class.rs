@@ -1,4 +1,5 @@
-//! A maneuver class: how it is recognised in a record, what is estimated from it, with which weights.
+//! A maneuver class: how it is recognised in a record, what is estimated from it, with which
+//! weights.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,8 +30,8 @@ impl Status {
     }
 }
 
-/// How many fast steps of one signal a maneuver of the class has. One that may step as often as a doublet does but need not
-/// is an input of those maneuvers in which it does.
+/// How many fast steps of one signal a maneuver of the class has. One that may step as often as a
+/// doublet does but need not is an input of those maneuvers in which it does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepCount {
@@ -53,7 +54,8 @@ pub struct Pulses {
     /// The shortest and the longest unit, s. Default: any.
     #[serde(default = "any_unit")]
     pub unit_s: (f64, f64),
-    /// By how many units a pulse may be longer or shorter. Default 0.5: nearer to its own number than to the next.
+    /// By how many units a pulse may be longer or shorter. Default 0.5: nearer to its own number
+    /// than to the next.
     #[serde(default = "half_a_unit")]
     pub tolerance: f64,
 }
@@ -71,7 +73,8 @@ fn half_a_unit() -> f64 {
 pub struct Sweep {
     /// The fewest swings from one side to the other.
     pub at_least: usize,
-    /// By what factor the frequency rises at least from the first third of the swings to the last. Default 2.
+    /// By what factor the frequency rises at least from the first third of the swings to the last.
+    /// Default 2.
     #[serde(default = "an_octave")]
     pub ratio: f64,
 }
@@ -80,19 +83,20 @@ fn an_octave() -> f64 {
     2.0
 }
 
-/// How a class is recognised. What its inputs do must all hold; flags are evidence, for they may be missing, stuck or late.
+/// How a class is recognised. What its inputs do must all hold; flags are evidence, for they may be
+/// missing, stuck or late.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recognition {
-    /// Flag signal → whether it is up for most of the maneuver. Evidence: it raises or lowers the confidence, and decides
-    /// only between classes that differ in nothing else that is recorded.
+    /// Flag signal → whether it is up for most of the maneuver. Evidence: it raises or lowers the
+    /// confidence, and decides only between classes that differ in nothing else that is recorded.
     #[serde(default)]
     pub flags: BTreeMap<String, bool>,
     /// Signal → how often it steps. A signal that is not named may do as it likes.
     #[serde(default)]
     pub steps: BTreeMap<String, StepCount>,
-    /// Signal → whether it moves at all during the maneuver (a thrust-vectoring vane). One that is not recorded decides
-    /// nothing.
+    /// Signal → whether it moves at all during the maneuver (a thrust-vectoring vane). One that is
+    /// not recorded decides nothing.
     #[serde(default)]
     pub moves: BTreeMap<String, bool>,
     /// Signal → the pulses that it makes.
@@ -182,7 +186,8 @@ impl Class {
             .copied()
     }
 
-    /// The class as it is at a mean angle of attack, and so at every other: for maneuvers that must agree.
+    /// The class as it is at a mean angle of attack, and so at every other: for maneuvers that must
+    /// agree.
     #[must_use]
     pub fn at(&self, alpha_deg: f64) -> Class {
         let mut class = self.clone();

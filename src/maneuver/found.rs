@@ -14,7 +14,8 @@ pub struct Event {
     pub end_s: f64,
 }
 
-/// One maneuver: its window in the record and its mean flight condition. A row of the `maneuvers` table.
+/// One maneuver: its window in the record and its mean flight condition. A row of the `maneuvers`
+/// table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Maneuver {
     pub maneuver_id: String,
@@ -67,24 +68,30 @@ pub const ACCEPTED: &str = "accepted";
 /// [`Quality::verdict`] of a maneuver that is not estimated.
 pub const REJECTED: &str = "rejected";
 
-/// What a maneuver is worth before it is estimated; a measure that could not be taken does not exist.
+/// What a maneuver is worth before it is estimated; a measure that could not be taken does not
+/// exist.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// [`ACCEPTED`] or [`REJECTED`].
     pub verdict: String,
     /// Every limit that it is beyond, in words.
     pub reason: String,
-    /// Angular rates of its axis in the lead-in over those in the maneuver, both root mean square about a straight line.
+    /// Angular rates of its axis in the lead-in over those in the maneuver, both root mean square
+    /// about a straight line.
     pub lead_in_motion: Option<f64>,
     /// Root mean square of the angle of attack about its mean, deg.
     pub alpha_rms_deg: Option<f64>,
-    /// Angular rates of the other axis over those of its own, both root mean square about a straight line.
+    /// Angular rates of the other axis over those of its own, both root mean square about a
+    /// straight line.
     pub other_axis: Option<f64>,
-    /// Angular rates of its axis, root mean square, over their noise from sample to sample; the best of them.
+    /// Angular rates of its axis, root mean square, over their noise from sample to sample; the
+    /// best of them.
     pub signal_to_noise: Option<f64>,
-    /// Share of the time of the inputs in which a surface rests at a stop; the surface that does so most.
+    /// Share of the time of the inputs in which a surface rests at a stop; the surface that does so
+    /// most.
     pub saturated_share: Option<f64>,
-    /// Share of the time of the inputs in which a surface moves as fast as its actuator can; the surface that does so most.
+    /// Share of the time of the inputs in which a surface moves as fast as its actuator can; the
+    /// surface that does so most.
     pub rate_limited_share: Option<f64>,
     /// Share of samples of its outputs and inputs that are not as recorded.
     pub marked_share: Option<f64>,
@@ -106,7 +113,8 @@ pub struct Unknown {
 }
 
 impl Maneuver {
-    /// Where a tunnel is read for this maneuver: its means, as far as the tunnel's third variable is among them.
+    /// Where a tunnel is read for this maneuver: its means, as far as the tunnel's third variable
+    /// is among them.
     #[must_use]
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
         let third = tunnel

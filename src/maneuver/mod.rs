@@ -1,4 +1,5 @@
-//! A maneuver class is one column of the paper's Tables 1-4 with the way it is recognised; a maneuver is one flown.
+//! A maneuver class is one column of the paper's Tables 1-4 with the way it is recognised; a
+//! maneuver is one flown.
 
 pub mod class;
 pub mod found;

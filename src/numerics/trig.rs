@@ -1,9 +1,11 @@
-//! Sine and cosine of an angle together, from arithmetic alone: the equations of motion wait for them four times in every
-//! step, and a call into the platform's library costs more than the rest of a stage.
+//! Sine and cosine of an angle together, from arithmetic alone: the equations of motion wait for
+//! them four times in every step, and a call into the platform's library costs more than the rest
+//! of a stage.
 //!
-//! Within ±π/4 the minimax polynomials of FreeBSD's msun (W. J. Cody and W. Waite's reduction of the argument otherwise):
-//! the error is below one unit in the last place for the angles that an integration reaches (some 50 rad, beyond which it
-//! is stopped). With fused multiplication throughout, every processor gets the same bits.
+//! Within ±π/4 the minimax polynomials of FreeBSD's msun (W. J. Cody and W. Waite's reduction of
+//! the argument otherwise): the error is below one unit in the last place for the angles that an
+//! integration reaches (some 50 rad, beyond which it is stopped). With fused multiplication
+//! throughout, every processor gets the same bits.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -64,7 +66,8 @@ fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
     }
 }
 
-/// Both sines and both cosines are the same polynomial with other numbers, so the processor computes all four at once.
+/// Both sines and both cosines are the same polynomial with other numbers, so the processor
+/// computes all four at once.
 #[inline(always)]
 fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
     let angle = [r[0], r[1], r[0], r[1]];

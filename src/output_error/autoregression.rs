@@ -1,7 +1,7 @@
 //! Noise of one output as an autoregressive process: v_k + Σ a_j v_{k−j} = e_k with white e.
 //!
-//! Found from autocovariances by the recursion of Levinson and Durbin, in the order of least information criterion
-//! (Akaike's, corrected for few samples). White noise is order 0.
+//! Found from autocovariances by the recursion of Levinson and Durbin, in the order of least
+//! information criterion (Akaike's, corrected for few samples). White noise is order 0.
 
 /// An autoregressive process.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,8 @@ impl Autoregression {
         best
     }
 
-    /// Becomes the process of the next order, unless no further autocovariance is given or no process can have it.
+    /// Becomes the process of the next order, unless no further autocovariance is given or no
+    /// process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
         let Some((next, past)) = autocovariances
@@ -132,7 +133,8 @@ mod tests {
 
     #[test]
     fn a_second_order_process_is_found_from_its_autocovariances() {
-        // v_k = 1.2 v_{k−1} − 0.5 v_{k−2} + e_k: Yule-Walker gives ρ1 = 1.2/1.5, ρ_l = 1.2 ρ_{l−1} − 0.5 ρ_{l−2}.
+        // v_k = 1.2 v_{k−1} − 0.5 v_{k−2} + e_k: Yule-Walker gives ρ1 = 1.2/1.5, ρ_l = 1.2 ρ_{l−1}
+        // − 0.5 ρ_{l−2}.
         let mut covariances = vec![1.0, 0.8];
         (2..8).for_each(|l| covariances.push(1.2 * covariances[l - 1] - 0.5 * covariances[l - 2]));
         let process = Autoregression::fitted(&covariances, 500.0);

@@ -1,9 +1,11 @@
-//! What errors of calibration do to the estimates. The equations take every recorded signal for true but for noise: a bias
-//! or a scale error of one moves a maneuver's estimates as a whole, and hardly shows in the residuals.
+//! What errors of calibration do to the estimates. The equations take every recorded signal for
+//! true but for noise: a bias or a scale error of one moves a maneuver's estimates as a whole, and
+//! hardly shows in the residuals.
 //!
-//! The estimates solve Σ Sᵀ W v = 0. In error by one standard deviation, a signal leaves other residuals v′ at the same
-//! parameters, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first order in the error. A surface in error is the same as
-//! its derivatives in error, so for surfaces v′ − v is known from sensitivities; for other signals it is integrated.
+//! The estimates solve Σ Sᵀ W v = 0. In error by one standard deviation, a signal leaves other
+//! residuals v′ at the same parameters, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first
+//! order in the error. A surface in error is the same as its derivatives in error, so for surfaces
+//! v′ − v is known from sensitivities; for other signals it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -16,7 +18,8 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 
-/// What calibration leaves unknown of a signal, as standard deviations: reading = (1 + scale) · truth + bias.
+/// What calibration leaves unknown of a signal, as standard deviations: reading = (1 + scale) ·
+/// truth + bias.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Calibration {
@@ -163,8 +166,9 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
 /// A signal that is one throughout.
 const ONE: &str = "one";
 
-/// What errors of surfaces do, of all of them from one pass: a surface enters through its derivatives alone, so its scale
-/// error changes the outputs as errors of its derivatives would, and its bias as errors of the coefficients' constants.
+/// What errors of surfaces do, of all of them from one pass: a surface enters through its
+/// derivatives alone, so its scale error changes the outputs as errors of its derivatives would,
+/// and its bias as errors of the coefficients' constants.
 struct Surfaces<'a> {
     /// The derivatives along surfaces with their values.
     acting: Vec<(&'a Derivative, f64)>,
@@ -269,7 +273,8 @@ impl<'a> Surfaces<'a> {
     }
 }
 
-/// The name of what a constant deflection of a surface, or force of a vane, changes of a coefficient.
+/// The name of what a constant deflection of a surface, or force of a vane, changes of a
+/// coefficient.
 fn constant(coefficient: Coefficient, regressor: &Regressor) -> String {
     let vane = matches!(regressor, Regressor::Vane(_));
     format!(

@@ -1,9 +1,12 @@
-//! One maneuver made ready for estimation: everything that does not depend on the parameters, laid out for the inner loop.
+//! One maneuver made ready for estimation: everything that does not depend on the parameters, laid
+//! out for the inner loop.
 //!
-//! Each coefficient is linear in the derivatives: c = Σ ξ_j r_j, where r_j is known at every point or proportional to a
-//! state: c = offset + slope · x. Held derivatives are summed once into offset and slope, free ones once per iteration.
+//! Each coefficient is linear in the derivatives: c = Σ ξ_j r_j, where r_j is known at every point
+//! or proportional to a state: c = offset + slope · x. Held derivatives are summed once into offset
+//! and slope, free ones once per iteration.
 //!
-//! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states if they are free.
+//! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states
+//! if they are free.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -44,7 +47,8 @@ pub(super) const WIDEST_STRIDE: usize = 8;
 /// Points kept beyond the last sample: those of a chunk that begins there, of the widest strides.
 const BEYOND: usize = POINTS * WIDEST_STRIDE;
 
-/// The three coefficients at every point as functions of the state: c = offset + slope · x; empty where zero throughout.
+/// The three coefficients at every point as functions of the state: c = offset + slope · x; empty
+/// where zero throughout.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Coefficients<const NX: usize> {
     offset: [Vec<f64>; COEFFICIENTS],
@@ -147,8 +151,8 @@ impl<const NX: usize> At<NX> {
     }
 }
 
-/// How a derivative acts: on which coefficient, along which state (where its regressor is one), and which column of
-/// regressors or factors of proportion is its own.
+/// How a derivative acts: on which coefficient, along which state (where its regressor is one), and
+/// which column of regressors or factors of proportion is its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Acting {
     pub coefficient: usize,
@@ -306,8 +310,9 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         std::array::from_fn(|o| self.measurements.used.iter().filter(|used| used[o]).count())
     }
 
-    /// The history of a free derivative's regressor along the measured motion, in what the derivative multiplies: deg,
-    /// rad of a reduced rate, for a vane deg over q̄S (and the reference length).
+    /// The history of a free derivative's regressor along the measured motion, in what the
+    /// derivative multiplies: deg, rad of a reduced rate, for a vane deg over q̄S (and the
+    /// reference length).
     #[must_use]
     pub fn regressor_as_flown(&self, derivative: usize) -> Vec<f64> {
         let acting = self.acting[derivative];
@@ -390,7 +395,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
     }
 
-    /// The parameters to start from: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
+    /// The parameters to start from: `derivative` by name, biases zero, initial states as measured
+    /// (rad, rad/s).
     #[must_use]
     pub fn starting_values(&self, derivative: impl Fn(&str) -> f64) -> Vec<f64> {
         let mut values: Vec<f64> = self
@@ -509,7 +515,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
         }
     }
 
-    /// How a derivative acts. Two share a column when they have the same regressor, but a vane's moment is not its force.
+    /// How a derivative acts. Two share a column when they have the same regressor, but a vane's
+    /// moment is not its force.
     fn acting(&mut self, derivative: &'a Derivative) -> Acting {
         let moment =
             |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
@@ -573,7 +580,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
     }
 }
 
-/// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and moment are made coefficients.
+/// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and
+/// moment are made coefficients.
 pub(super) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
     if !matches!(derivative.regressor, Regressor::Vane(_)) {
         return 1.0;

@@ -1,20 +1,24 @@
-//! Scatter of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R W S] H⁻¹ with R the
-//! autocovariance of the noise, in a form that stays positive and counts the degrees of freedom.
+//! Scatter of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R
+//! W S] H⁻¹ with R the autocovariance of the noise, in a form that stays positive and counts the
+//! degrees of freedom.
 //!
-//! Residuals are not the noise: the parameters have followed it, most where it is slow. With C = S H⁻¹ W, the change of the
-//! estimates with each value, the residuals are (I − S Cᵀ) times the noise and their covariance is
-//! (I − S Cᵀ) R (I − C Sᵀ), so what the parameters took, R C Sᵀ + S Cᵀ R − S K Sᵀ with K = Cᵀ R C their own covariance, is
-//! added back, round after round until R settles. R of each output is that of an autoregressive process, by which the
-//! changes are filtered: every variance is a sum of squares.
+//! Residuals are not the noise: the parameters have followed it, most where it is slow. With C = S
+//! H⁻¹ W, the change of the estimates with each value, the residuals are (I − S Cᵀ) times the noise
+//! and their covariance is (I − S Cᵀ) R (I − C Sᵀ), so what the parameters took, R C Sᵀ + S Cᵀ R −
+//! S K Sᵀ with K = Cᵀ R C their own covariance, is added back, round after round until R settles. R
+//! of each output is that of an autoregressive process, by which the changes are filtered: every
+//! variance is a sum of squares.
 //!
-//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a number. White noise that
-//! has settled is left alone while that of other outputs goes on.
+//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
+//! number. White noise that has settled is left alone while that of other outputs goes on.
 //!
-//! Variances from a noise that is itself estimated are known with few degrees of freedom ([`freedom`]).
+//! Variances from a noise that is itself estimated are known with few degrees of freedom
+//! ([`freedom`]).
 //!
-//! Noise is seen through blocks of samples: what moves slower than a block is the autoregressive process, with few
-//! coefficients even where it is far slower; what moves faster is white within the blocks. Parameters act slower than a
-//! block, so the process decides, and a slow component counts that is small beside the sensors' white noise.
+//! Noise is seen through blocks of samples: what moves slower than a block is the autoregressive
+//! process, with few coefficients even where it is far slower; what moves faster is white within
+//! the blocks. Parameters act slower than a block, so the process decides, and a slow component
+//! counts that is small beside the sensors' white noise.
 
 use nalgebra::DMatrix;
 
@@ -32,9 +36,11 @@ const BLOCKS_PER_COEFFICIENT: usize = 10;
 const ROUNDS: usize = 30;
 /// An output's noise is settled when its long-run variance changes by no more than this share.
 const SETTLED: f64 = 0.01;
-/// White noise that has settled is left alone while the parameters follow it alike, to this share of its variance.
+/// White noise that has settled is left alone while the parameters follow it alike, to this share
+/// of its variance.
 const STILL: f64 = 1e-3;
-/// Where the parameters leave at least this share of white noise, its strength follows from the residuals' at once.
+/// Where the parameters leave at least this share of white noise, its strength follows from the
+/// residuals' at once.
 const LITTLE: f64 = 0.95;
 
 /// One output of one maneuver, seen through blocks of samples.
@@ -46,7 +52,8 @@ pub struct Series {
     block: f64,
     /// Means of the blocks' residuals.
     residuals: Padded,
-    /// Variance of the samples about their block's mean, and the degrees of freedom with which it is known.
+    /// Variance of the samples about their block's mean, and the degrees of freedom with which it
+    /// is known.
     fast: f64,
     fast_freedom: f64,
     /// Of each block how many samples count, and the sums of their sensitivities.
@@ -128,8 +135,8 @@ pub fn noise(inverse: &DMatrix<f64>, outputs: &[Series]) -> Noise {
     )
 }
 
-/// The variance of white noise that is as strong as the slowest part of these values, NaN where one does not count, and
-/// never weaker than the values are.
+/// The variance of white noise that is as strong as the slowest part of these values, NaN where one
+/// does not count, and never weaker than the values are.
 #[must_use]
 pub fn level(values: &[f64], step_s: f64) -> f64 {
     let counted = |values: &[f64]| {
@@ -190,8 +197,9 @@ pub(super) fn samples_of_block(step_s: f64) -> usize {
 }
 
 impl Series {
-    /// Sees one output's `samples` through blocks: of each `block_of` writes the sensitivities of some samples that count,
-    /// added up, to a row. `square` and `squares` are Σ v² and Σ s sᵀ of all samples that count.
+    /// Sees one output's `samples` through blocks: of each `block_of` writes the sensitivities of
+    /// some samples that count, added up, to a row. `square` and `squares` are Σ v² and Σ s sᵀ of
+    /// all samples that count.
     #[must_use]
     pub fn new(
         step_s: f64,
@@ -360,13 +368,13 @@ struct Settling<'a> {
     /// The noise of the blocks' means, and its variance.
     slow: Autoregression,
     variance: f64,
-    /// Parts of the parameters' covariance: by the noise within blocks, by that of their means, and by the latter were it
-    /// white with unit variance.
+    /// Parts of the parameters' covariance: by the noise within blocks, by that of their means, and
+    /// by the latter were it white with unit variance.
     by_fast: Padded,
     by_slow: Padded,
     by_white: Padded,
-    /// The change of the parameters with each block's mean, and R times it for unit innovation; none as long as the noise
-    /// is white.
+    /// The change of the parameters with each block's mean, and R times it for unit innovation;
+    /// none as long as the noise is white.
     changes: Option<Padded>,
     spread: Option<Padded>,
     /// Variance of what the parameters made of the noise, S K Sᵀ, when that was last added back.
@@ -416,8 +424,9 @@ impl<'a> Settling<'a> {
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Adds back what the parameters, of this covariance, took. White noise is at once made as strong as leaves residuals
-    /// as strong as they are; then only what others do to the parameters can change it.
+    /// Adds back what the parameters, of this covariance, took. White noise is at once made as
+    /// strong as leaves residuals as strong as they are; then only what others do to the parameters
+    /// can change it.
     fn settle(&mut self, scatter: &Padded) {
         let (pairs, block) = (self.pairs[0], self.output.block);
         let followed = scatter.dot(&self.output.between) / (block * block * pairs);
@@ -529,7 +538,8 @@ mod tests {
         )
     }
 
-    /// The variance stated for the mean of values, given their residuals from it; H = w N and H⁻¹ = 1/H.
+    /// The variance stated for the mean of values, given their residuals from it; H = w N and H⁻¹ =
+    /// 1/H.
     fn of_the_mean(values: &[f64], used: &[bool]) -> Estimated {
         let weight = 3.0;
         let count = used.iter().filter(|used| **used).count() as f64;
@@ -554,7 +564,8 @@ mod tests {
 
     #[test]
     fn the_variance_of_a_mean_of_white_values_has_n_minus_one_degrees_of_freedom() {
-        // Fewer than BLOCKS_PER_COEFFICIENT blocks: white noise is all that is considered. The blocks' means speak alone.
+        // Fewer than BLOCKS_PER_COEFFICIENT blocks: white noise is all that is considered. The
+        // blocks' means speak alone.
         let means = [1.0, 3.0, 2.0, 5.0, 4.0, 1.0, 0.0, 2.0, 3.0];
         let values: Vec<f64> = means.iter().flat_map(|m| [m + 0.5, m - 0.5]).collect();
         let mean = means.iter().sum::<f64>() / 9.0;

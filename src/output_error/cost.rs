@@ -1,7 +1,9 @@
-//! The cost J (eq. 1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums over the samples that count.
+//! The cost J (eq. 1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums
+//! over the samples that count.
 //!
-//! Here they are kept without the factor 1/(n_t n_z) of the print: as sums they are the likelihood's, and the information
-//! matrix (1.7) is the second gradient without any factor. [`Sums::cost`] is J as printed.
+//! Here they are kept without the factor 1/(n_t n_z) of the print: as sums they are the
+//! likelihood's, and the information matrix (1.7) is the second gradient without any factor.
+//! [`Sums::cost`] is J as printed.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,7 +1,8 @@
-//! The states' own way through a chunk of samples, and what it leaves for the sensitivities: at each stage of each step the
-//! slopes A = ∂ẋ/∂x (through the coefficients included) and B = ∂ẋ/∂c.
+//! The states' own way through a chunk of samples, and what it leaves for the sensitivities: at
+//! each stage of each step the slopes A = ∂ẋ/∂x (through the coefficients included) and B = ∂ẋ/∂c.
 //!
-//! A stage waits for the one before it, so the chain goes stage by stage beside other work ([`Meanwhile`]).
+//! A stage waits for the one before it, so the chain goes stage by stage beside other work
+//! ([`Meanwhile`]).
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -15,7 +16,8 @@ use super::lanes::VECTOR;
 use crate::dynamics::runge_kutta::{POINT, STAGES};
 use crate::dynamics::{COEFFICIENTS, Equations};
 
-/// A state beyond this (rad, rad/s) is no flight: it stops the integration before the numbers overflow.
+/// A state beyond this (rad, rad/s) is no flight: it stops the integration before the numbers
+/// overflow.
 const BEYOND_SENSE: f64 = 50.0;
 
 /// Something that goes on step by step beside other work.
@@ -38,7 +40,8 @@ impl Meanwhile for Nothing {
 pub(super) struct Path<const NX: usize> {
     /// The states at the samples.
     pub states: [SVector<f64, NX>; CHUNK],
-    /// What the first lanes of a group multiply their regressors by: the states that they follow, else one.
+    /// What the first lanes of a group multiply their regressors by: the states that they follow,
+    /// else one.
     pub times: [[[f64; VECTOR]; CHUNK]; STAGES],
     /// A by stage, rate and state.
     pub a: [[[[f64; CHUNK]; NX]; NX]; STAGES],
@@ -82,7 +85,8 @@ pub(super) struct Course<'a, const NX: usize, E: Equations<NX>> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Course<'a, NX, E> {
-    /// The course from the state `x` over `samples` samples: at the first of these points, at every other of them.
+    /// The course from the state `x` over `samples` samples: at the first of these points, at every
+    /// other of them.
     pub fn new(
         case: &'a Case<NX, E>,
         near: &'a Near<NX>,
@@ -123,8 +127,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Course<'a, NX, E> {
         }
     }
 
-    /// Goes to a stage's state. What is written of it is written while the processor has it at hand: reading it back at
-    /// once, in another width, would hold up the chain.
+    /// Goes to a stage's state. What is written of it is written while the processor has it at
+    /// hand: reading it back at once, in another width, would hold up the chain.
     #[inline(always)]
     fn arrive(&mut self, at: SVector<f64, NX>) {
         self.at = at;

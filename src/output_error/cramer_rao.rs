@@ -1,9 +1,11 @@
-//! How well the data determine the parameters: Cramér-Rao bounds (1.6, 1.7) in a form that holds for any weights.
+//! How well the data determine the parameters: Cramér-Rao bounds (1.6, 1.7) in a form that holds
+//! for any weights.
 //!
-//! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹; it is H⁻¹, the
-//! usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate weights that are not. Correlated residuals are
-//! counted by their autocovariance ([`coloured`]), and the bound is never below the one for white ones. Where that
-//! autocovariance is known from little, the corrected bound is longer by what Student's t says, so that ±1.96 of it are an
+//! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W
+//! S] H⁻¹; it is H⁻¹, the usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate
+//! weights that are not. Correlated residuals are counted by their autocovariance ([`coloured`]),
+//! and the bound is never below the one for white ones. Where that autocovariance is known from
+//! little, the corrected bound is longer by what Student's t says, so that ±1.96 of it are an
 //! interval of 95 %.
 
 use std::collections::BTreeMap;
@@ -48,8 +50,8 @@ pub enum Identified {
     },
 }
 
-/// A parameter takes part in a direction when its share of the unit vector's square is at least this: the few that a reader
-/// is to be told of.
+/// A parameter takes part in a direction when its share of the unit vector's square is at least
+/// this: the few that a reader is to be told of.
 const TAKES_PART: f64 = 0.1;
 
 /// Inverts the information matrix, or names what it does not determine.
@@ -96,8 +98,8 @@ pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     ))
 }
 
-/// Variances of the residuals from Σ v² and the samples of each output, with the parameters counted as spread evenly over
-/// the outputs.
+/// Variances of the residuals from Σ v² and the samples of each output, with the parameters counted
+/// as spread evenly over the outputs.
 #[must_use]
 pub fn variances(outputs: [(f64, usize); OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
     let total: usize = outputs.iter().map(|(_, used)| used).sum();
@@ -144,7 +146,8 @@ pub fn noise<D: Likelihood>(
     }
 }
 
-/// A maneuver with the held derivatives free as well, and the values at which their effect is wanted.
+/// A maneuver with the held derivatives free as well, and the values at which their effect is
+/// wanted.
 #[derive(Debug)]
 pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub case: &'a Case<NX, E>,
@@ -156,11 +159,11 @@ pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub places: Vec<usize>,
 }
 
-/// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P Gᵀ with
-/// G = −H⁻¹ Σ S_fᵀ W S_h ("consider" covariance).
+/// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P
+/// Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h ("consider" covariance).
 ///
-/// `wide` is the same maneuver with the held derivatives free as well; `values` has every derivative of it and
-/// `uncertainties` the standard uncertainty of each held one, by name.
+/// `wide` is the same maneuver with the held derivatives free as well; `values` has every
+/// derivative of it and `uncertainties` the standard uncertainty of each held one, by name.
 pub fn consider<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     wide: &Case<NX, E>,
@@ -181,8 +184,8 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     );
 }
 
-/// [`consider`] for maneuvers that share parameters: the error of a held value is common to all that hold it, so its
-/// effects on them add up before they are squared.
+/// [`consider`] for maneuvers that share parameters: the error of a held value is common to all
+/// that hold it, so its effects on them add up before they are squared.
 pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     members: &[Considered<NX, E>],
     uncertainties: &BTreeMap<&str, f64>,
@@ -229,8 +232,8 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     fit.covariance_held = Some(held);
 }
 
-/// Adds to a fit's corrected covariance what errors common to all its data do to the estimates: of each, the change of the
-/// gradient with one standard deviation of it ([`super::calibration`]).
+/// Adds to a fit's corrected covariance what errors common to all its data do to the estimates: of
+/// each, the change of the gradient with one standard deviation of it ([`super::calibration`]).
 pub fn miscalibrated<D: Likelihood>(
     data: &D,
     gradient_shifts: &[DVector<f64>],

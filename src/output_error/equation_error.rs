@@ -1,7 +1,9 @@
-//! Equation error: the derivatives by linear least squares on the coefficients that the measured accelerations imply.
+//! Equation error: the derivatives by linear least squares on the coefficients that the measured
+//! accelerations imply.
 //!
-//! It needs no integration and so cannot diverge, whatever the airframe's stability; noise in the regressors biases it,
-//! so it is a start for output error and a check of it ([`regression`]), not a result.
+//! It needs no integration and so cannot diverge, whatever the airframe's stability; noise in the
+//! regressors biases it, so it is a start for output error and a check of it ([`regression`]), not
+//! a result.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,11 +13,12 @@ use super::cramer_rao::{Identified, identified};
 use crate::dynamics::motion::SLOPE_REACH;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
-/// Weight of the prior start against the data, on unit-diagonal scale: enough to hold what the data do not say.
+/// Weight of the prior start against the data, on unit-diagonal scale: enough to hold what the data
+/// do not say.
 const PULL: f64 = 1e-4;
 
-/// Starting values with the derivatives from equation error; what the data do not determine stays near `prior`, as do
-/// biases and initial states.
+/// Starting values with the derivatives from equation error; what the data do not determine stays
+/// near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
     let mut values = prior.to_vec();
@@ -67,14 +70,16 @@ fn regress<const NX: usize, E: Equations<NX>>(
 /// Condition number of the scaled normal matrix beyond which a regression says nothing.
 const SINGULAR: f64 = 1e10;
 
-/// The derivatives by least squares on the measured accelerations alone, as a check of output error; parameters in the
-/// order of the case, none for biases and initial states and for a coefficient whose regressors are proportional.
+/// The derivatives by least squares on the measured accelerations alone, as a check of output
+/// error; parameters in the order of the case, none for biases and initial states and for a
+/// coefficient whose regressors are proportional.
 ///
-/// The measured angular accelerations are slopes of local straight lines through the rates, that is accelerations seen
-/// through a short window. Forces and regressors are seen through the same window, so that what is fast (the edge of a
-/// step) is not rounded on one side of the equation only; a straight filter over both sides leaves the derivatives
-/// alone. Samples whose window touches a marked one do not count. Noise in the regressors is left: it draws derivatives
-/// towards zero by its share of the regressor's motion.
+/// The measured angular accelerations are slopes of local straight lines through the rates, that is
+/// accelerations seen through a short window. Forces and regressors are seen through the same
+/// window, so that what is fast (the edge of a step) is not rounded on one side of the equation
+/// only; a straight filter over both sides leaves the derivatives alone. Samples whose window
+/// touches a marked one do not count. Noise in the regressors is left: it draws derivatives towards
+/// zero by its share of the regressor's motion.
 #[must_use]
 pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<Option<f64>> {
     let none = vec![0.0; case.parameters()];
@@ -123,7 +128,8 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
     values
 }
 
-/// At every sample the regressors of a coefficient, then the held part of it, then what the measured motion implies.
+/// At every sample the regressors of a coefficient, then the held part of it, then what the
+/// measured motion implies.
 fn rows<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     coefficient: usize,
@@ -153,11 +159,13 @@ fn seen_through(window: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
     seen
 }
 
-/// The window through which the slope of a local straight line sees the derivative: Σ d (x(k+d) − x(k−d)) / Σ 2 d² is a
-/// weighted mean of the increments, and an increment is the mean of the derivative at its ends.
+/// The window through which the slope of a local straight line sees the derivative: Σ d (x(k+d) −
+/// x(k−d)) / Σ 2 d² is a weighted mean of the increments, and an increment is the mean of the
+/// derivative at its ends.
 fn slope_window() -> Vec<f64> {
     let reach = SLOPE_REACH;
-    // Increment i lies between samples i and i+1 of the window; the slopes from a distance d of at least `nearest` cross it.
+    // Increment i lies between samples i and i+1 of the window; the slopes from a distance d of at
+    // least `nearest` cross it.
     let across = |i: usize| -> f64 {
         let nearest = if i < reach { reach - i } else { i + 1 - reach };
         (nearest..=reach).map(|d| d as f64).sum()
@@ -196,7 +204,8 @@ mod tests {
 
     #[test]
     fn an_edge_of_the_derivative_is_rounded_as_the_local_straight_line_rounds_it() {
-        // A derivative that begins to grow by one per sample at sample 0, and the rate that it makes.
+        // A derivative that begins to grow by one per sample at sample 0, and the rate that it
+        // makes.
         let rate = |k: i32| 0.5 * f64::from(k.max(0)).powi(2);
         let derivative = |k: i32| f64::from(k.max(0));
         let reach = i32::try_from(SLOPE_REACH).unwrap();

@@ -1,11 +1,14 @@
-//! How well a variance from coloured residuals is known: the noise's spectrum is itself an estimate from a few seconds, so
-//! normal intervals are too short, and Student's t takes the normal distribution's place.
+//! How well a variance from coloured residuals is known: the noise's spectrum is itself an estimate
+//! from a few seconds, so normal intervals are too short, and Student's t takes the normal
+//! distribution's place.
 //!
-//! An output gives a parameter the variance V = σ² Q(φ), Q being Σ u² of what the process 1/A filters the parameter's
-//! sensitivities to. Of an autoregressive process fitted to N values var σ² = 2σ⁴/N and cov φ = σ² Γ⁻¹/N, independent of
-//! each other (Brockwell and Davis 1991, sections 8.1 and 10.8), with σ² Γ⁻¹ = L Lᵀ − U Uᵀ of its own coefficients
-//! (Siddiqui 1958). Then var V = 2V²/N + σ⁴ ∇Qᵀ cov φ ∇Q (delta method), where ∂u/∂φ_i is −u filtered once more, i samples
-//! late. Variances of several outputs add up to V with ν = 2V²/Σ var V degrees of freedom (Satterthwaite 1946).
+//! An output gives a parameter the variance V = σ² Q(φ), Q being Σ u² of what the process 1/A
+//! filters the parameter's sensitivities to. Of an autoregressive process fitted to N values var σ²
+//! = 2σ⁴/N and cov φ = σ² Γ⁻¹/N, independent of each other (Brockwell and Davis 1991, sections 8.1
+//! and 10.8), with σ² Γ⁻¹ = L Lᵀ − U Uᵀ of its own coefficients (Siddiqui 1958). Then var V = 2V²/N
+//! + σ⁴ ∇Qᵀ cov φ ∇Q (delta method), where ∂u/∂φ_i is −u filtered once more, i samples late.
+//! Variances of several outputs add up to V with ν = 2V²/Σ var V degrees of freedom (Satterthwaite
+//! 1946).
 
 use super::autoregression::Autoregression;
 use super::padded::Padded;
@@ -17,7 +20,8 @@ pub(super) struct Known {
     of_variance: Vec<f64>,
 }
 
-/// Fewer degrees of freedom are not told from so many: the delta method is none for variances known to less than their size.
+/// Fewer degrees of freedom are not told from so many: the delta method is none for variances known
+/// to less than their size.
 const FEWEST: f64 = 3.0;
 
 impl Known {
@@ -61,7 +65,8 @@ impl Known {
 /// What one output's process gives each parameter.
 pub(super) struct Part<'a> {
     pub noise: &'a Autoregression,
-    /// The change of the estimates with each value of the output, filtered by the process until that has died away.
+    /// The change of the estimates with each value of the output, filtered by the process until
+    /// that has died away.
     pub filtered: Padded,
     /// Values the process is known from, less what the parameters took of them.
     pub freedom: f64,
@@ -121,8 +126,8 @@ fn coefficient_covariance(coefficients: &[f64], values: f64) -> Vec<Vec<f64>> {
     (0..p).map(|i| (0..p).map(|j| at(i, j)).collect()).collect()
 }
 
-/// By how much an interval of 95 % of Student's distribution is longer than the normal one: the expansion of Abramowitz
-/// and Stegun 26.7.5, to 0.2 % from three degrees of freedom on.
+/// By how much an interval of 95 % of Student's distribution is longer than the normal one: the
+/// expansion of Abramowitz and Stegun 26.7.5, to 0.2 % from three degrees of freedom on.
 #[must_use]
 pub fn longer(freedom: f64) -> f64 {
     const X: f64 = 1.959_963_984_540_054;

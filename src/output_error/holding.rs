@@ -1,17 +1,20 @@
-//! Which parameters to hold at values known from elsewhere: those of which the wind tunnel knows more than the maneuver.
+//! Which parameters to hold at values known from elsewhere: those of which the wind tunnel knows
+//! more than the maneuver.
 //!
-//! Estimated, parameter j has the variance `V_j` from noise; held, the variance `u_j²` of the value it is held at. Holding
-//! it changes the covariance of all others by `g (u_j² − V_j) gᵀ`: with weights that are the inverse of the noise's
-//! variances it lowers the mean square error of every one of them exactly where `u_j² < V_j`, and raises it everywhere
-//! else (Toro-Vizcarrondo and Wallace 1968). So the ratio `√V_j / u_j` decides, above one for hold. `V_j` is the corrected
-//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F; information matrix H and gradient covariance M of all parameters give it
-//! for every F without another fit.
+//! Estimated, parameter j has the variance `V_j` from noise; held, the variance `u_j²` of the value
+//! it is held at. Holding it changes the covariance of all others by `g (u_j² − V_j) gᵀ`: with
+//! weights that are the inverse of the noise's variances it lowers the mean square error of every
+//! one of them exactly where `u_j² < V_j`, and raises it everywhere else (Toro-Vizcarrondo and
+//! Wallace 1968). So the ratio `√V_j / u_j` decides, above one for hold. `V_j` is the corrected
+//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F; information matrix H and gradient covariance M of
+//! all parameters give it for every F without another fit.
 //!
-//! What the errors of values already held do to parameter j is no reason to hold it too: free, it takes those errors up
-//! and spares the others. Counted, they would make each held value hold the next.
+//! What the errors of values already held do to parameter j is no reason to hold it too: free, it
+//! takes those errors up and spares the others. Counted, they would make each held value hold the
+//! next.
 //!
-//! The worst is held first, until none is above one; then each held one that alone would be below one again is freed,
-//! at most once. So it ends.
+//! The worst is held first, until none is above one; then each held one that alone would be below
+//! one again is freed, at most once. So it ends.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -22,14 +25,15 @@ use super::cramer_rao::{scale, scaled};
 use super::likelihood::Likelihood;
 use crate::dynamics::{Equations, OUTPUTS};
 
-/// Parameters to be held or estimated: what the data say of all of them together, and how well some of them are known
-/// from elsewhere.
+/// Parameters to be held or estimated: what the data say of all of them together, and how well some
+/// of them are known from elsewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidates {
     information: DMatrix<f64>,
     /// Σ Sᵀ W R W S.
     scatter: DMatrix<f64>,
-    /// Standard uncertainty of the value a parameter may be held at; none for one that may not be held.
+    /// Standard uncertainty of the value a parameter may be held at; none for one that may not be
+    /// held.
     uncertainty: Vec<Option<f64>>,
     max_condition_number: f64,
 }
@@ -41,8 +45,8 @@ pub enum Because {
     NotFelt,
     /// Free, it would take part in a direction that the data do not determine, with these others.
     NotToldApart(Vec<usize>),
-    /// Free, its bound would be larger than the uncertainty of the value it is held at. The estimate it would correlate
-    /// with most, and how.
+    /// Free, its bound would be larger than the uncertainty of the value it is held at. The
+    /// estimate it would correlate with most, and how.
     Bound {
         bound: f64,
         uncertainty: f64,
@@ -50,8 +54,8 @@ pub enum Because {
     },
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this: a
-/// smaller part would hardly be determined by holding it.
+/// A parameter takes part in an undetermined direction when its share of the unit vector's square
+/// is at least this: a smaller part would hardly be determined by holding it.
 const TAKES_PART: f64 = 0.01;
 
 /// What a set of free parameters knows of itself.
@@ -65,10 +69,11 @@ enum Known {
 }
 
 impl Candidates {
-    /// What the data say of a case with all parameters free at `values`; none where its integration diverges.
+    /// What the data say of a case with all parameters free at `values`; none where its integration
+    /// diverges.
     ///
-    /// The noise is best that of the fit that holds least: with more held, residuals are errors of the held values too,
-    /// and would make the data look worse than they are.
+    /// The noise is best that of the fit that holds least: with more held, residuals are errors of
+    /// the held values too, and would make the data look worse than they are.
     #[must_use]
     pub fn gather<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
@@ -90,7 +95,8 @@ impl Candidates {
         })
     }
 
-    /// What must be held besides `held` for the data to determine the rest, as far as it may be held.
+    /// What must be held besides `held` for the data to determine the rest, as far as it may be
+    /// held.
     #[must_use]
     pub fn determined(&self, mut held: Vec<bool>) -> Vec<bool> {
         while let Some(lost) = self.undetermined(&held) {
@@ -99,8 +105,8 @@ impl Candidates {
         held
     }
 
-    /// Which parameters to hold, from those `held` so far. `released` remembers which have been freed again: a second
-    /// time none is.
+    /// Which parameters to hold, from those `held` so far. `released` remembers which have been
+    /// freed again: a second time none is.
     #[must_use]
     pub fn settle(&self, mut held: Vec<bool>, released: &mut [bool]) -> Vec<bool> {
         loop {
@@ -117,7 +123,8 @@ impl Candidates {
         }
     }
 
-    /// Why a held parameter is held; none where, freed alone, it would be determined better than by what it is held at.
+    /// Why a held parameter is held; none where, freed alone, it would be determined better than by
+    /// what it is held at.
     #[must_use]
     pub fn because(&self, held: &[bool], parameter: usize) -> Option<Because> {
         if self.information[(parameter, parameter)] <= 0.0 {
@@ -154,7 +161,8 @@ impl Candidates {
         }
     }
 
-    /// The free parameter that is not felt, or of an undetermined direction the one that the tunnel knows best along it.
+    /// The free parameter that is not felt, or of an undetermined direction the one that the tunnel
+    /// knows best along it.
     fn undetermined(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
         let silent =
@@ -168,7 +176,8 @@ impl Candidates {
         }
     }
 
-    /// The free parameter that is best held: an undetermined one, or that of the largest ratio above one.
+    /// The free parameter that is best held: an undetermined one, or that of the largest ratio
+    /// above one.
     fn worst(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
         self.undetermined(held).or_else(|| match self.known(&free) {
@@ -177,7 +186,8 @@ impl Candidates {
         })
     }
 
-    /// Of the parameters that may be held that of the largest size over the tunnel's uncertainty, above a limit.
+    /// Of the parameters that may be held that of the largest size over the tunnel's uncertainty,
+    /// above a limit.
     fn largest_ratio(&self, free: &[usize], sizes: &DVector<f64>, limit: f64) -> Option<usize> {
         let ratios = free
             .iter()
@@ -273,7 +283,8 @@ mod tests {
         evidence.settle(vec![false; n], &mut vec![false; n])
     }
 
-    /// Two parameters that correlate by ρ = 0.9, of bound 1/√(1-ρ²) = 2.29 when both are free and 1 when alone.
+    /// Two parameters that correlate by ρ = 0.9, of bound 1/√(1-ρ²) = 2.29 when both are free and 1
+    /// when alone.
     fn pair(first: Option<f64>, second: Option<f64>) -> Candidates {
         evidence(
             DMatrix::from_row_slice(2, 2, &[1.0, 0.9, 0.9, 1.0]),
@@ -309,8 +320,8 @@ mod tests {
 
     #[test]
     fn the_error_of_what_is_held_is_no_reason_to_hold_the_next() {
-        // With the first held at ±1.0 the second is off by √(1 + 0.9²) = 1.35, more than the tunnel's 1.2, but from noise
-        // by 1 only: it takes up the error of the first.
+        // With the first held at ±1.0 the second is off by √(1 + 0.9²) = 1.35, more than the
+        // tunnel's 1.2, but from noise by 1 only: it takes up the error of the first.
         assert_eq!(settled(&pair(Some(1.0), Some(1.2))), [true, false]);
         assert_eq!(settled(&pair(Some(0.95), Some(0.9))), [true, true]);
     }
@@ -327,7 +338,8 @@ mod tests {
             DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 4.0]),
             vec![Some(50.0), Some(20.0)],
         );
-        // Along the undetermined direction (2, -1) the tunnel's uncertainties are passed at 50/2 and 20/1: the second first.
+        // Along the undetermined direction (2, -1) the tunnel's uncertainties are passed at 50/2
+        // and 20/1: the second first.
         assert_eq!(settled(&e), [false, true]);
         assert_eq!(
             e.because(&[false, true], 1),

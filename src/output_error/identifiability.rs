@@ -1,5 +1,6 @@
-//! What the data of a maneuver tell apart: correlations, variance inflation, condition indices with variance proportions
-//! (Belsley, Kuh and Welsch 1980), on the unit-length columns of `W^½ S`, that is on H with unit diagonal.
+//! What the data of a maneuver tell apart: correlations, variance inflation, condition indices with
+//! variance proportions (Belsley, Kuh and Welsch 1980), on the unit-length columns of `W^½ S`, that
+//! is on H with unit diagonal.
 //!
 //! With `H_s = D H D`, `D = diag H^-½`, eigenvalues λ and unit eigenvectors v:
 //! - variance inflation of parameter j: `H_jj (H⁻¹)_jj = Σ_k v_jk²/λ_k`, the factor by which the other parameters raise the
@@ -7,8 +8,8 @@
 //! - condition index of direction k: `√(λ_max/λ_k)`, the ratio of the lengths of the best and this determined direction;
 //! - variance proportion of j in k: `(v_jk²/λ_k) / Σ_l v_jl²/λ_l`.
 //!
-//! A direction of high index that makes more than half of the variance of two or more parameters names a group that the
-//! data hardly tell apart.
+//! A direction of high index that makes more than half of the variance of two or more parameters
+//! names a group that the data hardly tell apart.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use serde::{Deserialize, Serialize};
@@ -54,7 +55,8 @@ pub struct Group {
 /// The measures of one information matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collinearity {
-    /// Of each parameter; none for one that takes part in a direction that the data do not determine.
+    /// Of each parameter; none for one that takes part in a direction that the data do not
+    /// determine.
     pub inflation: Vec<Option<f64>>,
     /// Of the estimates, from H⁻¹; absent where H has none.
     pub correlation: Option<DMatrix<f64>>,
@@ -64,8 +66,8 @@ pub struct Collinearity {
     pub groups: Vec<Group>,
 }
 
-/// Measures an information matrix; none where it is empty or no number. A parameter that the data do not feel at all
-/// (`H_jj = 0`) is in no group.
+/// Measures an information matrix; none where it is empty or no number. A parameter that the data
+/// do not feel at all (`H_jj = 0`) is in no group.
 #[must_use]
 pub fn collinearity(
     information: &DMatrix<f64>,
@@ -85,7 +87,8 @@ pub fn collinearity(
     });
     let eigen = SymmetricEigen::new(scaled(&own, &scale(&own)));
     let most = eigen.eigenvalues.max();
-    // Rounding leaves a direction that the data do not determine with some tiny length of either sign.
+    // Rounding leaves a direction that the data do not determine with some tiny length of either
+    // sign.
     let floor = most / max_condition_number;
     let directions = Directions { eigen, most, floor };
     let determined = felt.len() == n && directions.eigen.eigenvalues.iter().all(|l| *l > floor);
@@ -110,8 +113,8 @@ pub fn collinearity(
     })
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square is at least this: more
-/// than rounding, for however small its part, its variance has no bound.
+/// A parameter takes part in an undetermined direction when its share of the unit vector's square
+/// is at least this: more than rounding, for however small its part, its variance has no bound.
 const TAKES_PART: f64 = 1e-6;
 
 struct Directions {
@@ -214,8 +217,8 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The information of regressors of unit weight, `Xᵀ X`, of two that correlate by ρ and one that stands apart; with
-    /// lengths that unit diagonal must take out.
+    /// The information of regressors of unit weight, `Xᵀ X`, of two that correlate by ρ and one
+    /// that stands apart; with lengths that unit diagonal must take out.
     fn designed(rho: f64) -> DMatrix<f64> {
         let (a, b, c) = (1.0, 1e3, 1e-4);
         DMatrix::from_row_slice(

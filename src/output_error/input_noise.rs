@@ -1,11 +1,12 @@
-//! What noise of the measured surfaces does to the estimates. The equations take surfaces as exact, so their noise flies
-//! the computed aircraft a little; through a moment it is integrated to slow errors that residuals show hardly, beside the
-//! sensors' own noise, and that derivatives follow.
+//! What noise of the measured surfaces does to the estimates. The equations take surfaces as exact,
+//! so their noise flies the computed aircraft a little; through a moment it is integrated to slow
+//! errors that residuals show hardly, beside the sensors' own noise, and that derivatives follow.
 //!
-//! The gradient Σ Sᵀ W v answers to an error of one sample of a surface through the outputs at once and through the states
-//! that it leaves behind: an adjoint λ = ∂(gradient)/∂(state), run backwards, has both. White noise of variance σ² then
-//! adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. However many surfaces there are, they reach the aircraft through three
-//! coefficients, so three vectors g a sample are enough.
+//! The gradient Σ Sᵀ W v answers to an error of one sample of a surface through the outputs at once
+//! and through the states that it leaves behind: an adjoint λ = ∂(gradient)/∂(state), run
+//! backwards, has both. White noise of variance σ² then adds σ² Σ_k g_k g_kᵀ to the gradient's
+//! covariance. However many surfaces there are, they reach the aircraft through three coefficients,
+//! so three vectors g a sample are enough.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -38,7 +39,8 @@ pub struct NoisySurface {
 struct Effect {
     coefficient: usize,
     value: Value,
-    /// Coefficient per deflection and unit of the derivative, sample by sample; one throughout where empty.
+    /// Coefficient per deflection and unit of the derivative, sample by sample; one throughout
+    /// where empty.
     factors: Vec<f64>,
 }
 
@@ -49,7 +51,8 @@ enum Value {
     Held(f64),
 }
 
-/// Surfaces of a window that have noise. `free` are the derivatives in the order of the case's parameters.
+/// Surfaces of a window that have noise. `free` are the derivatives in the order of the case's
+/// parameters.
 #[must_use]
 pub fn noisy_surfaces(
     aircraft: &Aircraft,
@@ -97,12 +100,13 @@ pub fn noisy_surfaces(
     names.iter().filter_map(surface).collect()
 }
 
-/// Variance of the white noise on a signal that is otherwise smooth but for few steps: of third differences, which have
-/// 1 + 9 + 9 + 1 times that of the noise, the median size decides.
+/// Variance of the white noise on a signal that is otherwise smooth but for few steps: of third
+/// differences, which have 1 + 9 + 9 + 1 times that of the noise, the median size decides.
 #[must_use]
 pub fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
-    // Sizes are in the order of their bits, which are compared faster; what is no number comes last.
+    // Sizes are in the order of their bits, which are compared faster; what is no number comes
+    // last.
     let size = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
     let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.windows(4).map(size).collect());
     let finite = sizes
@@ -117,7 +121,8 @@ pub fn white_variance(samples: &[f64]) -> f64 {
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 
-/// The gradient's covariance from the noise of the surfaces, along the measured motion, given the outputs' series.
+/// The gradient's covariance from the noise of the surfaces, along the measured motion, given the
+/// outputs' series.
 #[must_use]
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
@@ -146,8 +151,8 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     DMatrix::from_fn(n, n, at)
 }
 
-/// The adjoint's run from the last block of samples to the first. Sensitivities change little within a block, so its
-/// samples answer alike to the noise.
+/// The adjoint's run from the last block of samples to the first. Sensitivities change little
+/// within a block, so its samples answer alike to the noise.
 struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
     parameters: &'a [f64],
@@ -187,7 +192,8 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
             let middle = b * block + samples / 2;
             let at = self.at(middle, samples);
             let root = root(&self.noise(middle));
-            // Each of the block's samples has this part of the outputs' sums, and all of them together its square.
+            // Each of the block's samples has this part of the outputs' sums, and all of them
+            // together its square.
             let all = (samples as f64).sqrt();
             let mut part = [0.0; OUTPUTS];
             for (part, series) in part.iter_mut().zip(self.series) {
@@ -287,7 +293,8 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         at
     }
 
-    /// Covariance of the coefficients' errors at a sample: each surface's noise acts on all of them together.
+    /// Covariance of the coefficients' errors at a sample: each surface's noise acts on all of them
+    /// together.
     #[inline(always)]
     fn noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
@@ -385,8 +392,8 @@ mod tests {
         assert!(white_variance(&[]) == 0.0 && white_variance(&[f64::NAN; 9]) == 0.0);
     }
 
-    /// The scatter of the gradient over draws of the surfaces' noise against what is said of it; the last derivative is
-    /// held.
+    /// The scatter of the gradient over draws of the surfaces' noise against what is said of it;
+    /// the last derivative is held.
     fn scatter_is_as_said<const NX: usize, E: Equations<NX>>() {
         let (sd_deg, draws, mut noise) = (0.02, 150, Noise(77));
         let truth = truth(E::AXIS);

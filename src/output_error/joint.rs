@@ -1,9 +1,10 @@
-//! Several maneuvers that share derivatives while each keeps its biases and initial states, and those derivatives that
-//! stand for biases: one cost (1.2), the sum over the maneuvers.
+//! Several maneuvers that share derivatives while each keeps its biases and initial states, and
+//! those derivatives that stand for biases: one cost (1.2), the sum over the maneuvers.
 //!
-//! Parameters in order: the shared derivatives, then each maneuver's own. The information matrix (1.5) is an arrow: a
-//! block for the derivatives, one for each maneuver's own parameters, and what ties these to the derivatives. Residuals of
-//! different maneuvers are independent; each has its own variances and autocorrelation.
+//! Parameters in order: the shared derivatives, then each maneuver's own. The information matrix
+//! (1.5) is an arrow: a block for the derivatives, one for each maneuver's own parameters, and what
+//! ties these to the derivatives. Residuals of different maneuvers are independent; each has its
+//! own variances and autocorrelation.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -52,8 +53,8 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Joins maneuvers, each with a label that tells its own parameters from those of the others. `is_own` names the
-    /// derivatives that each keeps to itself.
+    /// Joins maneuvers, each with a label that tells its own parameters from those of the others.
+    /// `is_own` names the derivatives that each keeps to itself.
     ///
     /// # Errors
     /// A sentence that names the maneuver whose free derivatives are not those of the first.
@@ -116,7 +117,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         self.members.get(member).map_or(&[], |m| &m.places)
     }
 
-    /// The joint parameters from the shared derivatives and each member's own full set (its own part is taken).
+    /// The joint parameters from the shared derivatives and each member's own full set (its own
+    /// part is taken).
     #[must_use]
     pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
         let mut joint = shared.to_vec();
@@ -141,7 +143,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Computes each member's response. The sample at which one diverges is counted through the members in order.
+    /// Computes each member's response. The sample at which one diverges is counted through the
+    /// members in order.
     fn each(
         &self,
         response: &mut [Response],
@@ -206,7 +209,8 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         sums
     }
 
-    /// Pooled over the members by their samples. A member's freedom counts all its parameters, also those it shares.
+    /// Pooled over the members by their samples. A member's freedom counts all its parameters, also
+    /// those it shares.
     fn variances(&self, response: &Vec<Response>) -> [f64; OUTPUTS] {
         let (mut squares, mut counts) = ([0.0; OUTPUTS], [0.0; OUTPUTS]);
         for (member, response) in self.members.iter().zip(response) {

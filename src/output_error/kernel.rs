@@ -1,13 +1,16 @@
-//! The inner loop: one pass over a maneuver integrates the states, and beside them the sensitivities of all parameters.
+//! The inner loop: one pass over a maneuver integrates the states, and beside them the
+//! sensitivities of all parameters.
 //!
-//! A pass goes chunk by chunk. The states themselves are a chain of dependent operations ([`Course`]); what it leaves of
-//! each stage becomes the propagators of all its steps side by side ([`Propagators`]); with them all sensitivities take a
-//! step at once, s ← Φ s + Σ Γ_jk r_j over the stages j, k being the coefficient of a derivative and r its regressor, and
-//! outputs read y = C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`Lanes`]). While the
-//! sink sums what one chunk left, the states of the next one move on: the chain waits for itself, the sums do not.
+//! A pass goes chunk by chunk. The states themselves are a chain of dependent operations
+//! ([`Course`]); what it leaves of each stage becomes the propagators of all its steps side by side
+//! ([`Propagators`]); with them all sensitivities take a step at once, s ← Φ s + Σ Γ_jk r_j over
+//! the stages j, k being the coefficient of a derivative and r its regressor, and outputs read y =
+//! C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`Lanes`]).
+//! While the sink sums what one chunk left, the states of the next one move on: the chain waits for
+//! itself, the sums do not.
 //!
-//! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed alike in all of them, with
-//! fused multiplication, so the width does not show in the results.
+//! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed
+//! alike in all of them, with fused multiplication, so the width does not show in the results.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"
@@ -28,7 +31,8 @@ use super::response::Diverged;
 use crate::dynamics::runge_kutta::{POINT, STAGES};
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
-/// Samples between two calls of the sink, whole vectors of them: what they leave fits into the fastest memory.
+/// Samples between two calls of the sink, whole vectors of them: what they leave fits into the
+/// fastest memory.
 pub(super) const CHUNK: usize = 24;
 
 /// Samples, or points, at equal distances.
@@ -47,8 +51,9 @@ impl Spaced {
 
 /// What becomes of the sensitivities of the outputs.
 pub(super) trait Sink {
-    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by output one row of lanes.
-    /// Nobody needs the rows afterwards. There is something to do meanwhile.
+    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by
+    /// output one row of lanes. Nobody needs the rows afterwards. There is something to do
+    /// meanwhile.
     fn take<S: Simd>(
         &mut self,
         simd: S,
@@ -71,8 +76,8 @@ pub(super) struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// Integrates with these parameters in steps of `stride` samples: outputs to the front of `outputs`, sensitivities to
-    /// the sink.
+    /// Integrates with these parameters in steps of `stride` samples: outputs to the front of
+    /// `outputs`, sensitivities to the sink.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves the bounds of sense or is no number.
@@ -231,8 +236,9 @@ struct Work<'a, S: Simd, const NX: usize> {
 }
 
 impl<S: Simd, const NX: usize> Work<'_, S, NX> {
-    /// Reads the sensors and takes the chunk's steps: the groups of all coefficients side by side, so that the processor
-    /// has several independent sums to work on, then that of the initial states.
+    /// Reads the sensors and takes the chunk's steps: the groups of all coefficients side by side,
+    /// so that the processor has several independent sums to work on, then that of the initial
+    /// states.
     #[inline(always)]
     fn all<E: Equations<NX>>(&mut self) {
         let (from, end) = (self.lanes.groups[0].start, self.lanes.groups[0].end);
@@ -278,7 +284,8 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
         }
     }
 
-    /// What the derivatives of some groups' lanes multiply at the stages of a step; nothing for initial states.
+    /// What the derivatives of some groups' lanes multiply at the stages of a step; nothing for
+    /// initial states.
     #[inline(always)]
     fn regressors_at<const N: usize>(
         &self,

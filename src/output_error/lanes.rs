@@ -1,14 +1,17 @@
-//! Where the parameters stand in the processor's vectors. Those that the integration feels, derivatives and initial
-//! states, lie in lanes side by side; a bias shifts an output and never meets a state.
+//! Where the parameters stand in the processor's vectors. Those that the integration feels,
+//! derivatives and initial states, lie in lanes side by side; a bias shifts an output and never
+//! meets a state.
 //!
-//! The derivatives of one coefficient form a group and fill whole vectors, so that what a coefficient does is one number
-//! for all of a vector's lanes; those along a state come first, in the order of the states, so that they are the same
-//! lanes of each group, and the groups of all coefficients are equally long. Initial states are the last group. Two lanes
-//! that are left over hold the residual and a one when sums are taken.
+//! The derivatives of one coefficient form a group and fill whole vectors, so that what a
+//! coefficient does is one number for all of a vector's lanes; those along a state come first, in
+//! the order of the states, so that they are the same lanes of each group, and the groups of all
+//! coefficients are equally long. Initial states are the last group. Two lanes that are left over
+//! hold the residual and a one when sums are taken.
 //!
-//! What the derivatives multiply stands in rows, point by point. Where the columns of all coefficients together need no
-//! more room than the widest group, all groups read the same stretch of a row: most derivatives come three at a time, one
-//! of each coefficient, along the same surface. Lanes that nobody asked for are then computed too, and never read.
+//! What the derivatives multiply stands in rows, point by point. Where the columns of all
+//! coefficients together need no more room than the widest group, all groups read the same stretch
+//! of a row: most derivatives come three at a time, one of each coefficient, along the same
+//! surface. Lanes that nobody asked for are then computed too, and never read.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -28,13 +31,15 @@ pub(super) struct Lanes {
     pub groups: [Range<usize>; GROUPS],
     /// The lane of each parameter in order, without the biases.
     pub places: Vec<usize>,
-    /// Lanes left over: for the residual and a one when sums are taken, for the biases when sensitivities are kept.
+    /// Lanes left over: for the residual and a one when sums are taken, for the biases when
+    /// sensitivities are kept.
     pub residual: usize,
     pub one: usize,
     pub biases: Vec<usize>,
     /// Lanes in use of each vector, from its first.
     pub used: Vec<usize>,
-    /// Where the regressors of each group of derivatives begin in a row of them, and how long a row is.
+    /// Where the regressors of each group of derivatives begin in a row of them, and how long a row
+    /// is.
     pub regressors: [usize; COEFFICIENTS],
     pub row: usize,
     /// Which column stands where in a row: (place, column).
@@ -46,8 +51,8 @@ fn padded(count: usize) -> usize {
 }
 
 impl Lanes {
-    /// The layout for these derivatives, sorted by coefficient, and this number of free initial states. `followed` are
-    /// the states that derivatives can be along.
+    /// The layout for these derivatives, sorted by coefficient, and this number of free initial
+    /// states. `followed` are the states that derivatives can be along.
     pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
         let of = |k: usize| -> Vec<usize> {
             acting
@@ -144,7 +149,8 @@ impl Lanes {
     }
 }
 
-/// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines costs twice.
+/// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines
+/// costs twice.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Aligned {
     buffer: Vec<f64>,

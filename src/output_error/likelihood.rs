@@ -1,4 +1,5 @@
-//! What Newton-Raphson (1.3) and the bounds (1.7) need of the data, whether of one maneuver or of several joined.
+//! What Newton-Raphson (1.3) and the bounds (1.7) need of the data, whether of one maneuver or of
+//! several joined.
 
 use nalgebra::DMatrix;
 
@@ -12,7 +13,8 @@ use crate::dynamics::{Equations, OUTPUTS};
 
 /// Data that say something of parameters: cost, gradient and information at any values of them.
 pub trait Likelihood {
-    /// Computed outputs with the sums of the normal equations, allocated once and written over at every iteration.
+    /// Computed outputs with the sums of the normal equations, allocated once and written over at
+    /// every iteration.
     type Response: Default;
 
     /// Names of the parameters in order.
@@ -41,16 +43,16 @@ pub trait Likelihood {
     /// Variances of the residuals, output by output.
     fn variances(&self, response: &Self::Response) -> [f64; OUTPUTS];
 
-    /// Residuals of a whole response with their sensitivities, output by output; those of different series are
-    /// independent.
+    /// Residuals of a whole response with their sensitivities, output by output; those of different
+    /// series are independent.
     fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
 
     /// Σ Sᵀ W R W S for white residuals.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS])
     -> DMatrix<f64>;
 
-    /// These series, and what noise of what is taken as exact does to the gradient, at a whole response to these
-    /// parameters.
+    /// These series, and what noise of what is taken as exact does to the gradient, at a whole
+    /// response to these parameters.
     fn noisy(
         &self,
         parameters: &[f64],

@@ -1,7 +1,9 @@
-//! The mean of several estimates of the same parameters, weighted by their whole covariances: (Σ C⁻¹)⁻¹ Σ C⁻¹ θ.
+//! The mean of several estimates of the same parameters, weighted by their whole covariances: (Σ
+//! C⁻¹)⁻¹ Σ C⁻¹ θ.
 //!
-//! To first order it is what a joint estimation of the same data would find. Weighting each parameter by its own bound
-//! would not do: a constant and a slope of one maneuver are strongly correlated, and only their sum is well determined.
+//! To first order it is what a joint estimation of the same data would find. Weighting each
+//! parameter by its own bound would not do: a constant and a slope of one maneuver are strongly
+//! correlated, and only their sum is well determined.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -16,7 +18,8 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
 }
 
-/// The weighted mean of `n` parameters; none where some parameter is in no estimate or a covariance has no inverse.
+/// The weighted mean of `n` parameters; none where some parameter is in no estimate or a covariance
+/// has no inverse.
 #[must_use]
 pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
     let (mut information, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -74,7 +77,8 @@ mod tests {
 
     #[test]
     fn what_is_well_determined_of_correlated_parameters_is_kept() {
-        // θ₀ + 20 θ₁ is 3 in both and known to a thousandth; θ₁ alone is known to a tenth in one, to ten in the other.
+        // θ₀ + 20 θ₁ is 3 in both and known to a thousandth; θ₁ alone is known to a tenth in one,
+        // to ten in the other.
         let of = |slope: f64, variance: f64| {
             let c = [
                 400.0 * variance + 1e-6,

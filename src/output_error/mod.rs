@@ -1,8 +1,10 @@
-//! Output error: maximum likelihood by matching the outputs of the integrated equations to the measured ones (eqs. 1.1-1.7).
+//! Output error: maximum likelihood by matching the outputs of the integrated equations to the
+//! measured ones (eqs. 1.1-1.7).
 //!
-//! A [`Case`] is one maneuver made ready: what is known, what is held, what is free; a [`Joint`] is several that share
-//! their derivatives. Both are [`Likelihood`]: [`newton_raphson::estimate`] finds the free parameters of either,
-//! [`cramer_rao`] says how well the data determine them. [`theil`] says how well a response predicts what was measured.
+//! A [`Case`] is one maneuver made ready: what is known, what is held, what is free; a [`Joint`] is
+//! several that share their derivatives. Both are [`Likelihood`]: [`newton_raphson::estimate`]
+//! finds the free parameters of either, [`cramer_rao`] says how well the data determine them.
+//! [`theil`] says how well a response predicts what was measured.
 
 mod autoregression;
 pub mod calibration;

@@ -1,7 +1,9 @@
-//! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step does not lower the cost.
+//! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step
+//! does not lower the cost.
 //!
-//! Far from the minimum the iteration goes by a coarse response, of fewer and longer steps, until it is as near as that can
-//! tell. That only makes a better start: from there on everything is exact, and decides where the iteration ends.
+//! Far from the minimum the iteration goes by a coarse response, of fewer and longer steps, until
+//! it is as near as that can tell. That only makes a better start: from there on everything is
+//! exact, and decides where the iteration ends.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -17,10 +19,11 @@ use crate::dynamics::OUTPUTS;
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     pub max_iterations: usize,
-    /// Converged when a full step would lower J by less than this share of it: at 1e-8 the estimates are within a
-    /// hundredth of their bounds.
+    /// Converged when a full step would lower J by less than this share of it: at 1e-8 the
+    /// estimates are within a hundredth of their bounds.
     pub tolerance: f64,
-    /// Beyond this condition number of the information matrix with unit diagonal a direction counts as not determined.
+    /// Beyond this condition number of the information matrix with unit diagonal a direction counts
+    /// as not determined.
     pub max_condition_number: f64,
 }
 
@@ -41,7 +44,8 @@ pub enum Weights {
     /// Tables 2 and 4.
     #[default]
     Table,
-    /// The inverse of the residuals' variances, re-estimated in alternation with the parameters until both settle.
+    /// The inverse of the residuals' variances, re-estimated in alternation with the parameters
+    /// until both settle.
     Estimated,
 }
 
@@ -56,18 +60,21 @@ impl Weights {
     }
 }
 
-/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled information matrix:
-/// about the smallest eigenvalue of a maneuver that determines its derivatives badly.
+/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled
+/// information matrix: about the smallest eigenvalue of a maneuver that determines its derivatives
+/// badly.
 const FIRST_DAMPING: f64 = 1e-8;
 const MOST_DAMPING: f64 = 1e9;
-/// Rounds of re-estimating the weights, and the relative change of all weights at which they have settled.
+/// Rounds of re-estimating the weights, and the relative change of all weights at which they have
+/// settled.
 const WEIGHT_ROUNDS: usize = 20;
 const WEIGHTS_SETTLED: f64 = 1e-3;
 
-/// Estimates the free parameters of a maneuver, or of several joined, from `start`, with the table's weights or those
-/// they settle to.
+/// Estimates the free parameters of a maneuver, or of several joined, from `start`, with the
+/// table's weights or those they settle to.
 ///
-/// `resolution` is the smallest standard deviation of each output that is believed when weights are estimated.
+/// `resolution` is the smallest standard deviation of each output that is believed when weights are
+/// estimated.
 #[must_use]
 pub fn estimate<D: Likelihood>(
     data: &D,
@@ -138,11 +145,12 @@ struct Near {
     initial_cost: f64,
 }
 
-/// A full step that would lower the coarse cost by less than this share of it ends in what the samples left out are worth.
+/// A full step that would lower the coarse cost by less than this share of it ends in what the
+/// samples left out are worth.
 const NEAR: f64 = 0.1;
 
-/// Goes by the coarse response while that is still far from its minimum; none where there is no such response, or where it
-/// leads nowhere.
+/// Goes by the coarse response while that is still far from its minimum; none where there is no
+/// such response, or where it leads nowhere.
 fn approach<D: Likelihood>(
     data: &D,
     start: &[f64],
@@ -292,8 +300,8 @@ fn predicted_gain(at: &Sums, d: &DVector<f64>) -> f64 {
     2.0 * at.gradient.dot(d) - (&at.information * d).dot(d)
 }
 
-/// Less damping after a step that did what it promised, more after one that overshot: where the residuals stay large,
-/// undamped Gauss-Newton steps zigzag across the minimum.
+/// Less damping after a step that did what it promised, more after one that overshot: where the
+/// residuals stay large, undamped Gauss-Newton steps zigzag across the minimum.
 fn next_damping(damping: f64, kept: f64) -> f64 {
     match kept {
         k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,

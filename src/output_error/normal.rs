@@ -1,14 +1,15 @@
-//! The sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples that count. Weights
-//! come later, so that other weights need no other pass.
+//! The sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples
+//! that count. Weights come later, so that other weights need no other pass.
 //!
-//! Beside them the rows of a whole pass are added up over blocks of samples: what the corrected bounds see the
-//! sensitivities through, so that they need no pass of their own.
+//! Beside them the rows of a whole pass are added up over blocks of samples: what the corrected
+//! bounds see the sensitivities through, so that they need no pass of their own.
 //!
 //! A coarse pass leaves out samples; its sums count the others as many times.
 //!
-//! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one symmetric matrix, updated
-//! by as many ranks as there are samples in a chunk: a tile of it stays in the processor's registers while the samples run
-//! past, and only tiles that touch the lower triangle are computed.
+//! The residual and a one stand beside the sensitivities in a sample's row, so all of it is one
+//! symmetric matrix, updated by as many ranks as there are samples in a chunk: a tile of it stays
+//! in the processor's registers while the samples run past, and only tiles that touch the lower
+//! triangle are computed.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -31,7 +32,8 @@ use crate::dynamics::OUTPUTS;
 /// The sums of all outputs of one case.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Normal {
-    /// Of each output Σ over rows (s, v, 1) of their squares, row by row; the lower triangle counts.
+    /// Of each output Σ over rows (s, v, 1) of their squares, row by row; the lower triangle
+    /// counts.
     squares: [Aligned; OUTPUTS],
     /// Of each output Σ v (s, v, 1).
     moments: [Aligned; OUTPUTS],
@@ -39,12 +41,14 @@ pub(super) struct Normal {
     counts: [usize; OUTPUTS],
     /// The sums are of every so many samples.
     stride: usize,
-    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of whole sums only.
+    /// Rows (s, v, 1) added up over blocks of so many samples, block by block, output by output; of
+    /// whole sums only.
     blocks: Aligned,
     block: usize,
     samples: usize,
     lanes: Lanes,
-    /// Derivatives, which come before the biases among the parameters; initial states come after them.
+    /// Derivatives, which come before the biases among the parameters; initial states come after
+    /// them.
     derivatives: usize,
     biased: Vec<usize>,
 }
@@ -97,7 +101,8 @@ impl Normal {
         self.block
     }
 
-    /// Writes the sensitivities of an output to all parameters, added up over a block's samples that count.
+    /// Writes the sensitivities of an output to all parameters, added up over a block's samples
+    /// that count.
     pub fn block(&self, block: usize, output: usize, row: &mut [f64]) -> Block {
         let width = self.lanes.width();
         let Some(sums) = self
@@ -328,8 +333,8 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Adds Σ s sᵀ to the lower triangle of a matrix with rows of `width`. `used` says how many lanes of each vector are
-    /// in use.
+    /// Adds Σ s sᵀ to the lower triangle of a matrix with rows of `width`. `used` says how many
+    /// lanes of each vector are in use.
     #[inline(always)]
     pub fn add_squares<S: Simd>(self, simd: S, used: &[usize], matrix: &mut [f64], width: usize) {
         self.add_squares_beside(simd, used, matrix, width, &mut Nothing);

@@ -12,7 +12,8 @@ pub enum Outcome {
     Converged,
     /// It is not: the reason says what stopped the iteration.
     NotConverged,
-    /// The data do not determine some direction of the parameters: the reason names the derivatives.
+    /// The data do not determine some direction of the parameters: the reason names the
+    /// derivatives.
     Unidentifiable,
     /// The maneuver was not estimated at all.
     Rejected,
@@ -46,15 +47,18 @@ pub struct Fit<R = Response> {
     pub response: R,
     /// Of the information matrix with unit diagonal.
     pub condition_number: Option<f64>,
-    /// The parameters that take part in the least determined direction, where the data do not determine it.
+    /// The parameters that take part in the least determined direction, where the data do not
+    /// determine it.
     pub undetermined: Vec<usize>,
-    /// Sandwich covariance of the parameters, the held values' part in it; absent where the data determine none.
+    /// Sandwich covariance of the parameters, the held values' part in it; absent where the data
+    /// determine none.
     pub covariance: Option<DMatrix<f64>>,
     /// What the uncertainty of the held values contributes to both covariances.
     pub covariance_held: Option<DMatrix<f64>>,
     /// What errors of calibration contribute to the corrected covariance.
     pub covariance_calibration: Option<DMatrix<f64>>,
-    /// The covariance with the residuals' autocorrelation, noise of the surfaces and errors of calibration counted.
+    /// The covariance with the residuals' autocorrelation, noise of the surfaces and errors of
+    /// calibration counted.
     pub covariance_corrected: Option<DMatrix<f64>>,
 }
 

@@ -1,5 +1,6 @@
-//! Rows of numbers padded to whole vectors, and the products of them that the corrected bounds take. In each of them a
-//! number is summed in one order, whatever the width of the processor's vectors.
+//! Rows of numbers padded to whole vectors, and the products of them that the corrected bounds
+//! take. In each of them a number is summed in one order, whatever the width of the processor's
+//! vectors.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -14,14 +15,16 @@ use super::kernel::{load, store};
 use super::lanes::{Aligned, VECTOR};
 use super::normal::Rows;
 
-/// Rows side by side in a product, and lags: as many sums as hide how long one of them waits for itself.
+/// Rows side by side in a product, and lags: as many sums as hide how long one of them waits for
+/// itself.
 const ROWS_AT_ONCE: usize = 8;
 const SHIFTED_AT_ONCE: usize = 4;
 const LAGS_AT_ONCE: usize = 7;
 const REACHED: usize = SHIFTED_AT_ONCE + LAGS_AT_ONCE - 1;
 /// The longest lag that can be asked for.
 pub(super) const LONGEST_LAG: usize = 2 * LAGS_AT_ONCE - 1;
-/// Rows of zeros behind the last one, so that neither products nor lags end within what they do at once.
+/// Rows of zeros behind the last one, so that neither products nor lags end within what they do at
+/// once.
 const BEYOND: usize = LONGEST_LAG + SHIFTED_AT_ONCE;
 const _: () = assert!(BEYOND >= ROWS_AT_ONCE);
 
@@ -131,7 +134,8 @@ impl Padded {
         self.rows = rows.min(self.rows);
     }
 
-    /// Σ of all numbers times those of another; lanes are summed apart, of which none waits for the others.
+    /// Σ of all numbers times those of another; lanes are summed apart, of which none waits for the
+    /// others.
     pub fn dot(&self, other: &Padded) -> f64 {
         let (a, b) = (
             self.values().as_chunks::<VECTOR>().0,
@@ -183,7 +187,8 @@ impl Padded {
         self.product(&inner.product(self))
     }
 
-    /// The inverse of a symmetric matrix, by elimination; none of one that is not positive definite.
+    /// The inverse of a symmetric matrix, by elimination; none of one that is not positive
+    /// definite.
     pub fn inverse(mut self) -> Option<Padded> {
         let (width, size) = (self.width(), self.rows);
         let values = self.values_mut();
@@ -335,7 +340,8 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// u = s/A of each column in place, at rest before its first row; backwards in time, at rest after its last.
+/// u = s/A of each column in place, at rest before its first row; backwards in time, at rest after
+/// its last.
 struct Filter<'a> {
     process: &'a Autoregression,
     series: &'a mut [f64],
@@ -395,8 +401,8 @@ impl WithSimd for Lagged<'_> {
 }
 
 impl Lagged<'_> {
-    /// Those from one lag on. Lanes are summed eight apart and then in one order, so that the width of vectors does not
-    /// show.
+    /// Those from one lag on. Lanes are summed eight apart and then in one order, so that the width
+    /// of vectors does not show.
     #[inline(always)]
     fn from<S: Simd>(&self, simd: S, lag: usize) -> [f64; LAGS_AT_ONCE] {
         let width = self.a.width();

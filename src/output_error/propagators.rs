@@ -1,9 +1,10 @@
-//! What a Runge-Kutta step does to sensitivities, exactly: s ← Φ s + Σ Γ_j r_j over its stages j, for a chunk's steps side by
-//! side in the lanes of vectors.
+//! What a Runge-Kutta step does to sensitivities, exactly: s ← Φ s + Σ Γ_j r_j over its stages j,
+//! for a chunk's steps side by side in the lanes of vectors.
 //!
-//! With ẋ_j the slope of stage j and A_j, B_j its slopes along states and coefficients, the step's end depends on the slopes
-//! of its stages as M₄ = h/6, M₃ = h/3 + h M₄A₄, M₂ = h/3 + h/2 M₃A₃, M₁ = h/6 + h/2 M₂A₂ (the later stages start from the
-//! earlier ones' slopes). Then Φ = 1 + Σ M_j A_j and Γ_j = M_j B_j.
+//! With ẋ_j the slope of stage j and A_j, B_j its slopes along states and coefficients, the step's
+//! end depends on the slopes of its stages as M₄ = h/6, M₃ = h/3 + h M₄A₄, M₂ = h/3 + h/2 M₃A₃, M₁
+//! = h/6 + h/2 M₂A₂ (the later stages start from the earlier ones' slopes). Then Φ = 1 + Σ M_j A_j
+//! and Γ_j = M_j B_j.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"

@@ -1,5 +1,5 @@
-//! The computed response of a maneuver to a set of parameters: outputs, sums of the normal equations, and on demand the
-//! sensitivities themselves.
+//! The computed response of a maneuver to a set of parameters: outputs, sums of the normal
+//! equations, and on demand the sensitivities themselves.
 
 use pulp::Simd;
 
@@ -11,8 +11,8 @@ use super::lanes::Aligned;
 use super::normal::{Normal, Summing};
 use crate::dynamics::{Equations, OUTPUTS};
 
-/// Outputs at every sample and what the normal equations need; allocated once per maneuver and written over at every
-/// iteration.
+/// Outputs at every sample and what the normal equations need; allocated once per maneuver and
+/// written over at every iteration.
 #[derive(Clone, Debug, Default)]
 pub struct Response {
     pub outputs: Vec<[f64; OUTPUTS]>,
@@ -28,8 +28,8 @@ pub struct Diverged {
 /// How much of a maneuver a response looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Integrated in steps of about [`COARSE_STEP_S`] and compared at their ends only: near the minimum, at a fraction of
-    /// the work.
+    /// Integrated in steps of about [`COARSE_STEP_S`] and compared at their ends only: near the
+    /// minimum, at a fraction of the work.
     Coarse,
     /// Sample by sample.
     Whole,
@@ -40,7 +40,8 @@ pub const COARSE_STEP_S: f64 = 0.1;
 /// So many samples a parameter are left at least.
 const SAMPLES_A_PARAMETER: usize = 8;
 
-/// The slopes of every output along every parameter at every sample, zero where a sample does not count.
+/// The slopes of every output along every parameter at every sample, zero where a sample does not
+/// count.
 #[derive(Clone, Debug, Default)]
 pub struct Sensitivities {
     /// Sample by sample, output by output a row of lanes.

@@ -1,10 +1,13 @@
-//! How well a computed response predicts what was measured: Theil's inequality coefficient with its parts, and R².
+//! How well a computed response predicts what was measured: Theil's inequality coefficient with its
+//! parts, and R².
 //!
-//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean square in the numerator
-//! splits exactly into the square of the difference of the means (bias), the square of the difference of the standard
-//! deviations (variance) and 2 (1 − ρ) σ_y σ_z (covariance); each part is given as its share, and the shares add up to one
-//! (Theil 1966; Klein and Morelli 2006, section 11.3; Jategaonkar 2015, section 11.4). A good model leaves next to nothing
-//! to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and may be negative.
+//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean
+//! square in the numerator splits exactly into the square of the difference of the means (bias),
+//! the square of the difference of the standard deviations (variance) and 2 (1 − ρ) σ_y σ_z
+//! (covariance); each part is given as its share, and the shares add up to one (Theil 1966; Klein
+//! and Morelli 2006, section 11.3; Jategaonkar 2015, section 11.4). A good model leaves next to
+//! nothing to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and
+//! may be negative.
 
 /// Theil's inequality coefficient and the shares of its parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +66,8 @@ impl Agreement {
         self.parts().iter().sum::<f64>().sqrt()
     }
 
-    /// Share of the measured variance that the computed response explains; none where nothing varies.
+    /// Share of the measured variance that the computed response explains; none where nothing
+    /// varies.
     #[must_use]
     pub fn r_squared(&self) -> Option<f64> {
         let left: f64 = self.parts().iter().sum();
@@ -77,8 +81,9 @@ impl Agreement {
     }
 }
 
-/// Theil's coefficient of several outputs together, each with the weight that it has in the cost; none where there is
-/// nothing measured or computed. Where the prediction is exact there is no difference to share out: the parts are zero.
+/// Theil's coefficient of several outputs together, each with the weight that it has in the cost;
+/// none where there is nothing measured or computed. Where the prediction is exact there is no
+/// difference to share out: the parts are zero.
 #[must_use]
 pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
     let (mut parts, mut measured, mut computed) = ([0.0; 3], 0.0, 0.0);

@@ -1,7 +1,9 @@
-//! What changed from one published night to the next, and why: maneuvers, their derivatives, trends and verdicts.
+//! What changed from one published night to the next, and why: maneuvers, their derivatives, trends
+//! and verdicts.
 //!
-//! A number has moved when it differs by more than its uncertainty, the larger one of the two nights: the corrected bound
-//! of an estimate, the standard error of a trend. Anything else that differs is noise of the method and not listed.
+//! A number has moved when it differs by more than its uncertainty, the larger one of the two
+//! nights: the corrected bound of an estimate, the standard error of a trend. Anything else that
+//! differs is noise of the method and not listed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,7 +25,8 @@ pub struct Window {
     pub end_s: f64,
 }
 
-/// The tables of a night that are compared, with what decided them. Rows of maneuvers estimated together do not count.
+/// The tables of a night that are compared, with what decided them. Rows of maneuvers estimated
+/// together do not count.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<'a> {
     pub lineage: &'a Lineage,
@@ -46,7 +49,8 @@ pub struct ManeuverChange {
     pub because: String,
 }
 
-/// A number that moved by more than its uncertainty: of a maneuver, or of a trend at an angle of attack.
+/// A number that moved by more than its uncertainty: of a maneuver, or of a trend at an angle of
+/// attack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moved {
     pub derivative: String,
@@ -74,7 +78,8 @@ pub struct VerdictChange {
 pub struct Changes {
     /// The night that it is held against; none for a first one.
     pub since: Option<String>,
-    /// Whether somebody should look: something moved, is gone, or is not what it was. New maneuvers alone are no alert.
+    /// Whether somebody should look: something moved, is gone, or is not what it was. New maneuvers
+    /// alone are no alert.
     pub alert: bool,
     /// What went in differently: flights, configuration, code.
     pub causes: Vec<Cause>,
@@ -158,7 +163,8 @@ impl Reasons {
         }
     }
 
-    /// Why something of a maneuver differs: its flight, or what its stages read. Other classes' settings do not count.
+    /// Why something of a maneuver differs: its flight, or what its stages read. Other classes'
+    /// settings do not count.
     fn of_maneuver(&self, flight_id: &str, class: &str) -> String {
         let other_class = |c: &Cause| {
             let mut path = c.subject.split('.');
@@ -229,7 +235,8 @@ impl Reasons {
         self
     }
 
-    /// Why a trend differs: the maneuvers behind it, and what only trends and comparisons read. `group` may be a class.
+    /// Why a trend differs: the maneuvers behind it, and what only trends and comparisons read.
+    /// `group` may be a class.
     fn of_trend(&self, derivative: &str, group: &str, until: Stage) -> String {
         let counts = |class: &str| class == group || !self.classes.contains(group);
         let behind = self
@@ -390,7 +397,8 @@ fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     }
 }
 
-/// A derivative, its group and an angle of attack in ten-thousandths of a degree: a place in the tables of trends.
+/// A derivative, its group and an angle of attack in ten-thousandths of a degree: a place in the
+/// tables of trends.
 type Place<'a> = (&'a str, &'a str, i64);
 
 #[expect(clippy::cast_possible_truncation, reason = "angles of attack")]

@@ -1,5 +1,6 @@
-//! A drawing: the part of SVG that the report's figures are made of (groups, clips, rectangles, lines, paths, text), as
-//! operators of a PDF page. y points down, as in the SVG; who places the drawing turns it over.
+//! A drawing: the part of SVG that the report's figures are made of (groups, clips, rectangles,
+//! lines, paths, text), as operators of a PDF page. y points down, as in the SVG; who places the
+//! drawing turns it over.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -1,4 +1,5 @@
-//! The page's elements as items: headings, paragraphs, lists, figures, and what stands side by side.
+//! The page's elements as items: headings, paragraphs, lists, figures, and what stands side by
+//! side.
 
 use std::sync::Arc;
 

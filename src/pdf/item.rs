@@ -1,4 +1,5 @@
-//! What the pages are filled with: items, one under the other, each with marks at places within it, y downwards.
+//! What the pages are filled with: items, one under the other, each with marks at places within it,
+//! y downwards.
 
 use std::sync::Arc;
 

@@ -1,5 +1,6 @@
-//! The report on paper: the page's own HTML, which is well-formed XML too, set on A4 with page numbers, a table of
-//! contents and an outline, as a PDF with its fonts in it. No browser, no clock: the same page is the same bytes.
+//! The report on paper: the page's own HTML, which is well-formed XML too, set on A4 with page
+//! numbers, a table of contents and an outline, as a PDF with its fonts in it. No browser, no
+//! clock: the same page is the same bytes.
 
 mod drawing;
 mod flow;
@@ -310,9 +311,8 @@ fn describe(item: &mut pdf_writer::writers::OutlineItem, heading: &Heading, pare
         .xyz(0.0, HEIGHT - heading.y + 6.0, None);
 }
 
-/// The operators of one page.
-/// A page that is set: its content, compressed; the opacities that it uses, in percent; where its links are, and to which
-/// height of which page they lead.
+/// The operators of one page. A page that is set: its content, compressed; the opacities that it
+/// uses, in percent; where its links are, and to which height of which page they lead.
 struct Set {
     content: Vec<u8>,
     opacities: BTreeSet<u8>,

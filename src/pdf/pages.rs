@@ -113,7 +113,8 @@ impl Pages {
     }
 }
 
-/// The items with a line for each heading where the contents belong, and an anchor at each heading for it.
+/// The items with a line for each heading where the contents belong, and an anchor at each heading
+/// for it.
 fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
     let is_place = |item: &Item| {
         item.marks.iter().any(|m| {

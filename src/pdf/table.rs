@@ -1,5 +1,5 @@
-//! A table as items, a row each: columns as wide as their words want where the page has the room, else narrower, at last
-//! in smaller type.
+//! A table as items, a row each: columns as wide as their words want where the page has the room,
+//! else narrower, at last in smaller type.
 
 use std::sync::Arc;
 
@@ -120,7 +120,8 @@ fn wanted(grid: &[(bool, Vec<Cell>)]) -> (Vec<f32>, Vec<f32>) {
     (least, most)
 }
 
-/// The width of each column: what it wants, or what is left beyond the least in proportion to what it wants beyond it.
+/// The width of each column: what it wants, or what is left beyond the least in proportion to what
+/// it wants beyond it.
 fn shared(least: &[f32], most: &[f32], room: f32) -> Vec<f32> {
     let (least_sum, most_sum) = (least.iter().sum::<f32>(), most.iter().sum::<f32>());
     if most_sum <= room {

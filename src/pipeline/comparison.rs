@@ -1,5 +1,5 @@
-//! The comparison's tables: flight against the tunnel, trend by trend and maneuver by maneuver, and against the tables of
-//! earlier campaigns.
+//! The comparison's tables: flight against the tunnel, trend by trend and maneuver by maneuver, and
+//! against the tables of earlier campaigns.
 
 use std::collections::BTreeSet;
 

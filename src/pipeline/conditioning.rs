@@ -1,8 +1,9 @@
-//! Ingest of one flight, conducted: its files surveyed, every channel through its flow into the store's record file, the
-//! whole judged.
+//! Ingest of one flight, conducted: its files surveyed, every channel through its flow into the
+//! store's record file, the whole judged.
 //!
-//! The channels of a row group flow in parallel, in batches that the memory allows; flights are taken up by a few workers
-//! of their own, so that no thread of the pool begins another flight while it waits for one.
+//! The channels of a row group flow in parallel, in batches that the memory allows; flights are
+//! taken up by a few workers of their own, so that no thread of the pool begins another flight
+//! while it waits for one.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -21,7 +22,8 @@ use crate::store::atomic::Draft;
 use crate::store::record_file::{self, About, GROUP, SignalWriter};
 use crate::store::{Digest, Fingerprint, object};
 
-/// What the store keeps of a flight besides its records: what concerns all of it, and its stretches.
+/// What the store keeps of a flight besides its records: what concerns all of it, and its
+/// stretches.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Kept {
     pub problems: Vec<Problem>,
@@ -53,7 +55,8 @@ const PIECE: usize = 1 << 16;
 /// The shortest pieces, samples.
 const LEAST_PIECE: usize = 1 << 14;
 
-/// What a channel holds per sample of its piece, from the file's numbers to the settled ones, bytes.
+/// What a channel holds per sample of its piece, from the file's numbers to the settled ones,
+/// bytes.
 const PER_SAMPLE: f64 = 64.0;
 
 /// What a thread holds of encoded groups, bytes: a batch is written while the next is encoded.
@@ -199,7 +202,8 @@ impl Run<'_> {
         Ok(self.conditioned(kept, &fingerprint, artefact))
     }
 
-    /// A flight as the store has it: none unless it is up to date and its records hold what was written.
+    /// A flight as the store has it: none unless it is up to date and its records hold what was
+    /// written.
     pub(super) fn ingested(&self, id: &str, content: &str) -> Option<Conditioned> {
         let fingerprint = self.ingest_fingerprint(id, content);
         let artefact = self.store.path("ingest", id, &fingerprint, "json");
@@ -214,8 +218,8 @@ impl Run<'_> {
             .then(|| self.conditioned(kept, &fingerprint, artefact))
     }
 
-    /// Whether a record is in the store as it was written. One that lies in the object store alone is looked at when it is
-    /// fetched.
+    /// Whether a record is in the store as it was written. One that lies in the object store alone
+    /// is looked at when it is fetched.
     fn has_record(&self, path: &Path, digest: &Digest) -> bool {
         let is_here = self.contents.of(path).is_ok_and(|found| found == *digest);
         if is_here {
@@ -224,7 +228,8 @@ impl Run<'_> {
         is_here || !path.exists() && self.store.is_shared(path, digest.bytes)
     }
 
-    /// The records that an artefact of ingest tells of, relative to the store, with what they hold; none of another kind.
+    /// The records that an artefact of ingest tells of, relative to the store, with what they hold;
+    /// none of another kind.
     pub(super) fn recorded(&self, artefact: &str) -> Vec<(PathBuf, Digest)> {
         let path = self.store.folder().join(artefact);
         let fingerprint = path

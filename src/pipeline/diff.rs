@@ -14,8 +14,8 @@ pub struct Diff {
     pub changes: Changes,
 }
 
-/// What changed in the night `to`, unless given the last complete one, since the night `since`, unless given the one
-/// before it.
+/// What changed in the night `to`, unless given the last complete one, since the night `since`,
+/// unless given the one before it.
 ///
 /// # Errors
 /// There is no such night, or its tables cannot be read.

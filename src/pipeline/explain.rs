@@ -1,5 +1,5 @@
-//! The whole story of one maneuver: where it comes from, which samples, what was held, how it was fitted, what it depends
-//! on. Told from the store; nothing is made and nothing changed.
+//! The whole story of one maneuver: where it comes from, which samples, what was held, how it was
+//! fitted, what it depends on. Told from the store; nothing is made and nothing changed.
 
 use std::fmt::Write;
 use std::path::Path;

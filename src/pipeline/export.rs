@@ -1,4 +1,5 @@
-//! The export: the campaign brought up to date as far as the comparison, and its derivatives written for simulators.
+//! The export: the campaign brought up to date as far as the comparison, and its derivatives
+//! written for simulators.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -22,7 +23,8 @@ pub struct Exported {
     pub problems: Vec<Problem>,
 }
 
-/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
+/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and
+/// writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
 /// (`_jsbsim.xml`) into a folder. The published night is left alone.
 ///
 /// # Errors

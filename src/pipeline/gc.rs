@@ -1,5 +1,6 @@
-//! Housekeeping: artefacts that no published night is made of, and nights beyond those that stay. Of a store in an object
-//! store only the cache is kept house in: what other machines have published is not known here.
+//! Housekeeping: artefacts that no published night is made of, and nights beyond those that stay.
+//! Of a store in an object store only the cache is kept house in: what other machines have
+//! published is not known here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -19,12 +20,12 @@ pub struct Litter {
     pub kept: usize,
 }
 
-/// Finds what no published night needs, and removes it where `remove` says so. The store may serve several folders of
-/// reports; the nights of all of them count.
+/// Finds what no published night needs, and removes it where `remove` says so. The store may serve
+/// several folders of reports; the nights of all of them count.
 ///
 /// # Errors
-/// A store in use; reports that cannot be found or a night whose manifest cannot be read, for what they need is unknown; a
-/// disk that says no.
+/// A store in use; reports that cannot be found or a night whose manifest cannot be read, for what
+/// they need is unknown; a disk that says no.
 pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Litter> {
     let store = Store::open(&config.store, wait)?;
     let keep = config.report.keep_nights;

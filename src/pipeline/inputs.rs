@@ -1,4 +1,5 @@
-//! What a run is given: the content of each flight's files, and the lineage that it makes with configuration and code.
+//! What a run is given: the content of each flight's files, and the lineage that it makes with
+//! configuration and code.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,7 +32,8 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// Takes the fingerprint of every file. Of files with the same bytes the first counts, or its flight would count twice.
+    /// Takes the fingerprint of every file. Of files with the same bytes the first counts, or its
+    /// flight would count twice.
     fn gather(files: &[FlightFiles], known: &Contents, progress: &dyn Progress) -> Inputs {
         progress.begin("contents", files.len());
         let of_flight = |flight: &FlightFiles| {
@@ -71,8 +73,8 @@ impl Inputs {
         inputs
     }
 
-    /// A flight of which there are two records: where they are the same bytes one is left out, else nobody knows which
-    /// is right.
+    /// A flight of which there are two records: where they are the same bytes one is left out, else
+    /// nobody knows which is right.
     fn among_rivals(
         &mut self,
         flight: &FlightFiles,
@@ -231,7 +233,8 @@ fn lineage(config: &Config, inputs: &Inputs, earlier: &[Earlier]) -> Lineage {
         let content = content.clone().unwrap_or_else(|reason| refused(&reason));
         (id.clone(), content)
     });
-    // Copies that were left out are in no table but `problems`, which a night must not pass over either.
+    // Copies that were left out are in no table but `problems`, which a night must not pass over
+    // either.
     let copies = inputs
         .problems
         .iter()

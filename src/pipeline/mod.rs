@@ -1,9 +1,11 @@
-//! The conductor: brings the stages of a campaign up to date in order, in parallel within each, and publishes their tables.
+//! The conductor: brings the stages of a campaign up to date in order, in parallel within each, and
+//! publishes their tables.
 //!
-//! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions ([`others`]). Their artefacts
-//! lie in the store under fingerprints of all that decides them, so what is up to date is not done again, and a killed run
-//! goes on where it was. Trend, compare and report are small and are made anew from the artefacts. Results are collected in
-//! the order of flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
+//! Per flight: ingest, segment. Per maneuver: estimate; then joint estimates and predictions
+//! ([`others`]). Their artefacts lie in the store under fingerprints of all that decides them, so
+//! what is up to date is not done again, and a killed run goes on where it was. Trend, compare and
+//! report are small and are made anew from the artefacts. Results are collected in the order of
+//! flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
 
 mod comparison;
 mod conditioning;
@@ -119,13 +121,15 @@ pub struct Campaign {
     pub estimates: Vec<EstimateRow>,
     /// The sums that the tunnel tabulates, with the variance of the sum.
     pub combined: Vec<EstimateRow>,
-    /// Maneuvers estimated together: published with the others' rows, but in no trend, which would count the same data
-    /// twice.
+    /// Maneuvers estimated together: published with the others' rows, but in no trend, which would
+    /// count the same data twice.
     pub joined: Vec<Joined>,
-    /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not asked for.
+    /// How well others predict each maneuver, in the order of the maneuvers; empty where it is not
+    /// asked for.
     pub predicted: Vec<Predicted>,
     pub correlations: Vec<CorrelationRow>,
-    /// Where the time history of each maneuver lies, thinned for the report, in the order of the maneuvers.
+    /// Where the time history of each maneuver lies, thinned for the report, in the order of the
+    /// maneuvers.
     histories: Vec<PathBuf>,
     pub trends: Vec<TrendRow>,
     /// Maneuvers far from their trend.
@@ -175,12 +179,12 @@ impl Campaign {
     }
 }
 
-/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait` for another run to
-/// leave store and reports.
+/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait`
+/// for another run to leave store and reports.
 ///
 /// # Errors
-/// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight or a maneuver is among
-/// the problems of the night's summary.
+/// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight
+/// or a maneuver is among the problems of the night's summary.
 pub fn run(
     config: &Config,
     until: Stage,
@@ -204,7 +208,8 @@ pub fn run(
     made
 }
 
-/// Opens the store; while the run lives no other can. What files hold is looked at before anything is done with them.
+/// Opens the store; while the run lives no other can. What files hold is looked at before anything
+/// is done with them.
 fn begin<'a>(
     config: &'a Config,
     wait: Duration,
@@ -264,7 +269,8 @@ impl Run<'_> {
         Ok(campaign)
     }
 
-    /// Does `work` on every item in parallel with a progress bar; results in the order of the items.
+    /// Does `work` on every item in parallel with a progress bar; results in the order of the
+    /// items.
     fn each<T: Sync, R: Send>(
         &self,
         stage: &str,
@@ -373,7 +379,8 @@ impl Run<'_> {
             .path("segment", &flight.flight_id, &fingerprint, "json")
     }
 
-    /// The analyst's events in a flight, and where what is found in it lies. Only for events its record is looked at.
+    /// The analyst's events in a flight, and where what is found in it lies. Only for events its
+    /// record is looked at.
     fn to_segment(&self, flight: &Flight) -> Result<(Vec<Event>, PathBuf)> {
         let events = match self.config.events.as_slice() {
             [] => Vec::new(),
@@ -623,7 +630,8 @@ impl Run<'_> {
     }
 }
 
-/// The tunnel table's name, with the sources of its values where it states them: a review must see what was judged.
+/// The tunnel table's name, with the sources of its values where it states them: a review must see
+/// what was judged.
 fn tunnel_and_sources(config: &Config) -> String {
     let (name, sources) = (config.wind_tunnel.display(), config.tunnel.sources());
     if sources.is_empty() {

@@ -1,4 +1,5 @@
-//! A night: what a run made, published together with what it was made from; or, when nothing is new, the night that holds.
+//! A night: what a run made, published together with what it was made from; or, when nothing is
+//! new, the night that holds.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,8 @@ use crate::store::table::{self, Shelf};
 use crate::store::{Fingerprint, atomic, files};
 use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
 
-/// What changed since the night before, for machines: among the published files of a complete night.
+/// What changed since the night before, for machines: among the published files of a complete
+/// night.
 pub const ALERT: &str = "alert.json";
 
 /// Keys of the Parquet files' metadata.
@@ -39,8 +41,8 @@ pub struct Done {
 }
 
 impl Done {
-    /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for a trend is among the
-    /// problems, but nothing of it was rejected.
+    /// Whether something of what was recorded was rejected. A derivative with too few maneuvers for
+    /// a trend is among the problems, but nothing of it was rejected.
     #[must_use]
     pub fn rejected(&self) -> bool {
         rejected(&self.summary.problems)
@@ -189,8 +191,8 @@ impl Run<'_> {
             .map_or(Ok(()), |folder| atomic::place(&folder.join(name), bytes))
     }
 
-    /// The night that holds, if it was made of what this run would be made of, reaches as far, and is whole with all its
-    /// artefacts: then there is nothing to do.
+    /// The night that holds, if it was made of what this run would be made of, reaches as far, and
+    /// is whole with all its artefacts: then there is nothing to do.
     pub(super) fn is_published(&self, nights: &Nights, until: Stage) -> Option<Done> {
         let night = nights
             .current()
@@ -233,7 +235,8 @@ impl Run<'_> {
 
     /// What changed since the last complete night; also placed for machines to read.
     pub(super) fn changes(&self, nights: &Nights, campaign: &Campaign) -> Result<Changes> {
-        // Tables that an older program wrote may lack what this one reads: then there is nothing to compare with.
+        // Tables that an older program wrote may lack what this one reads: then there is nothing to
+        // compare with.
         let before = self
             .before(nights)
             .and_then(|night| Some((Published::read(nights, &night).ok()?, night)));

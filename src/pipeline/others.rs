@@ -1,7 +1,9 @@
-//! What is made from several maneuvers together: joint estimates, and the prediction of each from the others.
+//! What is made from several maneuvers together: joint estimates, and the prediction of each from
+//! the others.
 //!
-//! An artefact's fingerprint is over the names of its maneuvers' own estimates, which carry theirs: what decides one of
-//! them decides this. Records are read only for what is not up to date, and only the parts that hold the maneuvers.
+//! An artefact's fingerprint is over the names of its maneuvers' own estimates, which carry theirs:
+//! what decides one of them decides this. Records are read only for what is not up to date, and
+//! only the parts that hold the maneuvers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -86,7 +88,8 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Predicts each maneuver from the others of its class and angle of attack, unless that is switched off.
+    /// Predicts each maneuver from the others of its class and angle of attack, unless that is
+    /// switched off.
     pub(super) fn predict(
         &self,
         campaign: &mut Campaign,
@@ -165,7 +168,8 @@ impl Run<'_> {
         }
     }
 
-    /// Publishes what was estimated: the maneuvers' rows, then those of maneuvers estimated together.
+    /// Publishes what was estimated: the maneuvers' rows, then those of maneuvers estimated
+    /// together.
     pub(super) fn publish_estimates(&self, campaign: &Campaign) -> Result<()> {
         let joined = || campaign.joined.iter().map(|j| &j.estimated);
         let fits: Vec<FitRow> = campaign

@@ -1,8 +1,9 @@
-//! A campaign in shards: what a plan deals, what of it is missing, a shard's work, the merge of all.
+//! A campaign in shards: what a plan deals, what of it is missing, a shard's work, the merge of
+//! all.
 //!
-//! Shards share nothing but the store. An artefact is named by what decides it, so a shard that runs twice, even at the
-//! same time, finds or makes the same bytes; a shard that died leaves what it had done. A merge is a run that finds
-//! everything made.
+//! Shards share nothing but the store. An artefact is named by what decides it, so a shard that
+//! runs twice, even at the same time, finds or makes the same bytes; a shard that died leaves what
+//! it had done. A merge is a run that finds everything made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -54,7 +55,8 @@ pub fn plan(
 /// Computes a shard's share into the store, as far as `until`; how many artefacts were made for it.
 ///
 /// # Errors
-/// The plan is of something else; a flight of it cannot be read; the disk says no ([`Error::is_passing`]).
+/// The plan is of something else; a flight of it cannot be read; the disk says no
+/// ([`Error::is_passing`]).
 pub fn work(
     config: &Config,
     plan: &Plan,
@@ -153,7 +155,8 @@ fn join<'a>(
 }
 
 impl Run<'_> {
-    /// Whether a plan is of this archive, configuration and code; of the archive, only these flights where some are named.
+    /// Whether a plan is of this archive, configuration and code; of the archive, only these
+    /// flights where some are named.
     fn is_of(&self, plan: &Plan, flights: Option<&BTreeSet<&str>>) -> Result<()> {
         let mut planned = plan.lineage.clone();
         if let Some(flights) = flights {

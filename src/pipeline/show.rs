@@ -14,8 +14,8 @@ use crate::report::chart::{self, FlightView, Groups, ManeuverView};
 use crate::store::archive::FlightFiles;
 use crate::store::atomic;
 
-/// A flight of more samples than this is drawn by the smallest and the largest of several: far more than a picture has
-/// columns.
+/// A flight of more samples than this is drawn by the smallest and the largest of several: far more
+/// than a picture has columns.
 const DRAWN: usize = 1 << 18;
 
 /// What of the record around a maneuver is at hand for its picture, s.
@@ -38,11 +38,13 @@ pub struct Picture {
     pub problems: Vec<Problem>,
 }
 
-/// Brings the flight or maneuver up to date as the stages do, and writes its strip chart to `out`, or else into the
-/// folder `show` of the reports. The table `problems`, which is the whole campaign's, is left to the stages.
+/// Brings the flight or maneuver up to date as the stages do, and writes its strip chart to `out`,
+/// or else into the folder `show` of the reports. The table `problems`, which is the whole
+/// campaign's, is left to the stages.
 ///
 /// # Errors
-/// What stops a run, and a flight or maneuver that does not exist or was refused, with what was probably meant.
+/// What stops a run, and a flight or maneuver that does not exist or was refused, with what was
+/// probably meant.
 pub fn show(
     config: &Config,
     subject: &Subject,
@@ -233,8 +235,8 @@ fn of_flight(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
         .collect()
 }
 
-/// What the configuration says of the signals that it names: surfaces have derivatives, pilot controls have steps that
-/// are counted, flags are up or down in a class.
+/// What the configuration says of the signals that it names: surfaces have derivatives, pilot
+/// controls have steps that are counted, flags are up or down in a class.
 fn groups(config: &Config) -> Groups {
     let surface = |d: &crate::aero::Derivative| match &d.regressor {
         Regressor::Surface(name) | Regressor::Vane(name) => Some(name.clone()),

@@ -1,4 +1,5 @@
-//! What a run would do: per stage what is fresh, what is stale and why, what failed and why. Nothing is changed.
+//! What a run would do: per stage what is fresh, what is stale and why, what failed and why.
+//! Nothing is changed.
 
 use std::collections::BTreeMap;
 

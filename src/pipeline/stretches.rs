@@ -1,5 +1,5 @@
-//! Stretches of flights on their way through segment: their events, the windows in which a long record is looked at, and
-//! rows that two flights have in common.
+//! Stretches of flights on their way through segment: their events, the windows in which a long
+//! record is looked at, and rows that two flights have in common.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -18,11 +18,12 @@ use crate::store::record_file::{self, About, RecordFile};
 /// A flight of which this share is another's rows is the other under another name.
 const COPY: f64 = 0.9;
 
-/// The samples of a long record that are segmented at once: an hour of a usual recorder. A record that is hardly longer is
-/// taken whole.
+/// The samples of a long record that are segmented at once: an hour of a usual recorder. A record
+/// that is hardly longer is taken whole.
 const WINDOW: usize = 1 << 17;
 
-/// What a window sees beyond its own on either side, s: longer than any maneuver with its lead-in and decay.
+/// What a window sees beyond its own on either side, s: longer than any maneuver with its lead-in
+/// and decay.
 const SURROUNDINGS_S: f64 = 180.0;
 
 /// How far from an event no window ends, s.
@@ -40,7 +41,8 @@ impl Flight {
         is_stretch(&self.flight_id, flight_id)
     }
 
-    /// The analyst's events in this stretch: those that name it, and those of its flight that lie in its time.
+    /// The analyst's events in this stretch: those that name it, and those of its flight that lie
+    /// in its time.
     pub(super) fn events(&self, events: &[Event], about: &About) -> Vec<Event> {
         let end_s = about.start_s + about.samples as f64 * about.step_s;
         let inside = |e: &Event| e.start_s < end_s && e.end_s > about.start_s;

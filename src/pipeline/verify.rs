@@ -25,7 +25,8 @@ pub struct Finding {
 pub struct Verified {
     pub night: String,
     pub files: Vec<Finding>,
-    /// Artefacts that are damaged or gone. What was made of them still holds; the next run makes them again.
+    /// Artefacts that are damaged or gone. What was made of them still holds; the next run makes
+    /// them again.
     pub artefacts: Vec<String>,
 }
 
@@ -36,9 +37,9 @@ impl Verified {
     }
 }
 
-/// Takes the fingerprints of all input anew, trusting none that was remembered, and holds them, the configuration and the
-/// code against what the files of a night state: that of the name `night`, unless given the one that holds. With `tables`,
-/// only of files of these names.
+/// Takes the fingerprints of all input anew, trusting none that was remembered, and holds them, the
+/// configuration and the code against what the files of a night state: that of the name `night`,
+/// unless given the one that holds. With `tables`, only of files of these names.
 ///
 /// # Errors
 /// No night, no archive, or a table without a name among the files.
@@ -86,7 +87,8 @@ pub fn verify(
             reasons.push("its bytes are not those that were published".to_owned());
         } else {
             let path = nights.folder(&night.name).join(file);
-            // A CSV and the report state nothing themselves: what the table beside, or the night, states holds for them.
+            // A CSV and the report state nothing themselves: what the table beside, or the night,
+            // states holds for them.
             let beside = path.with_extension("parquet");
             let of_the_night = (night.until, night.lineage.clone());
             let stated = if beside.is_file() {
@@ -112,7 +114,8 @@ pub fn verify(
 }
 
 impl Run<'_> {
-    /// The artefacts of a night that are not as they were written; a record is held against its flight's artefact.
+    /// The artefacts of a night that are not as they were written; a record is held against its
+    /// flight's artefact.
     fn damaged(&self, night: &Night) -> Vec<String> {
         let records: BTreeMap<PathBuf, Digest> = night
             .artefacts

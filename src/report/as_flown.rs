@@ -1,5 +1,5 @@
-//! Which regressors moved together in a typical maneuver of each class: what the paper's Figures 3, 10 and 11 show by time
-//! histories, as a shaded triangle of correlations.
+//! Which regressors moved together in a typical maneuver of each class: what the paper's Figures 3,
+//! 10 and 11 show by time histories, as a shaded triangle of correlations.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use super::subject::by_name;
 use super::{Contents, histories};
 use crate::tables::{CorrelationRow, History};
 
-/// The correlations of one maneuver, below the diagonal: a row per regressor but the first, a column per one but the last.
+/// The correlations of one maneuver, below the diagonal: a row per regressor but the first, a
+/// column per one but the last.
 #[derive(Clone, Debug, Serialize)]
 pub struct TriangleView {
     pub class: String,
@@ -52,7 +53,8 @@ pub fn triangles(contents: &Contents) -> Vec<TriangleView> {
 }
 
 fn triangle(class: &str, alpha: String, pairs: &[&CorrelationRow], flag: f64) -> TriangleView {
-    // In the order of the model: a pair names the earlier one first, so the names in order of appearance are that order.
+    // In the order of the model: a pair names the earlier one first, so the names in order of
+    // appearance are that order.
     let mut names: Vec<&str> = Vec::new();
     for name in pairs
         .iter()

@@ -1,5 +1,5 @@
-//! The figures that show classes beside each other: their inputs (the paper's Figures 2 and 9), what moved together in
-//! them (3, 10, 11), and how they excite the rates (8).
+//! The figures that show classes beside each other: their inputs (the paper's Figures 2 and 9),
+//! what moved together in them (3, 10, 11), and how they excite the rates (8).
 
 use std::collections::BTreeMap;
 
@@ -205,8 +205,8 @@ fn together_figure(
     of_one(history, anchor, svg, legend, &caption, marks)
 }
 
-/// A signal's change from its mean over the root mean square of the change; none where it is not in the history or did
-/// not move.
+/// A signal's change from its mean over the root mean square of the change; none where it is not in
+/// the history or did not move.
 fn changes(history: &History, name: &str) -> Option<Vec<(f64, f64)>> {
     let is_output = |label: &str| {
         let bare = without_unit(label);

@@ -1,4 +1,5 @@
-//! What failed and why, as tables: problems, fits, events, checks between channels, channels that were repaired.
+//! What failed and why, as tables: problems, fits, events, checks between channels, channels that
+//! were repaired.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +19,8 @@ pub struct TableView {
     pub rows: Vec<Vec<String>>,
     /// Whether each column is of numbers, which stand right.
     pub numeric: Vec<bool>,
-    /// Where each row's first cell leads, and the class it is hidden with; empty where no row has any.
+    /// Where each row's first cell leads, and the class it is hidden with; empty where no row has
+    /// any.
     pub links: Vec<String>,
     pub classes: Vec<String>,
 }
@@ -253,7 +255,8 @@ fn instruments(contents: &Contents) -> TableView {
     TableView::new("Instruments", note, &heads, rows)
 }
 
-/// Channels that were repaired or are not as they should be, summed over the flights with the same verdict.
+/// Channels that were repaired or are not as they should be, summed over the flights with the same
+/// verdict.
 fn channels(contents: &Contents) -> TableView {
     let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 5])> = BTreeMap::new();
     for c in contents.channels.iter().filter(|c| is_noteworthy(c)) {

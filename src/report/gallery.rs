@@ -14,7 +14,8 @@ use super::subject::{Subject, by_name};
 use super::verdict;
 use crate::aero::{Axis, Coefficient};
 
-/// A derivative's page: its figure with legend and caption, what flight says against the tunnel, and the numbers of it.
+/// A derivative's page: its figure with legend and caption, what flight says against the tunnel,
+/// and the numbers of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct FigureView {
     pub anchor: String,
@@ -47,7 +48,8 @@ pub fn anchors<'a>(subjects: &[Subject<'a>]) -> BTreeMap<&'a str, String> {
         .collect()
 }
 
-/// The classes with their marks, in the order of the configuration, axis by axis: one mark per class throughout.
+/// The classes with their marks, in the order of the configuration, axis by axis: one mark per
+/// class throughout.
 pub fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
     let mut marks: Vec<(&str, Mark)> = Vec::new();
     for axis in [Axis::Longitudinal, Axis::Lateral] {
@@ -71,7 +73,8 @@ pub fn marks<'a>(contents: &Contents<'a>) -> Vec<(&'a str, Mark)> {
     marks
 }
 
-/// What a class is called in the page where it is hidden: a word that needs no escaping; nothing for an unknown class.
+/// What a class is called in the page where it is hidden: a word that needs no escaping; nothing
+/// for an unknown class.
 #[must_use]
 pub fn token(marks: &[(&str, Mark)], class: &str) -> String {
     marks
@@ -185,7 +188,8 @@ struct Drawn<'a> {
     estimates: ClassEstimates,
 }
 
-/// The classes that a figure shows, in the order of the configuration; one that is not known there comes last.
+/// The classes that a figure shows, in the order of the configuration; one that is not known there
+/// comes last.
 fn drawn<'a>(subject: &'a Subject, marks: &[(&'a str, Mark)]) -> Vec<Drawn<'a>> {
     let by_class = by_name(&subject.points, |p| p.class);
     let unknown = by_class
@@ -318,7 +322,8 @@ fn lines_legend(subject: &Subject) -> Vec<LegendView> {
     legend
 }
 
-/// What the reader must know to read one figure: how many estimates, what the bars are, what is not drawn.
+/// What the reader must know to read one figure: how many estimates, what the bars are, what is not
+/// drawn.
 fn caption(subject: &Subject, scale: Scale) -> String {
     let estimates = count(subject.points.len(), "estimate");
     let corrected = subject.points.iter().filter(|p| p.corrected).count();

@@ -1,5 +1,5 @@
-//! The time history of a maneuver: inputs, and outputs measured and computed with their residuals, as in the paper's
-//! Figures 4 and 12.
+//! The time history of a maneuver: inputs, and outputs measured and computed with their residuals,
+//! as in the paper's Figures 4 and 12.
 
 use super::figure::stack::{self, Stack, Strip, StripLine};
 use super::figure::{self};
@@ -50,8 +50,8 @@ pub fn typical<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
 /// So many samples are kept of one signal at most: more cannot be told apart in a column.
 const MOST_SAMPLES: usize = 240;
 
-/// A history as the report draws it: every so many samples, with the digits that a drawing can show, and beside them each
-/// sample that was left out of the cost.
+/// A history as the report draws it: every so many samples, with the digits that a drawing can
+/// show, and beside them each sample that was left out of the cost.
 #[must_use]
 pub fn thinned(history: &History) -> History {
     let step = history.time_s.len().div_ceil(MOST_SAMPLES).max(1);

@@ -1,5 +1,5 @@
-//! The mark of each maneuver class: shape, solid or hollow, and a dark colour, so that classes stay apart in print and
-//! for the colour-blind.
+//! The mark of each maneuver class: shape, solid or hollow, and a dark colour, so that classes stay
+//! apart in print and for the colour-blind.
 
 use std::fmt::Write;
 
@@ -61,7 +61,8 @@ impl Mark {
         if self.hollow { "#ffffff" } else { self.colour }
     }
 
-    /// Appends its outline around a point to the data of an SVG path; `radius` makes all shapes look equally large.
+    /// Appends its outline around a point to the data of an SVG path; `radius` makes all shapes
+    /// look equally large.
     pub fn outline(self, path: &mut String, x: f64, y: f64, radius: f64) {
         let polygon = |path: &mut String, corners: &[(f64, f64)]| {
             for (i, (dx, dy)) in corners.iter().enumerate() {

@@ -1,6 +1,6 @@
-//! The report stage: one self-contained HTML page (inline SVG, style and a light script that it does without, nothing
-//! loaded) that a flight-test review board reads, and the same page on paper ([`crate::pdf`]). Words and numbers are put together
-//! here, the looks are the template's.
+//! The report stage: one self-contained HTML page (inline SVG, style and a light script that it
+//! does without, nothing loaded) that a flight-test review board reads, and the same page on paper
+//! ([`crate::pdf`]). Words and numbers are put together here, the looks are the template's.
 
 mod as_flown;
 mod by_class;
@@ -74,7 +74,8 @@ pub struct Contents<'a> {
     pub instruments: &'a [InstrumentRow],
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
-    /// The maneuvers that have a page ([`pages::chosen`]), and their time histories, thinned to what a drawing can show.
+    /// The maneuvers that have a page ([`pages::chosen`]), and their time histories, thinned to
+    /// what a drawing can show.
     pub pages: &'a BTreeSet<String>,
     pub histories: &'a [History],
     /// A class is shown by its maneuver nearest to this angle of attack.
@@ -276,7 +277,8 @@ fn maneuvers(contents: &Contents) -> TableView {
             of_fit(|f| f.condition_number),
             fit.and_then(|f| f.left_out)
                 .map_or_else(|| NOTHING.to_owned(), |share| fixed(100.0 * share, 2)),
-            // That a fit converged needs no reason; for the others the reader wants it beside the flight condition.
+            // That a fit converged needs no reason; for the others the reader wants it beside the
+            // flight condition.
             fit.filter(|f| f.outcome != "converged")
                 .map_or_else(String::new, |f| f.reason.clone()),
         ]

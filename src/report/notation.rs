@@ -1,4 +1,5 @@
-//! How the field writes things: derivatives with subscripts, units in words, numbers with the digits that mean something.
+//! How the field writes things: derivatives with subscripts, units in words, numbers with the
+//! digits that mean something.
 
 use minijinja::HtmlEscape;
 
@@ -8,7 +9,8 @@ use crate::units::Unit;
 /// What stands where there is no value.
 pub const NOTHING: &str = "\u{2013}";
 
-/// The coefficient a derivative belongs to, by its name `<coefficient>_<regressor>`; none for a bias.
+/// The coefficient a derivative belongs to, by its name `<coefficient>_<regressor>`; none for a
+/// bias.
 #[must_use]
 pub fn coefficient_of(name: &str) -> Option<Coefficient> {
     let (prefix, _) = name.split_once('_')?;
@@ -18,8 +20,8 @@ pub fn coefficient_of(name: &str) -> Option<Coefficient> {
         .find(|coefficient| format!("{coefficient:?}") == prefix)
 }
 
-/// A derivative as the field writes it, in HTML: a C with the rest as its subscript, surfaces with a δ, angles in Greek.
-/// What is no derivative (a bias) is its own name.
+/// A derivative as the field writes it, in HTML: a C with the rest as its subscript, surfaces with
+/// a δ, angles in Greek. What is no derivative (a bias) is its own name.
 #[must_use]
 pub fn symbol(name: &str) -> String {
     let (Some(_), Some((prefix, regressor))) = (coefficient_of(name), name.split_once('_')) else {
@@ -74,7 +76,8 @@ pub fn without_unit(signal: &str) -> &str {
         .unwrap_or(signal)
 }
 
-/// A number with so many significant digits, a proper minus, and a dash where it is missing or not finite.
+/// A number with so many significant digits, a proper minus, and a dash where it is missing or not
+/// finite.
 #[must_use]
 pub fn number(value: Option<f64>, significant: usize) -> String {
     let Some(value) = value.filter(|v| v.is_finite()) else {

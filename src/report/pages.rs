@@ -1,5 +1,6 @@
-//! Which maneuvers have a page of their own: all of a campaign, but of a fleet's archive no more than a reader can leaf
-//! through and a browser can hold. Everything is in the tables, and `harvest show` draws any of them.
+//! Which maneuvers have a page of their own: all of a campaign, but of a fleet's archive no more
+//! than a reader can leaf through and a browser can hold. Everything is in the tables, and `harvest
+//! show` draws any of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,9 +9,9 @@ use crate::output_error::Outcome;
 use crate::overnight::Changes;
 use crate::tables::FitRow;
 
-/// At most `most` maneuvers: the one that stands for its class (the converged one nearest to `typical_alpha_deg`), those
-/// that are not what they were the night before (up to half of the pages), those whose fit failed, and of the others some
-/// at equal distances.
+/// At most `most` maneuvers: the one that stands for its class (the converged one nearest to
+/// `typical_alpha_deg`), those that are not what they were the night before (up to half of the
+/// pages), those whose fit failed, and of the others some at equal distances.
 #[must_use]
 pub fn chosen(
     maneuvers: &[Maneuver],
@@ -79,7 +80,8 @@ pub(super) fn typical<'a>(
         .collect()
 }
 
-/// Adds those that are not there yet, or of too many some at equal distances, until there are `most`.
+/// Adds those that are not there yet, or of too many some at equal distances, until there are
+/// `most`.
 fn add<'a>(chosen: &mut BTreeSet<&'a str>, from: &[&'a str], most: usize) {
     let left: Vec<&str> = from
         .iter()

@@ -1,4 +1,5 @@
-//! How well maneuvers are predicted with the derivatives of others: per class and output the medians, and the worst named.
+//! How well maneuvers are predicted with the derivatives of others: per class and output the
+//! medians, and the worst named.
 
 use super::Contents;
 use super::failures::TableView;

@@ -1,4 +1,5 @@
-//! Where everything came from, enough to do it again: program, command, data with their fingerprints, configuration.
+//! Where everything came from, enough to do it again: program, command, data with their
+//! fingerprints, configuration.
 
 use serde::Serialize;
 

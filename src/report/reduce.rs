@@ -1,5 +1,5 @@
-//! A long signal made small enough to draw: per column of the picture the smallest and the largest sample, so that no
-//! spike is lost however long the flight is, and runs of marked samples.
+//! A long signal made small enough to draw: per column of the picture the smallest and the largest
+//! sample, so that no spike is lost however long the flight is, and runs of marked samples.
 
 use crate::flight::Mark;
 use crate::flight::record::Series;
@@ -80,8 +80,8 @@ impl Extremes {
     }
 }
 
-/// The line through a signal, in pieces between which samples are missing: at most two points per column, among them the
-/// smallest and the largest sample of each.
+/// The line through a signal, in pieces between which samples are missing: at most two points per
+/// column, among them the smallest and the largest sample of each.
 #[must_use]
 pub fn envelope(shown: Shown, columns: Columns) -> Vec<Vec<(f64, f64)>> {
     let (mut pieces, mut piece) = (Vec::new(), Vec::new());

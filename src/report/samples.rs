@@ -81,7 +81,8 @@ const LATERAL: [(&str, &str); 4] = [
     ("Cn_dyv", "ftlbf_per_deg"),
 ];
 
-/// Two classes of each axis at α 10° to 50°; names that differ by case alone, a wild estimate, one fit that failed.
+/// Two classes of each axis at α 10° to 50°; names that differ by case alone, a wild estimate, one
+/// fit that failed.
 pub fn campaign() -> Campaign {
     let mut campaign = Campaign::default();
     for (class, axis) in [

@@ -1,5 +1,5 @@
-//! The scale of one axis of a figure: round limits and ticks that show what the reader came for, whatever a few wild
-//! values do.
+//! The scale of one axis of a figure: round limits and ticks that show what the reader came for,
+//! whatever a few wild values do.
 
 use super::notation::power_of_ten;
 
@@ -68,8 +68,8 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// The scale for it: all of the lines, the estimates but for the wild ones, and of bars and band what does not
-    /// dwarf them.
+    /// The scale for it: all of the lines, the estimates but for the wild ones, and of bars and
+    /// band what does not dwarf them.
     #[must_use]
     pub fn scale(&self) -> Scale {
         let values: Vec<f64> = self
@@ -144,7 +144,8 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// An interval of some width, however narrow the given one: one value alone gets a tenth of itself to either side.
+/// An interval of some width, however narrow the given one: one value alone gets a tenth of itself
+/// to either side.
 fn widened(low: f64, high: f64) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if !(low.is_finite() && high.is_finite()) || size > 1e300 {

@@ -1,4 +1,5 @@
-//! A page per maneuver: its flight condition, how its fit ended, its time history, and its derivatives.
+//! A page per maneuver: its flight condition, how its fit ended, its time history, and its
+//! derivatives.
 
 use std::collections::BTreeMap;
 

@@ -39,13 +39,15 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// Whether flight is compared with the tunnel here; a bias of an instrument is not, whatever rows there are.
+    /// Whether flight is compared with the tunnel here; a bias of an instrument is not, whatever
+    /// rows there are.
     #[must_use]
     pub fn is_compared(&self) -> bool {
         self.coefficient.is_some() && !self.comparison.is_empty()
     }
 
-    /// How many maneuvers speak for flight: those of the trend, or of the estimates where there is no trend.
+    /// How many maneuvers speak for flight: those of the trend, or of the estimates where there is
+    /// no trend.
     #[must_use]
     pub fn maneuvers(&self) -> usize {
         self.trend
@@ -53,13 +55,15 @@ impl Subject<'_> {
             .map_or(self.points.len(), |row| row.maneuvers)
     }
 
-    /// Where this derivative stands: the coefficients in the order of the equations, the biases last.
+    /// Where this derivative stands: the coefficients in the order of the equations, the biases
+    /// last.
     fn place(&self) -> (bool, Option<Coefficient>, Option<Axis>) {
         (self.coefficient.is_none(), self.coefficient, self.axis)
     }
 }
 
-/// Every derivative that was estimated, has a trend or is compared: by coefficient, then in the order of the model.
+/// Every derivative that was estimated, has a trend or is compared: by coefficient, then in the
+/// order of the model.
 #[must_use]
 pub fn gather<'a>(contents: &Contents<'a>) -> Vec<Subject<'a>> {
     let failed = failed_fits(contents);
@@ -86,7 +90,8 @@ pub fn gather<'a>(contents: &Contents<'a>) -> Vec<Subject<'a>> {
     subjects
 }
 
-/// The names of the subjects, in the order of the model; those it does not name come last, by the alphabet.
+/// The names of the subjects, in the order of the model; those it does not name come last, by the
+/// alphabet.
 fn names<'a>(contents: &Contents<'a>) -> Vec<&'a str> {
     let estimated = contents
         .estimates
@@ -201,7 +206,8 @@ fn point(row: &EstimateRow) -> Option<Point<'_>> {
     })
 }
 
-/// The tunnel's values: those of the comparison, or where a derivative is not compared those that the estimation used.
+/// The tunnel's values: those of the comparison, or where a derivative is not compared those that
+/// the estimation used.
 fn tunnel(of: &Rows) -> Vec<(f64, f64)> {
     let compared = of.comparison.iter().map(|c| (c.alpha_deg, c.wind_tunnel));
     let used = of.estimates.iter().map(|e| (e.alpha_deg, e.wind_tunnel));

@@ -1,4 +1,5 @@
-//! The summary: what was flown and fitted, class by class, and derivative by derivative where flight and tunnel agree.
+//! The summary: what was flown and fitted, class by class, and derivative by derivative where
+//! flight and tunnel agree.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,5 @@
-//! The page as a whole: complete, well-formed, safe against what stands in the data, and the same bytes every time.
+//! The page as a whole: complete, well-formed, safe against what stands in the data, and the same
+//! bytes every time.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +10,8 @@ fn render(campaign: &Campaign) -> String {
     html(&campaign.contents(), None).expect("a page")
 }
 
-/// Elements that HTML knows as never having content: in HTML these alone may be closed in their own tag.
+/// Elements that HTML knows as never having content: in HTML these alone may be closed in their own
+/// tag.
 const VOID: [&str; 4] = ["meta", "br", "hr", "input"];
 /// What stands in running text: a paragraph can hold nothing else.
 const PHRASING: [&str; 9] = ["a", "b", "i", "small", "sub", "span", "code", "svg", "br"];

@@ -1,5 +1,6 @@
-//! What the data tell apart and what they do not, class by class: regressors that move together (the paper's Figures 3, 10
-//! and 11), estimates that correlate, groups of near dependencies, and what the maneuvers' own evidence holds.
+//! What the data tell apart and what they do not, class by class: regressors that move together
+//! (the paper's Figures 3, 10 and 11), estimates that correlate, groups of near dependencies, and
+//! what the maneuvers' own evidence holds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -189,7 +190,8 @@ fn median(values: &[f64]) -> String {
     quantile(values, 0.5).map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0))
 }
 
-/// From the lowest to the highest: a pair may move together in one maneuver and against each other in the next.
+/// From the lowest to the highest: a pair may move together in one maneuver and against each other
+/// in the next.
 fn range(values: &[f64]) -> String {
     match extent(values.iter().copied()).map(|(low, high)| (fixed(low, 2), fixed(high, 2))) {
         None => NOTHING.to_owned(),

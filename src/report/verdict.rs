@@ -1,4 +1,5 @@
-//! The verdicts of one derivative across angle of attack, put into one line: equal verdicts side by side become a range.
+//! The verdicts of one derivative across angle of attack, put into one line: equal verdicts side by
+//! side become a range.
 
 use std::fmt::Write;
 
@@ -49,8 +50,8 @@ pub fn runs<'a>(rows: &[&'a ComparisonRow]) -> Vec<Run<'a>> {
 /// More runs than these are read more easily by verdict than by angle of attack.
 const MOST_RUNS: usize = 4;
 
-/// The runs in words: `agrees 5°–25°, flight lower 30°–60°`; many of them by verdict, the most frequent first:
-/// `agrees 5°, 15°–30°; flight lower 10°, 35°–60°`.
+/// The runs in words: `agrees 5°–25°, flight lower 30°–60°`; many of them by verdict, the most
+/// frequent first: `agrees 5°, 15°–30°; flight lower 10°, 35°–60°`.
 #[must_use]
 pub fn phrase(runs: &[Run]) -> String {
     if runs.len() <= MOST_RUNS {
@@ -101,8 +102,8 @@ impl Run<'_> {
     }
 }
 
-/// How a verdict is drawn: top and bottom of its bar in a strip 14 high, and its colour. Place and height tell them
-/// apart without colour.
+/// How a verdict is drawn: top and bottom of its bar in a strip 14 high, and its colour. Place and
+/// height tell them apart without colour.
 fn bar(verdict: &str) -> (f64, f64, &'static str) {
     match verdict {
         "agrees" => (5.0, 9.0, "#8a8f98"),

@@ -1,8 +1,10 @@
-//! Candidates for maneuvers: trains of steps of the surfaces that nobody's stick explains, and trains of pilot steps.
+//! Candidates for maneuvers: trains of steps of the surfaces that nobody's stick explains, and
+//! trains of pilot steps.
 //!
-//! The on-board excitation system moves surfaces while the pilot's controls rest. A surface that steps while a control
-//! moves is geared to it, and one that steps soon after a pilot's step answers it by feedback: neither is excitation of its
-//! own. What is left tells excitation from ordinary flying without any flag.
+//! The on-board excitation system moves surfaces while the pilot's controls rest. A surface that
+//! steps while a control moves is geared to it, and one that steps soon after a pilot's step
+//! answers it by feedback: neither is excitation of its own. What is left tells excitation from
+//! ordinary flying without any flag.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,12 +25,13 @@ pub(super) struct Scene<'a> {
     pub deflections: Steps,
     /// The steps of surfaces on their own.
     pub own: Steps,
-    /// Whether one of the pilot's controls is recorded: without any, nothing tells the pilot's hand from the system's.
+    /// Whether one of the pilot's controls is recorded: without any, nothing tells the pilot's hand
+    /// from the system's.
     pub sees_pilot: bool,
     /// Whether the excitation flag is recorded and not stuck.
     flag_speaks: bool,
-    /// From when to when a flag that is not stuck is down between two times that it is up, for no less than the shortest
-    /// pause.
+    /// From when to when a flag that is not stuck is down between two times that it is up, for no
+    /// less than the shortest pause.
     pub flag_rests: Vec<(f64, f64)>,
 }
 
@@ -88,8 +91,8 @@ impl<'a> Scene<'a> {
         self.settings.pilot_controls.iter().any(|c| c == signal)
     }
 
-    /// Whether the pilot explains what a surface does at a time: a control of his moves then, or has stepped shortly before
-    /// and no flag says that the on-board system is at work.
+    /// Whether the pilot explains what a surface does at a time: a control of his moves then, or
+    /// has stepped shortly before and no flag says that the on-board system is at work.
     fn is_answer(&self, time_s: f64) -> bool {
         let settings = self.settings;
         let system = self.flag_is_up(time_s);
@@ -184,8 +187,9 @@ pub(super) struct Train<'a> {
 }
 
 impl<'a> Train<'a> {
-    /// This train and the next as one, where the pilot may have gone over from one control to another: he rests no longer
-    /// than he may hold a control, and steps first with another than the one that he has stepped with last.
+    /// This train and the next as one, where the pilot may have gone over from one control to
+    /// another: he rests no longer than he may hold a control, and steps first with another than
+    /// the one that he has stepped with last.
     pub fn going_over(&self, next: &Train<'a>, scene: &Scene) -> Option<Train<'a>> {
         let smallest = |signal: &str| {
             scene
@@ -268,7 +272,8 @@ fn edges<'a>(
     edges
 }
 
-/// Surfaces on their own, one train as long as no pause is longer than a control may be held away from trim.
+/// Surfaces on their own, one train as long as no pause is longer than a control may be held away
+/// from trim.
 fn onboard<'a>(scene: &'a Scene) -> Vec<Train<'a>> {
     let all = edges(&scene.own, |_| true, (f64::NEG_INFINITY, f64::INFINITY));
     let near = |a: &Edge, b: &Edge| b.time_s - a.time_s <= scene.settings.longest_hold_s;
@@ -279,9 +284,9 @@ fn onboard<'a>(scene: &'a Scene) -> Vec<Train<'a>> {
     all.chunk_by(near).map(of).collect()
 }
 
-/// From when to when pilot controls step, with the deflection from trim that begins a train and the one back that ends it.
-/// A train goes on while a control is held away from its trim for no longer than `longest_hold_s`, or while all rest at trim
-/// for no longer than `longest_rest_s`.
+/// From when to when pilot controls step, with the deflection from trim that begins a train and the
+/// one back that ends it. A train goes on while a control is held away from its trim for no longer
+/// than `longest_hold_s`, or while all rest at trim for no longer than `longest_rest_s`.
 fn pilot(scene: &Scene, signals: &BTreeSet<String>) -> Vec<(f64, f64)> {
     let settings = scene.settings;
     let of = |signal| {
@@ -346,8 +351,8 @@ struct Growing<'a> {
     controls: BTreeMap<&'a str, Control>,
 }
 
-/// A deflection from trim is about half a reversal: halfway to it, a quarter of the largest step away, a control is as near
-/// to trim as to a deflection.
+/// A deflection from trim is about half a reversal: halfway to it, a quarter of the largest step
+/// away, a control is as near to trim as to a deflection.
 pub(super) const TRIM_SHARE: f64 = 0.25;
 
 /// Where one control of a train stands.
@@ -368,14 +373,15 @@ impl Control {
         from_trim.abs() < self.deflection.max(TRIM_SHARE * self.largest)
     }
 
-    /// Trim drifts in a turn, so a control is back at it when its steps cancel, or by its level; but a whole reversal leads
-    /// to the other side, whatever the level.
+    /// Trim drifts in a turn, so a control is back at it when its steps cancel, or by its level;
+    /// but a whole reversal leads to the other side, whatever the level.
     fn rests(&self) -> bool {
         let reversed = self.last > (1.0 - TRIM_SHARE) * self.largest;
         self.is_near(self.moved) || (self.is_near(self.now - self.trim) && !reversed)
     }
 
-    /// Whether a step leads from away to trim, by the sum of the steps or by the level: one of them may have been slow.
+    /// Whether a step leads from away to trim, by the sum of the steps or by the level: one of them
+    /// may have been slow.
     fn comes_to_trim(&self, step: &Step) -> bool {
         let leads = |before: f64, after: f64| !self.is_near(before) && self.is_near(after);
         leads(self.moved, self.moved + step.change())

@@ -1,9 +1,11 @@
-//! Steps of a surface that turbulence hides. Where feedback makes a surface work its smallest step is raised above what it
-//! does by itself, and the halves of a doublet, away from trim and back to it, may be smaller than that.
+//! Steps of a surface that turbulence hides. Where feedback makes a surface work its smallest step
+//! is raised above what it does by itself, and the halves of a doublet, away from trim and back to
+//! it, may be smaller than that.
 //!
-//! Steps that follow each other closely begin and end with a half. Where the first or the last of them is more than a half
-//! beside its neighbour, a deflection to the other side that is half as large is a step too, if turbulence hardly makes one
-//! or if there must be one. A single step that is not much larger than the smallest and has no halves is a gust's.
+//! Steps that follow each other closely begin and end with a half. Where the first or the last of
+//! them is more than a half beside its neighbour, a deflection to the other side that is half as
+//! large is a step too, if turbulence hardly makes one or if there must be one. A single step that
+//! is not much larger than the smallest and has no halves is a gust's.
 
 use super::candidates::TRIM_SHARE;
 use super::steps::Steps;
@@ -12,8 +14,8 @@ use super::{Settings, Step};
 /// A single step is somebody's when it is so many times the smallest: as large as a reversal.
 const REVERSAL: f64 = 2.0;
 
-/// A reversal is twice a half; where the actuator takes as long as the detector looks it is seen as √2 of it, and beside
-/// another reversal as large as that. Between the two in the sense of ratios.
+/// A reversal is twice a half; where the actuator takes as long as the detector looks it is seen as
+/// √2 of it, and beside another reversal as large as that. Between the two in the sense of ratios.
 const REVERSES: f64 = 1.2;
 
 /// A deflection of so many standard deviations of what turbulence does is hardly its own.
@@ -90,9 +92,9 @@ fn within(deflections: &[Step], (after_s, before_s): (f64, f64)) -> Vec<Step> {
         .collect()
 }
 
-/// The hidden half beside the step at one end: the largest deflection to the other side that is about half of it, or less
-/// by no more than two standard deviations of what turbulence does. None where that step is a half itself beside its
-/// neighbour.
+/// The hidden half beside the step at one end: the largest deflection to the other side that is
+/// about half of it, or less by no more than two standard deviations of what turbulence does. None
+/// where that step is a half itself beside its neighbour.
 fn half(deflections: &[Step], end: &Step, neighbour: Option<&Step>, noise: f64) -> Option<Step> {
     let beside = neighbour.map_or(1.0, |n| (end.change() / n.change()).abs());
     let hardly = if beside < REVERSES {

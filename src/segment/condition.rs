@@ -26,8 +26,8 @@ pub(super) const SIGNALS: &[&str] = &[
     signal::Z_CG,
 ];
 
-/// The maneuver of a class in a window (s on the record's clock), cut at the record, with its quality. It was found if it is
-/// known by what.
+/// The maneuver of a class in a window (s on the record's clock), cut at the record, with its
+/// quality. It was found if it is known by what.
 ///
 /// # Errors
 /// What keeps its flight condition from being known, in words.

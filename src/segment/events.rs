@@ -12,11 +12,11 @@ use super::{Segmented, condition, problem};
 /// Start and end of a found maneuver agree with a given event when both are within this, s.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Replaces what was found by the events given for this flight where one covers more than half of the other, and says how they
-/// compare.
+/// Replaces what was found by the events given for this flight where one covers more than half of
+/// the other, and says how they compare.
 ///
-/// An event of an unknown class or outside the record becomes a problem and replaces nothing. Without any event for any
-/// flight nothing is compared.
+/// An event of an unknown class or outside the record becomes a problem and replaces nothing.
+/// Without any event for any flight nothing is compared.
 #[must_use]
 pub fn with_events(
     found: Segmented,
@@ -45,7 +45,8 @@ pub fn with_events(
             Err(reason) => problems.push(problem(record, event.start_s, reason)),
         }
     }
-    // Windows close together share what is between them: an event replaces what it covers by more than half of either.
+    // Windows close together share what is between them: an event replaces what it covers by more
+    // than half of either.
     let shorter_s = |f: &Maneuver, g: &Maneuver| (f.end_s - f.start_s).min(g.end_s - g.start_s);
     let covers =
         |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);

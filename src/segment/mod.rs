@@ -1,13 +1,14 @@
-//! Segment finds the maneuvers of a record and their classes from the record alone, says what each is worth, and weighs the
-//! analyst's events against them.
+//! Segment finds the maneuvers of a record and their classes from the record alone, says what each
+//! is worth, and weighs the analyst's events against them.
 //!
-//! What is looked at is steps: fast, lasting changes of a surface or of a pilot control ([`steps`]). Steps do not depend on
-//! where a surface is trimmed, and ordinary flying moves the surfaces smoothly or singly. Two kinds of trains are made of
-//! them ([`candidates`]): surfaces that step while the pilot's controls rest, and pilot controls. A train is cut at its pauses
-//! into stretches that fit the recognition of a class: counts of steps, lengths of pulses, what else moves ([`seen`],
-//! [`patterns`], [`recognise`]); sweeps are found by their [`swings`]. Flags are evidence among others: they may be missing,
-//! stuck or late. What fits no class is `unknown`, with the reason. Each maneuver's [`quality`] is measured; one beyond a
-//! limit is rejected.
+//! What is looked at is steps: fast, lasting changes of a surface or of a pilot control
+//! ([`steps`]). Steps do not depend on where a surface is trimmed, and ordinary flying moves the
+//! surfaces smoothly or singly. Two kinds of trains are made of them ([`candidates`]): surfaces
+//! that step while the pilot's controls rest, and pilot controls. A train is cut at its pauses into
+//! stretches that fit the recognition of a class: counts of steps, lengths of pulses, what else
+//! moves ([`seen`], [`patterns`], [`recognise`]); sweeps are found by their [`swings`]. Flags are
+//! evidence among others: they may be missing, stuck or late. What fits no class is `unknown`, with
+//! the reason. Each maneuver's [`quality`] is measured; one beyond a limit is rejected.
 
 mod candidates;
 mod completed;
@@ -39,60 +40,68 @@ pub use steps::Step;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// The flag signal that is up while the on-board excitation system moves the surfaces: it is drawn, and a record without
-    /// it is a problem. While it is up, and not stuck, a surface that steps soon after the pilot does not answer him.
+    /// The flag signal that is up while the on-board excitation system moves the surfaces: it is
+    /// drawn, and a record without it is a problem. While it is up, and not stuck, a surface that
+    /// steps soon after the pilot does not answer him.
     pub excitation_flag: String,
-    /// The pilot's controls. A surface that steps while one of them moves, or right after it has stepped, is the pilot's.
+    /// The pilot's controls. A surface that steps while one of them moves, or right after it has
+    /// stepped, is the pilot's.
     #[serde(default)]
     pub pilot_controls: Vec<String>,
-    /// Signal → the smallest change, in the signal's unit, that counts as a step. Well above noise, turbulence and
-    /// feedback, well below the smallest reversal that is commanded.
+    /// Signal → the smallest change, in the signal's unit, that counts as a step. Well above noise,
+    /// turbulence and feedback, well below the smallest reversal that is commanded.
     pub steps: BTreeMap<String, f64>,
-    /// Pilot steps begin with a deflection from trim and end with one back to trim, each about half a reversal or less:
-    /// such a step belongs to the maneuver when it is at least this share of the smallest step. It is not counted.
-    /// Default 0.45.
+    /// Pilot steps begin with a deflection from trim and end with one back to trim, each about half
+    /// a reversal or less: such a step belongs to the maneuver when it is at least this share of
+    /// the smallest step. It is not counted. Default 0.45.
     #[serde(default = "default_deflection")]
     pub deflection_share: f64,
-    /// A step is complete within this time: a full reversal at the actuators' rate limit. Default 0.15 s.
+    /// A step is complete within this time: a full reversal at the actuators' rate limit. Default
+    /// 0.15 s.
     #[serde(default = "default_transit")]
     pub transit_s: f64,
     /// Before and after a step the level is averaged over this time. Default 0.125 s.
     #[serde(default = "default_level")]
     pub level_s: f64,
-    /// A step is at least this many standard deviations of the signal's own changes, whatever its smallest step: in
-    /// turbulence feedback moves the surfaces. Default 4.
+    /// A step is at least this many standard deviations of the signal's own changes, whatever its
+    /// smallest step: in turbulence feedback moves the surfaces. Default 4.
     #[serde(default = "default_over_noise")]
     pub steps_over_noise: f64,
-    /// Steps smaller than this share of the signal's largest in the same maneuver are feedback and not counted. Default
-    /// 0.35: a deflection from trim is about half a reversal.
+    /// Steps smaller than this share of the signal's largest in the same maneuver are feedback and
+    /// not counted. Default 0.35: a deflection from trim is about half a reversal.
     #[serde(default = "default_outstanding")]
     pub outstanding_share: f64,
-    /// A surface is geared to a pilot control that moves by this share of its smallest step. Default 0.35.
+    /// A surface is geared to a pilot control that moves by this share of its smallest step.
+    /// Default 0.35.
     #[serde(default = "default_geared")]
     pub geared_share: f64,
     /// It follows within this time, s. Default 0.4: filters and actuators.
     #[serde(default = "default_gearing")]
     pub gearing_s: f64,
-    /// Feedback answers a pilot's step within this time, s. Default 1: the response's first overshoot.
+    /// Feedback answers a pilot's step within this time, s. Default 1: the response's first
+    /// overshoot.
     #[serde(default = "default_answer")]
     pub answer_s: f64,
     /// Two maneuvers are at least this far apart, s. Default 0.7.
     #[serde(default = "default_pause")]
     pub shortest_pause_s: f64,
-    /// How long a pilot may hold a control away from trim within one maneuver: half a slow oscillation. Default 4 s.
+    /// How long a pilot may hold a control away from trim within one maneuver: half a slow
+    /// oscillation. Default 4 s.
     #[serde(default = "default_hold")]
     pub longest_hold_s: f64,
-    /// How long all controls of one maneuver may rest at trim between two inputs; a longer rest ends the maneuver, and
-    /// what comes after it is recovery, unless the pilot has gone over to another control of the same class. Default 2 s.
+    /// How long all controls of one maneuver may rest at trim between two inputs; a longer rest
+    /// ends the maneuver, and what comes after it is recovery, unless the pilot has gone over to
+    /// another control of the same class. Default 2 s.
     #[serde(default = "default_rest")]
     pub longest_rest_s: f64,
-    /// Where a maneuver begins before another has decayed: the share of the pause between their inputs that is the decay's
-    /// at least, and of the lead-in that it may use besides. Default 0.25: the lead-in counts for more, for the inputs
-    /// before a decay have told most of their derivatives already.
+    /// Where a maneuver begins before another has decayed: the share of the pause between their
+    /// inputs that is the decay's at least, and of the lead-in that it may use besides. Default
+    /// 0.25: the lead-in counts for more, for the inputs before a decay have told most of their
+    /// derivatives already.
     #[serde(default = "default_shared")]
     pub shared_lead_in: f64,
-    /// Excitation of fewer steps than this is no maneuver and not worth a word: a flag that flickers, a turn. Default 3,
-    /// the edges of one doublet.
+    /// Excitation of fewer steps than this is no maneuver and not worth a word: a flag that
+    /// flickers, a turn. Default 3, the edges of one doublet.
     #[serde(default = "default_fewest")]
     pub fewest_steps: usize,
     /// When a maneuver is not estimated.
@@ -141,8 +150,8 @@ fn default_fewest() -> usize {
 }
 
 impl Settings {
-    /// The signals that some class counts steps of and for which no smallest step is set: a mistake in the
-    /// configuration, since such a class could never be recognised.
+    /// The signals that some class counts steps of and for which no smallest step is set: a mistake
+    /// in the configuration, since such a class could never be recognised.
     #[must_use]
     pub fn without_smallest_step(&self, classes: &[Class]) -> BTreeSet<String> {
         let counted = classes.iter().flat_map(|c| c.recognition.counted());
@@ -153,7 +162,8 @@ impl Settings {
     }
 }
 
-/// The maneuvers of one record in the order of their starts, excitation that fits no class, and what went wrong.
+/// The maneuvers of one record in the order of their starts, excitation that fits no class, and
+/// what went wrong.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Segmented {
     pub maneuvers: Vec<Maneuver>,
@@ -161,8 +171,8 @@ pub struct Segmented {
     pub problems: Vec<Problem>,
 }
 
-/// The signals that are looked at: what classes are known by, and what flight condition and quality are made of. A record
-/// needs no others.
+/// The signals that are looked at: what classes are known by, and what flight condition and quality
+/// are made of. A record needs no others.
 #[must_use]
 pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
     let named = classes
@@ -189,8 +199,8 @@ pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
 
 /// Finds the maneuvers of one record.
 ///
-/// Excitation that fits no class or several is `unknown` and a problem; so are flags that cannot be right and signals that
-/// the record lacks. The rest of the record is segmented all the same.
+/// Excitation that fits no class or several is `unknown` and a problem; so are flags that cannot be
+/// right and signals that the record lacks. The rest of the record is segmented all the same.
 #[must_use]
 pub fn maneuvers(
     record: &Record,

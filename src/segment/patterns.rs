@@ -1,5 +1,5 @@
-//! Patterns of one signal in time: pulses whose lengths stand in a proportion (3-2-1-1), and swings that become faster (a
-//! sweep).
+//! Patterns of one signal in time: pulses whose lengths stand in a proportion (3-2-1-1), and swings
+//! that become faster (a sweep).
 
 use crate::maneuver::{Pulses, Sweep};
 
@@ -15,7 +15,8 @@ pub(super) struct PulseFit {
     pub deviation: f64,
 }
 
-/// Whether the steps of a signal are the edges of these pulses, each to the other side than the one before.
+/// Whether the steps of a signal are the edges of these pulses, each to the other side than the one
+/// before.
 ///
 /// # Errors
 /// Whether pulses are missing, and what is wrong in words.
@@ -73,8 +74,8 @@ fn reversals(steps: &[&Step]) -> Vec<f64> {
     runs.map(largest).collect()
 }
 
-/// Whether swings become faster as a sweep's do: from the first third to the last by the ratio, and each with few
-/// exceptions faster than the one before.
+/// Whether swings become faster as a sweep's do: from the first third to the last by the ratio, and
+/// each with few exceptions faster than the one before.
 ///
 /// # Errors
 /// Whether swings are missing, and what is wrong in words.

@@ -1,5 +1,6 @@
-//! The quality of a maneuver before it is estimated: trimmed at the start, α held, one axis alone, above the noise, surfaces
-//! free of their stops, samples as recorded. What is beyond a limit is rejected with the reason.
+//! The quality of a maneuver before it is estimated: trimmed at the start, α held, one axis alone,
+//! above the noise, surfaces free of their stops, samples as recorded. What is beyond a limit is
+//! rejected with the reason.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -24,21 +25,24 @@ pub struct Actuator {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
-    /// Motion in the lead-in over motion in the maneuver. Default 0.5: the response to the inputs must be well above what was
-    /// going on before them, or the initial state speaks louder than the derivatives.
+    /// Motion in the lead-in over motion in the maneuver. Default 0.5: the response to the inputs
+    /// must be well above what was going on before them, or the initial state speaks louder than
+    /// the derivatives.
     pub lead_in_motion: f64,
-    /// Root mean square of α about its mean, deg. Default 5, the spacing at which trends are published: beyond it a maneuver
-    /// does not belong to one angle of attack, and derivatives do not stay constant.
+    /// Root mean square of α about its mean, deg. Default 5, the spacing at which trends are
+    /// published: beyond it a maneuver does not belong to one angle of attack, and derivatives do
+    /// not stay constant.
     pub alpha_rms_deg: f64,
-    /// Motion of the other axis over motion of the own. Default 1: the other axis's signals enter the equations as measured,
-    /// with their errors, and must not be what moves the aircraft.
+    /// Motion of the other axis over motion of the own. Default 1: the other axis's signals enter
+    /// the equations as measured, with their errors, and must not be what moves the aircraft.
     pub other_axis: f64,
     /// The least signal to noise. Default 5: what noise hides is not estimated.
     pub signal_to_noise: f64,
-    /// Share of the inputs' time at a stop. Default 0.5: a surface that rests there excites nothing.
+    /// Share of the inputs' time at a stop. Default 0.5: a surface that rests there excites
+    /// nothing.
     pub saturated_share: f64,
-    /// Share of the inputs' time at the actuator's rate. Default 0.8: a surface that is always on its way follows no command;
-    /// what it does is measured, so less does no harm.
+    /// Share of the inputs' time at the actuator's rate. Default 0.8: a surface that is always on
+    /// its way follows no command; what it does is measured, so less does no harm.
     pub rate_limited_share: f64,
     /// Share of samples that are not as recorded. Default 0.2.
     pub marked_share: f64,
@@ -61,7 +65,8 @@ impl Default for Limits {
     }
 }
 
-/// The quality of a maneuver. What the analyst gave is measured, and accepted whatever the limits say: he has seen it.
+/// The quality of a maneuver. What the analyst gave is measured, and accepted whatever the limits
+/// say: he has seen it.
 pub(super) fn of(
     record: &Record,
     class: &Class,
@@ -215,8 +220,8 @@ fn mean_square(values: &[f64], fit: Fit) -> Option<f64> {
     Some(known.iter().map(|k| residual(k).powi(2)).sum::<f64>() / n)
 }
 
-/// The rate with the most signal over noise. Noise is what does not continue from sample to sample: the median of second
-/// differences, of which motion at the aircraft's frequencies makes nothing.
+/// The rate with the most signal over noise. Noise is what does not continue from sample to sample:
+/// the median of second differences, of which motion at the aircraft's frequencies makes nothing.
 fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usize>) -> Option<f64> {
     let of = |name: &&str| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
@@ -230,7 +235,8 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
         if middle == 0 {
             return None;
         }
-        // Of white noise with a deviation of one: second differences of √6, their median magnitude 1/1.4826 of that.
+        // Of white noise with a deviation of one: second differences of √6, their median magnitude
+        // 1/1.4826 of that.
         let noise =
             1.4826 * *differences.select_nth_unstable_by(middle, f64::total_cmp).1 / 6.0_f64.sqrt();
         ratio(Some(mean_square(values, Fit::Line)?.sqrt()), Some(noise))
@@ -277,8 +283,8 @@ fn at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
         .all(|w| (w[1] - w[0]).abs() >= 0.9 * actuator.rate_deg_s * step_s)
 }
 
-/// Share of samples with which something went wrong, among those of the axis's outputs and the class's inputs that are
-/// recorded.
+/// Share of samples with which something went wrong, among those of the axis's outputs and the
+/// class's inputs that are recorded.
 fn marked(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
     let outputs = class.axis.outputs();
     let names = outputs

@@ -1,12 +1,14 @@
 //! Recognition: which classes the stretches of a train fit, and what fits none.
 //!
-//! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its pauses into the stretches
-//! that leave the fewest steps unexplained, then with the most steps in pulses of known lengths, then where the flag rests,
-//! then into as few as possible, then where decay and lead-in are whole, then where one repeats the other, then where most
-//! inputs are back at their trim and steps of one input follow each other, then at the longest pauses. Two trains between
-//! which the pilot has gone over from one control to another are one where more is found in both together. A stretch that
-//! fits several classes is of the one whose inputs explain the most steps; a rule about lengths of pulses goes before one
-//! about counts; where nothing else differs the flags decide.
+//! A train may hold one maneuver, several that follow each other closely, or none. It is cut at its
+//! pauses into the stretches that leave the fewest steps unexplained, then with the most steps in
+//! pulses of known lengths, then where the flag rests, then into as few as possible, then where
+//! decay and lead-in are whole, then where one repeats the other, then where most inputs are back
+//! at their trim and steps of one input follow each other, then at the longest pauses. Two trains
+//! between which the pilot has gone over from one control to another are one where more is found in
+//! both together. A stretch that fits several classes is of the one whose inputs explain the most
+//! steps; a rule about lengths of pulses goes before one about counts; where nothing else differs
+//! the flags decide.
 
 use crate::error::Problem;
 use crate::maneuver::{Class, Recognised, Unknown};
@@ -109,14 +111,15 @@ struct Cut<'a> {
     /// Rests of the flag that stretches run across.
     run_across: usize,
     stretches: usize,
-    /// Stretches that follow another so closely that one's decay and the other's lead-in overlap, where both are whole
-    /// elsewhere.
+    /// Stretches that follow another so closely that one's decay and the other's lead-in overlap,
+    /// where both are whole elsewhere.
     cramped: usize,
-    /// Stretches of the class of the one before that do not repeat its steps: what is flown again at once is mostly the
-    /// same.
+    /// Stretches of the class of the one before that do not repeat its steps: what is flown again
+    /// at once is mostly the same.
     unlike: usize,
-    /// How many inputs of stretches do not end where they began, and how often one steps again after another has stepped
-    /// meanwhile: a cut in the wrong place makes more of them. Neither counts for more, for a step may pass unseen.
+    /// How many inputs of stretches do not end where they began, and how often one steps again
+    /// after another has stepped meanwhile: a cut in the wrong place makes more of them. Neither
+    /// counts for more, for a step may pass unseen.
     loose_ends: usize,
     /// The pauses cut at, s.
     paused_s: f64,
@@ -326,8 +329,8 @@ fn explained<'a>(
         .min_by_key(|e| (e.unexplained, usize::MAX - e.in_pulses))
 }
 
-/// How many rests of the excitation flag lie within a stretch of a class that it is up for. A flag that rests while there is
-/// more than a step of feedback is late, or wrong.
+/// How many rests of the excitation flag lie within a stretch of a class that it is up for. A flag
+/// that rests while there is more than a step of feedback is late, or wrong.
 fn run_across(seen: &Seen, class: &Class, edges: &[super::candidates::Edge]) -> usize {
     let scene = seen.scene;
     if *seen.kind != Kind::Onboard
@@ -346,7 +349,8 @@ fn run_across(seen: &Seen, class: &Class, edges: &[super::candidates::Edge]) -> 
     scene.flag_rests.iter().filter(within).filter(still).count()
 }
 
-/// Whether a signal does not end near where it began, by those of its changes that are not feedback's.
+/// Whether a signal does not end near where it began, by those of its changes that are not
+/// feedback's.
 fn is_away(changes: &[f64], outstanding_share: f64) -> bool {
     let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);
     let moved: f64 = changes
@@ -415,8 +419,9 @@ fn stretch<'a>(
     }
 }
 
-/// When the first step of a surface was preceded by a smaller one to the other side: a deflection from trim that feedback
-/// made small. What steps no later than the edge before the stretch belongs to another.
+/// When the first step of a surface was preceded by a smaller one to the other side: a deflection
+/// from trim that feedback made small. What steps no later than the edge before the stretch belongs
+/// to another.
 fn opening(scene: &Scene, seen: &Seen, (after_s, first_s): (f64, f64)) -> f64 {
     if *seen.kind != Kind::Onboard {
         return first_s;
@@ -448,8 +453,8 @@ fn opening(scene: &Scene, seen: &Seen, (after_s, first_s): (f64, f64)) -> f64 {
         .fold(first_s, f64::min)
 }
 
-/// What fits no class: worth a word where a signal goes to one side, to the other by more than ordinary flying does, and
-/// back.
+/// What fits no class: worth a word where a signal goes to one side, to the other by more than
+/// ordinary flying does, and back.
 fn leave<'a>(
     scene: &Scene,
     classes: &[&'a Class],
@@ -472,7 +477,8 @@ fn leave<'a>(
     {
         return;
     }
-    // Pilots move their controls anyway: a few steps, or steps among which no class finds one of its inputs complete.
+    // Pilots move their controls anyway: a few steps, or steps among which no class finds one of
+    // its inputs complete.
     if train.kind != Kind::Onboard
         && misses.iter().filter(|m| m.too_little).count() > 0
         && !is_series(&seen, class)
@@ -484,8 +490,8 @@ fn leave<'a>(
         .push(unknown(&seen, classes, class.name.clone(), reason));
 }
 
-/// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants of all its inputs
-/// together, and four reversals.
+/// Whether the pilot's steps are more than ordinary flying: at least half of what the class wants
+/// of all its inputs together, and four reversals.
 fn is_series(seen: &Seen, class: &Class) -> bool {
     let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
     seen.explained(class) >= wanted.div_ceil(2).max(4)
@@ -521,7 +527,8 @@ fn in_words(scene: &Scene, class: &Class, misses: &[Miss], seen: &Seen) -> Strin
     format!("nearest to {}; {why}{}", class.name, reasons.join("; "))
 }
 
-/// Runs of swings, each no more than half as long again as the one before, and none longer than a control may be held.
+/// Runs of swings, each no more than half as long again as the one before, and none longer than a
+/// control may be held.
 fn runs(scene: &Scene, swings: Vec<Swing>) -> Vec<Vec<Swing>> {
     let record = scene.record;
     let at = |k: f64| record.start_s + k * record.step_s;
@@ -578,8 +585,9 @@ fn one_sweep<'a>(
     })
 }
 
-/// Puts the maneuvers in order of time and keeps their inputs from overlapping: where they do, the longer excitation stands.
-/// What is unknown within a maneuver, or within something longer unknown, is a part of it.
+/// Puts the maneuvers in order of time and keeps their inputs from overlapping: where they do, the
+/// longer excitation stands. What is unknown within a maneuver, or within something longer unknown,
+/// is a part of it.
 pub(super) fn keep_apart(recognition: &mut Recognition) {
     let Recognition { found, unknown } = recognition;
     found.sort_by(|a, b| (b.last_s - b.first_s).total_cmp(&(a.last_s - a.first_s)));
@@ -611,9 +619,10 @@ pub(super) fn keep_apart(recognition: &mut Recognition) {
     (*found, *unknown) = (kept, left);
 }
 
-/// The windows of maneuvers in order of time: the lead-in before the first input, the decay after the last. A window ends
-/// where the pilot takes over. Of a pause too short for both, a share is the decay's, the rest the next maneuver's lead-in;
-/// the decay may use the same share of that lead-in.
+/// The windows of maneuvers in order of time: the lead-in before the first input, the decay after
+/// the last. A window ends where the pilot takes over. Of a pause too short for both, a share is
+/// the decay's, the rest the next maneuver's lead-in; the decay may use the same share of that
+/// lead-in.
 pub(super) fn windows(scene: &Scene, found: &[Found]) -> Vec<(f64, f64)> {
     let of = |f: &Found| {
         let rule = &f.class.recognition;

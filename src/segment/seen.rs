@@ -1,5 +1,5 @@
-//! What is seen in one stretch of a record, and how it stands to a class: what of the class's recognition fails, how much
-//! of the stretch the class explains, and how sure that is.
+//! What is seen in one stretch of a record, and how it stands to a class: what of the class's
+//! recognition fails, how much of the stretch the class explains, and how sure that is.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,13 +33,15 @@ struct Voice {
 }
 
 impl<'a> Seen<'a> {
-    /// The detector places a step within half its transit; that much belongs to a stretch at both ends.
+    /// The detector places a step within half its transit; that much belongs to a stretch at both
+    /// ends.
     fn slack_s(&self) -> f64 {
         self.scene.settings.transit_s / 2.0
     }
 
-    /// The steps of a signal that stand out from feedback's: at least a share of its largest, less what turbulence may have
-    /// taken from them. Of a surface in a train of surfaces only those of its own.
+    /// The steps of a signal that stand out from feedback's: at least a share of its largest, less
+    /// what turbulence may have taken from them. Of a surface in a train of surfaces only those of
+    /// its own.
     pub fn steps_of(&self, signal: &str) -> Vec<&'a Step> {
         let scene = self.scene;
         let own = *self.kind == Kind::Onboard && !scene.is_pilot_s(signal);
@@ -58,8 +60,8 @@ impl<'a> Seen<'a> {
             .collect()
     }
 
-    /// How often a signal steps to count against a class: of a surface that hardly moves beside the others, feedback, not at
-    /// all.
+    /// How often a signal steps to count against a class: of a surface that hardly moves beside the
+    /// others, feedback, not at all.
     fn against(&self, signal: &str) -> usize {
         let relative = |signal: &str| {
             let smallest = self
@@ -151,9 +153,9 @@ impl<'a> Seen<'a> {
         (n > 2).then(|| format!("the pilot's controls step {n} times meanwhile"))
     }
 
-    /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as from side to side; that is
-    /// more where turbulence makes it work. It rests within half of the smallest step. Between the two, as where it is not
-    /// recorded, nothing is known.
+    /// Whether a signal moves: between its 2nd and 98th hundredth over twice its smallest step, as
+    /// from side to side; that is more where turbulence makes it work. It rests within half of the
+    /// smallest step. Between the two, as where it is not recorded, nothing is known.
     fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.scene.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
@@ -195,8 +197,9 @@ impl<'a> Seen<'a> {
             && steps.iter().any(|s| s.change().abs() >= 2.0 * smallest)
     }
 
-    /// The signals that make a maneuver of a class here: those that must, and of those that may step as often as a doublet
-    /// does the ones that are excited. Fewer steps of these are feedback's.
+    /// The signals that make a maneuver of a class here: those that must, and of those that may
+    /// step as often as a doublet does the ones that are excited. Fewer steps of these are
+    /// feedback's.
     pub fn inputs<'c>(&self, class: &'c Class) -> BTreeSet<&'c str> {
         let fewest = self.scene.settings.fewest_steps;
         let may = class
@@ -215,7 +218,8 @@ impl<'a> Seen<'a> {
             .collect()
     }
 
-    /// First and last step of the class's inputs; of the pilot's controls, first and last deflection.
+    /// First and last step of the class's inputs; of the pilot's controls, first and last
+    /// deflection.
     pub fn excited_s(&self, class: &Class) -> Option<(f64, f64)> {
         if *self.kind != Kind::Onboard {
             return Some((self.from_s, self.to_s));
@@ -295,8 +299,9 @@ impl<'a> Seen<'a> {
         others.map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 
-    /// What was asked about the class beyond its inputs, and what it answers. The weights are judgements: a contradiction
-    /// of a flag, which may be stuck, costs a fifth; a question that nothing recorded answers, a twentieth.
+    /// What was asked about the class beyond its inputs, and what it answers. The weights are
+    /// judgements: a contradiction of a flag, which may be stuck, costs a fifth; a question that
+    /// nothing recorded answers, a twentieth.
     fn voices(&self, class: &Class) -> Vec<Voice> {
         let rule = &class.recognition;
         let mut voices = Vec::new();

@@ -1,9 +1,10 @@
-//! Steps of a signal: a change between two levels, averaged shortly before and shortly after it, that is beyond the
-//! smallest step.
+//! Steps of a signal: a change between two levels, averaged shortly before and shortly after it,
+//! that is beyond the smallest step.
 //!
-//! At each time t the level before is averaged over [t − transit/2 − level, t − transit/2], the level after over
-//! [t + transit/2, t + transit/2 + level]. A run of times at which their difference has one sign and exceeds the smallest
-//! step is one step, at the middle of the run's near-maximum. What this sees and what it does not:
+//! At each time t the level before is averaged over [t − transit/2 − level, t − transit/2], the
+//! level after over [t + transit/2, t + transit/2 + level]. A run of times at which their
+//! difference has one sign and exceeds the smallest step is one step, at the middle of the run's
+//! near-maximum. What this sees and what it does not:
 //! - the trim does not matter, only the change;
 //! - smooth motion counts only where it is as fast as an actuator: it must cross the smallest step within
 //!   transit + level;
@@ -32,12 +33,14 @@ impl Step {
     }
 }
 
-/// The steps of a record by signal, each in order of time, and the smallest change that counts as one.
+/// The steps of a record by signal, each in order of time, and the smallest change that counts as
+/// one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Steps {
     pub of: BTreeMap<String, Vec<Step>>,
     pub smallest: BTreeMap<String, f64>,
-    /// The standard deviation of the signal's own changes, where turbulence has raised its smallest step; else 0.
+    /// The standard deviation of the signal's own changes, where turbulence has raised its smallest
+    /// step; else 0.
     pub noise: BTreeMap<String, f64>,
 }
 
@@ -51,9 +54,10 @@ impl Steps {
     }
 }
 
-/// The steps of every signal that has a smallest step and is in the record, and the deflections: those and all changes of
-/// at least the deflection's share of the smallest step. The smallest step is the one set, or the noise of the signal's own
-/// changes times `steps_over_noise` where that is larger: a surface that works in turbulence.
+/// The steps of every signal that has a smallest step and is in the record, and the deflections:
+/// those and all changes of at least the deflection's share of the smallest step. The smallest step
+/// is the one set, or the noise of the signal's own changes times `steps_over_noise` where that is
+/// larger: a surface that works in turbulence.
 pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
@@ -81,7 +85,8 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
     (steps, deflections)
 }
 
-/// The largest change of a signal, between levels as those of a step, from one time to another; 0 where nothing is known.
+/// The largest change of a signal, between levels as those of a step, from one time to another; 0
+/// where nothing is known.
 pub(super) fn largest_change(
     record: &Record,
     signal: &str,
@@ -101,7 +106,8 @@ pub(super) fn largest_change(
         .fold(0.0, f64::max)
 }
 
-/// The standard deviation of changes that nobody commanded: from the median of all, of which steps are few.
+/// The standard deviation of changes that nobody commanded: from the median of all, of which steps
+/// are few.
 fn noise(levels: &[f64], window: Window) -> f64 {
     let mut sizes: Vec<f64> = changes(levels, window)
         .map(|change| change.size())
@@ -174,12 +180,14 @@ fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = Change> {
         .filter(|change| change.size().is_finite())
 }
 
-/// The steps among the changes between levels, their times in samples (a step between samples 9 and 10 is at 9.5).
+/// The steps among the changes between levels, their times in samples (a step between samples 9 and
+/// 10 is at 9.5).
 fn of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
     let reach = window.half_transit + window.level;
     let mut steps = Vec::new();
     let mut run: Vec<Change> = Vec::new();
-    // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a step.
+    // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a
+    // step.
     for change in changes(levels, window) {
         let big = change.size() >= smallest;
         let goes_on = |last: &Change| {
@@ -223,8 +231,8 @@ fn peak(run: &[Change]) -> Option<Step> {
 /// Levels that are averaged side by side, in the processor's vectors.
 const SIDE: usize = 64;
 
-/// The level that begins at each sample: the mean of its finite samples without the largest and the smallest of them; NaN
-/// where fewer than half are finite.
+/// The level that begins at each sample: the mean of its finite samples without the largest and the
+/// smallest of them; NaN where fewer than half are finite.
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
     let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
     let side_by_side = pulp::Arch::new();

@@ -1,8 +1,8 @@
-//! Swings of a signal: from one extreme to the next, by more than the smallest step. Unlike steps they need not be fast, so
-//! a slow sine shows them as well as a pulse does.
+//! Swings of a signal: from one extreme to the next, by more than the smallest step. Unlike steps
+//! they need not be fast, so a slow sine shows them as well as a pulse does.
 
-/// From one extreme to the other: when the signal has left the first by a quarter of the way, and when it has come within a
-/// quarter of the second, s or samples.
+/// From one extreme to the other: when the signal has left the first by a quarter of the way, and
+/// when it has come within a quarter of the second, s or samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
     pub from_s: f64,
@@ -15,8 +15,8 @@ impl Swing {
     }
 }
 
-/// The swings of a signal beyond a size, times in samples. Missing samples are passed over; a lone spike is taken out by
-/// the median of three.
+/// The swings of a signal beyond a size, times in samples. Missing samples are passed over; a lone
+/// spike is taken out by the median of three.
 pub(super) fn of_signal(values: &[f64], size: f64) -> Vec<Swing> {
     let finite: Vec<(usize, f64)> = values
         .iter()

@@ -284,7 +284,8 @@ fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
     assert_window(&segmented.maneuvers[0], class, start_s, end_s);
 }
 
-/// Noise that feedback makes of turbulence: white noise through two lags of 0.15 s, of the given standard deviation.
+/// Noise that feedback makes of turbulence: white noise through two lags of 0.15 s, of the given
+/// standard deviation.
 fn turbulence(record: &mut Record, name: &str, seed: u64, deviation: f64) {
     let mut state = seed;
     let mut uniform = || {
@@ -548,7 +549,8 @@ fn excitation_that_fits_no_class_is_unknown_with_its_times_and_the_reason() {
 
 #[test]
 fn a_maneuver_broken_off_is_unknown_and_not_of_a_shorter_class() {
-    // The first pulses of each: six steps of a series are not a 3-2-1-1, two pulses of that are no doublet of two surfaces.
+    // The first pulses of each: six steps of a series are not a 3-2-1-1, two pulses of that are no
+    // doublet of two surfaces.
     let mut series = flight(60);
     pilot_steps(&mut series, "de_deg", 21.0, 4.0, 4, 0.9);
     let mut pulses = flight(60);
@@ -705,7 +707,8 @@ fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_
 #[test]
 fn a_series_flown_again_after_its_decay_is_cut_there_and_not_where_its_surface_passes_trim() {
     let mut r = flight(90);
-    // A series that is held at trim in its midst, and ends away from where it began by what feedback leaves of it.
+    // A series that is held at trim in its midst, and ends away from where it began by what
+    // feedback leaves of it.
     let series = |at: f64| {
         let mut all: Vec<(f64, f64)> = vec![(at, 4.0)];
         all.extend((1..=9).map(|k| (at + 0.9 * f64::from(k), if k % 2 == 1 { -8.0 } else { 8.0 })));
@@ -969,7 +972,8 @@ fn a_sweep_is_recognised_by_its_rising_frequency() {
     assert_eq!(classes_of(&find(&others)), ["3211", "SERIES"]);
 }
 
-/// A maneuver whose pitch rate answers the stabilator, in a record that can be spoiled; its quality.
+/// A maneuver whose pitch rate answers the stabilator, in a record that can be spoiled; its
+/// quality.
 fn quality(spoil: impl Fn(&mut Record)) -> Quality {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);

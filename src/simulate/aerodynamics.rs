@@ -1,7 +1,8 @@
-//! The build-up 2.10-2.13, 3.9-3.13 as forces and moments: coefficients from the true tables and what multiplies them.
+//! The build-up 2.10-2.13, 3.9-3.13 as forces and moments: coefficients from the true tables and
+//! what multiplies them.
 //!
-//! X = −q̄S CA, Y = q̄S CY, Z = −q̄S CN; L = q̄Sb Cl, M = q̄Sc̄ Cm, N = q̄Sb Cn, about the actual c.g. A vane's derivative is a
-//! force or a moment itself.
+//! X = −q̄S CA, Y = q̄S CY, Z = −q̄S CN; L = q̄Sb Cl, M = q̄Sc̄ Cm, N = q̄Sb Cn, about the actual
+//! c.g. A vane's derivative is a force or a moment itself.
 
 use nalgebra::Vector3;
 

@@ -1,6 +1,8 @@
-//! Air data: the flow that the aircraft meets, from its velocity over the ground, the gusts and the atmosphere.
+//! Air data: the flow that the aircraft meets, from its velocity over the ground, the gusts and the
+//! atmosphere.
 //!
-//! With u v w the velocity relative to the air: V² = u² + v² + w², tan α = w/u, sin β = v/V, q̄ = ρV²/2.
+//! With u v w the velocity relative to the air: V² = u² + v² + w², tan α = w/u, sin β = v/V, q̄ =
+//! ρV²/2.
 
 use nalgebra::Vector3;
 

@@ -1,15 +1,17 @@
-//! The rigid body: m (v̇ + ω × v) = F + m g and I ω̇ = M − ω × (I ω + h), with velocity u v w and rates p q r in body axes, the
-//! attitude as a quaternion, and the engines' angular momentum h along +x.
+//! The rigid body: m (v̇ + ω × v) = F + m g and I ω̇ = M − ω × (I ω + h), with velocity u v w and
+//! rates p q r in body axes, the attitude as a quaternion, and the engines' angular momentum h
+//! along +x.
 //!
-//! Written from Newton's and Euler's laws in vector form, and not from the estimator's equations of α, β and V: each is a
-//! check of the other. The earth is flat and does not turn; gravity is that of [`crate::earth::gravity_ft_s2`].
+//! Written from Newton's and Euler's laws in vector form, and not from the estimator's equations of
+//! α, β and V: each is a check of the other. The earth is flat and does not turn; gravity is that
+//! of [`crate::earth::gravity_ft_s2`].
 
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 
 use super::loading::Loading;
 
-/// Velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude (body to earth: north, east, down) as scalar and
-/// vector part; position north, east and up, ft.
+/// Velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude (body to earth: north, east,
+/// down) as scalar and vector part; position north, east and up, ft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub velocity: Vector3<f64>,

@@ -1,5 +1,5 @@
-//! Cards as they are written, YAML: the simulated aircraft, its truth and instruments, the programs of the maneuvers, and
-//! the flights with their test points.
+//! Cards as they are written, YAML: the simulated aircraft, its truth and instruments, the programs
+//! of the maneuvers, and the flights with their test points.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,7 +12,8 @@ use super::{Input, Instruments, Program, Settings, Tables, Turbulence};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cards {
-    /// The pipeline whose aircraft, channel map and build-up hold: a folder, or the name of one under `pipelines/`.
+    /// The pipeline whose aircraft, channel map and build-up hold: a folder, or the name of one
+    /// under `pipelines/`.
     pub pipeline: PathBuf,
     /// The true derivatives, CSV as a wind-tunnel table.
     pub truth: PathBuf,
@@ -41,7 +42,8 @@ pub struct Study {
     pub realisations: usize,
     /// Angles of attack of each class, spread over those that its cards have.
     pub points: usize,
-    /// Time constant of the outputs' noise where it is coloured; its size is that of the white noise.
+    /// Time constant of the outputs' noise where it is coloured; its size is that of the white
+    /// noise.
     pub coloured_time_s: f64,
 }
 
@@ -59,7 +61,8 @@ impl Default for Study {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tunnel {
-    /// Standard deviation of a derivative's error over the whole table, in percent of its root mean square.
+    /// Standard deviation of a derivative's error over the whole table, in percent of its root mean
+    /// square.
     pub error_pct: f64,
     /// The same for each of its points.
     pub scatter_pct: f64,

@@ -1,8 +1,8 @@
 //! Control: feedback that holds a trim, sticks geared to the surfaces, and flaps scheduled with α.
 //!
-//! The feedback of each axis is the linear-quadratic regulator of the motion linearised at the trim by finite differences
-//! (Bryson's weights: one over the square of the deviation that is allowed), so it holds a trim at any angle of attack
-//! whatever the derivatives are.
+//! The feedback of each axis is the linear-quadratic regulator of the motion linearised at the trim
+//! by finite differences (Bryson's weights: one over the square of the deviation that is allowed),
+//! so it holds a trim at any angle of attack whatever the derivatives are.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,8 @@ use crate::units::DEG;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Law {
-    /// Surfaces that feedback moves in pitch, and lateral-directionally, with the deflection it may use, deg.
+    /// Surfaces that feedback moves in pitch, and lateral-directionally, with the deflection it may
+    /// use, deg.
     #[serde(default)]
     pub pitch: BTreeMap<String, f64>,
     #[serde(default)]
@@ -33,8 +34,8 @@ pub struct Law {
     pub gearing: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
-/// Deviations from trim that the feedback trades against the surfaces' deflection: small ones make it stiff. The defaults
-/// let a test input be seen and keep the aircraft at its test point.
+/// Deviations from trim that the feedback trades against the surfaces' deflection: small ones make
+/// it stiff. The defaults let a test input be seen and keep the aircraft at its test point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Hold {
@@ -231,7 +232,8 @@ fn linear(
     (a, b)
 }
 
-/// Gains K of δ = −K x that minimise Σ xᵀQx + δᵀRδ of the sampled motion, from the Riccati recursion run until it settles.
+/// Gains K of δ = −K x that minimise Σ xᵀQx + δᵀRδ of the sampled motion, from the Riccati
+/// recursion run until it settles.
 fn regulator(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

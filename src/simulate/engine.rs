@@ -1,4 +1,5 @@
-//! Engines: thrust lags the throttle by a first order, its greatest value falls with density, and speed follows power.
+//! Engines: thrust lags the throttle by a first order, its greatest value falls with density, and
+//! speed follows power.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,5 @@
-//! Test inputs as data: pulses of alternating sign on a surface, a pilot's control or the thrust, one after another.
+//! Test inputs as data: pulses of alternating sign on a surface, a pilot's control or the thrust,
+//! one after another.
 //!
 //! Two widths are a doublet; 3, 2, 1 and 1 units of time are the 3-2-1-1; a step is one wide pulse.
 

@@ -1,8 +1,8 @@
-//! Instruments: what a recorder makes of an exact signal: lag, scale, bias, noise white and coloured, steps of the
-//! converter, spikes, dropouts.
+//! Instruments: what a recorder makes of an exact signal: lag, scale, bias, noise white and
+//! coloured, steps of the converter, spikes, dropouts.
 //!
-//! y = (1 + s) x(lagged) + b + w + c, rounded to the quantum; c is a first-order Gauss-Markov process,
-//! `c_{k+1}` = e^(−Δt/τ) `c_k` + σ√(1 − e^(−2Δt/τ)) `n_k`.
+//! y = (1 + s) x(lagged) + b + w + c, rounded to the quantum; c is a first-order Gauss-Markov
+//! process, `c_{k+1}` = e^(−Δt/τ) `c_k` + σ√(1 − e^(−2Δt/τ)) `n_k`.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,8 @@ pub struct Instrument {
 pub struct Instruments(pub BTreeMap<String, Instrument>);
 
 impl Instruments {
-    /// The instruments of one flight: biases and scales drawn from their spreads, which are zero then.
+    /// The instruments of one flight: biases and scales drawn from their spreads, which are zero
+    /// then.
     #[must_use]
     pub fn drawn(&self, seed: u64) -> Instruments {
         let draw = |(signal, i): (&String, &Instrument)| {

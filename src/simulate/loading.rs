@@ -1,4 +1,5 @@
-//! Loadings: mass, c.g. and inertias of the aircraft at some fuel states, linear in mass between them.
+//! Loadings: mass, c.g. and inertias of the aircraft at some fuel states, linear in mass between
+//! them.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -21,8 +22,8 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Between the two loadings next to a mass, and along the line through the last two beyond them. All zero
-    /// without any: the simulator refuses that.
+    /// Between the two loadings next to a mass, and along the line through the last two beyond
+    /// them. All zero without any: the simulator refuses that.
     #[must_use]
     pub fn at_mass(loadings: &[Loading], mass_slug: f64) -> Loading {
         let upper = loadings
@@ -76,7 +77,8 @@ impl Loading {
 
     #[must_use]
     pub fn inverse_inertia(&self) -> Matrix3<f64> {
-        // A matrix that cannot be inverted is refused with the cards; zeros stop the body instead of a panic.
+        // A matrix that cannot be inverted is refused with the cards; zeros stop the body instead
+        // of a panic.
         self.inertia().try_inverse().unwrap_or_else(Matrix3::zeros)
     }
 }

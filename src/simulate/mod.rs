@@ -1,8 +1,9 @@
-//! The simulator: one maneuver of a test card, flown from trim by a rigid body whose aerodynamics are the build-up with
-//! known derivatives, and recorded as perfect instruments would; [`Flown::recorded`] makes the record that real ones leave.
+//! The simulator: one maneuver of a test card, flown from trim by a rigid body whose aerodynamics
+//! are the build-up with known derivatives, and recorded as perfect instruments would;
+//! [`Flown::recorded`] makes the record that real ones leave.
 //!
-//! Its equations of motion are its own ([`body`]): it uses nothing of the estimator's dynamics, so that each is a check of
-//! the other.
+//! Its equations of motion are its own ([`body`]): it uses nothing of the estimator's dynamics, so
+//! that each is a check of the other.
 
 pub mod actuators;
 pub mod aerodynamics;
@@ -41,14 +42,16 @@ pub use turbulence::Turbulence;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tables {
-    /// At the card's α and the trim's Mach number: the estimator's assumption of constant derivatives.
+    /// At the card's α and the trim's Mach number: the estimator's assumption of constant
+    /// derivatives.
     #[default]
     Frozen,
     /// At the instant's α and Mach number.
     Varying,
 }
 
-/// What is done in a maneuver: the law in force, flags, and test inputs, on a clock that begins at 0.
+/// What is done in a maneuver: the law in force, flags, and test inputs, on a clock that begins at
+/// 0.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Program {
@@ -116,7 +119,8 @@ pub struct Simulator {
 
 impl Simulator {
     /// # Errors
-    /// A sentence: settings that contradict each other, a derivative without truth, a surface that is not simulated.
+    /// A sentence: settings that contradict each other, a derivative without truth, a surface that
+    /// is not simulated.
     pub fn new(
         aircraft: &Aircraft,
         buildup: &Buildup,

@@ -1,7 +1,9 @@
-//! Random numbers from a seed and a name: the same on every machine and whatever the number of threads.
+//! Random numbers from a seed and a name: the same on every machine and whatever the number of
+//! threads.
 //!
-//! A stream is `SplitMix64` (Steele, Lea and Flood 2014); normal deviates are Box and Muller's. Streams of different
-//! names do not touch each other, so a sensor's noise does not depend on which others there are.
+//! A stream is `SplitMix64` (Steele, Lea and Flood 2014); normal deviates are Box and Muller's.
+//! Streams of different names do not touch each other, so a sensor's noise does not depend on which
+//! others there are.
 
 /// A stream of random numbers.
 #[derive(Clone, Debug)]

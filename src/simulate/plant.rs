@@ -1,4 +1,5 @@
-//! The plant: aerodynamics, thrust, engines' momentum and gravity on the body at one instant, and the step between two.
+//! The plant: aerodynamics, thrust, engines' momentum and gravity on the body at one instant, and
+//! the step between two.
 
 use nalgebra::Vector3;
 
@@ -61,7 +62,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The instant of a state; `frozen` are the derivatives' values, else the tables are read at α and Mach.
+    /// The instant of a state; `frozen` are the derivatives' values, else the tables are read at α
+    /// and Mach.
     #[must_use]
     pub fn instant(&self, state: &State, given: &Given, frozen: Option<&[f64]>) -> Instant {
         let loading = Loading::at_mass(&self.loadings, given.mass_slug);
@@ -95,8 +97,8 @@ impl Plant {
         }
     }
 
-    /// The state after `step_s`, in `parts` Runge-Kutta steps, with everything given linear in time between `start` and
-    /// `end`.
+    /// The state after `step_s`, in `parts` Runge-Kutta steps, with everything given linear in time
+    /// between `start` and `end`.
     #[must_use]
     pub fn advance(
         &self,

@@ -1,6 +1,8 @@
-//! Sensors: what perfect instruments at their positions read of an instant, as the signals of a record.
+//! Sensors: what perfect instruments at their positions read of an instant, as the signals of a
+//! record.
 //!
-//! An accelerometer away from the c.g. feels f + ω̇ × r + ω × (ω × r); a vane the flow at its place.
+//! An accelerometer away from the c.g. feels f + ω̇ × r + ω × (ω × r); a vane the flow at its
+//! place.
 
 use nalgebra::Vector3;
 

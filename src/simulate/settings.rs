@@ -1,4 +1,5 @@
-//! Settings: what the simulated aircraft is besides its geometry and derivatives: rates, loadings, engines, surfaces, laws.
+//! Settings: what the simulated aircraft is besides its geometry and derivatives: rates, loadings,
+//! engines, surfaces, laws.
 
 use std::collections::BTreeMap;
 
@@ -17,8 +18,9 @@ pub struct Settings {
     /// Samples per second of the recorder. Default 40.
     #[serde(default = "default_rate")]
     pub rate_hz: f64,
-    /// Control steps per second, a multiple of the recorder's: surfaces and gusts are linear between them. At the
-    /// recorder's own rate the recorded surfaces are all there is to know of their motion. Default 80.
+    /// Control steps per second, a multiple of the recorder's: surfaces and gusts are linear
+    /// between them. At the recorder's own rate the recorded surfaces are all there is to know of
+    /// their motion. Default 80.
     #[serde(default = "default_control")]
     pub control_hz: f64,
     /// Integration steps per control step. Default 4.

@@ -1,8 +1,9 @@
 //! Trim: the steady straight flight at an angle of attack and height, found by Newton's method.
 //!
-//! No rotation, no sideslip: u̇ = v̇ = ẇ = 0 and ṗ = q̇ = ṙ = 0, for the speed, the thrust, one surface each in pitch, roll and
-//! yaw, and a small bank that carries what side force is left. Where level flight takes more thrust than there is, thrust
-//! is the greatest and the path descends.
+//! No rotation, no sideslip: u̇ = v̇ = ẇ = 0 and ṗ = q̇ = ṙ = 0, for the speed, the thrust, one
+//! surface each in pitch, roll and yaw, and a small bank that carries what side force is left.
+//! Where level flight takes more thrust than there is, thrust is the greatest and the path
+//! descends.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
@@ -181,7 +182,8 @@ impl Search<'_> {
     /// Accelerations that are to vanish, ft/s² and 0.02 rad/s².
     fn residual(&self, x: &Unknowns) -> Unknowns {
         let flight = self.flight(x);
-        // In trim the tables are read where they will be frozen: at the point's α and the speed's Mach number.
+        // In trim the tables are read where they will be frozen: at the point's α and the speed's
+        // Mach number.
         let slope = self.plant.instant(&flight.state, &flight.given, None).slope;
         let (v, w) = (slope.velocity, slope.rates * 50.0);
         Unknowns::from([v.x, v.y, v.z, w.x, w.y, w.z])

@@ -1,5 +1,6 @@
-//! Turbulence after Dryden (MIL-F-8785C): gusts along the body axes as white noise through the filters
-//! σ√(2T)/(1 + Ts) for u, T = `L_u`/V, and σ√T (1 + √3 Ts)/(1 + Ts)² for v and w, made in discrete time without approximation.
+//! Turbulence after Dryden (MIL-F-8785C): gusts along the body axes as white noise through the
+//! filters σ√(2T)/(1 + Ts) for u, T = `L_u`/V, and σ√T (1 + √3 Ts)/(1 + Ts)² for v and w, made in
+//! discrete time without approximation.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -28,7 +29,8 @@ struct Across {
     second: f64,
 }
 
-/// Gusts in body axes, ft/s, at the times k·`step_s`: `count` of them, from the stationary distribution.
+/// Gusts in body axes, ft/s, at the times k·`step_s`: `count` of them, from the stationary
+/// distribution.
 #[must_use]
 pub fn gusts(
     turbulence: &Turbulence,

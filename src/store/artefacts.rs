@@ -1,5 +1,6 @@
-//! The store: artefacts of the stages under their fingerprints, one run at a time; a folder, and where it is shared by
-//! machines without a common disk, an object store that the folder is the cache of.
+//! The store: artefacts of the stages under their fingerprints, one run at a time; a folder, and
+//! where it is shared by machines without a common disk, an object store that the folder is the
+//! cache of.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -22,7 +23,8 @@ pub struct Store {
     folder: PathBuf,
     _lock: Option<Lock>,
     shared: Option<Shared>,
-    /// What is in the folder and not yet in the object store: another run was killed before it had sent it.
+    /// What is in the folder and not yet in the object store: another run was killed before it had
+    /// sent it.
     unsent: Mutex<BTreeSet<PathBuf>>,
     /// Why something of the object store could not be had.
     trouble: Mutex<Option<Error>>,
@@ -44,8 +46,8 @@ const CONTENTS: &str = "contents.json";
 const SERVED: &str = "serves.json";
 
 impl Store {
-    /// Opens or creates a store, waiting up to `wait` for another run to leave it, and removes what a killed run left half
-    /// written.
+    /// Opens or creates a store, waiting up to `wait` for another run to leave it, and removes what
+    /// a killed run left half written.
     ///
     /// # Errors
     /// [`Error::Store`] when another run is using it, [`Error::Io`] when the disk says no.
@@ -61,8 +63,8 @@ impl Store {
         })
     }
 
-    /// Opens or creates a store as one of many that add to it at the same time, waiting up to `wait` for a run to leave
-    /// it. What lies there half written may be another's work and stays.
+    /// Opens or creates a store as one of many that add to it at the same time, waiting up to
+    /// `wait` for a run to leave it. What lies there half written may be another's work and stays.
     ///
     /// # Errors
     /// As [`Store::open`].
@@ -155,7 +157,8 @@ impl Store {
             .join(path.file_name().unwrap_or_default())
     }
 
-    /// The artefact at a path, where there is one that is as it was written; a damaged one counts as none and is made again.
+    /// The artefact at a path, where there is one that is as it was written; a damaged one counts
+    /// as none and is made again.
     #[must_use]
     pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Option<T> {
         let read = |bytes: &[u8]| serde_json::from_slice(unsealed(bytes)?).ok();
@@ -286,8 +289,8 @@ impl Store {
         self.made.lock().map_or(0, |made| made.len())
     }
 
-    /// Notes that the results of this run are made of these artefacts: what is published names them, and they are kept as
-    /// long as it is.
+    /// Notes that the results of this run are made of these artefacts: what is published names
+    /// them, and they are kept as long as it is.
     pub fn need<'a>(&self, paths: impl IntoIterator<Item = &'a PathBuf>) {
         if let Ok(mut needed) = self.needed.lock() {
             needed.extend(paths.into_iter().cloned());
@@ -309,13 +312,15 @@ impl Store {
         needed.iter().filter_map(name).collect()
     }
 
-    /// Whether an artefact, by its name relative to the store, is as it was written; not a record, which has no seal.
+    /// Whether an artefact, by its name relative to the store, is as it was written; not a record,
+    /// which has no seal.
     #[must_use]
     pub fn is_whole(&self, name: &str) -> bool {
         self.holds(&self.folder.join(name))
     }
 
-    /// Whether there is an artefact at a path that is as it was written; not a record, which has no seal.
+    /// Whether there is an artefact at a path that is as it was written; not a record, which has no
+    /// seal.
     #[must_use]
     pub fn holds(&self, path: &Path) -> bool {
         let is_sealed = |bytes: &Vec<u8>| unsealed(bytes).is_some();
@@ -331,7 +336,8 @@ impl Store {
             .is_some_and(is_sealed)
     }
 
-    /// Notes that what is published in this folder is made of this store's artefacts, so that none of them is removed.
+    /// Notes that what is published in this folder is made of this store's artefacts, so that none
+    /// of them is removed.
     ///
     /// # Errors
     /// [`Error::Io`] naming the file.
@@ -349,8 +355,8 @@ impl Store {
         Ok(())
     }
 
-    /// The folders of reports that are made of this store's artefacts. Where the list is damaged, a folder that cannot be
-    /// found stands for those that were in it.
+    /// The folders of reports that are made of this store's artefacts. Where the list is damaged, a
+    /// folder that cannot be found stands for those that were in it.
     #[must_use]
     pub fn served(&self) -> BTreeSet<PathBuf> {
         let Ok(bytes) = std::fs::read(self.folder.join(SERVED)) else {
@@ -360,7 +366,8 @@ impl Store {
             .unwrap_or_else(|_| [PathBuf::from("unknown: serves.json was damaged")].into())
     }
 
-    /// All artefacts, relative to the store, with their sizes; where it is shared, those that others see.
+    /// All artefacts, relative to the store, with their sizes; where it is shared, those that
+    /// others see.
     #[must_use]
     pub fn artefacts(&self) -> BTreeMap<String, u64> {
         if let Some(shared) = &self.shared {

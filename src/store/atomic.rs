@@ -1,4 +1,5 @@
-//! Files appear whole or not at all: written beside their place under a temporary name, synced, then renamed.
+//! Files appear whole or not at all: written beside their place under a temporary name, synced,
+//! then renamed.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +11,8 @@ use crate::error::{Error, Result};
 /// How the temporary files of an interrupted run are told from everything else.
 pub const TEMPORARY: &str = ".harvest-";
 
-/// Puts `bytes` at `path`, creating folders as needed. A file that holds these bytes already is left untouched.
+/// Puts `bytes` at `path`, creating folders as needed. A file that holds these bytes already is
+/// left untouched.
 ///
 /// # Errors
 /// [`Error::Io`] naming the path.
@@ -26,7 +28,8 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
     draft.place()
 }
 
-/// A file that is being written beside its place; dropped before it is placed, nothing of it remains.
+/// A file that is being written beside its place; dropped before it is placed, nothing of it
+/// remains.
 #[derive(Debug)]
 pub struct Draft {
     file: tempfile::NamedTempFile,
@@ -125,13 +128,14 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Makes sure that the names in a folder are on the disk, as its files' contents are: what is renamed after this cannot
-/// survive a loss of power without what was renamed before.
+/// Makes sure that the names in a folder are on the disk, as its files' contents are: what is
+/// renamed after this cannot survive a loss of power without what was renamed before.
 ///
 /// # Errors
 /// [`Error::Io`] naming the folder.
 pub fn sync_folder(folder: &Path) -> Result<()> {
-    // Elsewhere than on Unix a folder cannot be opened as a file, and a rename is as durable as it gets.
+    // Elsewhere than on Unix a folder cannot be opened as a file, and a rename is as durable as it
+    // gets.
     if cfg!(unix) {
         let synced = fs::File::open(folder).and_then(|f| f.sync_all());
         synced.map_err(Error::io(folder, "cannot write the folder to the disk"))?;

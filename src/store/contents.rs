@@ -1,12 +1,15 @@
-//! Fingerprints of files' contents, remembered from night to night, so that a night with nothing new reads no flight.
+//! Fingerprints of files' contents, remembered from night to night, so that a night with nothing
+//! new reads no flight.
 //!
-//! What is remembered counts only while the file is the same to the file system: device, inode, size, time of last write
-//! and time of last change, which no program can set. A file that changed within [`SETTLED`] before it was read is not
-//! remembered: it may change again within the tick of the file system's clock. Where the system has no such times (not
-//! Unix), every file is read each time.
+//! What is remembered counts only while the file is the same to the file system: device, inode,
+//! size, time of last write and time of last change, which no program can set. A file that changed
+//! within [`SETTLED`] before it was read is not remembered: it may change again within the tick of
+//! the file system's clock. Where the system has no such times (not Unix), every file is read each
+//! time.
 //!
-//! An object is the same while its size and its ETag are: the store's own mark of its content. That holds on every machine,
-//! so what is known of objects is shared where the store is ([`Contents::objects`]).
+//! An object is the same while its size and its ETag are: the store's own mark of its content. That
+//! holds on every machine, so what is known of objects is shared where the store is
+//! ([`Contents::objects`]).
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
@@ -20,8 +23,9 @@ use super::fingerprint::{sealed, unsealed};
 use super::{Digest, atomic, object};
 use crate::error::Result;
 
-/// A file must have been left alone for so long before it was read to be remembered. Clocks of file systems tick at most
-/// every two seconds; the rest is for a file server's clock that differs from ours.
+/// A file must have been left alone for so long before it was read to be remembered. Clocks of file
+/// systems tick at most every two seconds; the rest is for a file server's clock that differs from
+/// ours.
 const SETTLED: Duration = Duration::from_secs(10);
 
 /// What the file system says of a file's state; as text, so that it is compared and nothing else.
@@ -67,7 +71,8 @@ impl Contents {
         }
     }
 
-    /// Adds what others remember of objects, as [`Contents::objects`] gave it; nothing where it is damaged.
+    /// Adds what others remember of objects, as [`Contents::objects`] gave it; nothing where it is
+    /// damaged.
     #[must_use]
     pub fn with_objects(mut self, text: &[u8]) -> Contents {
         let theirs = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
@@ -326,7 +331,8 @@ mod tests {
         };
         remember();
         assert_eq!(Contents::load(&cache).of(&file).unwrap(), remembered);
-        // The same size, and the time of the last write put back: the time of the last change gives it away.
+        // The same size, and the time of the last write put back: the time of the last change gives
+        // it away.
         let written = std::fs::metadata(&file).unwrap().modified().unwrap();
         std::thread::sleep(Duration::from_millis(20));
         std::fs::write(&file, "two").unwrap();

@@ -1,4 +1,5 @@
-//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a simulation's truth.
+//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a
+//! simulation's truth.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -93,7 +94,8 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
 }
 
-/// The rows of a table that was published as CSV; columns that the row type does not have are passed over.
+/// The rows of a table that was published as CSV; columns that the row type does not have are
+/// passed over.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
@@ -132,7 +134,8 @@ pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
 /// The `trends` that an earlier campaign published in a folder.
 ///
 /// # Errors
-/// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no such table.
+/// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no
+/// such table.
 pub fn earlier_trends(folder: &Path) -> Result<Vec<PublishedTrend>> {
     let path = folder.join("trends.csv");
     if !path.is_file() {

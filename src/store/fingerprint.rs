@@ -1,5 +1,6 @@
-//! A fingerprint is everything that decides a result, in sixteen hexadecimal digits: the artefact of a stage carries it in
-//! its name, so an artefact with the right name is up to date by construction.
+//! A fingerprint is everything that decides a result, in sixteen hexadecimal digits: the artefact
+//! of a stage carries it in its name, so an artefact with the right name is up to date by
+//! construction.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// Collects what decides a result. The stage's name and the version of its method come first: a change of code that
-/// changes numbers changes the version.
+/// Collects what decides a result. The stage's name and the version of its method come first: a
+/// change of code that changes numbers changes the version.
 #[derive(Clone, Debug)]
 pub struct Fingerprint(blake3::Hasher);
 
@@ -21,11 +22,13 @@ impl Fingerprint {
         Fingerprint(hasher)
     }
 
-    /// Adds a value, by its serialised form with its length, so that neighbours cannot run into each other.
+    /// Adds a value, by its serialised form with its length, so that neighbours cannot run into
+    /// each other.
     #[must_use]
     pub fn with(mut self, value: &impl Serialize) -> Self {
-        // A value that cannot be serialised would have to be a map with keys that are no strings; there is none, and a
-        // fixed text in its place could only make two results look alike that the other parts tell apart.
+        // A value that cannot be serialised would have to be a map with keys that are no strings;
+        // there is none, and a fixed text in its place could only make two results look alike that
+        // the other parts tell apart.
         let bytes = serde_json::to_vec(value).unwrap_or_default();
         self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(&bytes);
@@ -82,7 +85,8 @@ impl Digest {
 /// Digits of the fingerprint at the end of a sealed text.
 const SEAL: usize = 16;
 
-/// A text with a fingerprint of its bytes in a last line, which tells whether it is as it was written.
+/// A text with a fingerprint of its bytes in a last line, which tells whether it is as it was
+/// written.
 pub(super) fn sealed(mut text: Vec<u8>) -> Vec<u8> {
     let seal = seal(&text);
     text.extend_from_slice(seal.as_bytes());

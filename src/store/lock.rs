@@ -1,10 +1,11 @@
 //! One run at a time, or many shards: a lock on a file that also says which run holds it.
 //!
-//! The lock is the operating system's and goes with the process that holds it, however that ends: the lock of a dead
-//! process blocks nobody, whatever its file still says. On a shared file system it reaches other machines where the file
-//! system carries locks; where it has none, everybody goes on without. Nothing hangs on it but waste: artefacts are named
-//! by what decides them and appear whole by a rename, so two who make the same one make the same bytes, and a leftover that
-//! a run sweeps away from under another costs that one a new try.
+//! The lock is the operating system's and goes with the process that holds it, however that ends:
+//! the lock of a dead process blocks nobody, whatever its file still says. On a shared file system
+//! it reaches other machines where the file system carries locks; where it has none, everybody goes
+//! on without. Nothing hangs on it but waste: artefacts are named by what decides them and appear
+//! whole by a rename, so two who make the same one make the same bytes, and a leftover that a run
+//! sweeps away from under another costs that one a new try.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -27,7 +28,8 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Takes the lock at `path`, waiting for it up to `wait`, and notes who holds it. `what` names what is locked.
+    /// Takes the lock at `path`, waiting for it up to `wait`, and notes who holds it. `what` names
+    /// what is locked.
     ///
     /// # Errors
     /// [`Error::Store`] naming the holder when another has it, [`Error::Io`] when the disk says no.
@@ -48,7 +50,8 @@ impl Lock {
         Ok(lock)
     }
 
-    /// Takes a share of the lock at `path`: any number may hold one, and nobody the whole meanwhile.
+    /// Takes a share of the lock at `path`: any number may hold one, and nobody the whole
+    /// meanwhile.
     ///
     /// # Errors
     /// As [`Lock::take`].
@@ -89,7 +92,8 @@ impl Lock {
     }
 }
 
-/// Whether an error says that the file system has no locks: not supported, or no lock manager (Linux's `ENOLCK`).
+/// Whether an error says that the file system has no locks: not supported, or no lock manager
+/// (Linux's `ENOLCK`).
 fn has_none(error: &std::io::Error) -> bool {
     error.kind() == std::io::ErrorKind::Unsupported
         || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)

@@ -1,5 +1,5 @@
-//! The run log: one JSON object per line with the time of day, appended to a file. The only place where a clock is read
-//! for what is kept.
+//! The run log: one JSON object per line with the time of day, appended to a file. The only place
+//! where a clock is read for what is kept.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -32,8 +32,9 @@ impl Log {
         })
     }
 
-    /// Appends a line: time, process, event and what belongs to it. A line is one write, so that two runs that share a log
-    /// do not mix theirs. A log that cannot be written stops no run; see [`Log::failure`].
+    /// Appends a line: time, process, event and what belongs to it. A line is one write, so that
+    /// two runs that share a log do not mix theirs. A log that cannot be written stops no run; see
+    /// [`Log::failure`].
     pub fn write(&self, event: &str, fields: &[(&str, Value)]) {
         let mut line = Map::new();
         line.insert("time".to_owned(), timestamp(SystemTime::now()).into());

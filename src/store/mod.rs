@@ -1,4 +1,5 @@
-//! Everything that touches the disk: the archive, the store of artefacts, the published tables, small text files.
+//! Everything that touches the disk: the archive, the store of artefacts, the published tables,
+//! small text files.
 
 pub mod archive;
 pub mod artefacts;

@@ -6,10 +6,11 @@
 //! reports/harv/fits.csv       → current/fits.csv, and so on
 //! ```
 //!
-//! A night is written beside the others under a temporary name, synced and renamed; then `current` is replaced by one
-//! rename. All paths change with it at once, so a reader sees last night's or tonight's files. One that opens several
-//! while it changes follows `current` once and stays in that folder. Where there are no symbolic links (not Unix),
-//! `current` is a text file and the files beside it are copies.
+//! A night is written beside the others under a temporary name, synced and renamed; then `current`
+//! is replaced by one rename. All paths change with it at once, so a reader sees last night's or
+//! tonight's files. One that opens several while it changes follows `current` once and stays in
+//! that folder. Where there are no symbolic links (not Unix), `current` is a text file and the
+//! files beside it are copies.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -49,7 +50,8 @@ pub struct Night {
     pub until: Stage,
     /// The complete night before it, which its changes are held against.
     pub since: Option<String>,
-    /// What the report prints beside numbers: the archive and the wind-tunnel table as they were named.
+    /// What the report prints beside numbers: the archive and the wind-tunnel table as they were
+    /// named.
     pub shown: BTreeMap<String, String>,
     pub lineage: Lineage,
     pub summary: Summary,
@@ -85,8 +87,8 @@ pub struct Nights {
 }
 
 impl Nights {
-    /// Opens a folder of reports to publish in, waiting up to `wait` for another run, and finishes what a killed run has
-    /// left: a night that is whole is published, anything half-written goes.
+    /// Opens a folder of reports to publish in, waiting up to `wait` for another run, and finishes
+    /// what a killed run has left: a night that is whole is published, anything half-written goes.
     ///
     /// # Errors
     /// [`Error::Store`] when another run publishes there, [`Error::Io`] when the disk says no.
@@ -209,8 +211,8 @@ impl Nights {
         );
     }
 
-    /// Publishes what lies in tonight's folder as `night`, whose name and files are filled in. The last `keep` complete
-    /// nights stay.
+    /// Publishes what lies in tonight's folder as `night`, whose name and files are filled in. The
+    /// last `keep` complete nights stay.
     ///
     /// # Errors
     /// [`Error::Io`] when the disk says no; then the night before still holds.
@@ -243,7 +245,8 @@ impl Nights {
         Ok(night)
     }
 
-    /// Puts the files of tonight's folder in the places of those of `night`, which was made of the same and is damaged.
+    /// Puts the files of tonight's folder in the places of those of `night`, which was made of the
+    /// same and is damaged.
     ///
     /// # Errors
     /// [`Error::Io`] when the disk says no.
@@ -270,7 +273,8 @@ impl Nights {
         Ok(night)
     }
 
-    /// The nights that `prune` would remove: complete ones before the last `keep`, and incomplete ones that do not hold.
+    /// The nights that `prune` would remove: complete ones before the last `keep`, and incomplete
+    /// ones that do not hold.
     #[must_use]
     pub fn superfluous(&self, keep: usize) -> Vec<String> {
         let current = self.pointed();
@@ -386,7 +390,8 @@ mod link {
         fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
     }
 
-    /// Gives each file of a night its name in the folder of reports; names that it does not have go.
+    /// Gives each file of a night its name in the folder of reports; names that it does not have
+    /// go.
     pub fn beside<'a>(
         reports: &Path,
         _: &Path,

@@ -1,8 +1,10 @@
-//! A record as a Parquet file: per signal a column of values and one of marks, the clock in the file's key-value metadata.
+//! A record as a Parquet file: per signal a column of values and one of marks, the clock in the
+//! file's key-value metadata.
 //!
-//! It is written row group by row group, the signals of a group in parallel, and read by windows of time and by signals:
-//! nothing ever needs a whole record in memory. Writing and reading back returns the record to the bit. Nothing but the
-//! record is in the bytes: no time, no host, nor the pieces in which it was written.
+//! It is written row group by row group, the signals of a group in parallel, and read by windows of
+//! time and by signals: nothing ever needs a whole record in memory. Writing and reading back
+//! returns the record to the bit. Nothing but the record is in the bytes: no time, no host, nor the
+//! pieces in which it was written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -41,7 +43,8 @@ const SAMPLES: &str = "samples";
 /// The beginning of the key of a signal that is one value throughout.
 const CONSTANT: &str = "constant:";
 
-/// The samples of a row group: what is encoded of one signal is in memory until its group is written.
+/// The samples of a row group: what is encoded of one signal is in memory until its group is
+/// written.
 pub const GROUP: usize = 1 << 19;
 
 /// The samples of a page: what has to be decoded for one sample.
@@ -107,8 +110,9 @@ impl<W: Write + Send> Writer<W> {
         out: W,
     ) -> Result<Writer<W>, String> {
         let mut fields = Vec::new();
-        // Uncompressed values: to compress what is mostly noise takes longer than to write it. A sample as it was measured,
-        // as nearly all are, has no mark: pages without one cost nothing.
+        // Uncompressed values: to compress what is mostly noise takes longer than to write it. A
+        // sample as it was measured, as nearly all are, has no mark: pages without one cost
+        // nothing.
         let mut properties = WriterProperties::builder()
             .set_compression(Compression::UNCOMPRESSED)
             .set_dictionary_enabled(false)
@@ -122,7 +126,8 @@ impl<W: Write + Send> Writer<W> {
             properties = properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
             fields.push(Field::new(marks, DataType::UInt8, true));
         }
-        // Without the serialised Arrow schema, the key-value metadata is all there is and its order is ours.
+        // Without the serialised Arrow schema, the key-value metadata is all there is and its order
+        // is ours.
         let schema = Arc::new(Schema::new(fields));
         let parquet = ArrowSchemaConverter::new()
             .convert(&schema)
@@ -138,7 +143,8 @@ impl<W: Write + Send> Writer<W> {
         })
     }
 
-    /// The writers of the next row group, one per signal in their order; each takes the group's samples.
+    /// The writers of the next row group, one per signal in their order; each takes the group's
+    /// samples.
     ///
     /// # Errors
     /// The reason in words.
@@ -163,8 +169,8 @@ impl<W: Write + Send> Writer<W> {
         Ok(signals)
     }
 
-    /// Writes the next row group: what its writers made, in batches, in their order. While one batch is written the next
-    /// is made.
+    /// Writes the next row group: what its writers made, in batches, in their order. While one
+    /// batch is written the next is made.
     ///
     /// # Errors
     /// The reason in words.
@@ -392,7 +398,8 @@ impl RecordFile {
             .sample_at(time_s)
     }
 
-    /// The part of the record from one time to another with a few samples more on each side, as [`Record::part`] cuts it.
+    /// The part of the record from one time to another with a few samples more on each side, as
+    /// [`Record::part`] cuts it.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
@@ -408,7 +415,8 @@ impl RecordFile {
         self.window(signals, from..to)
     }
 
-    /// A range of samples of some signals, or of all; signals that the record does not have are left out.
+    /// A range of samples of some signals, or of all; signals that the record does not have are
+    /// left out.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -492,8 +500,8 @@ impl RecordFile {
 }
 
 impl RecordFile {
-    /// The whole record for a picture: where it has more samples than `most`, the smallest and the largest of each of
-    /// several samples in their order. Signals are read one at a time.
+    /// The whole record for a picture: where it has more samples than `most`, the smallest and the
+    /// largest of each of several samples in their order. Signals are read one at a time.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
@@ -519,7 +527,8 @@ impl RecordFile {
     }
 }
 
-/// The smallest and the largest of each so many samples, in their order; the mark of one with a fault, if there is one.
+/// The smallest and the largest of each so many samples, in their order; the mark of one with a
+/// fault, if there is one.
 fn extremes(series: &Series, width: usize) -> Series {
     let mut outline = Series {
         values: Vec::new(),

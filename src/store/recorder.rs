@@ -1,4 +1,5 @@
-//! A flight as its recorder writes it: Parquet, a column per channel in the recorder's unit, the unit in the field's metadata.
+//! A flight as its recorder writes it: Parquet, a column per channel in the recorder's unit, the
+//! unit in the field's metadata.
 //!
 //! What [`super::archive::read`] reads: a value that was lost is a null.
 

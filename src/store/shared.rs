@@ -1,9 +1,10 @@
-//! The store's other half, where it lies in an object store: what is there, what comes from it and what goes to it. The
-//! folder beside it then is a cache of its own on each machine.
+//! The store's other half, where it lies in an object store: what is there, what comes from it and
+//! what goes to it. The folder beside it then is a cache of its own on each machine.
 //!
-//! There is no lock. One would have to outlive its holder, and somebody to say when a holder is dead; and nothing hangs on
-//! it: an object appears whole, by one request, and its name ends in the fingerprint of what decides it, so two runs that
-//! make the same one put the same bytes. Nothing of ours removes one that another may need.
+//! There is no lock. One would have to outlive its holder, and somebody to say when a holder is
+//! dead; and nothing hangs on it: an object appears whole, by one request, and its name ends in the
+//! fingerprint of what decides it, so two runs that make the same one put the same bytes. Nothing
+//! of ours removes one that another may need.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,8 @@ use super::atomic::Draft;
 use super::{Digest, object};
 use crate::error::{Error, Result};
 
-/// An object store that is opened: what is there was listed once, and is added to by what this run puts there.
+/// An object store that is opened: what is there was listed once, and is added to by what this run
+/// puts there.
 #[derive(Debug)]
 pub(super) struct Shared {
     place: PathBuf,
@@ -85,8 +87,8 @@ impl Shared {
         Ok(())
     }
 
-    /// Brings an object to a file, unless it is not what was written: then it is removed, for it would be taken for whole
-    /// again.
+    /// Brings an object to a file, unless it is not what was written: then it is removed, for it
+    /// would be taken for whole again.
     pub fn fetch(&self, name: &str, file: &Path, written: &Digest) -> Result<()> {
         let path = self.place.join(name);
         let mut draft = Draft::of(file)?;

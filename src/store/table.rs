@@ -37,7 +37,8 @@ impl Shelf {
         }
     }
 
-    /// The same with pairs for the key-value metadata of each Parquet file; the CSV beside it stays as it is.
+    /// The same with pairs for the key-value metadata of each Parquet file; the CSV beside it stays
+    /// as it is.
     #[must_use]
     pub fn with(mut self, provenance: Vec<(String, String)>) -> Shelf {
         self.provenance = provenance;
@@ -243,7 +244,8 @@ impl PredictedRow {
     }
 }
 
-/// Publishes `fits`: each fit beside the prediction of the same maneuver, those without one at the end.
+/// Publishes `fits`: each fit beside the prediction of the same maneuver, those without one at the
+/// end.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -257,7 +259,8 @@ pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) 
     place(shelf, FitRow::NAME, fits.len(), columns)
 }
 
-/// Publishes the export's rows; the third variable, where the tables have one, is a column of its name.
+/// Publishes the export's rows; the third variable, where the tables have one, is a column of its
+/// name.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -279,7 +282,8 @@ pub fn publish<T: Table>(shelf: &Shelf, rows: &[T]) -> Result<()> {
     publish_as(shelf, T::NAME, rows)
 }
 
-/// Publishes rows as [`publish`] does, under another name than their type's: a second table of the same columns.
+/// Publishes rows as [`publish`] does, under another name than their type's: a second table of the
+/// same columns.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.

@@ -1,5 +1,5 @@
-//! What a trend is made of: Legendre polynomials of the α range scaled to −1..1, or B-splines (Cox and de Boor's
-//! recursion) between knots.
+//! What a trend is made of: Legendre polynomials of the α range scaled to −1..1, or B-splines (Cox
+//! and de Boor's recursion) between knots.
 
 use nalgebra::RowDVector;
 
@@ -88,7 +88,8 @@ impl Basis {
             .chain(ends(high))
             .collect();
         let x = alpha_deg.clamp(low, high);
-        // Order 0: one on the interval of x; at the upper end on the last interval that has a length.
+        // Order 0: one on the interval of x; at the upper end on the last interval that has a
+        // length.
         let inside = |i: usize| {
             knots[i] < knots[i + 1] && knots[i] <= x && (x < knots[i + 1] || knots[i + 1] >= high)
         };

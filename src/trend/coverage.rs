@@ -1,4 +1,5 @@
-//! Do the bands hold what they promise: seeded Monte Carlo over few and many maneuvers, straight and bent truths.
+//! Do the bands hold what they promise: seeded Monte Carlo over few and many maneuvers, straight
+//! and bent truths.
 
 use super::tests::{Lcg, estimate, through};
 use super::*;
@@ -62,8 +63,9 @@ fn stall(a: f64) -> f64 {
     0.08 - 0.07 / (1.0 + (-(a - 22.0) / 4.0).exp()) + 3e-4 * a
 }
 
-/// Maneuvers, test points, truth, scatter between maneuvers; the share that the band holds at least. A stall within 15° bends
-/// more than test points 5° apart show: there the band is known to hold less than it says.
+/// Maneuvers, test points, truth, scatter between maneuvers; the share that the band holds at
+/// least. A stall within 15° bends more than test points 5° apart show: there the band is known to
+/// hold less than it says.
 const STUDIES: [(Study, f64); 7] = [
     (
         Study {

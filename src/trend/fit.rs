@@ -1,29 +1,35 @@
-//! Weighted least squares of a polynomial or spline in α, its order, and the scatter between maneuvers.
+//! Weighted least squares of a polynomial or spline in α, its order, and the scatter between
+//! maneuvers.
 //!
-//! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) + maneuver's own deviation +
-//! error, with the functions of [`Basis`], deviations of standard deviation τ, errors of standard deviation bᵢ. Weights are
-//! 1/(bᵢ² + τ²). τ² is the value at which the weighted residuals come out as large as their degrees of freedom,
-//! Σ r²/(b² + τ²) = Σ (1 − hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is what an estimate
-//! pulls its own trend, and the sum n − p over all maneuvers. A class of `OWN_SCATTER` maneuvers has a τ of its own: one
-//! that strays (a derivative of it is held at a wrong value, say) does not take the weight from those that agree.
+//! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) +
+//! maneuver's own deviation + error, with the functions of [`Basis`], deviations of standard
+//! deviation τ, errors of standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value at which
+//! the weighted residuals come out as large as their degrees of freedom, Σ r²/(b² + τ²) = Σ (1 −
+//! hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is what an estimate
+//! pulls its own trend, and the sum n − p over all maneuvers. A class of `OWN_SCATTER` maneuvers
+//! has a τ of its own: one that strays (a derivative of it is held at a wrong value, say) does not
+//! take the weight from those that agree.
 //!
-//! One wild estimate must bend neither the trend nor τ: a residual beyond `HUBER` standard deviations counts as if it
-//! were just that far (Huber's weights in the fit, his proposal 2 for τ). And no maneuver is trusted beyond a share
-//! `BOUND_FLOOR` of the group's median bound: bounds are themselves only known to a factor of a few.
+//! One wild estimate must bend neither the trend nor τ: a residual beyond `HUBER` standard
+//! deviations counts as if it were just that far (Huber's weights in the fit, his proposal 2 for
+//! τ). And no maneuver is trusted beyond a share `BOUND_FLOOR` of the group's median bound: bounds
+//! are themselves only known to a factor of a few.
 //!
 //! The covariance of the coefficients is that of an M-estimate (Huber 1981, section 7.6),
 //!
 //! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
 //!
-//! with u the residuals over their standard deviations, ψ cutting them at `HUBER`, m the share that is not cut and
-//! V = b² + τ². The bracket is what makes few data honest: it scales by the residuals as they are, not by what bounds and
-//! τ say they should be, and the interval takes Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is
-//! never smaller than what the bounds alone say.
+//! with u the residuals over their standard deviations, ψ cutting them at `HUBER`, m the share that
+//! is not cut and V = b² + τ². The bracket is what makes few data honest: it scales by the
+//! residuals as they are, not by what bounds and τ say they should be, and the interval takes
+//! Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is never smaller than
+//! what the bounds alone say.
 //!
-//! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not chosen count in the
-//! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance), each with its own
-//! variance and its distance from the chosen trend. And a criterion smooths: it leaves a bias as large as the errors. So no
-//! standard error is smaller than that of one coefficient more (undersmoothing, Hall 1992).
+//! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not
+//! chosen count in the variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's
+//! unconditional variance), each with its own variance and its distance from the chosen trend. And
+//! a criterion smooths: it leaves a bias as large as the errors. So no standard error is smaller
+//! than that of one coefficient more (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -31,16 +37,18 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::basis::Basis;
 use super::{Criterion, Settings};
 
-/// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit then bears a quarter
-/// of wild estimates, and costs 4% of efficiency where there are none.
+/// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit
+/// then bears a quarter of wild estimates, and costs 4% of efficiency where there are none.
 const HUBER: f64 = 1.5;
-/// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the equation for τ².
+/// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the
+/// equation for τ².
 const HUBER_VARIANCE: f64 = 0.778_465;
 /// Standard deviations beyond which a residual says nothing about the order of the polynomial.
 const WILD: f64 = 3.0;
 /// No bound is taken as smaller than this share of the median bound.
 const BOUND_FLOOR: f64 = 0.25;
-/// A class of so many maneuvers has a scatter of its own; from fewer it would be a guess, and they have that of all.
+/// A class of so many maneuvers has a scatter of its own; from fewer it would be a guess, and they
+/// have that of all.
 const OWN_SCATTER: usize = 8;
 /// Steps of the iteration between coefficients, τ² and Huber's weights; it settles in about ten.
 const MOST_STEPS: usize = 100;
@@ -96,7 +104,8 @@ pub(super) struct Trend {
 }
 
 impl Trend {
-    /// The trend through points sorted by α: the lower order on a tie, none where no order has a solution.
+    /// The trend through points sorted by α: the lower order on a tie, none where no order has a
+    /// solution.
     pub(super) fn through(
         points: &[Point],
         settings: &Settings,
@@ -146,10 +155,11 @@ impl Trend {
 impl Fit {
     /// The fits of every order that the data allow. Points are sorted by α.
     ///
-    /// At least two degrees of freedom are left to the residuals, and there are no more coefficients than distinct α: with
-    /// several maneuvers at each, a trend may run through the middle of every cluster, and must be able to where a
-    /// derivative bends between them. Besides polynomials there are splines: between the analyst's knots, with polynomials
-    /// up to the third order; where he gives none, between the flown α, each or every second.
+    /// At least two degrees of freedom are left to the residuals, and there are no more
+    /// coefficients than distinct α: with several maneuvers at each, a trend may run through the
+    /// middle of every cluster, and must be able to where a derivative bends between them. Besides
+    /// polynomials there are splines: between the analyst's knots, with polynomials up to the third
+    /// order; where he gives none, between the flown α, each or every second.
     fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<Fit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();
@@ -280,7 +290,8 @@ impl Fit {
         median(self.variances.clone()).sqrt()
     }
 
-    /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees of freedom.
+    /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees
+    /// of freedom.
     pub(super) fn quantile_95(&self) -> f64 {
         StudentsT::new(0.0, 1.0, self.degrees_of_freedom as f64)
             .map_or(f64::NAN, |t| t.inverse_cdf(0.975))
@@ -305,7 +316,8 @@ fn robust_covariance(
     Some(solve(design, residuals, &weights)?.1 * scale)
 }
 
-/// Residuals over their standard deviations: the variance of a residual is less by what the estimate pulls the trend.
+/// Residuals over their standard deviations: the variance of a residual is less by what the
+/// estimate pulls the trend.
 fn standardised(
     design: &DMatrix<f64>,
     residuals: &DVector<f64>,
@@ -325,8 +337,8 @@ fn standardised(
     (0..design.nrows()).map(of).collect()
 }
 
-/// The distinct α that were flown, deg, ascending: a new one begins half a step of the published grid beyond the last one's
-/// beginning. Each is the mean of its maneuvers, to a tenth.
+/// The distinct α that were flown, deg, ascending: a new one begins half a step of the published
+/// grid beyond the last one's beginning. Each is the mean of its maneuvers, to a tenth.
 fn flown(points: &[Point], step_deg: f64) -> Vec<f64> {
     let mut clusters: Vec<Vec<f64>> = Vec::new();
     for p in points {
@@ -355,7 +367,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The points of each scatter: of every class that has one of its own, and of all points, last, where any is left.
+/// The points of each scatter: of every class that has one of its own, and of all points, last,
+/// where any is left.
 fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     let classes = points
         .iter()
@@ -430,8 +443,8 @@ fn weight(residual: f64, variance: f64) -> f64 {
     }
 }
 
-/// Minus twice the log-likelihood of one residual; a wild one costs the same however wild it is, so that no order is
-/// chosen for coming nearer to it.
+/// Minus twice the log-likelihood of one residual; a wild one costs the same however wild it is, so
+/// that no order is chosen for coming nearer to it.
 fn deviance(residual: f64, variance: f64) -> f64 {
     variance.ln() + (residual * residual / variance).min(WILD * WILD)
 }
@@ -446,8 +459,9 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     }
 }
 
-/// τ² of some of the points: where the sum of their squared residuals over their variances, wild ones cut, is what its
-/// degrees of freedom expect. The sum falls as τ² grows, so bisection finds it.
+/// τ² of some of the points: where the sum of their squared residuals over their variances, wild
+/// ones cut, is what its degrees of freedom expect. The sum falls as τ² grows, so bisection finds
+/// it.
 fn scatter_squared(
     residuals: &DVector<f64>,
     variances: &[f64],
@@ -565,7 +579,8 @@ mod tests {
 
     #[test]
     fn scatter_between_maneuvers_is_what_the_bounds_leave() {
-        // Two levels 0.5 either side of the mean, negligible bounds: τ² = Σ r²/(n − 1), in terms of cut residuals.
+        // Two levels 0.5 either side of the mean, negligible bounds: τ² = Σ r²/(n − 1), in terms of
+        // cut residuals.
         let mut data = points(|_| 1.0, &alphas());
         for (i, p) in data.iter_mut().enumerate() {
             p.value += if i % 2 == 0 { 0.5 } else { -0.5 };

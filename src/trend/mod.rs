@@ -1,8 +1,8 @@
-//! Trend fits least squares across α through the estimates of one derivative, for the group of classes that speaks for
-//! it and for each class alone.
+//! Trend fits least squares across α through the estimates of one derivative, for the group of
+//! classes that speaks for it and for each class alone.
 //!
-//! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights 1/(bound² + τ²), where τ is the
-//! scatter between maneuvers of a class beyond their bounds.
+//! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights
+//! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds.
 
 mod basis;
 #[cfg(test)]
@@ -29,34 +29,37 @@ const FEWEST_MANEUVERS: usize = 3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Highest order of the polynomial in α. Default 10: an aircraft that goes through stall bends its derivatives at
-    /// every few degrees between 5° and 60°. The criterion chooses below it.
+    /// Highest order of the polynomial in α. Default 10: an aircraft that goes through stall bends
+    /// its derivatives at every few degrees between 5° and 60°. The criterion chooses below it.
     #[serde(default = "default_max_order")]
     pub max_order: usize,
     /// What chooses the order. Default `aicc`.
     #[serde(default)]
     pub criterion: Criterion,
-    /// The trend is published at the multiples of this that lie inside the range of the data, deg. Default 5°.
+    /// The trend is published at the multiples of this that lie inside the range of the data, deg.
+    /// Default 5°.
     #[serde(default = "default_alpha_step")]
     pub alpha_step_deg: f64,
-    /// A multiple that lies no further than this beyond the outermost maneuver counts as inside, deg: a maneuver flown
-    /// for 60° has a mean of 59.8°. Default 0.5°.
+    /// A multiple that lies no further than this beyond the outermost maneuver counts as inside,
+    /// deg: a maneuver flown for 60° has a mean of 59.8°. Default 0.5°.
     #[serde(default = "default_alpha_reach")]
     pub alpha_reach_deg: f64,
-    /// Angles of attack at which the trend may bend sharply, deg: with knots it is a spline whose order, up to 3, the
-    /// criterion chooses, or a polynomial up to the third order where that does better. Default none: a polynomial, or a
-    /// spline between the flown angles of attack where that does better.
+    /// Angles of attack at which the trend may bend sharply, deg: with knots it is a spline whose
+    /// order, up to 3, the criterion chooses, or a polynomial up to the third order where that does
+    /// better. Default none: a polynomial, or a spline between the flown angles of attack where
+    /// that does better.
     #[serde(default)]
     pub knots_deg: Vec<f64>,
-    /// A maneuver further than this from its trend, in standard deviations, is named in the table `outliers`. Default 3.
-    /// It pulls the trend like one at 1.5, whatever is set here.
+    /// A maneuver further than this from its trend, in standard deviations, is named in the table
+    /// `outliers`. Default 3. It pulls the trend like one at 1.5, whatever is set here.
     #[serde(default = "default_outlier_z")]
     pub outlier_z: f64,
     /// Whether each class has a trend of its own beside the group's. Default true.
     #[serde(default = "default_per_class")]
     pub per_class: bool,
-    /// Which classes speak for which derivatives. The first group that names a derivative, or that names none, is the
-    /// derivative's. Default: one group, `all`, of all classes for all derivatives.
+    /// Which classes speak for which derivatives. The first group that names a derivative, or that
+    /// names none, is the derivative's. Default: one group, `all`, of all classes for all
+    /// derivatives.
     #[serde(default = "default_groups")]
     pub groups: Vec<Group>,
     /// Names that have no trend across α: sensor biases.
@@ -130,7 +133,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The group that speaks for a derivative; none where no group names it and none takes the rest.
+    /// The group that speaks for a derivative; none where no group names it and none takes the
+    /// rest.
     #[must_use]
     pub fn group_of(&self, derivative: &str) -> Option<&Group> {
         let names = |g: &&Group| g.derivatives.iter().any(|d| d == derivative);
@@ -158,12 +162,14 @@ pub struct Trends {
     pub problems: Vec<Problem>,
 }
 
-/// The trends of every derivative, in the order in which the derivatives first appear: its group's, then its classes'.
+/// The trends of every derivative, in the order in which the derivatives first appear: its group's,
+/// then its classes'.
 ///
-/// Give it the estimates of converged fits only. Of them it takes those with status `estimated`, a value and a bound
-/// (the corrected one where there is one). A group of fewer than three maneuvers has no trend and is a problem; a
-/// single class of so few is passed over. A trend is published at the multiples of the step and at the derivative's
-/// `breakpoints`, deg, as far as they lie inside its data.
+/// Give it the estimates of converged fits only. Of them it takes those with status `estimated`, a
+/// value and a bound (the corrected one where there is one). A group of fewer than three maneuvers
+/// has no trend and is a problem; a single class of so few is passed over. A trend is published at
+/// the multiples of the step and at the derivative's `breakpoints`, deg, as far as they lie inside
+/// its data.
 #[must_use]
 pub fn trends(
     estimates: &[EstimateRow],
@@ -216,7 +222,8 @@ fn of_derivative(
         {
             let members: Vec<&EstimateRow> =
                 of_it.iter().filter(|e| e.class == class).copied().collect();
-            // What lies far from its class's trend alone is no more than a hint, and its group's names it too.
+            // What lies far from its class's trend alone is no more than a hint, and its group's
+            // names it too.
             let of_class = trend(&members, class, settings, &settings.knots_deg, further);
             trends
                 .rows
@@ -358,7 +365,8 @@ fn outliers(
     .collect()
 }
 
-/// α, or the end of the data where it lies a little beyond: a trend is not continued past its last maneuver.
+/// α, or the end of the data where it lies a little beyond: a trend is not continued past its last
+/// maneuver.
 fn inside(points: &[Point], alpha_deg: f64) -> f64 {
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
         return alpha_deg;
@@ -366,9 +374,10 @@ fn inside(points: &[Point], alpha_deg: f64) -> f64 {
     alpha_deg.max(first.alpha_deg).min(last.alpha_deg)
 }
 
-/// What the uncertainty of held values and of the instruments' calibration does to the trend at an angle of attack.
-/// Maneuvers that hold the same derivative at the same tunnel err together, and so do those with the same instruments: it
-/// does not average out. It is the mean over the maneuvers within a step of α, each with its weight 1/bound².
+/// What the uncertainty of held values and of the instruments' calibration does to the trend at an
+/// angle of attack. Maneuvers that hold the same derivative at the same tunnel err together, and so
+/// do those with the same instruments: it does not average out. It is the mean over the maneuvers
+/// within a step of α, each with its weight 1/bound².
 fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
     let near = members
         .iter()

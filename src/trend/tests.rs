@@ -34,7 +34,8 @@ pub(super) fn estimate(
     }
 }
 
-/// Numbers that look random and are the same every time: Knuth's linear congruential generator, normal by summing.
+/// Numbers that look random and are the same every time: Knuth's linear congruential generator,
+/// normal by summing.
 pub(super) struct Lcg(pub u64);
 
 impl Lcg {

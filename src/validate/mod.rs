@@ -1,8 +1,9 @@
-//! Is what the bounds say true? Maneuvers with known derivatives are recorded many times, each time with other noise, and
-//! estimated; how far the estimates scatter is held against what each of them said of itself.
+//! Is what the bounds say true? Maneuvers with known derivatives are recorded many times, each time
+//! with other noise, and estimated; how far the estimates scatter is held against what each of them
+//! said of itself.
 //!
-//! The maneuvers are the simulator's, whose equations of motion are not the estimator's. Instruments have noise only; held
-//! values are the true ones.
+//! The maneuvers are the simulator's, whose equations of motion are not the estimator's.
+//! Instruments have noise only; held values are the true ones.
 
 mod coverage;
 mod page;
@@ -26,7 +27,8 @@ pub enum Residuals {
     White,
     /// Coloured noise of the outputs, of the same size.
     Coloured,
-    /// White noise on every channel, also those that the estimator takes as exact: surfaces, airspeed, the other axis.
+    /// White noise on every channel, also those that the estimator takes as exact: surfaces,
+    /// airspeed, the other axis.
     EveryChannel,
 }
 

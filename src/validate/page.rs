@@ -1,12 +1,13 @@
-//! The page of the documentation that says what the bounds are worth: Markdown from the study's tables.
+//! The page of the documentation that says what the bounds are worth: Markdown from the study's
+//! tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use crate::tables::{CoverageRow, StartRow};
 
-/// What is wanted of every derivative: bias under this share of the scatter, and coverage of the 95% interval between
-/// these.
+/// What is wanted of every derivative: bias under this share of the scatter, and coverage of the
+/// 95% interval between these.
 const BIAS: f64 = 0.1;
 const COVERED: std::ops::RangeInclusive<f64> = 0.92..=0.98;
 

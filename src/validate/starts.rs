@@ -1,5 +1,5 @@
-//! Does the iteration find the same minimum from elsewhere? The same record is estimated from the true values, from values
-//! off by a factor of two, and from surfaces without effect.
+//! Does the iteration find the same minimum from elsewhere? The same record is estimated from the
+//! true values, from values off by a factor of two, and from surfaces without effect.
 
 use rayon::prelude::*;
 

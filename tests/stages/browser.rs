@@ -1,5 +1,5 @@
-//! The report in a browser: a headless Chromium, where there is one, opens it wide and narrow and with its script at work,
-//! loads nothing, complains of nothing, and prints it.
+//! The report in a browser: a headless Chromium, where there is one, opens it wide and narrow and
+//! with its script at work, loads nothing, complains of nothing, and prints it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -16,7 +16,8 @@ fn chromium() -> Option<PathBuf> {
     candidates.find(|path| path.is_file())
 }
 
-/// What a browser said of a page: standard output (the page as it has become) and what its console said.
+/// What a browser said of a page: standard output (the page as it has become) and what its console
+/// said.
 struct Seen {
     page: String,
     console: Vec<String>,

@@ -1,8 +1,10 @@
-//! Estimate: every maneuver a row, the demonstration's derivatives near their truths, new derivatives by YAML alone.
+//! Estimate: every maneuver a row, the demonstration's derivatives near their truths, new
+//! derivatives by YAML alone.
 
 use crate::support::{Campaign, Row, demo, number};
 
-/// Two tables of estimates are the same but for rounding: to a thousandth of the estimate's own bound.
+/// Two tables of estimates are the same but for rounding: to a thousandth of the estimate's own
+/// bound.
 pub fn assert_same_estimates(a: &[Row], b: &[Row]) {
     assert_eq!(a.len(), b.len());
     assert!(a.iter().any(|row| row["status"] == "estimated"));
@@ -37,9 +39,10 @@ fn every_maneuver_of_the_demonstration_converges() {
 
 #[test]
 fn derivatives_are_near_those_that_were_flown() {
-    // The last number of each line is the derivative that was true during the maneuver, from the list that came with the
-    // simulated campaign (JSBSim). The instruments have biases and scale factors of one to two per cent; a derivative is
-    // a ratio of two channels, and a tenth is what two such errors and a bound of a few per cent leave.
+    // The last number of each line is the derivative that was true during the maneuver, from the
+    // list that came with the simulated campaign (JSBSim). The instruments have biases and scale
+    // factors of one to two per cent; a derivative is a ratio of two channels, and a tenth is what
+    // two such errors and a bound of a few per cent leave.
     for (maneuver, derivative, truth) in [
         ("flight_001_t00118", "CN_alpha", 0.084_940),
         ("flight_003_t00103", "CN_alpha", 0.038_856),
@@ -192,7 +195,8 @@ fn a_derivative_under_another_name_is_a_matter_of_the_model_s_file() {
 fn a_new_derivative_is_a_line_in_the_model_and_one_in_each_class() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
-    // Normal force from the pitch rate's own surface, the ailerons: estimated by no class, absent in each.
+    // Normal force from the pitch rate's own surface, the ailerons: estimated by no class, absent
+    // in each.
     let first = "  - { name: CN_alpha,";
     campaign.edit(
         "model.yaml",

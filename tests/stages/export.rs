@@ -1,4 +1,5 @@
-//! Export: the demonstration's derivatives for simulators, read back as a tunnel and, where it is installed, by JSBSim.
+//! Export: the demonstration's derivatives for simulators, read back as a tunnel and, where it is
+//! installed, by JSBSim.
 
 use std::process::Command;
 
@@ -56,7 +57,8 @@ fn the_export_is_the_trend_where_flight_has_data_and_comes_back_as_the_tunnel() 
             number(row, "value") + value("CN_alpha", alpha).unwrap() * number(row, "alpha_deg");
         approx::assert_relative_eq!(sum, value("CN_ba", alpha).unwrap(), max_relative = 1e-12);
     }
-    // Every format is a tunnel that the pipeline takes; `export::tests` hold that its values are the same to the bit.
+    // Every format is a tunnel that the pipeline takes; `export::tests` hold that its values are
+    // the same to the bit.
     for name in [
         "flight_updated.csv",
         "flight_updated.parquet",

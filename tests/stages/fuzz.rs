@@ -1,5 +1,5 @@
-//! Whatever the input is, the program does not panic, hang, or take memory without bound: Parquet byte by byte, YAML and
-//! CSV by their structure. A few in the suite; `make fuzz` does many.
+//! Whatever the input is, the program does not panic, hang, or take memory without bound: Parquet
+//! byte by byte, YAML and CSV by their structure. A few in the suite; `make fuzz` does many.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! The house: modules use only what stands above them in `src/lib.rs`, what the analyst decides is nowhere in the code,
-//! and disk and terminal have one place each.
+//! The house: modules use only what stands above them in `src/lib.rs`, what the analyst decides is
+//! nowhere in the code, and disk and terminal have one place each.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -67,7 +67,8 @@ fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split(|c| !is_word(c)).filter(|w| !w.is_empty())
 }
 
-/// The top-level modules that follow each `crate::` in a text: one name, or the heads of a braced list.
+/// The top-level modules that follow each `crate::` in a text: one name, or the heads of a braced
+/// list.
 fn used(text: &str) -> BTreeSet<String> {
     let mut modules = BTreeSet::new();
     for rest in text.split("crate::").skip(1) {

@@ -1,4 +1,5 @@
-//! Ingest: bad input is named and the rest of the campaign is done; what cannot be run at all says why.
+//! Ingest: bad input is named and the rest of the campaign is done; what cannot be run at all says
+//! why.
 
 use std::fs;
 use std::sync::Arc;
@@ -11,8 +12,8 @@ use crate::support::{
     yaw_and_roll_steps,
 };
 
-/// A flight whose file was spoiled beside a healthy one: the run ends with 2, the healthy flight's maneuver is estimated,
-/// and the only problem names flight and place and says all of `words`.
+/// A flight whose file was spoiled beside a healthy one: the run ends with 2, the healthy flight's
+/// maneuver is estimated, and the only problem names flight and place and says all of `words`.
 fn is_refused(spoil: impl FnOnce(&Campaign), place: &str, words: &[&str]) {
     let campaign = Campaign::of_pitch_steps();
     spoil(&campaign);
@@ -176,8 +177,8 @@ fn a_reversed_sign_is_found_by_the_kinematics() {
     record_is_refused(&reversed, "`r`", &["`r`: its sign is reversed"]);
 }
 
-/// A healthy flight whose file was spoiled in a way that costs it little: it is a flight still, and the only problem
-/// says all of `words`.
+/// A healthy flight whose file was spoiled in a way that costs it little: it is a flight still, and
+/// the only problem says all of `words`.
 fn is_repaired_and_named(record: &RecordBatch, words: &[&str]) -> Campaign {
     let campaign = Campaign::new();
     campaign.add("spoiled", record);
@@ -272,7 +273,8 @@ fn a_copy_under_another_name_is_left_out_and_named() {
 #[test]
 fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one_flight() {
     let (whole, parted) = (Campaign::of_pitch_steps(), Campaign::new());
-    // Instruments are measured by fewer samples of the slow channel: what is wrong with them comes out a little different.
+    // Instruments are measured by fewer samples of the slow channel: what is wrong with them comes
+    // out a little different.
     for campaign in [&whole, &parted] {
         campaign.copy_pipeline();
         campaign.edit(

@@ -6,7 +6,8 @@ use harvest::memory::keep;
 /// Pages that this thread had to ask the kernel for.
 fn faults() -> u64 {
     let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
-    // The name of the program, in brackets, may hold spaces; the count is the eighth number after it.
+    // The name of the program, in brackets, may hold spaces; the count is the eighth number after
+    // it.
     stat.rsplit(')')
         .next()
         .unwrap()

@@ -1,5 +1,6 @@
-//! Nights: whatever happens to a run, the next one ends with the same bytes; what is published changes at once, says what
-//! it was made from and what changed, and nothing that it needs is removed.
+//! Nights: whatever happens to a run, the next one ends with the same bytes; what is published
+//! changes at once, says what it was made from and what changed, and nothing that it needs is
+//! removed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -78,7 +79,8 @@ fn a_run_that_is_killed_at_any_moment_ends_with_the_bytes_of_one_that_is_not() {
         two_nights(&campaign, |campaign| {
             for _ in 0..3 {
                 let mut child = spawned(campaign);
-                // Squared, so that early moments, and those of later nights that are short, are as often hit as others.
+                // Squared, so that early moments, and those of later nights that are short, are as
+                // often hit as others.
                 std::thread::sleep(longest.mul_f64(random.unit().powi(2)));
                 hit += usize::from(child.try_wait().unwrap().is_none());
                 child.kill().unwrap();

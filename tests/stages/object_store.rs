@@ -1,5 +1,6 @@
-//! Archive and store in an object store: a real S3-compatible server on this machine's loopback, named by
-//! `HARVEST_S3_SERVER` (`tests/cluster/s3.sh` installs one). Without it these tests say that they are skipped.
+//! Archive and store in an object store: a real S3-compatible server on this machine's loopback,
+//! named by `HARVEST_S3_SERVER` (`tests/cluster/s3.sh` installs one). Without it these tests say
+//! that they are skipped.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -111,7 +112,8 @@ impl Server {
             .env("AWS_ALLOW_HTTP", "true")
     }
 
-    /// The program on a machine of its own: with its own cache and reports, on archive and store of the server.
+    /// The program on a machine of its own: with its own cache and reports, on archive and store of
+    /// the server.
     fn command(&self, machine: &Campaign, stage: &str, archive: &str) -> Command {
         let mut command = crate::support::harvest();
         let pipeline = machine.path("pipeline");

@@ -1,4 +1,5 @@
-//! The report on paper, read back by another program's reader: text, table of contents, outline, links.
+//! The report on paper, read back by another program's reader: text, table of contents, outline,
+//! links.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! Run: stages bring their predecessors up to date, publish what was promised, and end the same however often, with
-//! however many threads and after whatever interruption they run.
+//! Run: stages bring their predecessors up to date, publish what was promised, and end the same
+//! however often, with however many threads and after whatever interruption they run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -121,8 +121,8 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack, no list of events, and
-/// nothing fails.
+/// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack,
+/// no list of events, and nothing fails.
 const WITHOUT_ROWS: [&str; 7] = [
     "beyond_tunnel",
     "changes",
@@ -250,8 +250,8 @@ fn every_published_table_is_promised() {
     );
 }
 
-/// The columns that `reports/README.md` explains, by table: what is in backticks in the first cell of a row. An ellipsis
-/// between two of them stands for the table's columns in between.
+/// The columns that `reports/README.md` explains, by table: what is in backticks in the first cell
+/// of a row. An ellipsis between two of them stands for the table's columns in between.
 fn explained_columns(
     published: &BTreeMap<String, Vec<String>>,
 ) -> BTreeMap<String, BTreeSet<String>> {
@@ -415,7 +415,8 @@ fn what_a_killed_run_leaves_is_swept_or_made_again() {
     campaign.finishes("run");
     let (store, reports) = (campaign.bytes("store"), campaign.bytes("reports"));
 
-    // Half-written files beside their places, one artefact cut short, others and half of the tables not there yet.
+    // Half-written files beside their places, one artefact cut short, others and half of the tables
+    // not there yet.
     for folder in [
         "store/estimate",
         "store/records",

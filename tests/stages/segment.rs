@@ -6,8 +6,8 @@ use crate::support::{
     Campaign, Outcome, Row, demo, number, pitch_steps, run, values, with_values, without,
 };
 
-/// The classes flown in the demonstration campaign, by flight in the order of time: read off the campaign's own list of
-/// what was flown, which is not part of this repository.
+/// The classes flown in the demonstration campaign, by flight in the order of time: read off the
+/// campaign's own list of what was flown, which is not part of this repository.
 const FLOWN: [(&str, [&str; 9]); 4] = [
     (
         "flight_001",
@@ -230,7 +230,8 @@ fn a_class_under_another_name_is_a_matter_of_its_file() {
     assert_eq!(plain(&other), plain(&shipped));
 }
 
-/// The demonstration's flight with a sweep of the stabilator instead of the pilot's steps, between them and the next maneuver.
+/// The demonstration's flight with a sweep of the stabilator instead of the pilot's steps, between
+/// them and the next maneuver.
 fn with_a_sweep() -> arrow::array::RecordBatch {
     let record = pitch_steps();
     let start = values(&record, "time")[0];

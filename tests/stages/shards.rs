@@ -1,4 +1,5 @@
-//! A campaign in shards: the tables of one process, whoever computed them, how often, and in whatever order.
+//! A campaign in shards: the tables of one process, whoever computed them, how often, and in
+//! whatever order.
 
 use std::fs;
 use std::process::{Command, Stdio};

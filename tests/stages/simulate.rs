@@ -1,13 +1,13 @@
-//! Simulate: the simulator and the estimator write the same physics down differently and agree; what is flown is found
-//! and estimated again; the same cards are the same bytes.
+//! Simulate: the simulator and the estimator write the same physics down differently and agree;
+//! what is flown is found and estimated again; the same cards are the same bytes.
 
 use std::fs;
 use std::path::Path;
 
 use approx::assert_abs_diff_eq;
-use harvest::earth::gravity_ft_s2;
 use harvest::config::Simulation;
 use harvest::dynamics::{Equations, Lateral, Longitudinal, Motion};
+use harvest::earth::gravity_ft_s2;
 use harvest::estimate::{self, Basis, Estimated};
 use harvest::flight::signal;
 use harvest::simulate::air_data::AirData;
@@ -80,7 +80,8 @@ fn measured(simulation: &Simulation, state: &State, given: &Given, instant: &Ins
     }
 }
 
-/// The disagreement of states' rates (rad/s, rad/s²) and of outputs (deg, deg/s, g) at one random instant.
+/// The disagreement of states' rates (rad/s, rad/s²) and of outputs (deg, deg/s, g) at one random
+/// instant.
 fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
     let (plant, aircraft) = (simulation.simulator.plant(), &simulation.config.aircraft);
     let (state, given) = anywhere(noise, simulation.simulator.settings().surface_names.len());
@@ -159,9 +160,8 @@ fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
 
 #[test]
 fn the_simulator_s_equations_and_the_estimator_s_agree_to_twelve_digits() {
-    // 2e-15 where this was written.
-    // No approximation is left between the two: sideslip, rotation about all axes, engines' momentum, I_xz and the arms of
-    // the sensors are all in both.
+    // 2e-15 where this was written. No approximation is left between the two: sideslip, rotation
+    // about all axes, engines' momentum, I_xz and the arms of the sensors are all in both.
     let simulation = simulation();
     let mut noise = Noise::new(5, "agreement");
     for _ in 0..500 {
@@ -240,7 +240,8 @@ fn every_surface_turns_the_aircraft_as_its_sign_says() {
 #[test]
 fn a_trimmed_aircraft_stays_where_it_is() {
     let simulation = simulation();
-    // In a descent (3000 ft in these 22 s at 60°) the air grows a tenth denser, and the thrust with it.
+    // In a descent (3000 ft in these 22 s at 60°) the air grows a tenth denser, and the thrust with
+    // it.
     for (alpha, drift_deg) in [(5.0, 0.02), (10.0, 0.02), (30.0, 0.3), (60.0, 1.0)] {
         let mut card = simulation.card("OLAT", alpha).unwrap();
         card.program.inputs.clear();
@@ -309,8 +310,9 @@ fn estimated(simulation: &Simulation, flown: &Flown) -> Estimated {
 
 #[test]
 fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
-    // With surfaces that are linear between the recorder's samples, as the estimator takes them, all come back to 0.1%. At
-    // 80 control steps a second their motion between samples leaves 0.1% in the median and 1% at worst of these.
+    // With surfaces that are linear between the recorder's samples, as the estimator takes them,
+    // all come back to 0.1%. At 80 control steps a second their motion between samples leaves 0.1%
+    // in the median and 1% at worst of these.
     let campaign = Campaign::new();
     let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     assert!(text.contains("control_hz: 80"));
@@ -542,7 +544,8 @@ fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
         rows.iter()
             .all(|r| r["class"] == "PPSS" && r["converged"] == "8")
     );
-    // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far more.
+    // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far
+    // more.
     let ratio = |residuals: &str, column: &str| {
         let mut ratios: Vec<f64> = rows
             .iter()

@@ -1,5 +1,5 @@
-//! What the tests of the stages share: the program on temporary folders, demonstration flights that can be spoiled, and
-//! tables read back.
+//! What the tests of the stages share: the program on temporary folders, demonstration flights that
+//! can be spoiled, and tables read back.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -41,8 +41,8 @@ pub fn run(command: &mut Command) -> Outcome {
     }
 }
 
-/// A campaign of its own: folders for the archive, the store and the reports, and a pipeline where it is not the shipped
-/// one.
+/// A campaign of its own: folders for the archive, the store and the reports, and a pipeline where
+/// it is not the shipped one.
 #[derive(Debug)]
 pub struct Campaign {
     folder: tempfile::TempDir,
@@ -128,8 +128,8 @@ impl Campaign {
         outcome
     }
 
-    /// Runs a stage after estimate to its end. So few maneuvers have no trend in most derivatives: the program may say so
-    /// by ending with 2.
+    /// Runs a stage after estimate to its end. So few maneuvers have no trend in most derivatives:
+    /// the program may say so by ending with 2.
     pub fn finishes(&self, stage: &str) -> Outcome {
         let outcome = self.harvest(stage);
         assert!(
@@ -152,7 +152,8 @@ impl Campaign {
         );
     }
 
-    /// Replaces text of a pipeline's file wherever it stands; it must stand somewhere. Returns its first line.
+    /// Replaces text of a pipeline's file wherever it stands; it must stand somewhere. Returns its
+    /// first line.
     pub fn edit(&self, file: &str, from: &str, to: &str) -> usize {
         let path = self.path("pipeline").join(file);
         let text = fs::read_to_string(&path).unwrap();
@@ -179,8 +180,9 @@ impl Campaign {
         ParquetReader::new(file).finish().unwrap()
     }
 
-    /// Bytes of every file below a folder of the campaign, by relative path: of the reports under the names that hold, of
-    /// the store without what knows a clock, a process or a folder of this machine.
+    /// Bytes of every file below a folder of the campaign, by relative path: of the reports under
+    /// the names that hold, of the store without what knows a clock, a process or a folder of this
+    /// machine.
     pub fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
         let folder = self.path(folder);
         let relative = |p: PathBuf| p.strip_prefix(&folder).unwrap().to_owned();
@@ -197,7 +199,8 @@ impl Campaign {
             .collect()
     }
 
-    /// Bytes of the published tables; the report, on screen and on paper, says where the archive lies.
+    /// Bytes of the published tables; the report, on screen and on paper, says where the archive
+    /// lies.
     pub fn tables(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let is_table = |p: &PathBuf| p.extension().is_some_and(|e| e == "csv" || e == "parquet");
         self.bytes("reports")

@@ -1,13 +1,13 @@
-//! What is made from several maneuvers, and what each lets the tunnel hold: `hold: evidence`, `estimate: joint`, the
-//! prediction of data not used, through the program.
+//! What is made from several maneuvers, and what each lets the tunnel hold: `hold: evidence`,
+//! `estimate: joint`, the prediction of data not used, through the program.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use crate::support::{Campaign, Row, number, pitch_steps, run, with_values};
 
-/// Two flights with one maneuver each, of one class at one angle of attack: the second is the first as other instruments
-/// would have recorded it. The pipeline is the shipped one, edited.
+/// Two flights with one maneuver each, of one class at one angle of attack: the second is the first
+/// as other instruments would have recorded it. The pipeline is the shipped one, edited.
 fn twins(edits: &[(&str, &str)]) -> Campaign {
     let campaign = Campaign::new();
     let first = pitch_steps();

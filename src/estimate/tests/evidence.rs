@@ -1,4 +1,5 @@
-//! Holding by evidence and the measures of a maneuver, on a simulated maneuver whose truth is known.
+//! Holding by evidence and the measures of a maneuver, on a simulated maneuver whose truth is
+//! known.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,8 @@ struct Flown {
     record: Record,
 }
 
-/// Flies the doublets of the simulated record with its surfaces edited; outputs as measured with noise.
+/// Flies the doublets of the simulated record with its surfaces edited; outputs as measured with
+/// noise.
 fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
     let mut record = record();
     edit(&mut record);
@@ -209,7 +211,8 @@ fn evidence_holds_what_a_tunnel_without_error_knows_better_but_no_constant() {
     );
 }
 
-/// A second surface that moves in proportion to the first, as stabilator and pitch vane of pilot's steps nearly do.
+/// A second surface that moves in proportion to the first, as stabilator and pitch vane of pilot's
+/// steps nearly do.
 fn with_twin() -> Flown {
     let mut truth = truth(Axis::Longitudinal);
     truth.push((
@@ -282,7 +285,8 @@ fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_
         because.starts_with("the data do not tell it apart from") && because.contains(other),
         "{because}"
     );
-    // The twin moves by twice the elevator: what is wrong with the one goes into the other, and its bound counts it.
+    // The twin moves by twice the elevator: what is wrong with the one goes into the other, and its
+    // bound counts it.
     let factor = if name == "Cm_twin" { 2.0 } else { 0.5 };
     let wrong = 0.5
         * flown

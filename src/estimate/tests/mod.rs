@@ -68,7 +68,8 @@ impl Bench {
         Basis::new(aircraft, buildup, tunnel, settings)
     }
 
-    /// A record whose outputs are the response to the true derivatives times `factor`, with noise and a bias of an.
+    /// A record whose outputs are the response to the true derivatives times `factor`, with noise
+    /// and a bias of an.
     fn flown(&self, seed: u64, factor: f64, an_bias_g: f64) -> Record {
         let mut record = record();
         let truth = truth(self.class.axis);
@@ -277,7 +278,8 @@ fn a_maneuver_of_which_nothing_is_free_is_rejected_and_no_panic() {
     }
 }
 
-/// Prediction of a maneuver whose `Cm_de` is `factor` times the true one from two with the true one.
+/// Prediction of a maneuver whose `Cm_de` is `factor` times the true one from two with the true
+/// one.
 fn predicted(factor: f64) -> prediction::Predicted {
     let bench = bench();
     let near = [bench.flown(1, 1.0, 0.0), bench.flown(2, 1.0, 0.05)]

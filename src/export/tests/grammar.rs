@@ -1,11 +1,13 @@
-//! The content models of DAVEfunc 2.0's DTD for the elements that the export writes, as patterns over the names of an
-//! element's children, and its identifiers and references. The whole DTD against a file: `tests/davefunc.py`.
+//! The content models of DAVEfunc 2.0's DTD for the elements that the export writes, as patterns
+//! over the names of an element's children, and its identifiers and references. The whole DTD
+//! against a file: `tests/davefunc.py`.
 
 use std::collections::BTreeSet;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-/// Element; its children in order, with ? * + as in the DTD, and an alternative's names between bars; required attributes.
+/// Element; its children in order, with ? * + as in the DTD, and an alternative's names between
+/// bars; required attributes.
 const MODELS: [(&str, &str, &str); 35] = [
     (
         "DAVEfunc",
@@ -136,7 +138,8 @@ fn of(node: Node) -> Vec<String> {
     faults
 }
 
-/// Whether names come in a model's order; each part takes as many as it can, which is enough for these models.
+/// Whether names come in a model's order; each part takes as many as it can, which is enough for
+/// these models.
 fn follows(names: &[&str], model: &str) -> bool {
     let mut rest = names;
     for part in model.split_whitespace().filter(|p| *p != "#text") {

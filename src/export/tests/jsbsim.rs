@@ -1,6 +1,6 @@
-//! JSBSim's functions evaluated as its reference manual says: properties, values, sums, products and tables of one to three
-//! variables, linear between their points and constant beyond. What JSBSim itself makes of the section:
-//! `tests/load_in_jsbsim.py`.
+//! JSBSim's functions evaluated as its reference manual says: properties, values, sums, products
+//! and tables of one to three variables, linear between their points and constant beyond. What
+//! JSBSim itself makes of the section: `tests/load_in_jsbsim.py`.
 
 use std::collections::BTreeMap;
 

@@ -1,13 +1,16 @@
-//! The kinematic equations of flight and what the instruments read of them, with exact slopes; no aerodynamics.
+//! The kinematic equations of flight and what the instruments read of them, with exact slopes; no
+//! aerodynamics.
 //!
-//! Over the turning earth, with ω the inertial body rates, Ω the earth's, n the navigation frame's and f the specific force:
+//! Over the turning earth, with ω the inertial body rates, Ω the earth's, n the navigation frame's
+//! and f the specific force:
 //!
 //! - v̇ = f + g − (ω + Ω) × v, with v relative to the air, whose wind may change at a steady rate
 //! - φ̇ = p' + tan θ (q' sin φ + r' cos φ), θ̇ = q' cos φ − r' sin φ, ψ̇ = (q' sin φ + r' cos φ)/cos θ, with ω' = ω − n
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ
 //!
-//! An accelerometer on an arm r feels ω̇ × r besides. So that no rate is differentiated the state is, component by component,
-//! the velocity at the sensor of that component, `s_i` = (v + ω × `r_i`)_i: its rate has no ω̇.
+//! An accelerometer on an arm r feels ω̇ × r besides. So that no rate is differentiated the state
+//! is, component by component, the velocity at the sensor of that component, `s_i` = (v + ω ×
+//! `r_i`)_i: its rate has no ω̇.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
@@ -51,7 +54,8 @@ pub struct Motion {
     pub by_input: SMatrix<f64, STATES, INPUTS>,
 }
 
-/// What the output instruments read, in the units of their signals, with slopes along states and body rates.
+/// What the output instruments read, in the units of their signals, with slopes along states and
+/// body rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readings {
     pub values: [f64; OUTPUTS],
@@ -59,7 +63,8 @@ pub struct Readings {
     pub by_rates: SMatrix<f64, OUTPUTS, 3>,
 }
 
-/// Where the slopes of the rates of each state can be other than zero: along which states, along which inputs.
+/// Where the slopes of the rates of each state can be other than zero: along which states, along
+/// which inputs.
 pub const RATES_BY_STATE: [&[usize]; STATES] = [
     &[1, 2, 4],
     &[0, 2, 3, 4],
@@ -209,7 +214,8 @@ fn climb(
     out.by_state[(6, 4)] = v.x * ct + v.y * sp * st + v.z * cp * st;
 }
 
-/// What the output instruments read: α and β vanes, V, θ, φ, ψ, altitude, q̄ and Mach, in deg, ft/s, ft, lbf/ft².
+/// What the output instruments read: α and β vanes, V, θ, φ, ψ, altitude, q̄ and Mach, in deg,
+/// ft/s, ft, lbf/ft².
 #[inline(always)]
 pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -> Readings {
     let omega = vector(input);
@@ -236,7 +242,8 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -
     ];
     for (o, vane) in vanes.iter().enumerate() {
         values[o] = DEG * vane.angle;
-        // A reading depends on the rates over the velocity only, which gives its slope along the velocity.
+        // A reading depends on the rates over the velocity only, which gives its slope along the
+        // velocity.
         let rates: Vector3<f64> = vane.by_rates.into();
         let by =
             alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);

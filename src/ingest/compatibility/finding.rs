@@ -14,7 +14,8 @@ use crate::units::Unit;
 const MODEL_BIAS: f64 = 0.01; // of an ordinary bias
 const MODEL_DELAY_S: f64 = 0.001;
 
-/// A parameter is told by the flight when its bound is at most this share of what was thought before.
+/// A parameter is told by the flight when its bound is at most this share of what was thought
+/// before.
 const TOLD: f64 = 0.7;
 
 /// One parameter of an instrument.
@@ -215,7 +216,8 @@ fn estimate(
     })
 }
 
-/// A bias and a scale error are estimated together and make sense together: where one is applied so is the other.
+/// A bias and a scale error are estimated together and make sense together: where one is applied so
+/// is the other.
 fn correct_together(estimates: &mut [Option<Estimate>; KINDS], settings: &Compatibility) {
     let [bias, scale, _] = estimates;
     if let (Some(bias), Some(scale)) = (bias, scale)

@@ -1,13 +1,16 @@
-//! The joint output-error fit: windows that each have their own first state and wind, and share the instruments' errors.
+//! The joint output-error fit: windows that each have their own first state and wind, and share the
+//! instruments' errors.
 //!
-//! Gauss-Newton on J = Σ v²/(2R) + Σ θ²/(2P). The windows' own parameters are eliminated window by window (Schur's
-//! complement), so that the work grows with the number of windows and no faster. R is the long-run variance of each
-//! window's residuals: coloured noise counts as white noise as strong as its slowest part. P says that instruments are
-//! ordinary or, rarely, wrong by any amount: P = size², and size² + θ² (Cauchy's distribution by reweighting) for what is
-//! surely larger, so that an error which several instruments could explain is given to one. At the end the data are asked
-//! of each parameter as if nothing had been thought of it before, and the one that is surest beyond the ordinary is freed,
-//! until none is; what comes out as large as a fault but not as sure as one is thought ordinary again. A delay common to
-//! all channels is no error: the mean of the delays, with the weights 1/P, is zero.
+//! Gauss-Newton on J = Σ v²/(2R) + Σ θ²/(2P). The windows' own parameters are eliminated window by
+//! window (Schur's complement), so that the work grows with the number of windows and no faster. R
+//! is the long-run variance of each window's residuals: coloured noise counts as white noise as
+//! strong as its slowest part. P says that instruments are ordinary or, rarely, wrong by any
+//! amount: P = size², and size² + θ² (Cauchy's distribution by reweighting) for what is surely
+//! larger, so that an error which several instruments could explain is given to one. At the end the
+//! data are asked of each parameter as if nothing had been thought of it before, and the one that
+//! is surest beyond the ordinary is freed, until none is; what comes out as large as a fault but
+//! not as sure as one is thought ordinary again. A delay common to all channels is no error: the
+//! mean of the delays, with the weights 1/P, is zero.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::ops::Range;
@@ -31,18 +34,20 @@ const STEPS: usize = 2;
 const HALVINGS: usize = 5;
 /// Settled when no parameter moves by more than this share of its bound.
 const SETTLED: f64 = 0.05;
-/// The equations themselves are held to be no better than this: gravity, arms and positions are not known more closely.
+/// The equations themselves are held to be no better than this: gravity, arms and positions are not
+/// known more closely.
 pub const MODEL_SCALE: f64 = 0.002;
-/// A parameter is surely larger than ordinary when it is this many times its bound; one that is to be freed at the end is
-/// so by itself, and needs more.
+/// A parameter is surely larger than ordinary when it is this many times its bound; one that is to
+/// be freed at the end is so by itself, and needs more.
 const SURELY: f64 = 3.0;
 const FREED: f64 = 4.0;
 /// So many at most.
 const MOST_FREED: usize = 4;
 /// The first round thinks every fault as likely as not: this many times the least size of one.
 const BROAD: f64 = 2.0;
-/// What the equations do not explain of a vane's motion is gusts, and the aircraft turns into a gust: as much of it as this
-/// goes with the motion that they do explain, and is taken for a scale error.
+/// What the equations do not explain of a vane's motion is gusts, and the aircraft turns into a
+/// gust: as much of it as this goes with the motion that they do explain, and is taken for a scale
+/// error.
 const ANSWERED: f64 = 0.5;
 /// How closely the mean of the delays is held at zero, s.
 const COMMON_DELAY_S: f64 = 1e-4;
@@ -53,7 +58,8 @@ pub struct Errors {
     pub values: [f64; PARAMETERS],
     /// Standard deviations; none for what nothing determines.
     pub bounds: [f64; PARAMETERS],
-    /// What a fault is to be measured against: the bounds, and of an output's scale what gusts may make of it.
+    /// What a fault is to be measured against: the bounds, and of an output's scale what gusts may
+    /// make of it.
     pub fault_bounds: [f64; PARAMETERS],
     /// What was thought of each before (√P).
     pub prior: [f64; PARAMETERS],
@@ -70,7 +76,8 @@ struct Sums {
     cost: f64,
 }
 
-/// Sums of one output with unit weight: of its rows (s, v) Σ of their squares, row by row; the lower triangle counts.
+/// Sums of one output with unit weight: of its rows (s, v) Σ of their squares, row by row; the
+/// lower triangle counts.
 struct Raw(Aligned);
 
 impl Raw {
@@ -158,8 +165,9 @@ pub fn fit(windows: &[Window], aircraft: &Aircraft, settings: &Compatibility) ->
     })
 }
 
-/// How many times larger than the swings of each accelerometer (forward, right, up) those of ω × v are which they are
-/// balanced against: a share of these that the model does not know is so much more of the accelerometer's scale.
+/// How many times larger than the swings of each accelerometer (forward, right, up) those of ω × v
+/// are which they are balanced against: a share of these that the model does not know is so much
+/// more of the accelerometer's scale.
 fn outweighed(windows: &[Window]) -> [f64; 3] {
     let swings = |values: &dyn Fn(&Window, usize) -> f64| {
         let of = |window: &Window| {
@@ -238,8 +246,8 @@ impl Problem<'_> {
         Some(steps)
     }
 
-    /// The parameter that the data, if nothing had been thought of it before, most surely put beyond what is thought of
-    /// it, and what is to be thought of it then.
+    /// The parameter that the data, if nothing had been thought of it before, most surely put
+    /// beyond what is thought of it, and what is to be thought of it then.
     fn surest(
         &self,
         members: &[Member],
@@ -417,8 +425,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Standard deviations of the shared parameters: of the information or of the scatter between windows, whichever is
-    /// larger.
+    /// Standard deviations of the shared parameters: of the information or of the scatter between
+    /// windows, whichever is larger.
     fn bounds(
         &self,
         members: &[Member],
@@ -451,8 +459,8 @@ impl Problem<'_> {
         wider
     }
 
-    /// Parameters that came out as large as a fault but, seen by their bounds, not as sure as one: no ordinary error is
-    /// that large, so they are thought ordinary after all.
+    /// Parameters that came out as large as a fault but, seen by their bounds, not as sure as one:
+    /// no ordinary error is that large, so they are thought ordinary after all.
     fn doubted(
         &self,
         shared: &[f64; PARAMETERS],
@@ -471,8 +479,8 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Variances of the shared parameters from the scatter between windows: each left out in turn. Few windows know their
-    /// scatter badly, so these are larger as Student's intervals are longer.
+    /// Variances of the shared parameters from the scatter between windows: each left out in turn.
+    /// Few windows know their scatter badly, so these are larger as Student's intervals are longer.
     fn jackknife(
         &self,
         members: &[Member],
@@ -575,7 +583,8 @@ impl<'a> Member<'a> {
         self.sums = sums;
     }
 
-    /// Of one output: the squares of the slow part of what the equations leave, and of the motion that they explain.
+    /// Of one output: the squares of the slow part of what the equations leave, and of the motion
+    /// that they explain.
     fn unexplained(&self, problem: &Problem, o: usize) -> (f64, f64) {
         let measured = &self.window.outputs[o];
         let known = problem

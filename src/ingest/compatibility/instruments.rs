@@ -1,7 +1,9 @@
-//! The instruments that are looked at, and what can be wrong with each: y(t) = (1 + scale) x(t − delay) + bias.
+//! The instruments that are looked at, and what can be wrong with each: y(t) = (1 + scale) x(t −
+//! delay) + bias.
 //!
-//! Rate gyros and accelerometers drive the kinematic equations (inputs); vanes, airspeed, attitudes, altitude and the
-//! pressures are compared with what the equations make of them (outputs).
+//! Rate gyros and accelerometers drive the kinematic equations (inputs); vanes, airspeed,
+//! attitudes, altitude and the pressures are compared with what the equations make of them
+//! (outputs).
 
 use super::settings::{Error, Errors};
 use crate::flight::signal as s;
@@ -71,8 +73,8 @@ pub fn size(errors: &Errors, instrument: usize, kind: Kind) -> f64 {
     }
 }
 
-/// Whether the kinematic equations say anything of a parameter at all: they know changes of altitude and heading only,
-/// and the heading's scale is that of a full turn.
+/// Whether the kinematic equations say anything of a parameter at all: they know changes of
+/// altitude and heading only, and the heading's scale is that of a full turn.
 pub fn observable(instrument: usize, kind: Kind) -> bool {
     !matches!(
         (SIGNALS[instrument], kind),

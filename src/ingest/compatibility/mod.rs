@@ -1,10 +1,11 @@
-//! Data compatibility by flight-path reconstruction: what is wrong with each instrument of a flight, by how much and how
-//! surely, from the kinematic equations alone, before any aerodynamics.
+//! Data compatibility by flight-path reconstruction: what is wrong with each instrument of a
+//! flight, by how much and how surely, from the kinematic equations alone, before any aerodynamics.
 //!
-//! The rates and accelerations drive the equations of motion through windows of the flight in which much moves; what comes
-//! out is matched to the vanes, the airspeed, the attitudes, the altitude and the pressures by output error. Biases, scale
-//! errors and delays of all of them are shared by the windows. Surfaces, thrust and mass are in no kinematic equation: a
-//! fault of theirs is not found here.
+//! The rates and accelerations drive the equations of motion through windows of the flight in which
+//! much moves; what comes out is matched to the vanes, the airspeed, the attitudes, the altitude
+//! and the pressures by output error. Biases, scale errors and delays of all of them are shared by
+//! the windows. Surfaces, thrust and mass are in no kinematic equation: a fault of theirs is not
+//! found here.
 
 mod equations;
 mod finding;
@@ -36,8 +37,8 @@ pub fn signals() -> BTreeSet<String> {
         .collect()
 }
 
-/// What a record tells of its instruments; `recorded` are the signals that come from channels. A long record comes in
-/// `count` parts, each of which has its share of the windows.
+/// What a record tells of its instruments; `recorded` are the signals that come from channels. A
+/// long record comes in `count` parts, each of which has its share of the windows.
 #[must_use]
 pub fn examine(
     parts: impl Iterator<Item = Record>,

@@ -1,8 +1,10 @@
-//! What the equations make of a window for given errors of its instruments, with exact sensitivities.
+//! What the equations make of a window for given errors of its instruments, with exact
+//! sensitivities.
 //!
-//! An input is freed of its error before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale); an output is
-//! given its error after them, y(t) = (1 + scale) h(t − delay) + bias. Outputs are handed over sample by sample as soon as
-//! all that a delay reaches is there, so that no more than that is kept.
+//! An input is freed of its error before it drives the equations, x(t) = (y(t + delay) − bias)/(1 +
+//! scale); an output is given its error after them, y(t) = (1 + scale) h(t − delay) + bias. Outputs
+//! are handed over sample by sample as soon as all that a delay reaches is there, so that no more
+//! than that is kept.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
@@ -22,7 +24,8 @@ use crate::dynamics::runge_kutta::{POINT, STAGES};
 use crate::flight::taps::Taps;
 use crate::output_error::{load, store};
 
-/// Parameters of a window alone: its first state, and the change of the wind north, east and down, ft/s².
+/// Parameters of a window alone: its first state, and the change of the wind north, east and down,
+/// ft/s².
 pub const LOCAL: usize = STATES + WIND;
 const WIND: usize = 3;
 /// Parameters that the states depend on: the local ones, then bias, scale and delay of each input.
@@ -44,7 +47,8 @@ pub trait Sink {
     fn take<S: Simd>(&mut self, simd: S, sample: usize, output: usize, value: f64, row: &mut Row);
 }
 
-/// One input freed of its error at one instant, in rad/s or ft/s², with its slopes along bias, scale and delay.
+/// One input freed of its error at one instant, in rad/s or ft/s², with its slopes along bias,
+/// scale and delay.
 #[derive(Clone, Copy, Debug, Default)]
 struct Freed {
     value: f64,
@@ -90,14 +94,16 @@ struct Flight<'a, K: Sink> {
 
 /// Slopes of the states along what they depend on, a row for each state.
 type Slopes = [Row; STATES];
-/// Readings without error with their slopes, and the reading itself where an output's own errors will stand.
+/// Readings without error with their slopes, and the reading itself where an output's own errors
+/// will stand.
 type Cells = [Row; OUTPUTS];
 
 /// The states on their way with their slopes.
 struct Way {
     x: State,
     s: Slopes,
-    /// Room for a step: the slopes at a stage and at the next one, and at the end of the step as far as it is known.
+    /// Room for a step: the slopes at a stage and at the next one, and at the end of the step as
+    /// far as it is known.
     stages: [Slopes; 2],
     end: Slopes,
 }
@@ -289,7 +295,8 @@ const ALONG_WIND: [Row; WIND] = {
     rows
 };
 
-/// Vectors of a row that are summed side by side, so that the processor has something to do while one waits.
+/// Vectors of a row that are summed side by side, so that the processor has something to do while
+/// one waits.
 const SIDE_BY_SIDE: usize = 4;
 
 /// Some lanes of a sum of rows, in the processor's registers.
@@ -364,7 +371,8 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
     points
 }
 
-/// Where the columns of an output's row are: among the local parameters first, among the shared ones the rest.
+/// Where the columns of an output's row are: among the local parameters first, among the shared
+/// ones the rest.
 pub fn shared_place(column: usize, o: usize) -> usize {
     if column < DRIVING {
         column - LOCAL

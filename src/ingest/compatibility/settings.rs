@@ -1,4 +1,5 @@
-//! What the analyst may decide about data compatibility, with defaults reasoned from the instruments of a flight test.
+//! What the analyst may decide about data compatibility, with defaults reasoned from the
+//! instruments of a flight test.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,11 +19,12 @@ pub struct Compatibility {
     pub fault: OnFault,
     /// A correction counts when it is this many times its bound.
     pub standard_errors: f64,
-    /// A fault is named when it is this many times its bound, besides being beyond what is ordinary. A channel that is
-    /// ahead of the others needs twice as many: instruments and recorders delay, and for one to be ahead all others must
-    /// be late alike.
+    /// A fault is named when it is this many times its bound, besides being beyond what is
+    /// ordinary. A channel that is ahead of the others needs twice as many: instruments and
+    /// recorders delay, and for one to be ahead all others must be late alike.
     pub fault_standard_errors: f64,
-    /// Length of the windows, s: some periods of the Dutch roll, and short enough that wind stays what it is.
+    /// Length of the windows, s: some periods of the Dutch roll, and short enough that wind stays
+    /// what it is.
     pub window_s: f64,
     /// The most windows of a flight; memory and time are proportional to them.
     pub windows: usize,
@@ -30,8 +32,8 @@ pub struct Compatibility {
     pub least_windows: usize,
     /// The longest delay that is looked for, s.
     pub longest_delay_s: f64,
-    /// How fast the wind that the aircraft meets may change within a window, ft/s²: a climb of 100 ft/s through a shear of
-    /// 2 ft/s in a thousand feet makes 0.2.
+    /// How fast the wind that the aircraft meets may change within a window, ft/s²: a climb of 100
+    /// ft/s through a shear of 2 ft/s in a thousand feet makes 0.2.
     pub wind_change_ft_s2: f64,
     /// What a healthy instrument of each kind is off by (standard deviations).
     pub ordinary: Errors,

@@ -1,4 +1,5 @@
-//! The equations against closed forms and finite differences, and the fit against flights whose errors are known.
+//! The equations against closed forms and finite differences, and the fit against flights whose
+//! errors are known.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};
@@ -208,7 +209,8 @@ fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
 
 #[test]
 fn an_accelerometer_off_the_c_g_feels_the_turning_without_any_rate_being_differentiated() {
-    // Spinning up about the vertical with the c.g. at rest: the sensor at arm x goes right with r x.
+    // Spinning up about the vertical with the c.g. at rest: the sensor at arm x goes right with r
+    // x.
     let known = Known {
         gravity: 0.0,
         earth: Vector3::zeros(),
@@ -226,13 +228,14 @@ fn an_accelerometer_off_the_c_g_feels_the_turning_without_any_rate_being_differe
     assert_abs_diff_eq!(at.rates[6], 0.0, epsilon = 1e-12);
 }
 
-/// A flight in which everything moves, from the equations themselves with a step a tenth of the recorder's: what perfect
-/// instruments record of rates and forces that are sums of sines.
+/// A flight in which everything moves, from the equations themselves with a step a tenth of the
+/// recorder's: what perfect instruments record of rates and forces that are sums of sines.
 fn flight(seconds: f64) -> Record {
     const PARTS: usize = 10;
     let samples = window_samples(seconds);
     let aircraft = aircraft();
-    // φ, θ and the velocity are steered back to what they were, so that the flight goes on for long.
+    // φ, θ and the velocity are steered back to what they were, so that the flight goes on for
+    // long.
     let mut x = State::from([450.0, 0.0, 90.0, 0.0, 0.2, 1.0, 24_000.0]);
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); INSTRUMENTS];
     let sensors = &aircraft.sensors;
@@ -316,7 +319,8 @@ fn steered(t: f64, x: &State, known: &Known) -> Driven {
     let q = 0.08 * sine(5.3, 0.5) + 0.05 * sine(3.1, 0.0)
         - 0.3 * (theta - 0.25 - 0.1 * sine(47.0, 2.0));
     let r = 0.06 * sine(6.7, 0.3) + 0.03 * sine(2.9, 0.0);
-    // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without force.
+    // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without
+    // force.
     let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], known).rates;
     let wanted = [
         450.0 + 60.0 * sine(53.0, 0.0),
@@ -436,7 +440,8 @@ const NOISE: [f64; INSTRUMENTS] = [
     0.1, 0.05, 0.05, 0.003, 0.005, 0.01, 0.1, 0.1, 0.6, 0.05, 0.05, 0.05, 4.0, 0.15, 0.0008,
 ];
 
-/// What instruments with these errors (bias, scale, delay) record of an exact flight. A delay is a whole number of samples.
+/// What instruments with these errors (bias, scale, delay) record of an exact flight. A delay is a
+/// whole number of samples.
 fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
     let mut record = exact.clone();
     for (i, name) in SIGNALS.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Windows of a record: which stretches of a flight say most about its instruments, and what of them is needed.
+//! Windows of a record: which stretches of a flight say most about its instruments, and what of
+//! them is needed.
 
 use std::ops::Range;
 
@@ -91,7 +92,8 @@ pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
     samples(settings.longest_delay_s, step_s) + 3
 }
 
-/// Stretches of a window's length, or of half of it at least, through which the equations can be driven.
+/// Stretches of a window's length, or of half of it at least, through which the equations can be
+/// driven.
 fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     let pace = pace(record.step_s);
     let length = samples(settings.window_s, record.step_s).max(2 * pace);
@@ -108,7 +110,8 @@ fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     found
 }
 
-/// The longest runs of samples in which every input is known and the attitude is away from the singularity.
+/// The longest runs of samples in which every input is known and the attitude is away from the
+/// singularity.
 fn runs(record: &Record) -> Vec<Range<usize>> {
     let values = |name: &str| record.values(name).unwrap_or_default();
     let needed = SIGNALS[..INPUTS]
@@ -218,8 +221,8 @@ impl Window {
     }
 }
 
-/// Samples of the record that are one of a window: a faster recorder's are averaged, all channels' alike. The motion of an
-/// aircraft has no more to say than 25 samples a second tell.
+/// Samples of the record that are one of a window: a faster recorder's are averaged, all channels'
+/// alike. The motion of an aircraft has no more to say than 25 samples a second tell.
 fn pace(step_s: f64) -> usize {
     const SLOWEST_STEP_S: f64 = 0.04;
     #[expect(
@@ -286,8 +289,8 @@ fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
     }
 }
 
-/// The turning of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a heading only that
-/// part of it is known which does not depend on it.
+/// The turning of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s).
+/// Without a heading only that part of it is known which does not depend on it.
 pub fn turning(
     aircraft: &Aircraft,
     [phi, theta, psi]: [f64; 3],
@@ -373,7 +376,8 @@ fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) 
     ])
 }
 
-/// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).
+/// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down
+/// positive).
 pub fn factor(input: usize) -> f64 {
     match SIGNALS[input] {
         s::AX | s::AY => G0_FT_S2,

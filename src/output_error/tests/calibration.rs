@@ -93,7 +93,8 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         DVector::from_vec(fit.values) - DVector::from_vec(self.parameters.clone())
     }
 
-    /// The estimates move as is said, parameter by parameter, in units of how well noise lets them be known.
+    /// The estimates move as is said, parameter by parameter, in units of how well noise lets them
+    /// be known.
     fn moves_as_said(&self, signals: &[(&str, f64)]) {
         let sums = cost::sums(&self.response, &TABLE);
         let scale = cramer_rao::scale(&sums.information);

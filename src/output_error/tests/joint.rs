@@ -66,7 +66,8 @@ fn two_copies_of_a_maneuver_have_its_estimates_and_bounds_smaller_by_the_root_of
         &[parameters.clone(), parameters.clone()],
     );
     let both = fit_of(&joint, start);
-    // Shared parameters take less out of two maneuvers' noise than out of one's, which the corrected bound counts.
+    // Shared parameters take less out of two maneuvers' noise than out of one's, which the
+    // corrected bound counts.
     for (one, two, max_relative) in [
         (alone.covariance.unwrap(), both.covariance.unwrap(), 1e-4),
         (

@@ -1,4 +1,5 @@
-//! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for the bounds.
+//! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for
+//! the bounds.
 
 mod calibration;
 mod coarse;
@@ -397,7 +398,8 @@ fn the_bound_is_the_scatter_for_white_noise_and_weights_that_are_not_its_inverse
 
 #[test]
 fn the_corrected_bound_counts_colour_that_the_bound_for_white_noise_misses() {
-    // 80 draws give a scatter to 8%; three standard errors to each side. Student's t makes the bound some 10% longer.
+    // 80 draws give a scatter to 8%; three standard errors to each side. Student's t makes the
+    // bound some 10% longer.
     for (name, white, corrected) in scatter::<3, Longitudinal>(80, 0.9, Weights::Table) {
         assert!(
             white > 2.0,

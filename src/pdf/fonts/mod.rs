@@ -1,5 +1,6 @@
-//! The two faces of the printed report, regular and bold: a part of Arimo (SIL Open Font License, `fonts/OFL.txt`) with
-//! Latin, Greek and the signs that a report needs. Every PDF carries them, so it looks the same everywhere.
+//! The two faces of the printed report, regular and bold: a part of Arimo (SIL Open Font License,
+//! `fonts/OFL.txt`) with Latin, Greek and the signs that a report needs. Every PDF carries them, so
+//! it looks the same everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -186,7 +187,8 @@ impl Cut {
             .filter(Filter::FlateDecode)
             .pair(Name(b"Length1"), length);
         let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
-        // A hyphen and one that may be left out look alike: what is read is the former, which comes first.
+        // A hyphen and one that may be left out look alike: what is read is the former, which comes
+        // first.
         let mut known = BTreeSet::new();
         for (c, (glyph, _)) in &self.glyphs {
             if known.insert(*glyph) {

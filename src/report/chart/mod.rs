@@ -1,4 +1,5 @@
-//! Strip charts: a whole flight with its maneuvers, and one maneuver measured against computed, each as an SVG file.
+//! Strip charts: a whole flight with its maneuvers, and one maneuver measured against computed,
+//! each as an SVG file.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -59,11 +60,11 @@ const RESIDUAL: Look = Look {
     colour: INK,
     width: 0.8,
 };
-/// By what share of its range within the maneuver a scale grows for what lies before, after and in what was computed: the
-/// recovery from a maneuver, and a response that diverges, would flatten it.
+/// By what share of its range within the maneuver a scale grows for what lies before, after and in
+/// what was computed: the recovery from a maneuver, and a response that diverges, would flatten it.
 const STRETCH: f64 = 0.5;
-/// What is shown before and after a maneuver, s: the trimmed flight it starts from, and whether it was at rest when it was
-/// cut.
+/// What is shown before and after a maneuver, s: the trimmed flight it starts from, and whether it
+/// was at rest when it was cut.
 const AROUND_S: f64 = 4.0;
 /// An input that moves less than this share of its smallest step is not drawn.
 const HARDLY: f64 = 0.5;
@@ -88,7 +89,8 @@ pub struct Groups {
 pub struct FlightView<'a> {
     pub aircraft: &'a str,
     pub record: &'a Record,
-    /// How many samples were recorded and the step between them, s: the record at hand may be an outline.
+    /// How many samples were recorded and the step between them, s: the record at hand may be an
+    /// outline.
     pub recorded: (usize, f64),
     pub groups: &'a Groups,
     pub maneuvers: &'a [Maneuver],
@@ -343,7 +345,8 @@ impl Pen<'_> {
             .map(|(_, v)| *v)
     }
 
-    /// What a signal's scale covers: all of its core, and of the rest and of `more` what does not flatten that.
+    /// What a signal's scale covers: all of its core, and of the rest and of `more` what does not
+    /// flatten that.
     fn limits(&self, name: &str, more: &[f64]) -> (f64, f64) {
         let all = || {
             self.between(name, (self.columns.from_s, self.columns.to_s))
@@ -358,7 +361,8 @@ impl Pen<'_> {
         extent(near.chain([low, high])).unwrap_or((low, high))
     }
 
-    /// One signal with its marks on a scale for it and for `more`; none where the record has no such signal.
+    /// One signal with its marks on a scale for it and for `more`; none where the record has no
+    /// such signal.
     fn strip(&self, name: &str, look: Look, more: &[f64]) -> Option<Strip> {
         let record = self.record;
         let series = record.signals.get(name)?;
@@ -425,7 +429,8 @@ impl Pen<'_> {
         measured
             .traces
             .push(self.trace(start_s, &output.computed, measured.scale, INPUT));
-        // What was left out of the cost may be no measurement at all: it has a place in time and no residual.
+        // What was left out of the cost may be no measurement at all: it has a place in time and no
+        // residual.
         let samples = output
             .measured
             .iter()
@@ -455,7 +460,8 @@ impl Pen<'_> {
     }
 }
 
-/// A round scale of about so many steps on which at least two numbers stand: one alone gives no scale.
+/// A round scale of about so many steps on which at least two numbers stand: one alone gives no
+/// scale.
 fn scale(low: f64, high: f64, steps: f64) -> Scale {
     let scale = Scale::in_steps(low, high, steps);
     let ticks = (scale.max / scale.step).floor() - (scale.min / scale.step).ceil() + 1.0;
@@ -499,7 +505,8 @@ fn moved<'a>(pen: &Pen, groups: &'a Groups) -> (Vec<&'a str>, Vec<&'a str>) {
     (names(moved), names(still))
 }
 
-/// A maneuver as it is written over the chart: with what the record says where the analyst's list says otherwise.
+/// A maneuver as it is written over the chart: with what the record says where the analyst's list
+/// says otherwise.
 fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
     let same = |e: &&EventRow| {
         e.given_class.as_ref() == Some(&maneuver.class)

@@ -1,9 +1,11 @@
-//! The figures, as SVG to stand in the page: the only module that knows the plotting crate. A derivative over angle of
-//! attack in the manner of the paper's Figures 5-7 and 13-16, strips of time histories as in the others ([`stack`]), and
-//! the strip charts of flights and maneuvers ([`strips`]).
+//! The figures, as SVG to stand in the page: the only module that knows the plotting crate. A
+//! derivative over angle of attack in the manner of the paper's Figures 5-7 and 13-16, strips of
+//! time histories as in the others ([`stack`]), and the strip charts of flights and maneuvers
+//! ([`strips`]).
 //!
-//! The crate draws paper, axes, lines and band. The marks and bars of the estimates are one path per class in the
-//! crate's own scene: it draws bars over hollow marks otherwise, and each with an element of its own.
+//! The crate draws paper, axes, lines and band. The marks and bars of the estimates are one path
+//! per class in the crate's own scene: it draws bars over hollow marks otherwise, and each with an
+//! element of its own.
 
 pub mod stack;
 pub mod strips;
@@ -24,10 +26,12 @@ use super::marks::Mark;
 use super::notation::{Digits, escaped};
 use super::scale::Scale;
 
-/// Width of a figure in its own units. On a page (178 mm) a unit is 0.84 pt, so that 14 is over 11 pt.
+/// Width of a figure in its own units. On a page (178 mm) a unit is 0.84 pt, so that 14 is over 11
+/// pt.
 const WIDTH: f64 = 600.0;
 const HEIGHT: f64 = 350.0;
-/// Room above and below the frame: half a line of text for the topmost tick label, and ticks and label of the x axis.
+/// Room above and below the frame: half a line of text for the topmost tick label, and ticks and
+/// label of the x axis.
 const MARGINS: (f64, f64) = (9.0, 44.0);
 const TEXT: u32 = 14;
 const FONT: &str = "Helvetica, Arial, Liberation Sans, sans-serif";
@@ -132,7 +136,8 @@ fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layo
     }
 }
 
-/// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper minus.
+/// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper
+/// minus.
 fn ticks(scale: Scale) -> TickFormat {
     let digits = match scale.decimals() {
         decimals if decimals <= 6 => Digits::Decimals(decimals),
@@ -271,8 +276,8 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
     }))
 }
 
-/// Makes a drawing of the crate fit to stand in a page with others: it scales with its column, says its title to those
-/// who do not see it, has ids of its own, and no digits beyond a hundredth.
+/// Makes a drawing of the crate fit to stand in a page with others: it scales with its column, says
+/// its title to those who do not see it, has ids of its own, and no digits beyond a hundredth.
 fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);
     let height = svg

@@ -1,6 +1,7 @@
-//! Strips under each other over one time axis, in one column or several, as one small drawing: the inputs of a class, a
-//! maneuver measured and computed with its residuals, rates side by side. A report of five hundred maneuvers has five
-//! hundred of them, so everything alike is one path, and lines are written in steps of a tenth.
+//! Strips under each other over one time axis, in one column or several, as one small drawing: the
+//! inputs of a class, a maneuver measured and computed with its residuals, rates side by side. A
+//! report of five hundred maneuvers has five hundred of them, so everything alike is one path, and
+//! lines are written in steps of a tenth.
 
 use std::fmt::Write;
 
@@ -270,7 +271,8 @@ fn ticks(scale: Scale) -> impl Iterator<Item = (f64, String)> {
         .map(move |n| (n * scale.step, digits.write(Some(n * scale.step))))
 }
 
-/// A line through points, in steps of a tenth from one to the next: sums of steps stay true to the points.
+/// A line through points, in steps of a tenth from one to the next: sums of steps stay true to the
+/// points.
 fn trace(points: impl Iterator<Item = (f64, f64)>) -> String {
     let mut d = String::new();
     let mut at: Option<(i64, i64)> = None;

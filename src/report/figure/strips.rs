@@ -1,7 +1,9 @@
-//! A strip chart: signals under each other over one time axis, with the maneuvers shaded through all of them.
+//! A strip chart: signals under each other over one time axis, with the maneuvers shaded through
+//! all of them.
 //!
-//! The crate draws the axes of each strip; lines, shading and marks are paths in its scene, as in the other figures. It
-//! stacks no plots with names beside them, so the strips are put under each other here.
+//! The crate draws the axes of each strip; lines, shading and marks are paths in its scene, as in
+//! the other figures. It stacks no plots with names beside them, so the strips are put under each
+//! other here.
 
 use std::fmt::Write;
 
@@ -282,7 +284,8 @@ fn put_key(scene: &mut Scene, key: Key, x: f64, y: f64) {
     scene.elements.push(primitive);
 }
 
-/// Labels that do not fit into their windows, upright over them, pushed apart where they would touch.
+/// Labels that do not fit into their windows, upright over them, pushed apart where they would
+/// touch.
 fn labels(scene: &mut Scene, chart: &Chart, place: &Place, y: f64) -> f64 {
     if chart
         .windows
@@ -514,7 +517,8 @@ fn line(pieces: &[Vec<(f64, f64)>], place: &Place, y: impl Fn(f64) -> f64) -> St
     d
 }
 
-/// Bridged samples stand at the bottom of the strip, despiked ones at its top, missing ones as a hollow bar.
+/// Bridged samples stand at the bottom of the strip, despiked ones at its top, missing ones as a
+/// hollow bar.
 fn put_marks(scene: &mut Scene, strip: &Strip, place: &Place) {
     let (top, bottom) = (ROOM, ROOM + strip.height);
     let centre = |run: &(f64, f64)| place.x(0.5 * (run.0 + run.1));

@@ -1,8 +1,8 @@
-//! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned tree; or objects of an
-//! object store under the same names.
+//! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned
+//! tree; or objects of an object store under the same names.
 //!
-//! Only the columns of the channel map are read, each by itself, row group by row group and page by page, into numbers;
-//! what a file cannot give is a problem of its flight, never a panic.
+//! Only the columns of the channel map are read, each by itself, row group by row group and page by
+//! page, into numbers; what a file cannot give is a problem of its flight, never a panic.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -50,19 +50,21 @@ fn is_hidden(name: &str) -> bool {
     name.starts_with(['.', '_'])
 }
 
-/// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels at 200 Hz. A file of a
-/// few kilobytes can claim any number of rows, and would be read for as long.
+/// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels
+/// at 200 Hz. A file of a few kilobytes can claim any number of rows, and would be read for as
+/// long.
 const LARGEST_FILE: u64 = 500_000_000;
 
 /// The field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
 
-/// The flights of an archive, sorted by flight: a folder (searched for `*.parquet`, sub-folders too), a glob or a single
-/// file. The files of one folder `flight=007` are one flight of that name; otherwise a file is a flight named by its stem.
+/// The flights of an archive, sorted by flight: a folder (searched for `*.parquet`, sub-folders
+/// too), a glob or a single file. The files of one folder `flight=007` are one flight of that name;
+/// otherwise a file is a flight named by its stem.
 ///
 /// # Errors
-/// No file is found, or the archive's own folder cannot be read. A folder below it that cannot be read stands among the
-/// files, as one that cannot be read.
+/// No file is found, or the archive's own folder cannot be read. A folder below it that cannot be
+/// read stands among the files, as one that cannot be read.
 pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     let mut files = BTreeSet::new();
     if object::is_object(Path::new(archive)) {
@@ -96,7 +98,8 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     Ok(flights(files))
 }
 
-/// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other programs' own.
+/// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other
+/// programs' own.
 fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
     let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
     for entry in fs::read_dir(folder).map_err(unreadable)? {
@@ -165,12 +168,13 @@ fn identity(file: &Path) -> (String, PathBuf) {
 }
 
 thread_local! {
-    /// Whether this thread is reading a file of which it need not be said that it made the reader panic.
+    /// Whether this thread is reading a file of which it need not be said that it made the reader
+    /// panic.
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The files of a flight, opened: what their footers say. Columns are read from them one at a time, so that memory holds one
-/// page of one column and not of all.
+/// The files of a flight, opened: what their footers say. Columns are read from them one at a time,
+/// so that memory holds one page of one column and not of all.
 #[derive(Debug)]
 pub struct Opened {
     flight_id: String,
@@ -216,8 +220,8 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
     })
 }
 
-/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file, too; silently, for the reason
-/// goes into a table.
+/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file,
+/// too; silently, for the reason goes into a table.
 fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -246,7 +250,8 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
         .transpose()
         .map_err(|e| e.to_string())?;
     let metadata = if let Some(object) = &object {
-        // Where its pages lie, a file in an object store is asked for if it knows: then no others are fetched.
+        // Where its pages lie, a file in an object store is asked for if it knows: then no others
+        // are fetched.
         let options =
             ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
         ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
@@ -485,7 +490,8 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
     ))
 }
 
-/// For timestamps and durations, the factor from their ticks to the unit that the channel map states.
+/// For timestamps and durations, the factor from their ticks to the unit that the channel map
+/// states.
 fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
     let (DataType::Timestamp(tick, _) | DataType::Duration(tick)) = found else {
         return None;

@@ -1,4 +1,5 @@
-//! The archive in an object store: which objects are flights, and which of their bytes a column takes.
+//! The archive in an object store: which objects are flights, and which of their bytes a column
+//! takes.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,8 +14,8 @@ use super::super::object;
 use super::{is_hidden, unreadable};
 use crate::error::Error;
 
-/// The objects of an archive `s3://bucket/prefix`: those below it whose names end in `.parquet`, the one of this name, or
-/// those that match it as a glob.
+/// The objects of an archive `s3://bucket/prefix`: those below it whose names end in `.parquet`,
+/// the one of this name, or those that match it as a glob.
 ///
 /// # Errors
 /// The objects cannot be listed.
@@ -52,8 +53,8 @@ pub(super) fn find(archive: &str) -> Result<BTreeSet<PathBuf>, Error> {
     Ok(found)
 }
 
-/// Whether an object lies in a folder, or is the one of this name; names that begin with a dot or an underscore are other
-/// programs' own.
+/// Whether an object lies in a folder, or is the one of this name; names that begin with a dot or
+/// an underscore are other programs' own.
 fn is_below(folder: &str, object: &str) -> bool {
     let Some(rest) = object.strip_prefix(folder) else {
         return false;
@@ -81,8 +82,9 @@ pub(super) fn why(path: &Path, error: &ParquetError) -> String {
     object::failed(path).unwrap_or_else(|| unreadable(error))
 }
 
-/// The bytes of an object that these rows of a column take: of each row group the column's pages that hold them, where the
-/// file tells its pages, else all of the column; and the dictionary before them.
+/// The bytes of an object that these rows of a column take: of each row group the column's pages
+/// that hold them, where the file tells its pages, else all of the column; and the dictionary
+/// before them.
 pub(super) fn stretches(
     metadata: &ParquetMetaData,
     column: usize,
@@ -199,7 +201,8 @@ mod tests {
         ));
     }
 
-    /// A file of two row groups of 1000 rows in pages of 100, with or without the places of its pages.
+    /// A file of two row groups of 1000 rows in pages of 100, with or without the places of its
+    /// pages.
     fn metadata(pages: PageIndexPolicy) -> ArrowReaderMetadata {
         let schema = Arc::new(Schema::new(
             ["a", "b"]

@@ -1,4 +1,5 @@
-//! What stands in place of the connection in a program that was built without object stores: an error that says so.
+//! What stands in place of the connection in a program that was built without object stores: an
+//! error that says so.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

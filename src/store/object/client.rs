@@ -1,7 +1,9 @@
-//! The connection to a bucket: requests of the `object_store` crate, each waited for by the thread that makes it.
+//! The connection to a bucket: requests of the `object_store` crate, each waited for by the thread
+//! that makes it.
 //!
-//! Retries with backoff are that crate's; they end within half a minute, and after [`SILENT`] requests in a row without an
-//! answer nobody is asked again in this run: a dead endpoint costs a minute, not a minute for every flight.
+//! Retries with backoff are that crate's; they end within half a minute, and after [`SILENT`]
+//! requests in a row without an answer nobody is asked again in this run: a dead endpoint costs a
+//! minute, not a minute for every flight.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,13 +25,14 @@ use super::{About, Failure};
 /// So many requests in a row without an answer, and the endpoint is taken for dead.
 const SILENT: usize = 3;
 
-/// After so long a request that failed is not tried again. What was begun before may take as long once more.
+/// After so long a request that failed is not tried again. What was begun before may take as long
+/// once more.
 const PATIENCE: Duration = Duration::from_secs(25);
 
 const ENDPOINTS: [&str; 3] = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
 
-/// Other sources of credentials than a key and its secret. Without any, machines in Amazon's cloud would be asked for
-/// theirs, and elsewhere nobody answers that.
+/// Other sources of credentials than a key and its secret. Without any, machines in Amazon's cloud
+/// would be asked for theirs, and elsewhere nobody answers that.
 const CREDENTIALS: [&str; 4] = [
     "AWS_WEB_IDENTITY_TOKEN_FILE",
     "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",

@@ -1,8 +1,10 @@
-//! Objects of an S3-compatible store, `s3://bucket/key`, as archive and store use them: listed, read by ranges, put whole.
+//! Objects of an S3-compatible store, `s3://bucket/key`, as archive and store use them: listed,
+//! read by ranges, put whole.
 //!
-//! What connects is the environment's alone (`AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_SESSION_TOKEN`, `AWS_REGION`,
-//! `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP` and what else the `object_store` crate reads there): no file of the pipeline and no
-//! option holds a secret. An object is replaced by a single request or not at all, so none is ever half written.
+//! What connects is the environment's alone (`AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
+//! `AWS_SESSION_TOKEN`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP` and what else the
+//! `object_store` crate reads there): no file of the pipeline and no option holds a secret. An
+//! object is replaced by a single request or not at all, so none is ever half written.
 
 #[cfg(not(feature = "s3"))]
 #[path = "absent.rs"]
@@ -65,7 +67,8 @@ impl Failure {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct About {
     pub bytes: u64,
-    /// The store's own mark of its content; another content has another one. Not every store lists it.
+    /// The store's own mark of its content; another content has another one. Not every store lists
+    /// it.
     pub tag: Option<String>,
 }
 

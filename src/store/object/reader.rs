@@ -1,4 +1,5 @@
-//! An object read by ranges: what Parquet's reader asks for, and a little ahead of it, never the whole.
+//! An object read by ranges: what Parquet's reader asks for, and a little ahead of it, never the
+//! whole.
 
 use std::io::{self, Read};
 use std::ops::Range;
@@ -12,10 +13,12 @@ use parquet::file::reader::{ChunkReader, Length};
 use super::client::Client;
 use super::{About, Failure, at};
 
-/// The most that is asked for at once beyond what is needed, bytes: a request costs as much as some hundred kilobytes.
+/// The most that is asked for at once beyond what is needed, bytes: a request costs as much as some
+/// hundred kilobytes.
 const AHEAD: u64 = 1 << 20;
 
-/// An object that is being read; every copy reads the same content, or fails when it has been replaced.
+/// An object that is being read; every copy reads the same content, or fails when it has been
+/// replaced.
 #[derive(Clone, Debug)]
 pub struct Reader {
     source: Arc<Source>,
@@ -27,7 +30,8 @@ struct Source {
     client: Arc<Client>,
     key: String,
     about: About,
-    /// The stretches of the object that will be read: nothing is asked for ahead beyond the end of one.
+    /// The stretches of the object that will be read: nothing is asked for ahead beyond the end of
+    /// one.
     wanted: Vec<Range<u64>>,
     /// What was asked for last, with its beginning.
     held: Mutex<(u64, Bytes)>,

@@ -1,4 +1,5 @@
-//! Wind-tunnel databases as written: CSV, Parquet or DAVE-ML, told apart by the file's name, to the same rows.
+//! Wind-tunnel databases as written: CSV, Parquet or DAVE-ML, told apart by the file's name, to the
+//! same rows.
 
 mod daveml;
 #[cfg(test)]
@@ -13,10 +14,12 @@ use polars::prelude::{Column, DataFrame, DataType, ParquetReader, SerReader};
 use super::files::{self, TunnelRow};
 use crate::error::{Error, Result};
 
-/// The rows of a tunnel's tables, each with its line in the file (in Parquet its row, counted from 1).
+/// The rows of a tunnel's tables, each with its line in the file (in Parquet its row, counted from
+/// 1).
 ///
-/// `third` is the name of the tables' third variable, where they have one. Of a DAVE-ML file only the functions of the
-/// variables that are `wanted` are read: a model holds much that is no derivative.
+/// `third` is the name of the tables' third variable, where they have one. Of a DAVE-ML file only
+/// the functions of the variables that are `wanted` are read: a model holds much that is no
+/// derivative.
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
