@@ -14,7 +14,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use harvest::config::{Config, Overrides};
-use harvest::pipeline::{self, Progress, Stage};
+use harvest::lineage::Stage;
+use harvest::night;
+use harvest::pipeline::Progress;
 use harvest::store::archive;
 use polars::prelude::{ArrowDataType, ParquetReader, SerReader};
 
@@ -54,7 +56,7 @@ fn run(archive: Option<&str>, until: Stage) -> anyhow::Result<()> {
         ..Overrides::default()
     };
     let config = Config::load(Path::new("pipelines/harv"), own)?;
-    pipeline::run(&config, until, std::time::Duration::ZERO, &Quiet)?;
+    night::run(&config, until, std::time::Duration::ZERO, &Quiet)?;
     Ok(())
 }
 

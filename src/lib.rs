@@ -28,7 +28,6 @@ pub mod segment;
 pub mod estimate;
 pub mod trend;
 pub mod compare;
-pub mod overnight;
 pub mod export;
 pub mod pdf;
 pub mod report;
@@ -36,16 +35,15 @@ pub mod report;
 // Studies: is what the stages say of themselves true?
 pub mod validate;
 
-// Past one machine: work dealt to shards, scripts for a scheduler.
-pub mod cluster;
-
 // Outside: disk and configuration.
 pub mod store;
 pub mod config;
 
-// Conductor: the stages in order, and the command line.
+// Conductor: the stages in order; their results as published nights; campaigns on a cluster.
 pub mod memory;
 pub mod pipeline;
+pub mod night;
+pub mod cluster;
 pub mod simulation;
 pub mod validation;
 pub mod bench_case;

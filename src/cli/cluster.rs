@@ -10,9 +10,10 @@ use clap::{Args, ValueEnum};
 use super::{Bars, LOOK, Options, Patience, start_threads, summary};
 use crate::cluster::plan::{Of, Plan, Shard, array};
 use crate::cluster::scripts::{self, Campaign, Engine, LARGEST_ARRAY};
+use crate::cluster::shard;
 use crate::config::Config;
 use crate::error::Error;
-use crate::pipeline::{Stage, shard};
+use crate::lineage::Stage;
 use crate::store::atomic;
 
 /// Another try may go well (`EX_TEMPFAIL`).

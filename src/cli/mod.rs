@@ -13,12 +13,13 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Config, Overrides, Simulation};
+use crate::lineage::Stage;
 use crate::maneuver::Status;
-use crate::pipeline::night::{self, Done};
+use crate::night::publish::{self, Done};
 use crate::pipeline::show::{self, Subject};
-use crate::pipeline::{self, Progress, Stage};
+use crate::pipeline::{self, Progress};
 use crate::store::{Log, archive, atomic};
-use crate::{bench_case, simulation, validation};
+use crate::{bench_case, night, simulation, validation};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
@@ -409,7 +410,7 @@ fn brought(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Res
         );
     }
     let bars = Bars::new(quiet, log);
-    let done = pipeline::run(&config, until, options.patience.wait(), &bars)?;
+    let done = night::run(&config, until, options.patience.wait(), &bars)?;
     if !quiet {
         summary(&config, &done, until);
     }
@@ -576,7 +577,7 @@ fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
             println!("{}", file.display());
         }
     }
-    Ok(if night::rejected(&exported.problems) {
+    Ok(if publish::rejected(&exported.problems) {
         ExitCode::from(2)
     } else {
         ExitCode::SUCCESS

@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::{Bars, LOOK, Options, Patience, cluster, start_threads};
-use crate::overnight::{Changes, Moved};
-use crate::pipeline::{diff, explain, gc, status, verify};
+use crate::lineage::{Changes, Moved};
+use crate::night::{diff, explain, gc, status, verify};
 
 #[derive(Args, Debug)]
 pub struct StatusOptions {

@@ -6,7 +6,7 @@
 //! which the dependency outlives. PBS has no such command for a running task: there a task is tried
 //! again in its own time.
 
-use super::Settings;
+use crate::config::ClusterSettings as Settings;
 
 /// The schedulers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,6 +6,7 @@
 
 mod cards;
 mod check;
+mod cluster;
 mod places;
 mod source;
 mod written;
@@ -18,9 +19,10 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{cluster, compare, estimate, export, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 pub use cards::Simulation;
+pub use cluster::ClusterSettings;
 pub use written::ReportSettings;
 
 /// Everything that decides a campaign's results, checked.
@@ -53,7 +55,7 @@ pub struct Config {
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,
-    pub cluster: cluster::Settings,
+    pub cluster: ClusterSettings,
     /// The analyst's own report template, where there is one.
     pub template: Option<String>,
     /// The pipeline's files as they are: name and text.

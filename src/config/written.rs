@@ -12,7 +12,7 @@ use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
-use crate::{cluster, compare, estimate, export, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, segment, trend};
 
 /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]
@@ -48,7 +48,7 @@ pub struct PipelineFile {
     #[serde(default)]
     pub report: ReportSettings,
     #[serde(default)]
-    pub cluster: cluster::Settings,
+    pub cluster: super::cluster::ClusterSettings,
 }
 
 /// Settings of the report.

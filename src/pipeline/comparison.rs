@@ -3,24 +3,25 @@
 
 use std::collections::BTreeSet;
 
-use super::{Campaign, Run, Stage};
+use super::{Campaign, Run};
 use crate::compare::against::{self, Earlier};
 use crate::compare::{self, beyond, ranges};
 use crate::config::Config;
 use crate::error::Result;
+use crate::lineage::Stage;
 use crate::output_error::Outcome;
 use crate::store::{files, table};
 use crate::tables::EstimateRow;
 
 /// The published trends of the earlier campaigns that the analyst names.
-pub(super) fn earlier(config: &Config) -> Result<Vec<Earlier>> {
+pub(crate) fn earlier(config: &Config) -> Result<Vec<Earlier>> {
     let read =
         |folder: &std::path::PathBuf| Ok(Earlier::new(folder, files::earlier_trends(folder)?));
     config.compare.against.iter().map(read).collect()
 }
 
 /// The estimates and combined sums of the maneuvers that converged, without biases.
-pub(super) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow> {
+pub(crate) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow> {
     let converged: BTreeSet<&str> = campaign
         .fits
         .iter()
@@ -35,7 +36,7 @@ pub(super) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow
 }
 
 impl Run<'_> {
-    pub(super) fn compare(&self, campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn compare(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
         let (tunnel, settings, shelf) =
             (&config.tunnel, &config.compare, self.shelf(Stage::Compare));

@@ -25,13 +25,13 @@ use crate::store::{Digest, Fingerprint, object};
 /// What the store keeps of a flight besides its records: what concerns all of it, and its
 /// stretches.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Kept {
+pub(crate) struct Kept {
     pub problems: Vec<Problem>,
     pub stretches: Vec<(String, Ingested)>,
 }
 
 /// A flight after ingest: its stretches, and where its artefact lies.
-pub(super) struct Conditioned {
+pub(crate) struct Conditioned {
     pub stretches: Vec<Flight>,
     pub problems: Vec<Problem>,
     /// None where nothing is kept of it: what was refused for now may be read the next time.
@@ -73,7 +73,7 @@ const BATCH: usize = 2;
 
 /// How many flights are in work at once and in what pieces their channels are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shares {
+pub(crate) struct Shares {
     pub flights: usize,
     pub piece: usize,
     pub batch: usize,
@@ -117,7 +117,7 @@ impl Shares {
 
 impl Run<'_> {
     /// Does `work` on every flight, a few at once; results in the order of the flights.
-    pub(super) fn each_flight<T: Sync, R: Send>(
+    pub(crate) fn each_flight<T: Sync, R: Send>(
         &self,
         flights: &[T],
         name: impl Fn(&T) -> &str + Sync,
@@ -164,7 +164,7 @@ impl Run<'_> {
     }
 
     /// Ingests a flight, unless it is up to date.
-    pub(super) fn ingest_flight(&self, files: &FlightFiles) -> Result<Conditioned> {
+    pub(crate) fn ingest_flight(&self, files: &FlightFiles) -> Result<Conditioned> {
         let id = &files.flight_id;
         let content = match self.inputs.content(id) {
             Ok(content) => content,
@@ -204,7 +204,7 @@ impl Run<'_> {
 
     /// A flight as the store has it: none unless it is up to date and its records hold what was
     /// written.
-    pub(super) fn ingested(&self, id: &str, content: &str) -> Option<Conditioned> {
+    pub(crate) fn ingested(&self, id: &str, content: &str) -> Option<Conditioned> {
         let fingerprint = self.ingest_fingerprint(id, content);
         let artefact = self.store.path("ingest", id, &fingerprint, "json");
         let kept: Kept = self.store.load(&artefact)?;
@@ -230,7 +230,7 @@ impl Run<'_> {
 
     /// The records that an artefact of ingest tells of, relative to the store, with what they hold;
     /// none of another kind.
-    pub(super) fn recorded(&self, artefact: &str) -> Vec<(PathBuf, Digest)> {
+    pub(crate) fn recorded(&self, artefact: &str) -> Vec<(PathBuf, Digest)> {
         let path = self.store.folder().join(artefact);
         let fingerprint = path
             .file_stem()
@@ -296,7 +296,7 @@ impl Run<'_> {
         }
     }
 
-    pub(super) fn record_path(&self, id: &str, fingerprint: &str) -> PathBuf {
+    pub(crate) fn record_path(&self, id: &str, fingerprint: &str) -> PathBuf {
         self.store.path("records", id, fingerprint, "parquet")
     }
 
@@ -465,7 +465,7 @@ enum Halt {
 }
 
 impl Ingested {
-    pub(super) fn refused(problem: Problem) -> Ingested {
+    pub(crate) fn refused(problem: Problem) -> Ingested {
         Ingested {
             accepted: false,
             record: None,

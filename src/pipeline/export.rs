@@ -4,10 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Campaign, Progress, Stage, comparison};
+use super::{Campaign, Progress, comparison};
 use crate::config::Config;
 use crate::error::{Problem, Result};
 use crate::export::{self, Contents, daveml, jsbsim};
+use crate::lineage::Stage;
 use crate::store::table::Shelf;
 use crate::store::{atomic, table};
 

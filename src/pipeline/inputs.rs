@@ -22,7 +22,7 @@ use crate::store::{Contents, Digest, Fingerprint, Store};
 
 /// The content of the archive.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Inputs {
+pub(crate) struct Inputs {
     /// Fingerprint of each flight's content, or why there is none.
     contents: BTreeMap<String, std::result::Result<String, String>>,
     /// All files that could be read, the tunnel's table at the end.
@@ -122,7 +122,7 @@ impl Inputs {
 }
 
 /// The file of a flight that a problem names: the first, of several the folder.
-pub(super) fn place(flight: &FlightFiles) -> String {
+pub(crate) fn place(flight: &FlightFiles) -> String {
     flight
         .files
         .first()
@@ -155,7 +155,7 @@ fn source_file(file: &Path, digest: &Digest) -> SourceFile {
 
 impl<'a> Run<'a> {
     /// A run that believes what its store remembers of files' contents.
-    pub(super) fn of_store(
+    pub(crate) fn of_store(
         config: &'a Config,
         store: Store,
         files: &[FlightFiles],
@@ -165,7 +165,7 @@ impl<'a> Run<'a> {
         Run::new(config, store, contents, files, progress)
     }
 
-    pub(super) fn new(
+    pub(crate) fn new(
         config: &'a Config,
         store: Store,
         contents: Contents,
@@ -275,7 +275,7 @@ fn lineage(config: &Config, inputs: &Inputs, earlier: &[Earlier]) -> Lineage {
 }
 
 /// What stands in place of a content's fingerprint where a flight was refused before it was read.
-pub(super) fn refused(reason: &str) -> String {
+pub(crate) fn refused(reason: &str) -> String {
     format!("refused: {reason}")
 }
 

@@ -5,22 +5,15 @@
 //! ([`others`]). Their artefacts lie in the store under fingerprints of all that decides them, so
 //! what is up to date is not done again, and a killed run goes on where it was. Trend, compare and
 //! report are small and are made anew from the artefacts. Results are collected in the order of
-//! flights and maneuvers, whatever thread made them, and published together as a night ([`night`]).
+//! flights and maneuvers, whatever thread made them, and published together as a night ([`crate::night`]).
 
 mod comparison;
-mod conditioning;
-pub mod diff;
-pub mod explain;
+pub(crate) mod conditioning;
 pub mod export;
-pub mod gc;
-mod inputs;
-pub mod night;
+pub(crate) mod inputs;
 mod others;
-pub mod shard;
 pub mod show;
-pub mod status;
-mod stretches;
-pub mod verify;
+pub(crate) mod stretches;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -37,13 +30,12 @@ use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
 use crate::flight::{Correction, Record};
 use crate::ingest::Signature;
-use crate::lineage::Lineage;
+use crate::lineage::{Changes, Lineage, Stage};
 use crate::maneuver::{Event, Maneuver, Unknown};
 use crate::output_error::Outcome;
-use crate::overnight::Changes;
 use crate::store::archive::FlightFiles;
 use crate::store::table::Shelf;
-use crate::store::{Contents, Digest, Fingerprint, Nights, Store, archive, table};
+use crate::store::{Contents, Digest, Fingerprint, Store, archive, atomic, table};
 use crate::tables::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
     EventRow, FitRow, History, InstrumentRow, OutlierRow, PredictionRow, TrendRow, VerdictRow,
@@ -61,10 +53,8 @@ const TREND_VERSION: u32 = 2;
 const COMPARE_VERSION: u32 = 1;
 
 /// The report's names among the published files: on screen and on paper.
-const REPORT: &str = "report.html";
+pub(crate) const REPORT: &str = "report.html";
 const PRINTED: &str = "report.pdf";
-
-pub use crate::lineage::Stage;
 
 /// Where the conductor says how far it is.
 pub trait Progress: Sync {
@@ -77,33 +67,33 @@ pub trait Progress: Sync {
 #[derive(Clone, Debug)]
 pub struct Flight {
     pub flight_id: String,
-    fingerprint: String,
-    record: PathBuf,
-    ingested: Ingested,
+    pub(crate) fingerprint: String,
+    pub(crate) record: PathBuf,
+    pub(crate) ingested: Ingested,
 }
 
 /// What the store keeps of a stretch besides its record.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Ingested {
-    accepted: bool,
+pub(crate) struct Ingested {
+    pub(crate) accepted: bool,
     /// What the record's file holds, where there is one.
-    record: Option<Digest>,
-    channels: Vec<ChannelRow>,
-    checks: Vec<CheckRow>,
-    instruments: Vec<InstrumentRow>,
+    pub(crate) record: Option<Digest>,
+    pub(crate) channels: Vec<ChannelRow>,
+    pub(crate) checks: Vec<CheckRow>,
+    pub(crate) instruments: Vec<InstrumentRow>,
     /// What signals are corrected by when the record is read.
-    corrections: Vec<Correction>,
-    problems: Vec<Problem>,
-    signature: Signature,
+    pub(crate) corrections: Vec<Correction>,
+    pub(crate) problems: Vec<Problem>,
+    pub(crate) signature: Signature,
 }
 
 /// What the store keeps of segment.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Found {
-    maneuvers: Vec<Maneuver>,
-    unknown: Vec<Unknown>,
-    events: Vec<EventRow>,
-    problems: Vec<Problem>,
+pub(crate) struct Found {
+    pub(crate) maneuvers: Vec<Maneuver>,
+    pub(crate) unknown: Vec<Unknown>,
+    pub(crate) events: Vec<EventRow>,
+    pub(crate) problems: Vec<Problem>,
 }
 
 /// The campaign as far as it has been brought.
@@ -179,38 +169,9 @@ impl Campaign {
     }
 }
 
-/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait`
-/// for another run to leave store and reports.
-///
-/// # Errors
-/// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight
-/// or a maneuver is among the problems of the night's summary.
-pub fn run(
-    config: &Config,
-    until: Stage,
-    wait: Duration,
-    progress: &dyn Progress,
-) -> Result<night::Done> {
-    let (mut run, files) = begin(config, wait, progress)?;
-    let nights = Nights::open(&config.reports, wait)?;
-    if let Some(done) = run.is_published(&nights, until) {
-        return Ok(done);
-    }
-    run.publish_into(nights.tonight()?);
-    let made = run.make(&files, until, &nights).and_then(|campaign| {
-        run.store.send_rest()?;
-        run.publish(&nights, &campaign, until)
-    });
-    if made.is_err() {
-        // What is left of tonight takes up room on a disk that may be full.
-        nights.forget_tonight();
-    }
-    made
-}
-
 /// Opens the store; while the run lives no other can. What files hold is looked at before anything
 /// is done with them.
-fn begin<'a>(
+pub(crate) fn begin<'a>(
     config: &'a Config,
     wait: Duration,
     progress: &'a dyn Progress,
@@ -222,36 +183,36 @@ fn begin<'a>(
     Ok((run, files))
 }
 
-struct Run<'a> {
-    config: &'a Config,
-    store: Store,
-    progress: &'a dyn Progress,
-    shares: Shares,
-    contents: Contents,
-    inputs: inputs::Inputs,
+pub(crate) struct Run<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) store: Store,
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) shares: Shares,
+    pub(crate) contents: Contents,
+    pub(crate) inputs: inputs::Inputs,
     /// The tables of earlier campaigns to compare with.
-    earlier: Vec<Earlier>,
-    lineage: Lineage,
+    pub(crate) earlier: Vec<Earlier>,
+    pub(crate) lineage: Lineage,
     /// Where each stage's tables go; nowhere unless a night is to be published.
-    shelves: BTreeMap<Stage, Shelf>,
+    pub(crate) shelves: BTreeMap<Stage, Shelf>,
     /// Tonight's folder, where there is one.
-    tonight: Option<PathBuf>,
+    pub(crate) tonight: Option<PathBuf>,
 }
 
 impl Run<'_> {
-    /// All stages as far as `until`, their tables in tonight's folder.
-    fn make(&self, files: &[FlightFiles], until: Stage, nights: &Nights) -> Result<Campaign> {
-        let mut campaign = self.results(files, until)?;
-        if until >= Stage::Report {
-            campaign.overnight = self.changes(nights, &campaign)?;
-            self.report(&mut campaign)?;
-        }
-        table::publish(&self.shelf(until), &campaign.problems)?;
-        Ok(campaign)
+    /// Where the tables of a stage go.
+    pub(crate) fn shelf(&self, stage: Stage) -> Shelf {
+        self.shelves.get(&stage).cloned().unwrap_or_default()
+    }
+
+    pub(crate) fn place_tonight(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        self.tonight
+            .as_ref()
+            .map_or(Ok(()), |folder| atomic::place(&folder.join(name), bytes))
     }
 
     /// The stages before the report, as far as `until`.
-    fn results(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
+    pub(crate) fn results(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
         let mut campaign = Campaign::default();
         self.ingest(files, &mut campaign)?;
         if until >= Stage::Segment {
@@ -271,7 +232,7 @@ impl Run<'_> {
 
     /// Does `work` on every item in parallel with a progress bar; results in the order of the
     /// items.
-    fn each<T: Sync, R: Send>(
+    pub(crate) fn each<T: Sync, R: Send>(
         &self,
         stage: &str,
         items: &[T],
@@ -291,7 +252,7 @@ impl Run<'_> {
         results
     }
 
-    fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn ingest(&self, files: &[FlightFiles], campaign: &mut Campaign) -> Result<()> {
         campaign.problems.extend_from_slice(&self.inputs.problems);
         let done = self.each_flight(files, |f| &f.flight_id, |f| self.ingest_flight(f))?;
         for (files, done) in files.iter().zip(done) {
@@ -327,7 +288,7 @@ impl Run<'_> {
         table::publish(&shelf, &campaign.instruments)
     }
 
-    fn segment(&self, campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn segment(&self, campaign: &mut Campaign) -> Result<()> {
         let accepted: Vec<&Flight> = campaign
             .flights
             .iter()
@@ -362,7 +323,7 @@ impl Run<'_> {
         table::publish(&shelf, &campaign.events)
     }
 
-    fn segment_path(&self, flight: &Flight, events: &[Event]) -> PathBuf {
+    pub(crate) fn segment_path(&self, flight: &Flight, events: &[Event]) -> PathBuf {
         let config = self.config;
         let rules: Vec<_> = config
             .classes
@@ -381,7 +342,7 @@ impl Run<'_> {
 
     /// The analyst's events in a flight, and where what is found in it lies. Only for events its
     /// record is looked at.
-    fn to_segment(&self, flight: &Flight) -> Result<(Vec<Event>, PathBuf)> {
+    pub(crate) fn to_segment(&self, flight: &Flight) -> Result<(Vec<Event>, PathBuf)> {
         let events = match self.config.events.as_slice() {
             [] => Vec::new(),
             events => flight.events(events, &flight.open(&self.store)?.about),
@@ -391,12 +352,12 @@ impl Run<'_> {
     }
 
     /// What was found in a flight and where that lies, if it is up to date.
-    fn segmented(&self, flight: &Flight) -> Option<(PathBuf, Found)> {
+    pub(crate) fn segmented(&self, flight: &Flight) -> Option<(PathBuf, Found)> {
         let (_, path) = self.to_segment(flight).ok()?;
         Some((path.clone(), self.store.load(&path)?))
     }
 
-    fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
+    pub(crate) fn segment_flight(&self, flight: &Flight) -> Result<(PathBuf, Found)> {
         let (events, path) = self.to_segment(flight)?;
         if let Some(found) = self.store.load(&path) {
             return Ok((path, found));
@@ -406,7 +367,7 @@ impl Run<'_> {
         Ok((path, found))
     }
 
-    fn estimate(&self, campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn estimate(&self, campaign: &mut Campaign) -> Result<()> {
         let of_flight = |f: &Flight| {
             campaign
                 .maneuvers
@@ -453,7 +414,7 @@ impl Run<'_> {
     }
 
     /// Estimates a flight's maneuvers; its record is read only if one of them is not up to date.
-    fn estimate_flight(
+    pub(crate) fn estimate_flight(
         &self,
         flight: &Flight,
         maneuvers: &[&Maneuver],
@@ -498,7 +459,7 @@ impl Run<'_> {
             .collect()
     }
 
-    fn estimate_path(&self, flight: &Flight, maneuver: &Maneuver) -> PathBuf {
+    pub(crate) fn estimate_path(&self, flight: &Flight, maneuver: &Maneuver) -> PathBuf {
         let config = self.config;
         let fingerprint = Fingerprint::of("estimate", ESTIMATE_VERSION)
             .with(&flight.fingerprint)
@@ -513,14 +474,14 @@ impl Run<'_> {
             .path("estimate", &maneuver.maneuver_id, &fingerprint, "json")
     }
 
-    fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
+    pub(crate) fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
         match self.config.class(&maneuver.class) {
             Some(class) => estimate::maneuver(record, maneuver, class, &self.basis()),
             None => Estimated::unknown_class(maneuver),
         }
     }
 
-    fn basis(&self) -> Basis<'_> {
+    pub(crate) fn basis(&self) -> Basis<'_> {
         let config = self.config;
         Basis::new(
             &config.aircraft,
@@ -530,7 +491,7 @@ impl Run<'_> {
         )
     }
 
-    fn trend(&self, campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn trend(&self, campaign: &mut Campaign) -> Result<()> {
         let estimates = comparison::converged(self.config, campaign);
         let found = trend::trends(&estimates, &self.config.trend, |name| {
             self.config.tunnel.alphas_deg(name)
@@ -542,7 +503,7 @@ impl Run<'_> {
         table::publish(&self.shelf(Stage::Trend), &campaign.trends)
     }
 
-    fn report(&self, campaign: &mut Campaign) -> Result<()> {
+    pub(crate) fn report(&self, campaign: &mut Campaign) -> Result<()> {
         let config = self.config;
         let at = config.report.histories_at_alpha_deg;
         let (maneuvers, fits, most) = (
@@ -606,7 +567,7 @@ impl Run<'_> {
     }
 
     /// Everything that decided the results, enough to do it again.
-    fn provenance(&self) -> report::Provenance {
+    pub(crate) fn provenance(&self) -> report::Provenance {
         let config = self.config;
         let versions = format!(
             "ingest {INGEST_VERSION}, segment {SEGMENT_VERSION}, estimate {ESTIMATE_VERSION}, joint {JOINT_VERSION}, predict \

@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::{Campaign, Fingerprint, JOINT_VERSION, PREDICT_VERSION, Run, Stage, problem};
+use super::{Campaign, Fingerprint, JOINT_VERSION, PREDICT_VERSION, Run, problem};
 use crate::error::{Error, Result};
 use crate::estimate::Estimated;
 use crate::estimate::joint::{self, Bin, Joined};
 use crate::estimate::prediction::{self, Predicted};
 use crate::flight::Record;
+use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::store::{Store, table};
@@ -29,7 +30,7 @@ fn name(path: &Path) -> String {
 
 impl Run<'_> {
     /// Estimates maneuvers of one class and angle of attack together, where that is asked for.
-    pub(super) fn join(&self, campaign: &mut Campaign, estimates: &[PathBuf]) -> Result<()> {
+    pub(crate) fn join(&self, campaign: &mut Campaign, estimates: &[PathBuf]) -> Result<()> {
         let settings = self.config.estimate.joint.as_ref();
         let bins = settings.map_or_else(Vec::new, |s| joint::bins(&campaign.maneuvers, s));
         let path = |bin: &Bin| {
@@ -90,7 +91,7 @@ impl Run<'_> {
 
     /// Predicts each maneuver from the others of its class and angle of attack, unless that is
     /// switched off.
-    pub(super) fn predict(
+    pub(crate) fn predict(
         &self,
         campaign: &mut Campaign,
         paths: &[PathBuf],
@@ -170,7 +171,7 @@ impl Run<'_> {
 
     /// Publishes what was estimated: the maneuvers' rows, then those of maneuvers estimated
     /// together.
-    pub(super) fn publish_estimates(&self, campaign: &Campaign) -> Result<()> {
+    pub(crate) fn publish_estimates(&self, campaign: &Campaign) -> Result<()> {
         let joined = || campaign.joined.iter().map(|j| &j.estimated);
         let fits: Vec<FitRow> = campaign
             .fits

@@ -31,19 +31,19 @@ const EVENT_S: f64 = 10.0;
 
 impl Flight {
     /// Its record, corrected by what its instruments are off by.
-    pub(super) fn open(&self, store: &Store) -> Result<RecordFile> {
+    pub(crate) fn open(&self, store: &Store) -> Result<RecordFile> {
         store.fetch(&self.record, self.ingested.record.as_ref())?;
         Ok(record_file::open(&self.record)?.corrected(self.ingested.corrections.clone()))
     }
 
     /// Whether this is a stretch of a flight, or the flight itself.
-    pub(super) fn is_of(&self, flight_id: &str) -> bool {
+    pub(crate) fn is_of(&self, flight_id: &str) -> bool {
         is_stretch(&self.flight_id, flight_id)
     }
 
     /// The analyst's events in this stretch: those that name it, and those of its flight that lie
     /// in its time.
-    pub(super) fn events(&self, events: &[Event], about: &About) -> Vec<Event> {
+    pub(crate) fn events(&self, events: &[Event], about: &About) -> Vec<Event> {
         let end_s = about.start_s + about.samples as f64 * about.step_s;
         let inside = |e: &Event| e.start_s < end_s && e.end_s > about.start_s;
         let own =
@@ -57,7 +57,7 @@ impl Flight {
 }
 
 /// Refuses flights whose rows are another's, and says which rows two flights have in common.
-pub(super) fn same_rows(campaign: &mut Campaign) {
+pub(crate) fn same_rows(campaign: &mut Campaign) {
     for later in 1..campaign.flights.len() {
         let (before, rest) = campaign.flights.split_at_mut(later);
         let Some(flight) = rest.first_mut().filter(|f| f.ingested.accepted) else {
@@ -93,7 +93,7 @@ pub(super) fn same_rows(campaign: &mut Campaign) {
 }
 
 /// Leaves out maneuvers in rows that an earlier flight has, too.
-pub(super) fn leave_out_same(campaign: &mut Campaign) {
+pub(crate) fn leave_out_same(campaign: &mut Campaign) {
     // What lies between two full ten seconds, and its surroundings, is the same as well.
     let beyond_s = 10.0;
     let Campaign {
@@ -116,7 +116,7 @@ pub(super) fn leave_out_same(campaign: &mut Campaign) {
 }
 
 /// The maneuvers of a record, window by window where it is long.
-pub(super) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) -> Result<Found> {
+pub(crate) fn segmented(config: &Config, file: &RecordFile, events: &[Event]) -> Result<Found> {
     let ends = window_ends(&file.about, surroundings(&file.about), events);
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let windows: Vec<Range<usize>> = starts.zip(&ends).map(|(from, to)| from..*to).collect();

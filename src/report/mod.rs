@@ -35,9 +35,9 @@ use serde::Serialize;
 
 use crate::aero::Axis;
 use crate::error::Problem;
+use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
-use crate::overnight::Changes;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
     InstrumentRow, PredictionRow, TrendRow,

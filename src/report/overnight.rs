@@ -3,7 +3,7 @@
 use super::Contents;
 use super::failures::TableView;
 use super::notation::{angle, number};
-use crate::overnight::Moved;
+use crate::lineage::Moved;
 
 /// So many causes are named in the headline.
 const CAUSES: usize = 3;

@@ -4,9 +4,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
-use crate::overnight::Changes;
 use crate::tables::FitRow;
 
 /// At most `most` maneuvers: the one that stands for its class (the converged one nearest to
@@ -96,7 +96,7 @@ fn add<'a>(chosen: &mut BTreeSet<&'a str>, from: &[&'a str], most: usize) {
 mod tests {
     use super::super::samples;
     use super::*;
-    use crate::overnight::ManeuverChange;
+    use crate::lineage::ManeuverChange;
 
     fn change(maneuver_id: &str) -> ManeuverChange {
         ManeuverChange {

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::Problem;
+use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, Quality, Recognised};
 use crate::output_error::identifiability::Limits;
-use crate::overnight::Changes;
 use crate::tables::{
     ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
     HistoryOutput, InstrumentRow, PredictionRow, TrendRow,

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::night::stated;
-use super::{Progress, Run};
+use super::publish::stated;
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::{Lineage, Stage};
+use crate::pipeline::{Progress, Run};
 use crate::store::{Contents, Digest, Night, Nights, Store, archive};
 
 /// What is said of one published file.

@@ -11,12 +11,15 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::{Campaign, Flight, Progress, Run, Stage, night, status};
 use crate::cluster::plan::{self, Item, Of, Plan, Shard};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::flight::is_stretch;
+use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Status};
+use crate::night::publish::Done;
+use crate::night::{self, status};
+use crate::pipeline::{Campaign, Flight, Progress, Run};
 use crate::store::archive::{self, FlightFiles};
 use crate::store::{Store, files};
 
@@ -116,13 +119,13 @@ pub fn missing(config: &Config, plan: &Plan, progress: &dyn Progress) -> Result<
 /// Publishes what the shards of a plan of maneuvers computed: a run that finds everything made.
 ///
 /// # Errors
-/// Something is missing, named by shard; or as [`super::run`].
+/// Something is missing, named by shard; or as [`crate::night::run`].
 pub fn merge(
     config: &Config,
     plan: &Plan,
     wait: Duration,
     progress: &dyn Progress,
-) -> Result<night::Done> {
+) -> Result<Done> {
     if plan.of != Of::Maneuvers {
         return Err(Error::config(
             &config.store,
@@ -140,7 +143,7 @@ pub fn merge(
         );
         return Err(Error::config(&config.store, None, what));
     }
-    super::run(config, Stage::Report, wait, progress)
+    night::run(config, Stage::Report, wait, progress)
 }
 
 /// A run that adds to the store beside others and publishes nothing.

@@ -4,12 +4,12 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Flight, Progress, Run};
 use crate::config::Config;
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Estimated;
 use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Status};
+use crate::pipeline::{Flight, Progress, Run};
 use crate::store::Store;
 use crate::store::archive::{self, FlightFiles};
 use crate::tables::EstimateRow;

@@ -1,69 +1,12 @@
-//! Lineage: what decides a published night, and what tells two of them apart. Code, configuration
-//! and input, each part with the first stage that reads it.
+//! The differences between two lineages, in words.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The stages in order.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    #[default]
-    Ingest,
-    Segment,
-    Estimate,
-    Trend,
-    Compare,
-    Report,
-}
-
-impl Stage {
-    pub const ALL: [Stage; 6] = [
-        Stage::Ingest,
-        Stage::Segment,
-        Stage::Estimate,
-        Stage::Trend,
-        Stage::Compare,
-        Stage::Report,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::Ingest => "ingest",
-            Stage::Segment => "segment",
-            Stage::Estimate => "estimate",
-            Stage::Trend => "trend",
-            Stage::Compare => "compare",
-            Stage::Report => "report",
-        }
-    }
-}
-
-/// The code: the program's version, a fingerprint of its sources, and the version of each method.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Code {
-    pub version: String,
-    pub source: String,
-    /// By method, e.g. `estimate`; one goes up when its numbers change for the same input.
-    pub methods: BTreeMap<String, u32>,
-}
-
-/// What decides the results of a stage and of all before it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Lineage {
-    pub code: Code,
-    /// Per stage and part, e.g. `segment` → `recognition`, the configuration as it was checked.
-    pub configuration: BTreeMap<Stage, BTreeMap<String, Value>>,
-    /// Fingerprint of the content of each flight's files, or why it could not be read.
-    pub flights: BTreeMap<String, String>,
-    /// Fingerprints of the other files that are read, per stage: events, wind-tunnel table.
-    pub tables: BTreeMap<Stage, BTreeMap<String, String>>,
-}
+use super::parts::{Code, Lineage, method_stage};
+use super::stage::Stage;
 
 /// What kind of thing made a difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -90,18 +33,6 @@ pub struct Cause {
 const SPELLED_OUT: usize = 5;
 
 impl Lineage {
-    /// The part of it that decides a stage: what only later stages read is left out.
-    #[must_use]
-    pub fn until(&self, stage: Stage) -> Lineage {
-        let mut part = self.clone();
-        part.configuration.retain(|s, _| *s <= stage);
-        part.tables.retain(|s, _| *s <= stage);
-        part.code
-            .methods
-            .retain(|method, _| method_stage(method) <= stage);
-        part
-    }
-
     /// What became different since `before`, in the order of the stages; empty when nothing did.
     #[must_use]
     pub fn differences(&self, before: &Lineage) -> Vec<Cause> {
@@ -149,14 +80,6 @@ impl Lineage {
         causes.sort();
         causes
     }
-}
-
-/// The stage of a method: joint estimates and predictions belong to `estimate`.
-fn method_stage(method: &str) -> Stage {
-    Stage::ALL
-        .into_iter()
-        .find(|s| s.name() == method)
-        .unwrap_or(Stage::Estimate)
 }
 
 fn union<'a, V>(a: &'a BTreeMap<String, V>, b: &'a BTreeMap<String, V>) -> Vec<&'a String> {

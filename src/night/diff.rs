@@ -2,10 +2,11 @@
 
 use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::overnight::{self, Changes};
+use crate::lineage::Changes;
 use crate::store::{Night, Nights};
 
-use super::night::Published;
+use super::changes;
+use super::publish::Published;
 
 /// Two nights and what is different.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +55,7 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
         Published::read(&nights, &night)?,
     );
     Ok(Diff {
-        changes: overnight::between(&before.name, &a.tables(), &b.tables()),
+        changes: changes::between(&before.name, &a.tables(), &b.tables()),
         night: night.name,
     })
 }

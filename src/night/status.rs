@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use super::{Campaign, Progress, Run, Stage, inputs, stretches};
 use crate::config::Config;
 use crate::error::Result;
 use crate::estimate::Estimated;
 use crate::flight::is_stretch;
-use crate::lineage::{Lineage, Origin};
+use crate::lineage::{Lineage, Origin, Stage};
 use crate::output_error::Outcome;
+use crate::pipeline::{Campaign, Progress, Run, inputs, stretches};
 use crate::store::archive::{self, FlightFiles};
 use crate::store::{Nights, Store};
 
@@ -143,7 +143,7 @@ impl Run<'_> {
         }
     }
 
-    pub(super) fn ingest_status(
+    pub(crate) fn ingest_status(
         &self,
         files: &[FlightFiles],
         campaign: &mut Campaign,
@@ -182,7 +182,7 @@ impl Run<'_> {
         status
     }
 
-    pub(super) fn segment_status(
+    pub(crate) fn segment_status(
         &self,
         ingest: &StageStatus,
         campaign: &mut Campaign,
@@ -212,7 +212,7 @@ impl Run<'_> {
         status
     }
 
-    pub(super) fn estimate_status(
+    pub(crate) fn estimate_status(
         &self,
         campaign: &Campaign,
         before: Option<&Lineage>,

@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Campaign, REPORT, Run, Stage, inputs};
+use super::changes::{self, Window};
 use crate::config::Config;
 use crate::error::{Error, Problem, Result};
-use crate::lineage::Lineage;
+use crate::lineage::{Changes, Lineage, Stage};
 use crate::maneuver::Maneuver;
-use crate::overnight::{self, Changes, Window};
+use crate::pipeline::{Campaign, REPORT, Run, inputs};
 use crate::store::nights::{Night, Nights, Summary};
 use crate::store::table::{self, Shelf};
-use crate::store::{Fingerprint, atomic, files};
+use crate::store::{Fingerprint, files};
 use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
 
 /// What changed since the night before, for machines: among the published files of a complete
@@ -86,8 +86,8 @@ impl Published {
     }
 
     #[must_use]
-    pub fn tables(&self) -> overnight::Tables<'_> {
-        overnight::Tables {
+    pub fn tables(&self) -> changes::Tables<'_> {
+        changes::Tables {
             lineage: &self.lineage,
             maneuvers: &self.maneuvers,
             fits: &self.fits,
@@ -168,32 +168,21 @@ fn window(maneuver: &Maneuver) -> Window {
 }
 
 impl Run<'_> {
+    /// A folder for tables that say what decides this stage.
+    pub(crate) fn shelf_in(&self, folder: &Path, stage: Stage) -> Shelf {
+        Shelf::of(folder).with(provenance(&self.lineage, stage))
+    }
+
     /// Makes tonight's folder the place of all tables.
-    pub(super) fn publish_into(&mut self, tonight: PathBuf) {
+    pub(crate) fn publish_into(&mut self, tonight: PathBuf) {
         let shelf = |stage: Stage| (stage, self.shelf_in(&tonight, stage));
         self.shelves = Stage::ALL.into_iter().map(shelf).collect();
         self.tonight = Some(tonight);
     }
 
-    /// A folder for tables that say what decides this stage.
-    pub(super) fn shelf_in(&self, folder: &Path, stage: Stage) -> Shelf {
-        Shelf::of(folder).with(provenance(&self.lineage, stage))
-    }
-
-    /// Where the tables of a stage go.
-    pub(super) fn shelf(&self, stage: Stage) -> Shelf {
-        self.shelves.get(&stage).cloned().unwrap_or_default()
-    }
-
-    pub(super) fn place_tonight(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        self.tonight
-            .as_ref()
-            .map_or(Ok(()), |folder| atomic::place(&folder.join(name), bytes))
-    }
-
     /// The night that holds, if it was made of what this run would be made of, reaches as far, and
     /// is whole with all its artefacts: then there is nothing to do.
-    pub(super) fn is_published(&self, nights: &Nights, until: Stage) -> Option<Done> {
+    pub(crate) fn is_published(&self, nights: &Nights, until: Stage) -> Option<Done> {
         let night = nights
             .current()
             .filter(|night| self.is_of_the_same(night) && night.until >= until)?;
@@ -234,7 +223,7 @@ impl Run<'_> {
     }
 
     /// What changed since the last complete night; also placed for machines to read.
-    pub(super) fn changes(&self, nights: &Nights, campaign: &Campaign) -> Result<Changes> {
+    pub(crate) fn changes(&self, nights: &Nights, campaign: &Campaign) -> Result<Changes> {
         // Tables that an older program wrote may lack what this one reads: then there is nothing to
         // compare with.
         let before = self
@@ -251,7 +240,7 @@ impl Run<'_> {
                     .iter()
                     .map(PublishedVerdict::from)
                     .collect();
-                let now = overnight::Tables {
+                let now = changes::Tables {
                     lineage: &self.lineage,
                     maneuvers: &windows,
                     fits: &campaign.fits,
@@ -259,7 +248,7 @@ impl Run<'_> {
                     trends: &trends,
                     verdicts: &verdicts,
                 };
-                overnight::between(&night.name, &before.tables(), &now)
+                changes::between(&night.name, &before.tables(), &now)
             }
         };
         self.place_tonight(
@@ -270,7 +259,7 @@ impl Run<'_> {
     }
 
     /// Publishes what lies in tonight's folder.
-    pub(super) fn publish(
+    pub(crate) fn publish(
         &self,
         nights: &Nights,
         campaign: &Campaign,

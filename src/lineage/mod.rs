@@ -1,0 +1,12 @@
+//! Lineage: code, configuration and input that decide a published night, and the differences between
+//! two nights.
+
+mod changes;
+mod differences;
+mod parts;
+mod stage;
+
+pub use changes::{Changes, ManeuverChange, Moved, VerdictChange};
+pub use differences::{Cause, Origin};
+pub use parts::{Code, Lineage};
+pub use stage::Stage;
