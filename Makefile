@@ -77,10 +77,10 @@ show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder s
 	cargo run --release --locked --quiet -- show $(shown) '$(PIPELINE)' $(options)
 
 simulate: build ## fly the test cards CARDS into OUT: archive, wind-tunnel database and truth
-	cargo run --release --locked --quiet -- simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
+	cargo run --release --locked --quiet -- lab simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
 
-validate: build ## record simulated maneuvers many times and see what the bounds are worth: reports/coverage.md (takes long)
-	cargo run --release --locked --quiet -- validate '$(CARDS)' --out data/simulation/validation --page reports/coverage.md \
+validate: build ## how often the intervals hold the truth, by Monte Carlo: docs/coverage.md (takes long)
+	cargo run --release --locked --quiet -- lab validate '$(CARDS)' --out data/simulation/validation --page docs/coverage.md \
 		$(if $(REALISATIONS),--realisations '$(REALISATIONS)') $(if $(THREADS),--threads '$(THREADS)')
 
 # Before the build: that there is something to show.

@@ -11,9 +11,9 @@ use std::time::Instant;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use harvest::aero::{Derivative, Regressor};
-use harvest::bench_case::{self, Subject};
 use harvest::dynamics::motion::Window;
 use harvest::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion, OUTPUTS};
+use harvest::lab::standard_case::{self, Subject};
 use harvest::output_error::Detail;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -239,7 +239,7 @@ fn floors(samples: usize, lanes: usize, pass_s: f64) {
 
 fn kernel(c: &mut Criterion) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/standard_case.json");
-    let Ok(subject) = bench_case::load(&file) else {
+    let Ok(subject) = standard_case::load(&file) else {
         return;
     };
     let Ok(window) = subject.window() else { return };

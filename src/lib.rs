@@ -20,7 +20,6 @@ pub mod dynamics;
 
 // Method: how derivatives follow from motion.
 pub mod output_error;
-pub mod simulate;
 
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;
@@ -32,9 +31,6 @@ pub mod export;
 pub mod pdf;
 pub mod report;
 
-// Studies: is what the stages say of themselves true?
-pub mod validate;
-
 // Outside: disk and configuration.
 pub mod store;
 pub mod config;
@@ -44,7 +40,9 @@ pub mod memory;
 pub mod pipeline;
 pub mod night;
 pub mod cluster;
-pub mod simulation;
-pub mod validation;
-pub mod bench_case;
+
+// Laboratory: simulator, study of the bounds, timing. The nightly job needs none of it.
+pub mod lab;
+
+// Command line.
 pub mod cli;

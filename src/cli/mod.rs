@@ -1,6 +1,7 @@
 //! The command line: arguments as typed, progress bars, the few lines that a run says, exit codes.
 
 mod cluster;
+mod lab;
 mod nightly;
 
 use std::path::{Path, PathBuf};
@@ -9,17 +10,18 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use clap::{Args, Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::config::{Config, Overrides, Simulation};
+use crate::config::{Config, Overrides};
 use crate::lineage::Stage;
 use crate::maneuver::Status;
+use crate::night;
 use crate::night::publish::{self, Done};
 use crate::pipeline::show::{self, Subject};
 use crate::pipeline::{self, Progress};
-use crate::store::{Log, archive, atomic};
-use crate::{bench_case, night, simulation, validation};
+use crate::store::{Log, archive};
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
@@ -49,7 +51,7 @@ Examples:
                                                  from cron or a timer: waits for another run, speaks only of errors
   harvest diff                                   what changed since the night before, and why
   harvest submit --engine slurm                  the scripts of a job array and its merge; --go hands them over
-  harvest simulate pipelines/harv/cards.yaml --out data/simulation/campaign
+  harvest lab simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
 Archive and store may lie in an object store (s3://bucket/prefix) where harvest was built for it (cargo build --release
@@ -109,15 +111,15 @@ enum Command {
     /// Draw a strip chart of a flight or a maneuver, SVG
     #[command(subcommand)]
     Show(Show),
-    /// Fly a campaign of test cards: the archive that a recorder would leave, a wind-tunnel
-    /// database, and the truth
-    Simulate(SimulateOptions),
-    /// Put the bounds to the test: maneuvers of test cards recorded many times with other noise,
-    /// and estimated
-    Validate(ValidateOptions),
-    /// Time the standard case: estimate a maneuver given as JSON with its record as CSV beside it,
-    /// again and again
-    BenchCase(BenchCaseOptions),
+    /// Simulate a campaign with known derivatives, validate the bounds on it, time the estimator
+    #[command(subcommand)]
+    Lab(lab::LabCommand),
+    #[command(hide = true)]
+    Simulate(lab::Former),
+    #[command(hide = true)]
+    Validate(lab::Former),
+    #[command(hide = true)]
+    BenchCase(lab::Former),
 }
 
 #[derive(Debug, Subcommand)]
@@ -191,42 +193,6 @@ struct ExportOptions {
 }
 
 #[derive(Args, Debug)]
-struct SimulateOptions {
-    /// The test cards, YAML
-    cards: PathBuf,
-    /// Folder for flights/, wind_tunnel.csv and truth/
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
-    threads: Option<usize>,
-    /// No progress bars and no summary
-    #[arg(long, short)]
-    quiet: bool,
-}
-
-#[derive(Args, Debug)]
-struct ValidateOptions {
-    /// The test cards, YAML; their `study` says how many records of how many test points
-    cards: PathBuf,
-    /// Folder for the tables `coverage` and `starts`
-    #[arg(long, value_name = "FOLDER")]
-    out: PathBuf,
-    /// The page of the documentation to write, Markdown
-    #[arg(long, value_name = "FILE")]
-    page: PathBuf,
-    /// Records of each maneuver, instead of the cards' number
-    #[arg(long, value_name = "N")]
-    realisations: Option<usize>,
-    /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
-    threads: Option<usize>,
-    /// No progress bars and no summary
-    #[arg(long, short)]
-    quiet: bool,
-}
-
-#[derive(Args, Debug)]
 struct RunOptions {
     #[command(flatten)]
     options: Options,
@@ -256,22 +222,6 @@ impl Patience {
     fn wait(&self) -> Duration {
         Duration::from_secs(self.seconds)
     }
-}
-
-#[derive(Args, Debug)]
-struct BenchCaseOptions {
-    /// The case, JSON, with a CSV of the same name beside it; or a folder of such cases, which are
-    /// estimated in parallel
-    case: PathBuf,
-    /// How often each is estimated
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    repetitions: usize,
-    /// The file to write [default: the terminal]
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
-    threads: Option<usize>,
 }
 
 #[derive(Args, Debug)]
@@ -326,6 +276,9 @@ pub fn main() -> ExitCode {
     match run(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {
+            if let Some(usage) = error.downcast_ref::<clap::Error>() {
+                usage.exit();
+            }
             eprintln!("harvest: {error:#}");
             ExitCode::from(1)
         }
@@ -350,13 +303,21 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Submit(options) => return cluster::submit(&options),
         Command::Export(options) => return export(&options),
         Command::Check(options) => return check(&options),
-        Command::Simulate(options) => return simulate(&options),
-        Command::Validate(options) => return validate(&options),
-        Command::BenchCase(options) => return bench(&options),
+        Command::Lab(command) => return lab::run(&command),
+        Command::Simulate(_) => return Err(renamed("simulate", "simulate")),
+        Command::Validate(_) => return Err(renamed("validate", "validate")),
+        Command::BenchCase(_) => return Err(renamed("bench-case", "bench")),
         Command::Show(Show::Flight(options)) => return picture(Subject::Flight, &options),
         Command::Show(Show::Maneuver(options)) => return picture(Subject::Maneuver, &options),
     };
     logged(until, &options)
+}
+
+/// Usage error for a command that moved to the laboratory.
+fn renamed(former: &str, name: &str) -> anyhow::Error {
+    let message = format!("`harvest {former}` is now `harvest lab {name}`");
+    let error = Cli::command().error(ErrorKind::InvalidSubcommand, message);
+    error.into()
 }
 
 /// A stage of the whole campaign, or of one shard.
@@ -469,89 +430,6 @@ fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
             .context("cannot start the threads")?;
     }
     Ok(())
-}
-
-/// Flies the cards and says what came of them.
-#[expect(clippy::print_stdout, reason = "what a simulation says")]
-fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
-    start_threads(options.threads)?;
-    let simulation = Simulation::load(&options.cards)?;
-    let bars = Bars::new(options.quiet, None);
-    let flights = simulation::run(&simulation, &options.out, &bars)?;
-    let problems: Vec<_> = flights.iter().flat_map(|f| &f.problems).collect();
-    if !options.quiet {
-        let flown: usize = flights.iter().map(|f| f.flown.len()).sum();
-        println!("{} flights, {flown} maneuvers", flights.len());
-        for problem in &problems {
-            println!(
-                "  {}: {}: {}",
-                problem.flight_id, problem.place, problem.reason
-            );
-        }
-        println!("campaign in {}", options.out.display());
-    }
-    Ok(if problems.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(2)
-    })
-}
-
-/// Studies the bounds and says where the findings are.
-#[expect(clippy::print_stdout, reason = "what a study says")]
-fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
-    start_threads(options.threads)?;
-    let mut simulation = Simulation::load(&options.cards)?;
-    if let Some(realisations) = options.realisations {
-        simulation.cards.study.realisations = realisations;
-    }
-    anyhow::ensure!(
-        simulation.cards.study.realisations > 1,
-        "a scatter needs two realisations or more"
-    );
-    let bars = Bars::new(options.quiet, None);
-    let command = format!(
-        "harvest validate {} --realisations {}",
-        options.cards.display(),
-        simulation.cards.study.realisations
-    );
-    let found = validation::run(&simulation, &options.out, &options.page, &command, &bars)?;
-    if !options.quiet {
-        for problem in &found.problems {
-            println!("  {}: {}", problem.place, problem.reason);
-        }
-        println!(
-            "tables in {}\npage: {}",
-            options.out.display(),
-            options.page.display()
-        );
-    }
-    Ok(if found.problems.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(2)
-    })
-}
-
-/// Times a standard case, or a folder of them, and says what came of it as JSON.
-#[expect(clippy::print_stdout, reason = "what the timing says")]
-fn bench(options: &BenchCaseOptions) -> anyhow::Result<ExitCode> {
-    start_threads(options.threads)?;
-    let (case, repetitions) = (&options.case, options.repetitions);
-    let text = if case.is_dir() {
-        serde_json::to_string_pretty(&bench_case::batch(case, repetitions)?)?
-    } else {
-        let timed =
-            bench_case::timed(&bench_case::load(case)?, repetitions).map_err(anyhow::Error::msg)?;
-        serde_json::to_string_pretty(&timed)?
-    };
-    match &options.out {
-        Some(file) => {
-            atomic::place(file, text.as_bytes())?;
-        }
-        None => println!("{text}"),
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Writes the derivatives for simulators and says where they are.

@@ -69,7 +69,7 @@ pub(super) fn tunnel(
 
 /// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's
 /// derivatives and sums.
-pub(super) fn tunnel_rows(
+pub(crate) fn tunnel_rows(
     path: &Path,
     buildup: &Buildup,
     settings: &wind_tunnel::Settings,

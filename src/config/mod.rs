@@ -4,7 +4,6 @@
 //! `aircraft.yaml` (geometry, sensors, channel map), `model.yaml` (the build-up) and
 //! `maneuvers/*.yaml` (one class per file).
 
-mod cards;
 mod check;
 mod cluster;
 mod places;
@@ -21,8 +20,9 @@ use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
 use crate::{compare, estimate, export, ingest, segment, trend};
 
-pub use cards::Simulation;
+pub(crate) use check::tunnel_rows;
 pub use cluster::ClusterSettings;
+pub(crate) use source::Source;
 pub use written::ReportSettings;
 
 /// Everything that decides a campaign's results, checked.

@@ -13,7 +13,7 @@ use crate::store::files;
 
 /// One file and its text.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(crate) struct Source {
     pub path: PathBuf,
     text: String,
 }

@@ -11,6 +11,7 @@ mod faults;
 mod fuzz;
 mod house;
 mod ingest;
+mod lab;
 mod memory;
 mod nights;
 #[cfg(feature = "s3")]
@@ -21,7 +22,6 @@ mod run;
 mod segment;
 mod shards;
 mod show;
-mod simulate;
 mod support;
 mod together;
 mod trend;

@@ -14,8 +14,8 @@ use super::*;
 use crate::aero::{Axis, wind_tunnel};
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
-use crate::simulate::aerodynamics::Aerodynamics;
-use crate::simulate::air_data::AirData;
+use crate::lab::simulator::aerodynamics::Aerodynamics;
+use crate::lab::simulator::air_data::AirData;
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
 

@@ -15,7 +15,7 @@ use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal as s};
-use crate::simulate::noise::Noise;
+use crate::lab::simulator::noise::Noise;
 use crate::units::{DEG, G0_FT_S2};
 
 const STEP_S: f64 = 0.025;

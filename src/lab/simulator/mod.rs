@@ -9,7 +9,6 @@ pub mod actuators;
 pub mod aerodynamics;
 pub mod air_data;
 pub mod body;
-pub mod cards;
 pub mod control;
 pub mod engine;
 mod flight;
@@ -169,12 +168,10 @@ impl Simulator {
     }
 
     #[must_use]
-    pub fn plant(&self) -> &plant::Plant {
-        &self.plant
-    }
-
-    #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,21 +5,27 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::aero::WindTunnel;
-use crate::config::Simulation;
 use crate::error::{Problem, Result};
 use crate::estimate::{self, Basis};
+use crate::lab::campaign::SimulatedCampaign;
+use crate::lab::simulator::Flown;
+use crate::lab::simulator::noise::seed_of;
 use crate::maneuver::Class;
 use crate::output_error::newton_raphson::Weights;
 use crate::pipeline::Progress;
-use crate::simulate::Flown;
-use crate::simulate::noise::seed_of;
 use crate::store::{atomic, table};
 use crate::tables::{CoverageRow, StartRow};
-use crate::validate::{self, Residuals, Setting, Subject};
+
+mod coverage;
+mod page;
+mod recordings;
+mod starts;
+
+use recordings::{Residuals, Setting, Subject};
 
 /// What a study found.
 #[derive(Clone, Debug, Default)]
-pub struct Validation {
+pub struct BoundsStudy {
     pub coverage: Vec<CoverageRow>,
     pub starts: Vec<StartRow>,
     /// Test points that could not be flown.
@@ -43,13 +49,13 @@ const RECORDS_PER_START: usize = 10;
 /// # Errors
 /// A disk that says no.
 pub fn run(
-    simulation: &Simulation,
+    simulation: &SimulatedCampaign,
     out: &Path,
     page: &Path,
     command: &str,
     progress: &dyn Progress,
-) -> Result<Validation> {
-    let mut found = Validation::default();
+) -> Result<BoundsStudy> {
+    let mut found = BoundsStudy::default();
     let mut flown: Vec<(&Class, Flown)> = Vec::new();
     for class in &simulation.config.classes {
         for alpha_deg in angles(simulation, &class.name) {
@@ -74,7 +80,7 @@ pub fn run(
     for (residuals, weights) in SETTINGS {
         for (class, maneuver) in &flown {
             let (truth, seed) = (
-                validate::tunnel_of_truth(maneuver),
+                recordings::tunnel_of_truth(maneuver),
                 seed_of(simulation.cards.seed, &name(maneuver)),
             );
             let subject = subject(simulation, class, maneuver, &truth, &settings);
@@ -83,7 +89,7 @@ pub fn run(
                 coloured_time_s: study.coloured_time_s,
                 weights,
             };
-            found.coverage.extend(validate::coverage(
+            found.coverage.extend(coverage::coverage(
                 &subject,
                 setting,
                 study.realisations,
@@ -94,7 +100,7 @@ pub fn run(
     }
     for (class, maneuver) in &flown {
         let (truth, seed) = (
-            validate::tunnel_of_truth(maneuver),
+            recordings::tunnel_of_truth(maneuver),
             seed_of(simulation.cards.seed, &name(maneuver)),
         );
         let subject = subject(simulation, class, maneuver, &truth, &settings);
@@ -106,7 +112,7 @@ pub fn run(
         let records = study.realisations.div_ceil(RECORDS_PER_START);
         found
             .starts
-            .extend(validate::starts(&subject, setting, records, seed));
+            .extend(starts::starts(&subject, setting, records, seed));
         progress.advance(&name(maneuver));
     }
     progress.end();
@@ -115,7 +121,7 @@ pub fn run(
     table::publish(&shelf, &found.starts)?;
     atomic::place(
         page,
-        validate::page(command, &found.coverage, &found.starts).as_bytes(),
+        page::page(command, &found.coverage, &found.starts).as_bytes(),
     )?;
     Ok(found)
 }
@@ -125,7 +131,7 @@ fn name(maneuver: &Flown) -> String {
 }
 
 fn subject<'a>(
-    simulation: &'a Simulation,
+    simulation: &'a SimulatedCampaign,
     class: &'a Class,
     flown: &'a Flown,
     truth: &'a WindTunnel,
@@ -142,7 +148,7 @@ fn subject<'a>(
 }
 
 /// Angles of attack for a class's study, spread over those that its cards have.
-fn angles(simulation: &Simulation, class: &str) -> Vec<f64> {
+fn angles(simulation: &SimulatedCampaign, class: &str) -> Vec<f64> {
     let flights = simulation.cards.flights.values();
     let points = flights.flat_map(|f| &f.points).filter(|p| p.class == class);
     let mut angles: Vec<f64> = points.flat_map(|p| p.alpha_deg.iter().copied()).collect();

@@ -42,12 +42,6 @@ impl Input {
         }
         value
     }
-
-    /// When the last pulse ends, s.
-    #[must_use]
-    pub fn end_s(&self) -> f64 {
-        self.start_s + self.widths_s.iter().sum::<f64>() + self.rise_s
-    }
 }
 
 #[cfg(test)]

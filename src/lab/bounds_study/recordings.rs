@@ -5,20 +5,12 @@
 //! The maneuvers are the simulator's, whose equations of motion are not the estimator's.
 //! Instruments have noise only; held values are the true ones.
 
-mod coverage;
-mod page;
-mod starts;
-
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Output, WindTunnel};
 use crate::estimate::{self, Basis, Estimated};
+use crate::lab::simulator::{Flown, Instrument, Instruments};
 use crate::maneuver::Class;
 use crate::output_error::newton_raphson::Weights;
-use crate::simulate::{Flown, Instrument, Instruments};
-
-pub use coverage::coverage;
-pub use page::page;
-pub use starts::starts;
 
 /// What noise the records have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +74,7 @@ pub fn tunnel_of_truth(flown: &Flown) -> WindTunnel {
 
 impl Subject<'_> {
     /// The estimate from one record.
-    fn estimate(&self, setting: Setting, seed: u64) -> Estimated {
+    pub fn estimate(&self, setting: Setting, seed: u64) -> Estimated {
         let record = self.flown.recorded(&self.noise_only(setting), seed);
         let settings = estimate::Settings {
             weights: setting.weights,

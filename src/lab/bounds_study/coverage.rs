@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::{Setting, Subject};
+use super::recordings::{Setting, Subject};
 use crate::estimate::Estimated;
+use crate::lab::simulator::TrueDerivative;
+use crate::lab::simulator::noise::seed_of;
 use crate::maneuver::Status;
 use crate::output_error::Outcome;
-use crate::simulate::TrueDerivative;
-use crate::simulate::noise::seed_of;
 use crate::tables::{CoverageRow, EstimateRow};
 
 /// Half widths of the intervals that hold a normal deviate in 68 and 95 of 100 cases.

@@ -4,17 +4,16 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::source::Source;
-use super::{Config, Overrides};
+use super::cards::Cards;
+use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
-use crate::simulate::cards::Cards;
-use crate::simulate::{Card, Program, Simulator, Tables};
+use crate::lab::simulator::{Card, Program, Simulator, Tables};
 use crate::store::files::TunnelRow;
 
 /// A campaign to be simulated, checked.
 #[derive(Clone, Debug)]
-pub struct Simulation {
+pub struct SimulatedCampaign {
     pub cards: Cards,
     /// The pipeline; its tunnel is the truth here.
     pub config: Config,
@@ -23,13 +22,13 @@ pub struct Simulation {
     pub simulator: Simulator,
 }
 
-impl Simulation {
+impl SimulatedCampaign {
     /// Reads and checks a file of cards and its pipeline.
     ///
     /// # Errors
     /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first
     /// thing that is wrong.
-    pub fn load(file: &Path) -> Result<Simulation> {
+    pub fn load(file: &Path) -> Result<SimulatedCampaign> {
         let source = Source::read(file.to_owned())?;
         let cards: Cards = source.parse()?;
         let folder = if cards.pipeline.is_dir() {
@@ -42,8 +41,7 @@ impl Simulation {
             ..Overrides::default()
         };
         let config = Config::load(&folder, overrides)?;
-        let truth =
-            super::check::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
+        let truth = config::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
         let truth = truth.into_iter().map(|(_, row)| row).collect();
         let simulator = Simulator::new(
             &config.aircraft,
@@ -52,7 +50,7 @@ impl Simulation {
             cards.aircraft.clone(),
         )
         .map_err(|what| source.error("aircraft", what))?;
-        let simulation = Simulation {
+        let simulation = SimulatedCampaign {
             cards,
             config,
             truth,

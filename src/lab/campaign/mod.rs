@@ -5,24 +5,28 @@
 //! Between two cards of a flight the recorder is off. Each flight's random numbers come from the
 //! seed and its name, so the same cards are the same bytes whatever the number of threads.
 
+mod cards;
+mod loading;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::config::Simulation;
 use crate::error::{Error, Problem, Result};
 use crate::flight::channel::RawColumn;
 use crate::flight::{Channel, Record};
+use crate::lab::simulator::noise::{Noise, seed_of};
+use crate::lab::simulator::{Card, Flown, Instruments};
 use crate::maneuver::{Event, Maneuver};
 use crate::pipeline::Progress;
-use crate::simulate::cards::{FlightCard, TestPoint};
-use crate::simulate::noise::{Noise, seed_of};
-use crate::simulate::{Card, Flown, Instruments};
 use crate::store::files::TunnelRow;
 use crate::store::{atomic, files, recorder};
 use crate::units::Unit;
+
+use cards::{FlightCard, TestPoint};
+pub use loading::SimulatedCampaign;
 
 /// The record's time of a flight's first sample, and how long the recorder is off between two
 /// cards, s.
@@ -75,7 +79,7 @@ struct InstrumentRow<'a> {
 /// # Errors
 /// A disk that says no. A card that cannot be flown is among the flights' problems.
 pub fn run(
-    simulation: &Simulation,
+    simulation: &SimulatedCampaign,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Vec<FlownFlight>> {
@@ -103,7 +107,7 @@ pub fn run(
 }
 
 /// Flies the cards of one flight one after another.
-fn flight(simulation: &Simulation, flight_id: &str, card: &FlightCard) -> FlownFlight {
+fn flight(simulation: &SimulatedCampaign, flight_id: &str, card: &FlightCard) -> FlownFlight {
     let seed = seed_of(simulation.cards.seed, flight_id);
     let instruments = simulation.cards.instruments.drawn(seed);
     let mut flight = FlownFlight {
@@ -132,7 +136,12 @@ fn flight(simulation: &Simulation, flight_id: &str, card: &FlightCard) -> FlownF
 }
 
 /// The cards of a flight: its test points in order, each a little lighter than the one before.
-fn cards(simulation: &Simulation, flight_id: &str, flight: &FlightCard, seed: u64) -> Vec<Card> {
+fn cards(
+    simulation: &SimulatedCampaign,
+    flight_id: &str,
+    flight: &FlightCard,
+    seed: u64,
+) -> Vec<Card> {
     let points = flight
         .points
         .iter()
@@ -198,7 +207,7 @@ fn recording(
 
 /// The truth as a tunnel would have measured it: each derivative wrong by a share of its size over
 /// the whole table, each point by another; and the sums that a tunnel tabulates, of its own values.
-fn wind_tunnel(simulation: &Simulation) -> Vec<TunnelRow> {
+fn wind_tunnel(simulation: &SimulatedCampaign) -> Vec<TunnelRow> {
     let (settings, seed) = (&simulation.cards.wind_tunnel, simulation.cards.seed);
     let source = Some("simulated tunnel: the truth with stated errors".to_owned());
     let mut rows = Vec::new();
@@ -249,7 +258,7 @@ fn wind_tunnel(simulation: &Simulation) -> Vec<TunnelRow> {
     rows
 }
 
-fn truth(simulation: &Simulation, out: &Path, flights: &[FlownFlight]) -> Result<()> {
+fn truth(simulation: &SimulatedCampaign, out: &Path, flights: &[FlownFlight]) -> Result<()> {
     let folder = out.join("truth");
     let flown = || flights.iter().flat_map(|f| &f.flown);
     let event = |m: &Maneuver| Event {
@@ -268,7 +277,7 @@ fn truth(simulation: &Simulation, out: &Path, flights: &[FlownFlight]) -> Result
     files::place_rows(&folder.join("not_flown.csv"), &problems)
 }
 
-fn true_rows<'a>(simulation: &'a Simulation, flown: &'a Flown) -> Vec<TruthRow<'a>> {
+fn true_rows<'a>(simulation: &'a SimulatedCampaign, flown: &'a Flown) -> Vec<TruthRow<'a>> {
     let m = &flown.maneuver;
     let row = |derivative, unit, value| TruthRow {
         flight_id: &m.flight_id,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Input, Instruments, Program, Settings, Tables, Turbulence};
+use crate::lab::simulator::{Input, Instruments, Program, Settings, Tables, Turbulence};
 
 /// A campaign to be simulated. Paths are relative to the folder harvest is run in.
 #[derive(Clone, Debug, Deserialize)]

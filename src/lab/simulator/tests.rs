@@ -1,27 +1,25 @@
-//! Simulate: the simulator and the estimator write the same physics down differently and agree;
-//! what is flown is found and estimated again; the same cards are the same bytes.
+//! The simulator against the estimator: the same physics, written down twice, must agree.
 
 use std::fs;
 use std::path::Path;
 
 use approx::assert_abs_diff_eq;
-use harvest::config::Simulation;
-use harvest::dynamics::{Equations, Lateral, Longitudinal, Motion};
-use harvest::earth::gravity_ft_s2;
-use harvest::estimate::{self, Basis, Estimated};
-use harvest::flight::signal;
-use harvest::simulate::air_data::AirData;
-use harvest::simulate::body::{Euler, State};
-use harvest::simulate::noise::Noise;
-use harvest::simulate::plant::{Given, Instant};
-use harvest::simulate::{Flown, Instrument, Instruments, Program, sensors};
-use harvest::units::DEG;
 use nalgebra::{SVector, Vector3};
 
-use crate::support::{Campaign, files, harvest, number, run, table};
+use super::air_data::AirData;
+use super::body::{Euler, State};
+use super::noise::Noise;
+use super::plant::{Given, Instant};
+use super::{Flown, Instrument, Instruments, Program, sensors};
+use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
+use crate::earth::gravity_ft_s2;
+use crate::estimate::{self, Basis, Estimated};
+use crate::flight::signal;
+use crate::lab::campaign::SimulatedCampaign;
+use crate::units::DEG;
 
-fn simulation() -> Simulation {
-    Simulation::load(Path::new("pipelines/harv/cards.yaml")).unwrap()
+fn simulation() -> SimulatedCampaign {
+    SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap()
 }
 
 /// The aircraft at a random state with random deflections, some rotation and sideslip.
@@ -52,7 +50,12 @@ fn anywhere(noise: &mut Noise, surfaces: usize) -> (State, Given) {
 }
 
 /// The instant as the estimator would have measured it without any error.
-fn measured(simulation: &Simulation, state: &State, given: &Given, instant: &Instant) -> Motion {
+fn measured(
+    simulation: &SimulatedCampaign,
+    state: &State,
+    given: &Given,
+    instant: &Instant,
+) -> Motion {
     let (aircraft, loading, angles) =
         (&simulation.config.aircraft, &instant.loading, state.euler());
     Motion {
@@ -82,8 +85,8 @@ fn measured(simulation: &Simulation, state: &State, given: &Given, instant: &Ins
 
 /// The disagreement of states' rates (rad/s, rad/s²) and of outputs (deg, deg/s, g) at one random
 /// instant.
-fn disagreement(simulation: &Simulation, noise: &mut Noise) -> (f64, f64) {
-    let (plant, aircraft) = (simulation.simulator.plant(), &simulation.config.aircraft);
+fn disagreement(simulation: &SimulatedCampaign, noise: &mut Noise) -> (f64, f64) {
+    let (plant, aircraft) = (&simulation.simulator.plant, &simulation.config.aircraft);
     let (state, given) = anywhere(noise, simulation.simulator.settings().surface_names.len());
     let instant = plant.instant(&state, &given, None);
     let values = plant
@@ -178,13 +181,8 @@ fn every_surface_turns_the_aircraft_as_its_sign_says() {
         .simulator
         .trim(&simulation.card("OLAT", 10.0).unwrap())
         .unwrap();
-    let at = |state: &State, given: &Given| {
-        simulation
-            .simulator
-            .plant()
-            .instant(state, given, None)
-            .slope
-    };
+    let at =
+        |state: &State, given: &Given| simulation.simulator.plant.instant(state, given, None).slope;
     let still = at(&trim.state, &trim.given);
     let moved = |name: &str| {
         let mut given = trim.given.clone();
@@ -248,7 +246,7 @@ fn a_trimmed_aircraft_stays_where_it_is() {
         let trim = simulation.simulator.trim(&card).unwrap();
         let slope = simulation
             .simulator
-            .plant()
+            .plant
             .instant(&trim.state, &trim.given, None)
             .slope;
         assert!(
@@ -292,7 +290,7 @@ fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
     }
 }
 
-fn estimated(simulation: &Simulation, flown: &Flown) -> Estimated {
+fn estimated(simulation: &SimulatedCampaign, flown: &Flown) -> Estimated {
     let config = &simulation.config;
     let basis = Basis::new(
         &config.aircraft,
@@ -313,15 +311,12 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
     // With surfaces that are linear between the recorder's samples, as the estimator takes them,
     // all come back to 0.1%. At 80 control steps a second their motion between samples leaves 0.1%
     // in the median and 1% at worst of these.
-    let campaign = Campaign::new();
+    let folder = tempfile::tempdir().unwrap();
+    let cards = folder.path().join("cards.yaml");
     let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     assert!(text.contains("control_hz: 80"));
-    fs::write(
-        campaign.path("cards.yaml"),
-        text.replace("control_hz: 80", "control_hz: 40"),
-    )
-    .unwrap();
-    let simulation = Simulation::load(&campaign.path("cards.yaml")).unwrap();
+    fs::write(&cards, text.replace("control_hz: 80", "control_hz: 40")).unwrap();
+    let simulation = SimulatedCampaign::load(&cards).unwrap();
     for (class, alpha, derivatives) in [
         (
             "SSIMD_LON",
@@ -409,163 +404,4 @@ fn instruments_change_a_record_and_not_the_flight() {
     );
     assert_eq!(record.values(signal::P), flown.record.values(signal::P));
     assert_eq!(flown, simulation.simulator.fly(&card).unwrap());
-}
-
-/// The cards of the shipped campaign with other flights.
-fn cards(flights: &str) -> String {
-    let shipped = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
-    let (head, _) = shipped.split_once("\nflights:\n").unwrap();
-    format!("{head}\nflights:\n{flights}\n")
-}
-
-const TWO: &str = "
-  one: { altitude_ft: 25000, mass_slug: 1050, burnt_slug: 4, turbulence: { sigma_ft_s: 0.5 }, points: [
-    { class: \"3211\", alpha_deg: [20] }, { class: OLAT, alpha_deg: [30] } ] }
-  two: { altitude_ft: 24000, mass_slug: 1040, points: [ { class: PPSSTV, alpha_deg: [40] } ] }";
-
-#[test]
-fn a_simulated_campaign_is_found_and_estimated() {
-    let campaign = Campaign::new();
-    let (file, out) = (campaign.path("cards.yaml"), campaign.path("simulated"));
-    fs::write(&file, cards(TWO)).unwrap();
-    let simulate = |out: &Path, threads: &str| {
-        let mut command = harvest();
-        command
-            .arg("simulate")
-            .arg(&file)
-            .arg("--out")
-            .arg(out)
-            .args(["--threads", threads]);
-        let outcome = run(&mut command);
-        assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    };
-    simulate(&out, "1");
-    let again = campaign.path("again");
-    simulate(&again, "2");
-    let written = files(&out);
-    assert_eq!(written.len(), 7, "{written:?}");
-    for file in &written {
-        let other = again.join(file.strip_prefix(&out).unwrap());
-        assert!(
-            fs::read(file).unwrap() == fs::read(other).unwrap(),
-            "{} differs",
-            file.display()
-        );
-    }
-
-    let flights = Campaign::on(&out.join("flights").to_string_lossy());
-    let mut command = flights.command("estimate");
-    command
-        .arg("--wind-tunnel")
-        .arg(out.join("wind_tunnel.csv"));
-    let outcome = run(&mut command);
-    assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    let maneuvers = flights.table("maneuvers");
-    let classes: Vec<&str> = maneuvers.iter().map(|m| m["class"].as_str()).collect();
-    assert_eq!(classes, ["3211", "OLAT", "PPSSTV"]);
-    assert!(
-        flights
-            .table("fits")
-            .iter()
-            .all(|fit| fit["outcome"] == "converged")
-    );
-}
-
-#[test]
-fn a_wrong_card_is_named_with_its_line() {
-    let campaign = Campaign::new();
-    let file = campaign.path("cards.yaml");
-    for (right, wrong, said) in [
-        ("class: OLAT", "class: OLTA", "did you mean `OLAT`?"),
-        (
-            "signal: da_deg, size: 5",
-            "signal: dx_deg, size: 5",
-            "law `plain` moves no `dx_deg`",
-        ),
-        ("seed: 1994", "sed: 1994", "did you mean `seed`?"),
-        ("roll: da_deg", "roll: dA_deg", "did you mean `da_deg`?"),
-    ] {
-        let text = cards(TWO);
-        assert!(text.contains(right), "{right}");
-        fs::write(&file, text.replacen(right, wrong, 1)).unwrap();
-        let outcome = run(harvest()
-            .arg("simulate")
-            .arg(&file)
-            .arg("--out")
-            .arg(campaign.path("out")));
-        assert_eq!(outcome.code, Some(1), "{outcome:?}");
-        assert!(
-            outcome.stderr.contains(said) && outcome.stderr.contains("cards.yaml:"),
-            "{}",
-            outcome.stderr
-        );
-    }
-}
-
-#[test]
-fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
-    let campaign = Campaign::new();
-    let file = campaign.path("cards.yaml");
-    fs::write(
-        &file,
-        cards("  one: { altitude_ft: 25000, mass_slug: 1050, points: [ { class: PPSS, alpha_deg: [20] } ] }"),
-    )
-    .unwrap();
-    let validate = |name: &str, threads: &str| {
-        let (out, page) = (campaign.path(name), campaign.path(name).join("coverage.md"));
-        let mut command = harvest();
-        command
-            .arg("validate")
-            .arg(&file)
-            .arg("--out")
-            .arg(&out)
-            .arg("--page")
-            .arg(&page);
-        let outcome = run(command.args(["--realisations", "8", "--threads", threads]));
-        assert_eq!(outcome.code, Some(0), "{outcome:?}");
-        out
-    };
-    let (once, again) = (validate("once", "1"), validate("again", "2"));
-    for written in files(&once) {
-        let other = again.join(written.strip_prefix(&once).unwrap());
-        assert!(
-            fs::read(&written).unwrap() == fs::read(other).unwrap(),
-            "{} differs",
-            written.display()
-        );
-    }
-    let rows = table(&once.join("coverage.csv"));
-    let settings: std::collections::BTreeSet<(&str, &str)> = rows
-        .iter()
-        .map(|r| (r["residuals"].as_str(), r["weights"].as_str()))
-        .collect();
-    assert_eq!(settings.len(), 5);
-    assert!(
-        rows.iter()
-            .all(|r| r["class"] == "PPSS" && r["converged"] == "8")
-    );
-    // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far
-    // more.
-    let ratio = |residuals: &str, column: &str| {
-        let mut ratios: Vec<f64> = rows
-            .iter()
-            .filter(|r| r["residuals"] == residuals)
-            .map(|r| number(r, column))
-            .collect();
-        ratios.sort_by(f64::total_cmp);
-        ratios[ratios.len() / 2]
-    };
-    assert!((0.6..1.5).contains(&ratio("white", "scatter_over_bound")));
-    assert!(ratio("coloured", "scatter_over_bound") > 2.5);
-    assert!((0.6..1.5).contains(&ratio("coloured", "scatter_over_corrected")));
-    assert!(
-        table(&once.join("starts.csv"))
-            .iter()
-            .all(|r| r["reached"] == r["records"])
-    );
-    let page = fs::read_to_string(once.join("coverage.md")).unwrap();
-    assert!(
-        page.contains("--realisations 8`") && page.contains("| PPSS | Cm_alpha | 20 |"),
-        "{page}"
-    );
 }

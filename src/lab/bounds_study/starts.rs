@@ -3,12 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::{Setting, Subject, tunnel_of_truth};
+use super::recordings::{Setting, Subject, tunnel_of_truth};
 use crate::aero::{Buildup, WindTunnel};
 use crate::estimate::{self, Basis, Estimated, Start};
+use crate::lab::simulator::noise::seed_of;
+use crate::lab::simulator::{Flown, TrueDerivative};
 use crate::output_error::Outcome;
-use crate::simulate::noise::seed_of;
-use crate::simulate::{Flown, TrueDerivative};
 use crate::tables::{EstimateRow, StartRow};
 
 /// The minimum is the same when no derivative differs by more than this share of its bound.
