@@ -13,7 +13,6 @@ mod lateral;
 mod lever;
 mod longitudinal;
 pub mod motion;
-pub mod runge_kutta;
 
 pub use lateral::Lateral;
 pub(crate) use lever::lever;

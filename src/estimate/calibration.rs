@@ -4,8 +4,8 @@ use nalgebra::DVector;
 
 use super::{Ready, Run};
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration::{Fitted, Misreading};
-use crate::output_error::{Diverged, Fit, cramer_rao};
+use crate::output_error::calibration_errors::{Fitted, Misreading};
+use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// What a fit is told when it cannot be said what errors of calibration do to it.
 pub(super) const NOT_COUNTED: &str =
@@ -22,7 +22,7 @@ impl<'a> Run<'a> {
             return;
         }
         match self.gradient_shifts(ready, &fit.values, &fit.weights) {
-            Ok(shifts) => cramer_rao::miscalibrated(&ready.case, &shifts, fit),
+            Ok(shifts) => calibration_errors::miscalibrated(&ready.case, &shifts, fit),
             Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
         }
     }

@@ -19,8 +19,10 @@ use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Quality, Recognised, Status};
-use crate::output_error::cramer_rao::{self, Considered};
-use crate::output_error::{Case, Fit, Joint, Likelihood, Outcome, Response, mean, newton_raphson};
+use crate::output_error::consider::{self, Considered};
+use crate::output_error::{
+    Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation, mean,
+};
 use crate::tables::{EstimateRow, JointRow};
 
 /// Which maneuvers are estimated together.
@@ -244,7 +246,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
     let from = |shared: &[f64]| {
         let start = joint.assemble(shared, &own);
-        newton_raphson::estimate(
+        estimation::estimate(
             &joint,
             start,
             weights,
@@ -345,7 +347,7 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
             places: joint.places(i).to_vec(),
         })
         .collect();
-    cramer_rao::consider_together(
+    consider::consider_together(
         &considered,
         &run.held_uncertainties(&first.ready.model),
         fit,
@@ -378,7 +380,7 @@ fn miscalibrate<const NX: usize, E: Equations<NX>>(
             }
         }
     }
-    cramer_rao::miscalibrated(joint, &together, fit);
+    calibration_errors::miscalibrated(joint, &together, fit);
 }
 
 fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {

@@ -20,12 +20,13 @@ use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
-use crate::output_error::calibration::Calibration;
+use crate::output_error::calibration_errors::Calibration;
+use crate::output_error::estimation::{self, Weights};
 use crate::output_error::identifiability;
-use crate::output_error::input_noise::noisy_surfaces;
-use crate::output_error::newton_raphson::{self, Weights};
+use crate::output_error::newton_raphson;
+use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
-use crate::output_error::{cramer_rao, equation_error};
+use crate::output_error::{consider, equation_error};
 use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 
@@ -294,7 +295,7 @@ impl<'a> Run<'a> {
         }
         let wide = self.wide(&ready);
         let values = values_of(&ready.model, &case.names, &fit.values);
-        cramer_rao::consider(
+        consider::consider(
             case,
             &wide,
             &values,
@@ -411,7 +412,7 @@ impl<'a> Run<'a> {
         let resolution = self.resolution();
         let weights = self.weights()?;
         let from = |start| {
-            newton_raphson::estimate(
+            estimation::estimate(
                 case,
                 start,
                 weights,

@@ -19,7 +19,7 @@ use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
-use crate::output_error::{Case, Fit, Model, Outcome, cost, mean, newton_raphson};
+use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
 use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow};
 use crate::units::Unit;
 
@@ -176,7 +176,7 @@ fn predict<const NX: usize, E: Equations<NX>>(
         };
     }
     let start = case.starting_values(value);
-    let fit: Fit = newton_raphson::estimate(
+    let fit: Fit = estimation::estimate(
         case,
         start,
         weights,

@@ -1,44 +1,35 @@
 //! Output error: maximum likelihood by matching the outputs of the integrated equations to the
 //! measured ones (eqs. 1.1-1.7).
 //!
-//! A [`Case`] is one maneuver made ready: what is known, what is held, what is free; a [`Joint`] is
-//! several that share their derivatives. Both are [`Likelihood`]: [`newton_raphson::estimate`]
-//! finds the free parameters of either, [`cramer_rao`] says how well the data determine them.
-//! [`theil`] says how well a response predicts what was measured.
+//! The rooms in order; each uses only those before it:
+//!
+//! | room | content |
+//! |---|---|
+//! | [`case`] | one maneuver prepared for estimation: regressors, held and free parameters, layout |
+//! | [`kernel`] | one pass: outputs, sensitivities and the sums of the normal equations |
+//! | [`likelihood`] | cost (1.2), iteration (1.3), equation-error start, several maneuvers as one |
+//! | [`bounds`] | Cramér-Rao bounds (1.6, 1.7) corrected for coloured residuals and input noise |
+//! | [`identifiability`] | collinearity of the parameters, and the choice of those to hold |
+//! | [`estimation`] | iteration, weights and bounds together |
 
-mod autoregression;
-pub mod calibration;
-mod case;
-pub mod coloured;
-pub mod cost;
-mod course;
-pub mod cramer_rao;
-pub mod equation_error;
-pub mod freedom;
-mod likelihood;
-pub mod holding;
+pub(crate) mod bounds;
+pub(crate) mod case;
+pub mod estimation;
 pub mod identifiability;
-pub mod input_noise;
-mod joint;
-mod kernel;
-mod lanes;
-pub mod mean;
-pub mod newton_raphson;
-mod normal;
-mod outcome;
-mod padded;
-mod propagators;
-mod response;
-pub mod theil;
+pub mod kernel;
+pub mod likelihood;
 
+pub use bounds::data::Bounded;
+pub use bounds::{calibration_errors, coloured, consider, cramer_rao, freedom};
+pub use case::surface_noise;
 pub use case::{Case, InitialState, Measurements, Model};
-pub use joint::Joint;
-pub(crate) use kernel::{load, store};
-pub(crate) use lanes::{Aligned, VECTOR};
-pub use likelihood::Likelihood;
-pub(crate) use normal::Rows;
-pub use outcome::{Fit, Outcome};
-pub use response::{Detail, Diverged, Response, Sensitivities};
+pub use identifiability::holding;
+pub use kernel::pass::Diverged;
+pub use kernel::response::{Detail, Response, Sensitivities};
+pub use likelihood::data::Likelihood;
+pub use likelihood::joint::Joint;
+pub use likelihood::outcome::{Fit, Outcome};
+pub use likelihood::{cost, equation_error, mean, newton_raphson, theil};
 
 #[cfg(test)]
 pub(crate) mod tests;

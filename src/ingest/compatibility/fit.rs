@@ -26,7 +26,9 @@ use super::instruments::{
 use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
-use crate::output_error::{Aligned, Rows, VECTOR, coloured, freedom};
+use crate::numerics::row_products::Rows;
+use crate::numerics::simd::{Aligned, VECTOR};
+use crate::output_error::{coloured, freedom};
 
 /// Rounds of re-estimating R and P, and steps within each.
 const ROUNDS: usize = 6;

@@ -20,9 +20,9 @@ use super::equations::{self, STATES, State};
 use super::instruments::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
 use super::window::{Window, factor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::runge_kutta::{POINT, STAGES};
 use crate::flight::taps::Taps;
-use crate::output_error::{load, store};
+use crate::numerics::runge_kutta::{POINT, STAGES};
+use crate::numerics::simd::{load, store};
 
 /// Parameters of a window alone: its first state, and the change of the wind north, east and down,
 /// ft/s².

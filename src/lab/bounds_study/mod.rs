@@ -11,7 +11,7 @@ use crate::lab::campaign::SimulatedCampaign;
 use crate::lab::simulator::Flown;
 use crate::lab::simulator::noise::seed_of;
 use crate::maneuver::Class;
-use crate::output_error::newton_raphson::Weights;
+use crate::output_error::estimation::Weights;
 use crate::pipeline::Progress;
 use crate::store::{atomic, table};
 use crate::tables::{CoverageRow, StartRow};

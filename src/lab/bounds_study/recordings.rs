@@ -10,7 +10,7 @@ use crate::aero::{Output, WindTunnel};
 use crate::estimate::{self, Basis, Estimated};
 use crate::lab::simulator::{Flown, Instrument, Instruments};
 use crate::maneuver::Class;
-use crate::output_error::newton_raphson::Weights;
+use crate::output_error::estimation::Weights;
 
 /// What noise the records have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

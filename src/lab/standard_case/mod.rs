@@ -23,9 +23,10 @@ use crate::earth::gravity_ft_s2;
 use crate::error::{Error, Result};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
+use crate::numerics::symmetric;
 use crate::output_error::cost::Sums;
-use crate::output_error::input_noise::noisy_surfaces;
 use crate::output_error::newton_raphson::{self, Settings};
+use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{
     Case, Fit, InitialState, Likelihood, Measurements, Model, Outcome, cramer_rao,
 };
@@ -289,7 +290,7 @@ impl Subject {
         let fit = newton_raphson::minimise(&case, start, weights, &settings);
         let sums = case.sums(&fit.response, &fit.weights);
         let inverse = Some(&sums).filter(|_| fit.outcome == Outcome::Converged);
-        let inverse = inverse.and_then(|sums| cramer_rao::inverse(&sums.information));
+        let inverse = inverse.and_then(|sums| symmetric::inverse(&sums.information));
         let std = inverse
             .as_ref()
             .map_or(vec![], |inverse| standard_errors(inverse, &sums));

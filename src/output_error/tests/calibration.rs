@@ -3,10 +3,11 @@
 use approx::assert_relative_eq;
 use nalgebra::DVector;
 
-use super::super::calibration::{Calibration, Fitted, Misreading};
-use super::super::cramer_rao::Identified;
-use super::super::{cost, cramer_rao};
+use super::super::calibration_errors::{Calibration, Fitted, Misreading};
+use super::super::cost;
+use super::super::likelihood::information::{Identified, identified};
 use super::*;
+use crate::numerics::symmetric;
 
 fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
     Model {
@@ -53,9 +54,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         };
         let shifts = fitted.gradient_shifts(std::slice::from_ref(error)).unwrap();
         let sums = cost::sums(&self.response, &TABLE);
-        let Identified::Determined { inverse, .. } =
-            cramer_rao::identified(&sums.information, 1e12)
-        else {
+        let Identified::Determined { inverse, .. } = identified(&sums.information, 1e12) else {
             panic!()
         };
         inverse * &shifts[0]
@@ -97,7 +96,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     /// be known.
     fn moves_as_said(&self, signals: &[(&str, f64)]) {
         let sums = cost::sums(&self.response, &TABLE);
-        let scale = cramer_rao::scale(&sums.information);
+        let scale = symmetric::scale(&sums.information);
         for (signal, bias) in signals {
             for error in [
                 Misreading {

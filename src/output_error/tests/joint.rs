@@ -2,8 +2,8 @@
 
 use approx::assert_relative_eq;
 
-use super::super::cramer_rao::Considered;
-use super::super::{Detail, Joint, Likelihood};
+use super::super::consider::{self, Considered};
+use super::super::{Bounded, Detail, Joint, Likelihood};
 use super::*;
 
 type Longitudinals = Case<3, Longitudinal>;
@@ -25,7 +25,7 @@ fn precise() -> Settings {
     }
 }
 
-fn fit_of<D: Likelihood>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
+fn fit_of<D: Bounded>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
     let fit = estimate(
         data,
         start,
@@ -178,7 +178,7 @@ fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
     let start: Vec<f64> = case.names.iter().map(|n| values[n.as_str()]).collect();
     let uncertainties = [("Cm_de", 1e-4)].into();
     let mut alone = fit_of(&case, start.clone());
-    cramer_rao::consider(&case, &wide, &values, &uncertainties, &mut alone);
+    consider::consider(&case, &wide, &values, &uncertainties, &mut alone);
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
     let mut both = fit_of(
         &joint,
@@ -193,7 +193,7 @@ fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
         values: values.clone(),
         places: joint.places(i).to_vec(),
     });
-    cramer_rao::consider_together(&considered, &uncertainties, &mut both);
+    consider::consider_together(&considered, &uncertainties, &mut both);
     let (one, two) = (
         alone.covariance_held.unwrap(),
         both.covariance_held.unwrap(),

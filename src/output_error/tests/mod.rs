@@ -10,10 +10,11 @@ use std::collections::BTreeMap;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 
-use super::coloured::Block;
-use super::newton_raphson::{Settings, Weights, estimate};
+use super::case::blocks::Block;
+use super::estimation::{Weights, estimate};
+use super::newton_raphson::Settings;
 use super::{
-    Case, Fit, InitialState, Measurements, Model, Outcome, cost, cramer_rao, equation_error,
+    Case, Fit, InitialState, Measurements, Model, Outcome, consider, cost, equation_error,
 };
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Regressor};
 use crate::dynamics::motion::{MassProperties, Window};
@@ -565,7 +566,7 @@ fn what_an_error_of_a_held_value_does_is_what_the_consider_covariance_says() {
     let (case, mut right) = estimated(-0.012);
     let (_, wrong) = estimated(-0.012 + error);
     right.covariance = right.covariance.map(|m| m * 0.0);
-    cramer_rao::consider(
+    consider::consider(
         &case,
         &full,
         &values,

@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use super::super::normal::Summing;
+use super::super::kernel::normal_equations::Summing;
 use super::*;
 
 /// Outputs, gradient and information of a pass with vectors of a width, as bits.

@@ -1,0 +1,328 @@
+//! What the data of a maneuver tell apart: correlations, variance inflation, condition indices with
+//! variance proportions (Belsley, Kuh and Welsch 1980), on the unit-length columns of `W^½ S`, that
+//! is on H with unit diagonal.
+//!
+//! With `H_s = D H D`, `D = diag H^-½`, eigenvalues λ and unit eigenvectors v:
+//! - variance inflation of parameter j: `H_jj (H⁻¹)_jj = Σ_k v_jk²/λ_k`, the factor by which the other parameters raise the
+//!   variance of j above what it would be if they were known;
+//! - condition index of direction k: `√(λ_max/λ_k)`, the ratio of the lengths of the best and this determined direction;
+//! - variance proportion of j in k: `(v_jk²/λ_k) / Σ_l v_jl²/λ_l`.
+//!
+//! A direction of high index that makes more than half of the variance of two or more parameters
+//! names a group that the data hardly tell apart.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+
+use crate::numerics::symmetric::{scale, scaled};
+
+/// When a correlation, an inflation or a direction is worth a word.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Pairs of estimates that correlate by at least this are published.
+    pub published_correlation: f64,
+    /// Pairs that correlate by more than this are flagged.
+    pub correlation: f64,
+    /// Estimates whose variance is inflated by more than this are flagged.
+    pub variance_inflation: f64,
+    /// A direction of at least this condition index names its group (Belsley: 30 is strong).
+    pub condition_index: f64,
+    /// A parameter belongs to it where the direction makes at least this share of its variance.
+    pub variance_proportion: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            published_correlation: 0.5,
+            correlation: 0.9,
+            variance_inflation: 10.0,
+            condition_index: 30.0,
+            variance_proportion: 0.5,
+        }
+    }
+}
+
+/// Parameters that the data hardly tell apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// Infinite where the data do not tell them apart at all.
+    pub condition_index: f64,
+    pub parameters: Vec<usize>,
+}
+
+/// The measures of one information matrix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collinearity {
+    /// Of each parameter; none for one that takes part in a direction that the data do not
+    /// determine.
+    pub inflation: Vec<Option<f64>>,
+    /// Of the estimates, from H⁻¹; absent where H has none.
+    pub correlation: Option<DMatrix<f64>>,
+    /// `√(λ_max/λ_min)`; infinite where the data do not determine a direction.
+    pub largest_index: f64,
+    /// Worst first.
+    pub groups: Vec<Group>,
+}
+
+/// Measures an information matrix; none where it is empty or no number. A parameter that the data
+/// do not feel at all (`H_jj = 0`) is in no group.
+#[must_use]
+pub fn collinearity(
+    information: &DMatrix<f64>,
+    max_condition_number: f64,
+    limits: &Limits,
+) -> Option<Collinearity> {
+    let n = information.nrows();
+    if n == 0 || !information.iter().all(|h| h.is_finite()) {
+        return None;
+    }
+    let felt: Vec<usize> = (0..n).filter(|&j| information[(j, j)] > 0.0).collect();
+    if felt.is_empty() {
+        return None;
+    }
+    let own = DMatrix::from_fn(felt.len(), felt.len(), |i, j| {
+        information[(felt[i], felt[j])]
+    });
+    let eigen = SymmetricEigen::new(scaled(&own, &scale(&own)));
+    let most = eigen.eigenvalues.max();
+    // Rounding leaves a direction that the data do not determine with some tiny length of either
+    // sign.
+    let floor = most / max_condition_number;
+    let directions = Directions { eigen, most, floor };
+    let determined = felt.len() == n && directions.eigen.eigenvalues.iter().all(|l| *l > floor);
+    let mut inflation = vec![None; n];
+    for (i, &j) in felt.iter().enumerate() {
+        inflation[j] = directions.inflation(i);
+    }
+    let mut groups = directions.groups(limits);
+    for j in groups.iter_mut().flat_map(|g| &mut g.parameters) {
+        *j = felt[*j];
+    }
+    let least = directions.eigen.eigenvalues.min();
+    Some(Collinearity {
+        inflation,
+        correlation: determined.then(|| directions.correlation()),
+        largest_index: if determined {
+            (most / least).sqrt()
+        } else {
+            f64::INFINITY
+        },
+        groups,
+    })
+}
+
+/// A parameter takes part in an undetermined direction when its share of the unit vector's square
+/// is at least this: more than rounding, for however small its part, its variance has no bound.
+const TAKES_PART: f64 = 1e-6;
+
+struct Directions {
+    eigen: SymmetricEigen<f64, nalgebra::Dyn>,
+    most: f64,
+    floor: f64,
+}
+
+impl Directions {
+    fn length(&self, k: usize) -> f64 {
+        self.eigen.eigenvalues[k].max(self.floor)
+    }
+
+    /// `v_jk²/λ_k`: what direction k makes of the scaled variance of parameter j.
+    fn part(&self, j: usize, k: usize) -> f64 {
+        let v = self.eigen.eigenvectors[(j, k)];
+        v * v / self.length(k)
+    }
+
+    fn variance(&self, j: usize) -> f64 {
+        (0..self.eigen.eigenvalues.len())
+            .map(|k| self.part(j, k))
+            .sum()
+    }
+
+    fn inflation(&self, j: usize) -> Option<f64> {
+        let lost = |k: usize| self.eigen.eigenvalues[k] <= self.floor;
+        let takes_part = |k: usize| self.eigen.eigenvectors[(j, k)].powi(2) >= TAKES_PART;
+        let determined = !(0..self.eigen.eigenvalues.len()).any(|k| lost(k) && takes_part(k));
+        determined.then(|| self.variance(j))
+    }
+
+    fn correlation(&self) -> DMatrix<f64> {
+        let lengths = self.eigen.eigenvalues.map(|l| 1.0 / l);
+        let inverse = &self.eigen.eigenvectors
+            * DMatrix::from_diagonal(&lengths)
+            * self.eigen.eigenvectors.transpose();
+        scaled(&inverse, &scale(&inverse))
+    }
+
+    fn groups(&self, limits: &Limits) -> Vec<Group> {
+        let n = self.eigen.eigenvalues.len();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| self.eigen.eigenvalues[*a].total_cmp(&self.eigen.eigenvalues[*b]));
+        let named = order.into_iter().filter_map(|k| {
+            let index = (self.most / self.length(k)).sqrt();
+            let share =
+                |j: &usize| self.part(*j, k) / self.variance(*j) >= limits.variance_proportion;
+            let parameters: Vec<usize> = (0..n).filter(share).collect();
+            let condition_index = if self.eigen.eigenvalues[k] <= self.floor {
+                f64::INFINITY
+            } else {
+                index
+            };
+            (index >= limits.condition_index && parameters.len() >= 2).then_some(Group {
+                condition_index,
+                parameters,
+            })
+        });
+        named.collect()
+    }
+}
+
+/// Correlation of two histories; none where one of them does not move.
+#[must_use]
+pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+    let (da, db) = (about_mean(a), about_mean(b));
+    let product: f64 = da.iter().zip(&db).map(|(x, y)| x * y).sum();
+    let size = root_mean_square(&da) * root_mean_square(&db) * da.len() as f64;
+    (size > 0.0).then(|| (product / size).clamp(-1.0, 1.0))
+}
+
+/// Root mean square of a history about its mean. What rounding leaves of a constant counts as zero.
+#[must_use]
+pub fn excitation(values: &[f64]) -> f64 {
+    root_mean_square(&about_mean(values))
+}
+
+fn about_mean(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let rounding = 1e-12 * values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    values
+        .iter()
+        .map(|v| {
+            if (v - mean).abs() <= rounding {
+                0.0
+            } else {
+                v - mean
+            }
+        })
+        .collect()
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// The information of regressors of unit weight, `Xᵀ X`, of two that correlate by ρ and one
+    /// that stands apart; with lengths that unit diagonal must take out.
+    fn designed(rho: f64) -> DMatrix<f64> {
+        let (a, b, c) = (1.0, 1e3, 1e-4);
+        DMatrix::from_row_slice(
+            3,
+            3,
+            &[
+                a * a,
+                rho * a * b,
+                0.0,
+                rho * a * b,
+                b * b,
+                0.0,
+                0.0,
+                0.0,
+                c * c,
+            ],
+        )
+    }
+
+    fn measured(information: &DMatrix<f64>) -> Collinearity {
+        collinearity(information, 1e10, &Limits::default()).unwrap()
+    }
+
+    #[test]
+    fn two_regressors_have_the_closed_forms_of_their_correlation() {
+        let rho: f64 = 0.95;
+        let c = measured(&designed(rho));
+        // The inverse of [1 ρ; ρ 1] is [1 -ρ; -ρ 1]/(1-ρ²); its eigenvalues are 1+ρ and 1-ρ.
+        let inflation: Vec<f64> = c.inflation.iter().map(|v| v.unwrap()).collect();
+        assert_relative_eq!(inflation[0], 1.0 / (1.0 - rho * rho), max_relative = 1e-10);
+        assert_relative_eq!(inflation[1], 1.0 / (1.0 - rho * rho), max_relative = 1e-10);
+        assert_relative_eq!(inflation[2], 1.0, max_relative = 1e-10);
+        let correlation = c.correlation.unwrap();
+        assert_relative_eq!(correlation[(0, 1)], -rho, max_relative = 1e-10);
+        assert_relative_eq!(correlation[(0, 0)], 1.0, max_relative = 1e-10);
+        assert!(correlation[(0, 2)].abs() < 1e-12);
+        assert_relative_eq!(
+            c.largest_index,
+            ((1.0 + rho) / (1.0 - rho)).sqrt(),
+            max_relative = 1e-10
+        );
+        assert!(
+            c.groups.is_empty(),
+            "an index of 6 is no group: {:?}",
+            c.groups
+        );
+    }
+
+    #[test]
+    fn a_group_is_named_from_a_condition_index_of_30_on_with_the_parameters_that_share_it() {
+        // Index √((1+ρ)/(1-ρ)) = 30 at ρ = 899/901.
+        let at = |index: f64| (index * index - 1.0) / (index * index + 1.0);
+        assert!(measured(&designed(at(29.5))).groups.is_empty());
+        let groups = measured(&designed(at(30.5))).groups;
+        assert_eq!(groups.len(), 1);
+        assert_eq!(groups[0].parameters, [0, 1]);
+        assert_relative_eq!(groups[0].condition_index, 30.5, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn proportional_regressors_have_no_inflation_and_an_infinite_index_and_spare_the_third() {
+        let c = measured(&designed(1.0));
+        assert_eq!((c.inflation[0], c.inflation[1]), (None, None));
+        assert_relative_eq!(c.inflation[2].unwrap(), 1.0, max_relative = 1e-9);
+        assert!(c.correlation.is_none() && c.largest_index.is_infinite());
+        assert_eq!(
+            c.groups,
+            [Group {
+                condition_index: f64::INFINITY,
+                parameters: vec![0, 1]
+            }]
+        );
+    }
+
+    #[test]
+    fn a_regressor_that_is_not_felt_is_in_no_group() {
+        let mut information = designed(0.5);
+        information[(2, 2)] = 0.0;
+        let c = measured(&information);
+        assert_eq!(c.inflation[2], None);
+        assert!(c.inflation[0].is_some() && c.correlation.is_none() && c.groups.is_empty());
+    }
+
+    #[test]
+    fn correlation_and_excitation_are_about_the_mean() {
+        let sine: Vec<f64> = (0..1000)
+            .map(|k| 20.0 + 3.0 * (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).sin())
+            .collect();
+        let opposite: Vec<f64> = sine.iter().map(|v| 5.0 - 2.0 * v).collect();
+        let cosine: Vec<f64> = (0..1000)
+            .map(|k| (2.0 * std::f64::consts::PI * f64::from(k) / 250.0).cos())
+            .collect();
+        assert_relative_eq!(
+            excitation(&sine),
+            3.0 / 2.0_f64.sqrt(),
+            max_relative = 1e-10
+        );
+        assert_relative_eq!(
+            correlation(&sine, &opposite).unwrap(),
+            -1.0,
+            max_relative = 1e-10
+        );
+        assert!(correlation(&sine, &cosine).unwrap().abs() < 1e-10);
+        assert_eq!(correlation(&sine, &vec![0.1; 1000]), None);
+        assert!(excitation(&vec![0.1; 1000]).abs() < f64::EPSILON);
+    }
+}
