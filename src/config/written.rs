@@ -57,7 +57,7 @@ pub struct PipelineFile {
 pub struct ReportSettings {
     /// The class's maneuver nearest to this angle of attack shows its time histories.
     pub histories_at_alpha_deg: f64,
-    /// So many maneuvers have a page of their own at most; which ones, `report::pages` says.
+    /// So many maneuvers have a page of their own at most; which ones, `report::maneuvers_with_page` says.
     /// Default 600.
     pub maneuver_pages: usize,
     /// A template of the analyst's own instead of the built-in one.

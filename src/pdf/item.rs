@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use super::drawing::Drawing;
 use super::fonts::Weight;
+use super::svg::Drawing;
 
 /// One colour of a text or a box.
 pub type Colour = [u8; 3];

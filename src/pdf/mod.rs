@@ -2,13 +2,14 @@
 //! numbers, a table of contents and an outline, as a PDF with its fonts in it. No browser, no
 //! clock: the same page is the same bytes.
 
-mod drawing;
-mod flow;
+mod blocks;
+mod elements;
 mod fonts;
+mod inline_text;
 mod item;
-mod pages;
+mod pagination;
+mod svg;
 mod table;
-mod text;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -21,11 +22,11 @@ use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 use rayon::prelude::*;
 use roxmltree::{Document, ParsingOptions};
 
-use drawing::number;
-use flow::Flow;
+use blocks::Blocks;
 use fonts::{Fonts, Weight};
 use item::{Mark, SOFT, Style};
-use pages::{HEIGHT, Heading, MARGIN, Pages, WIDTH};
+use pagination::{HEIGHT, Heading, MARGIN, Pages, WIDTH};
+use svg::number;
 
 /// The page as a PDF.
 ///
@@ -51,8 +52,9 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         .children()
         .find(|n| n.has_tag_name("body"))
         .unwrap_or(root);
-    let items = Flow::new(&fonts).children(body, WIDTH - 2.0 * MARGIN, Style::of_size(flow::TEXT));
-    let pages = pages::paginate(items, &fonts);
+    let items =
+        Blocks::new(&fonts).children(body, WIDTH - 2.0 * MARGIN, Style::of_size(blocks::TEXT));
+    let pages = pagination::paginate(items, &fonts);
     Ok(Writer {
         fonts: &fonts,
         title,

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::flow::has_class;
+use super::elements::{has_class, is_for_screens};
 use super::fonts::Fonts;
+use super::inline_text::{Reader, Setting, Word, lines, widths};
 use super::item::{Colour, INK, Item, Mark, RULE, Style};
-use super::text::{Reader, Setting, Word, is_for_screens, lines, widths};
 
 /// Sizes of type to try, pt.
 const SIZES: [f32; 5] = [7.5, 7.0, 6.5, 6.0, 5.5];

@@ -511,7 +511,7 @@ impl Run<'_> {
             &campaign.fits,
             config.report.maneuver_pages,
         );
-        let pages = report::pages::chosen(maneuvers, fits, &campaign.overnight, at, most);
+        let pages = report::maneuvers_with_page(maneuvers, fits, &campaign.overnight, at, most);
         let with_page = maneuvers
             .iter()
             .zip(&campaign.histories)

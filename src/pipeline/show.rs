@@ -10,7 +10,7 @@ use crate::error::{Error, Problem, Result, did_you_mean};
 use crate::flight::is_stretch;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
-use crate::report::chart::{self, FlightView, Groups, ManeuverView};
+use crate::report::strip_chart::{self, FlightView, Groups, ManeuverView};
 use crate::store::archive::FlightFiles;
 use crate::store::atomic;
 
@@ -155,7 +155,7 @@ impl Run<'_> {
             .filter(|e| e.flight_id == id)
             .cloned()
             .collect();
-        Ok(chart::flight(&FlightView {
+        Ok(strip_chart::flight(&FlightView {
             aircraft: &self.config.aircraft.name,
             record: &record,
             recorded,
@@ -190,7 +190,7 @@ impl Run<'_> {
         } else {
             self.estimate_maneuver(&record, maneuver).history
         };
-        Ok(chart::maneuver(&ManeuverView {
+        Ok(strip_chart::maneuver(&ManeuverView {
             aircraft: &self.config.aircraft.name,
             record: &record,
             groups: &groups(self.config),

@@ -1,16 +1,32 @@
-//! How the field writes things: derivatives with subscripts, units in words, numbers with the
-//! digits that mean something.
+//! Notation of the field: derivatives with subscripts, units in words, numbers with significant
+//! digits, outcomes in words.
 
 use minijinja::HtmlEscape;
 
 use crate::aero::{Axis, Coefficient};
 use crate::units::Unit;
 
-/// What stands where there is no value.
+/// Dash in place of a missing value.
 pub const NOTHING: &str = "\u{2013}";
 
-/// The coefficient a derivative belongs to, by its name `<coefficient>_<regressor>`; none for a
-/// bias.
+/// Outcomes of a fit with their names in the report, in the order of its columns.
+pub const OUTCOMES: [(&str, &str); 4] = [
+    ("converged", "converged"),
+    ("not_converged", "did not converge"),
+    ("unidentifiable", "unidentifiable"),
+    ("rejected", "rejected"),
+];
+
+/// Outcome of a fit in words.
+#[must_use]
+pub fn outcome_in_words(outcome: &str) -> &str {
+    OUTCOMES
+        .iter()
+        .find(|(name, _)| *name == outcome)
+        .map_or(outcome, |(_, words)| words)
+}
+
+/// Coefficient of a derivative named `<coefficient>_<regressor>`; `None` for a bias.
 #[must_use]
 pub fn coefficient_of(name: &str) -> Option<Coefficient> {
     let (prefix, _) = name.split_once('_')?;
@@ -20,8 +36,8 @@ pub fn coefficient_of(name: &str) -> Option<Coefficient> {
         .find(|coefficient| format!("{coefficient:?}") == prefix)
 }
 
-/// A derivative as the field writes it, in HTML: a C with the rest as its subscript, surfaces with
-/// a δ, angles in Greek. What is no derivative (a bias) is its own name.
+/// Symbol of a derivative in HTML: C with a subscript, δ for surfaces, Greek angles. A bias keeps
+/// its name.
 #[must_use]
 pub fn symbol(name: &str) -> String {
     let (Some(_), Some((prefix, regressor))) = (coefficient_of(name), name.split_once('_')) else {
@@ -47,13 +63,13 @@ fn regressor_symbol(regressor: &str) -> String {
     }
 }
 
-/// Text made safe to stand in HTML.
+/// Text escaped for HTML.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     HtmlEscape(text).to_string()
 }
 
-/// A derivative's unit as a reader says it; nothing for a pure number.
+/// Unit of a derivative in words; empty for a pure number.
 #[must_use]
 pub fn unit(name: &str) -> String {
     match name {
@@ -67,7 +83,7 @@ pub fn unit(name: &str) -> String {
     }
 }
 
-/// A signal's name without the unit at its end, where that is said elsewhere or there is none.
+/// Name of a signal without the unit suffix.
 #[must_use]
 pub fn without_unit(signal: &str) -> &str {
     Unit::of_signal(signal)
@@ -76,8 +92,7 @@ pub fn without_unit(signal: &str) -> &str {
         .unwrap_or(signal)
 }
 
-/// A number with so many significant digits, a proper minus, and a dash where it is missing or not
-/// finite.
+/// A number with `significant` digits and a typographic minus; a dash if missing or not finite.
 #[must_use]
 pub fn number(value: Option<f64>, significant: usize) -> String {
     let Some(value) = value.filter(|v| v.is_finite()) else {
@@ -86,20 +101,20 @@ pub fn number(value: Option<f64>, significant: usize) -> String {
     Digits::of([value], significant).write(Some(value))
 }
 
-/// So many decimals, and a dash where there is no number.
+/// A number with `decimals` decimals; a dash if not finite.
 #[must_use]
 pub fn fixed(value: f64, decimals: usize) -> String {
     Digits::Decimals(decimals).write(Some(value))
 }
 
-/// An angle of attack in whole degrees where it is one, else with one decimal.
+/// Angle of attack in whole degrees if within 0.05° of one, else with one decimal.
 #[must_use]
 pub fn angle(alpha_deg: f64) -> String {
     let whole = (alpha_deg - alpha_deg.round()).abs() < 0.05;
     format!("{}°", fixed(alpha_deg, usize::from(!whole)))
 }
 
-/// `1 maneuver`, `2 maneuvers`.
+/// A number with its noun: `1 maneuver`, `2 maneuvers`.
 #[must_use]
 pub fn count(n: usize, noun: &str) -> String {
     if n == 1 {
@@ -109,7 +124,7 @@ pub fn count(n: usize, noun: &str) -> String {
     }
 }
 
-/// One form for all the numbers of a column, so that their decimal points stand under each other.
+/// Form of all numbers of a column, so that their decimal points align.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Digits {
     Decimals(usize),
@@ -117,7 +132,7 @@ pub enum Digits {
 }
 
 impl Digits {
-    /// The form in which the largest of the values shows so many significant digits.
+    /// Form in which the largest value shows `significant` digits.
     #[must_use]
     pub fn of(values: impl IntoIterator<Item = f64>, significant: usize) -> Digits {
         let largest = values
@@ -137,7 +152,7 @@ impl Digits {
         }
     }
 
-    /// The number in this form; a dash where it is missing or not finite.
+    /// Writes a number in this form; a dash if missing or not finite.
     #[must_use]
     pub fn write(self, value: Option<f64>) -> String {
         let Some(value) = value.filter(|v| v.is_finite()) else {
@@ -159,7 +174,7 @@ impl Digits {
     }
 }
 
-/// The power of ten of a positive finite number's first digit.
+/// Power of ten of the first digit of a positive finite number.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the logarithm of a finite number is within ±324"
@@ -174,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn derivatives_are_written_as_the_field_writes_them() {
+    fn derivatives_have_the_symbols_of_the_field() {
         for (name, html) in [
             ("CN_alpha", "C<sub>Nα</sub>"),
             ("Cn_beta", "C<sub>nβ</sub>"),
@@ -190,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_show_their_significant_digits_and_dashes_where_there_are_none() {
+    fn numbers_show_significant_digits_and_missing_ones_a_dash() {
         assert_eq!(number(Some(-0.012_345), 3), "\u{2212}0.0123");
         assert_eq!(number(Some(12_345.6), 3), "12346");
         assert_eq!(number(Some(0.0), 3), "0");

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::failures::TableView;
+use super::table_view::TableView;
 
 /// A file that was read, as anyone can check it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

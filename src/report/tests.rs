@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::samples::{Campaign, campaign, problem};
+use super::campaign_fixture::{Campaign, campaign, problem};
 use super::*;
 
 fn render(campaign: &Campaign) -> String {

@@ -31,7 +31,7 @@ fn sources() -> Vec<Source> {
         let name = file.file_name().unwrap().to_string_lossy();
         let is_rust = file.extension().is_some_and(|e| e == "rs");
         if !is_rust
-            || ["tests.rs", "samples.rs"].contains(&&*name)
+            || ["tests.rs", "campaign_fixture.rs"].contains(&&*name)
             || path.contains("/tests/")
             || ["lib.rs", "main.rs", "build.rs"].contains(&&*path)
         {

@@ -12,9 +12,10 @@ use kuva::render::color::Color;
 use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor, render_multiple};
 
-use super::super::notation::escaped;
-use super::super::scale::Scale;
-use super::{FONT, INK, LEFT_OUT_COLOUR, layout, nothing, path_of, shortened};
+use super::derivative_figure::{layout, nothing, path_of, shortened};
+use super::scale::Scale;
+use super::style::{EXCLUDED_COLOUR, FAINT, FONT, INK};
+use crate::report::notation::escaped;
 
 /// A strip chart with everything on it.
 #[derive(Clone, Debug)]
@@ -114,7 +115,6 @@ const LANE: f64 = 19.0;
 /// Ticks and label of the time axis.
 const AXIS: f64 = 46.0;
 const SHADE: &str = "#000000";
-const FAINT: &str = "#555555";
 /// So wide a letter is at most, on average, in units of its size.
 const LETTER: f64 = 0.6;
 /// Labels that stand upright are so far apart.
@@ -259,17 +259,17 @@ fn put_key(scene: &mut Scene, key: Key, x: f64, y: f64) {
             bridged(x + 10.0, x + 12.0, y + 4.0),
             "none",
             0.0,
-            Some(LEFT_OUT_COLOUR),
+            Some(EXCLUDED_COLOUR),
         ),
         Key::Despiked => path(
             despiked(x + 11.0, y - 4.0),
             "none",
             0.0,
-            Some(LEFT_OUT_COLOUR),
+            Some(EXCLUDED_COLOUR),
         ),
         Key::Missing => path(
             missing(x + 1.0, x + 19.0, y + 2.0),
-            LEFT_OUT_COLOUR,
+            EXCLUDED_COLOUR,
             0.8,
             Some("#ffffff"),
         ),
@@ -277,7 +277,7 @@ fn put_key(scene: &mut Scene, key: Key, x: f64, y: f64) {
             format!("M{:.1} {:.1}h4v4h-4z", x + 8.0, y - 2.0),
             "none",
             0.0,
-            Some(LEFT_OUT_COLOUR),
+            Some(EXCLUDED_COLOUR),
         ),
         Key::Line(colour, width) => path(format!("M{x:.1} {y:.1}h20"), colour, width, None),
     };
@@ -498,7 +498,7 @@ fn put_strip(
     }
     scene
         .elements
-        .push(path(dots, "none", 0.0, Some(LEFT_OUT_COLOUR)));
+        .push(path(dots, "none", 0.0, Some(EXCLUDED_COLOUR)));
     put_marks(scene, strip, place);
     scene.elements.push(Primitive::GroupEnd);
 }
@@ -543,10 +543,10 @@ fn put_marks(scene: &mut Scene, strip: &Strip, place: &Place) {
             "bridged",
             of_bridged.collect::<String>(),
             "none",
-            LEFT_OUT_COLOUR,
+            EXCLUDED_COLOUR,
         ),
-        ("despiked", of_despiked.collect(), "none", LEFT_OUT_COLOUR),
-        ("missing", of_missing.collect(), LEFT_OUT_COLOUR, "#ffffff"),
+        ("despiked", of_despiked.collect(), "none", EXCLUDED_COLOUR),
+        ("missing", of_missing.collect(), EXCLUDED_COLOUR, "#ffffff"),
     ];
     for (kind, d, stroke, fill) in kinds.into_iter().filter(|k| !k.1.is_empty()) {
         scene.elements.push(Primitive::GroupStart {

@@ -1,6 +1,7 @@
-//! Which maneuvers have a page of their own: all of a campaign, but of a fleet's archive no more
-//! than a reader can leaf through and a browser can hold. Everything is in the tables, and `harvest
-//! show` draws any of them.
+//! Selection of the maneuvers that get a page of their own.
+//!
+//! A campaign gets a page for each; a large archive no more than a browser can hold. The tables
+//! have all maneuvers, and `harvest show` draws any of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,11 +10,14 @@ use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::tables::FitRow;
 
-/// At most `most` maneuvers: the one that stands for its class (the converged one nearest to
-/// `typical_alpha_deg`), those that are not what they were the night before (up to half of the
-/// pages), those whose fit failed, and of the others some at equal distances.
+/// Selects at most `most` maneuvers. In order of precedence:
+///
+/// 1. the representative of each class ([`representatives`]),
+/// 2. those that changed since the previous night, up to half of `most`,
+/// 3. those whose fit failed,
+/// 4. an even selection of the others.
 #[must_use]
-pub fn chosen(
+pub fn maneuvers_with_page(
     maneuvers: &[Maneuver],
     fits: &[FitRow],
     changes: &Changes,
@@ -27,25 +31,19 @@ pub fn chosen(
         .map(|m| m.maneuver_id.as_str())
         .chain(changes.estimates.iter().map(|moved| moved.of.as_str()))
         .collect();
-    let ids = || maneuvers.iter().map(|m| m.maneuver_id.as_str());
-    let mut chosen: BTreeSet<&str> = typical(maneuvers, &converged, typical_alpha_deg);
-    add(
-        &mut chosen,
-        &ids().filter(|id| changed.contains(id)).collect::<Vec<_>>(),
-        most / 2,
-    );
-    add(
-        &mut chosen,
-        &ids()
-            .filter(|id| !converged.contains(id))
-            .collect::<Vec<_>>(),
-        most,
-    );
-    add(&mut chosen, &ids().collect::<Vec<_>>(), most);
-    chosen.into_iter().map(str::to_owned).collect()
+    let all: Vec<&str> = maneuvers.iter().map(|m| m.maneuver_id.as_str()).collect();
+    let mut selected: BTreeSet<&str> = representatives(maneuvers, &converged, typical_alpha_deg);
+    let mut fill = |is_candidate: &dyn Fn(&str) -> bool, most: usize| {
+        let candidates = all.iter().copied().filter(|id| is_candidate(id));
+        add_evenly(&mut selected, candidates, most);
+    };
+    fill(&|id| changed.contains(id), most / 2);
+    fill(&|id| !converged.contains(id), most);
+    fill(&|_| true, most);
+    selected.into_iter().map(str::to_owned).collect()
 }
 
-/// The maneuvers whose fit converged.
+/// Maneuvers whose fit converged.
 pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
     fits.iter()
         .filter(|f| f.outcome == Outcome::Converged.name())
@@ -53,21 +51,22 @@ pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
         .collect()
 }
 
-/// The maneuver that stands for its class: of each the converged one nearest to an angle of attack.
-pub(super) fn typical<'a>(
+/// Representative of each class: its converged maneuver nearest to an angle of attack. Ties go to
+/// the alphabetically first identifier.
+pub(super) fn representatives<'a>(
     maneuvers: &'a [Maneuver],
     converged: &BTreeSet<&str>,
     alpha_deg: f64,
 ) -> BTreeSet<&'a str> {
-    let off = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
+    let distance = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
     let mut nearest: BTreeMap<&str, &Maneuver> = BTreeMap::new();
     for maneuver in maneuvers
         .iter()
         .filter(|m| converged.contains(m.maneuver_id.as_str()))
     {
         let best = nearest.entry(maneuver.class.as_str()).or_insert(maneuver);
-        if off(maneuver)
-            .total_cmp(&off(best))
+        if distance(maneuver)
+            .total_cmp(&distance(best))
             .then_with(|| maneuver.maneuver_id.cmp(&best.maneuver_id))
             .is_lt()
         {
@@ -80,23 +79,22 @@ pub(super) fn typical<'a>(
         .collect()
 }
 
-/// Adds those that are not there yet, or of too many some at equal distances, until there are
-/// `most`.
-fn add<'a>(chosen: &mut BTreeSet<&'a str>, from: &[&'a str], most: usize) {
-    let left: Vec<&str> = from
-        .iter()
-        .copied()
-        .filter(|id| !chosen.contains(id))
-        .collect();
-    let room = most.saturating_sub(chosen.len()).min(left.len());
-    chosen.extend((0..room).filter_map(|k| left.get(k * left.len() / room.max(1))));
+/// Adds candidates until `most` are selected, at equal distances if there are too many.
+fn add_evenly<'a>(
+    selected: &mut BTreeSet<&'a str>,
+    candidates: impl Iterator<Item = &'a str>,
+    most: usize,
+) {
+    let left: Vec<&str> = candidates.filter(|id| !selected.contains(id)).collect();
+    let room = most.saturating_sub(selected.len()).min(left.len());
+    selected.extend((0..room).filter_map(|k| left.get(k * left.len() / room.max(1))));
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples;
     use super::*;
     use crate::lineage::ManeuverChange;
+    use crate::report::campaign_fixture;
 
     fn change(maneuver_id: &str) -> ManeuverChange {
         ManeuverChange {
@@ -109,9 +107,9 @@ mod tests {
     }
 
     #[test]
-    fn a_campaign_that_has_room_has_a_page_for_every_maneuver() {
-        let campaign = samples::campaign();
-        let pages = chosen(
+    fn a_small_campaign_has_a_page_for_every_maneuver() {
+        let campaign = campaign_fixture::campaign();
+        let pages = maneuvers_with_page(
             &campaign.maneuvers,
             &campaign.fits,
             &Changes::default(),
@@ -122,8 +120,8 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_no_room_what_stands_for_a_class_what_changed_and_what_failed_come_first() {
-        let campaign = samples::campaign();
+    fn representatives_changed_and_failed_maneuvers_come_first_where_pages_are_few() {
+        let campaign = campaign_fixture::campaign();
         let failed: Vec<&str> = campaign
             .fits
             .iter()
@@ -135,7 +133,7 @@ mod tests {
             .iter()
             .map(|m| m.class.as_str())
             .collect();
-        let plain = chosen(
+        let plain = maneuvers_with_page(
             &campaign.maneuvers,
             &campaign.fits,
             &Changes::default(),
@@ -161,7 +159,7 @@ mod tests {
             ..Changes::default()
         };
         let most = 2 * (classes.len() + 1);
-        let pages = chosen(&campaign.maneuvers, &campaign.fits, &changes, 30.0, most);
+        let pages = maneuvers_with_page(&campaign.maneuvers, &campaign.fits, &changes, 30.0, most);
         assert!(pages.len() == most && pages.contains(other) && pages.is_superset(&at_30));
         assert!(!failed.is_empty() && failed.iter().all(|id| pages.contains(*id)));
     }

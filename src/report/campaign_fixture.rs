@@ -1,4 +1,4 @@
-//! A small campaign with every kind of row, for the tests of the report.
+//! Fixture of the report's tests: a small campaign with every kind of row.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::tables::{
     HistoryOutput, InstrumentRow, PredictionRow, TrendRow,
 };
 
-/// Owns what [`Contents`] borrows.
+/// Owner of the rows that [`Contents`] borrows.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
     pub maneuvers: Vec<Maneuver>,
@@ -81,8 +81,8 @@ const LATERAL: [(&str, &str); 4] = [
     ("Cn_dyv", "ftlbf_per_deg"),
 ];
 
-/// Two classes of each axis at α 10° to 50°; names that differ by case alone, a wild estimate, one
-/// fit that failed.
+/// Two classes of each axis at α 10° to 50°; names that differ in case alone, one outlier, one
+/// failed fit.
 pub fn campaign() -> Campaign {
     let mut campaign = Campaign::default();
     for (class, axis) in [

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::drawing::{self, Drawing};
+use super::elements::is_for_screens;
 use super::fonts::{Fonts, Weight};
 use super::item::{Item, Mark, SOFT, Style};
+use super::svg::{self, Drawing};
 
 /// A page unit of a small drawing in the text (an SVG of so many px) in pt.
 const PX: f32 = 0.7;
@@ -169,8 +170,8 @@ impl<'a> Reader<'a> {
         self.word.parts.push((part, link.map(str::to_owned)));
     }
 
-    fn drawing(&mut self, svg: Node, link: Option<&str>) {
-        let drawing = drawing::drawing(svg, self.fonts);
+    fn drawing(&mut self, node: Node, link: Option<&str>) {
+        let drawing = svg::drawing(node, self.fonts);
         // Its margin to the word it stands before.
         let width = drawing.width * PX + 3.0;
         self.part(Part::Drawing(Arc::new(drawing)), width, link);
@@ -198,16 +199,6 @@ impl<'a> Reader<'a> {
             self.words.push(std::mem::take(&mut self.word));
         }
     }
-}
-
-/// What is of use on a screen alone.
-pub fn is_for_screens(node: Node) -> bool {
-    matches!(
-        node.tag_name().name(),
-        "script" | "style" | "head" | "button" | "input" | "label"
-    ) || node
-        .attribute("class")
-        .is_some_and(|c| c.split(' ').any(|c| c == "screen"))
 }
 
 /// How words fill a width.

@@ -1,7 +1,7 @@
 //! The scale of one axis of a figure: round limits and ticks that show what the reader came for,
 //! whatever a few wild values do.
 
-use super::notation::power_of_ten;
+use crate::report::notation::power_of_ten;
 
 /// Round limits, at half steps at least, with ticks at every multiple of the step between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +58,7 @@ impl Scale {
 
 /// What one figure has to show.
 #[derive(Clone, Debug, Default)]
-pub struct Shown {
+pub struct ValueRange {
     /// Values that must be seen: the trend and the tunnel.
     pub lines: Vec<f64>,
     /// Estimates and the half-length of their bars.
@@ -67,7 +67,7 @@ pub struct Shown {
     pub band: Vec<f64>,
 }
 
-impl Shown {
+impl ValueRange {
     /// The scale for it: all of the lines, the estimates but for the wild ones, and of bars and
     /// band what does not dwarf them.
     #[must_use]
@@ -208,19 +208,19 @@ mod tests {
 
     #[test]
     fn a_wild_estimate_does_not_flatten_the_figure() {
-        let mut shown = Shown {
+        let mut range = ValueRange {
             lines: vec![0.04, 0.08],
-            ..Shown::default()
+            ..ValueRange::default()
         };
-        shown.estimates = (0..40)
+        range.estimates = (0..40)
             .map(|i| (0.04 + 0.001 * f64::from(i), 0.001))
             .collect();
-        let calm = shown.scale();
-        shown
+        let calm = range.scale();
+        range
             .estimates
             .extend([(9.0, 30.0), (-4.0, 2.0), (f64::NAN, f64::INFINITY)]);
-        shown.band = vec![-2.0, 5.0, f64::INFINITY];
-        let wild = shown.scale();
+        range.band = vec![-2.0, 5.0, f64::INFINITY];
+        let wild = range.scale();
         assert!(
             wild.max - wild.min < 2.0 * (calm.max - calm.min),
             "{wild:?} against {calm:?}"
@@ -230,9 +230,9 @@ mod tests {
 
     #[test]
     fn nothing_to_show_and_what_is_not_finite_still_have_a_scale() {
-        let scale = Shown {
+        let scale = ValueRange {
             lines: vec![f64::NAN, f64::INFINITY],
-            ..Shown::default()
+            ..ValueRange::default()
         }
         .scale();
         assert!(scale.min.is_finite() && scale.max > scale.min);

@@ -1,21 +1,23 @@
 //! Strip charts: a whole flight with its maneuvers, and one maneuver measured against computed,
 //! each as an SVG file.
 
+mod envelope;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::figure::strips::{self, Chart, Key, Lane, LaneBox, Marks, PITCH, Strip, Trace, Window};
-use super::figure::{INK, MEASURED_COLOUR};
-
-use super::notation::{angle, fixed, number, without_unit};
-use super::reduce::{Columns, Shown, envelope, runs};
-use super::scale::{Scale, extent};
-use super::summary::outcome_in_words;
+use super::figure::annotated_chart::{
+    self, Chart, Key, Lane, LaneBox, Marks, PITCH, Strip, Trace, Window,
+};
+use super::figure::scale::{Scale, extent};
+use super::figure::style::{INK, MEASURED_COLOUR};
+use super::notation::{angle, fixed, number, outcome_in_words, without_unit};
 use crate::error::Problem;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Class, Maneuver, Unknown};
 use crate::tables::{EventRow, FitRow, History, HistoryOutput};
 use crate::units::Unit;
+use envelope::{Columns, Shown, envelope, runs};
 
 /// So many columns a chart has at least and at most: pixels of a screen, dots of a page.
 const COLUMNS: (f64, f64) = (760.0, 1000.0);
@@ -144,7 +146,7 @@ pub fn flight(view: &FlightView) -> String {
     notes.extend(problems(view.problems));
     let maneuvers = super::notation::count(view.maneuvers.len(), "maneuver");
     let lasting = format!("{} to {} s", fixed(from_s, 1), fixed(to_s, 1));
-    strips::draw(&Chart {
+    annotated_chart::draw(&Chart {
         title: format!("{}: {}", record.flight_id, view.aircraft),
         description: format!(
             "Strip chart of flight {}, {lasting}, with {maneuvers} shaded.",
@@ -209,7 +211,7 @@ pub fn maneuver(view: &ManeuverView) -> String {
     );
     let inside = |m: &&Maneuver| m.start_s < last_s && m.end_s > first_s;
     let windows = view.flight.iter().filter(inside).map(|m| window(m, &[]));
-    strips::draw(&Chart {
+    annotated_chart::draw(&Chart {
         title: title(view),
         description: format!(
             "Strip chart of maneuver {} of class {}: inputs, outputs {}.",

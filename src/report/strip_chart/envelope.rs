@@ -151,7 +151,7 @@ pub fn runs(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::scale::extent;
+    use crate::report::figure::scale::extent;
     use proptest::prelude::*;
 
     const COLUMNS: Columns = Columns {

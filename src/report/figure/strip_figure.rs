@@ -5,13 +5,13 @@
 
 use std::fmt::Write;
 
-use super::super::notation::{Digits, escaped};
-use super::super::scale::Scale;
-use super::{FONT, INK, LEFT_OUT_COLOUR};
+use super::scale::Scale;
+use super::style::{EXCLUDED_COLOUR, FONT, INK};
+use crate::report::notation::{Digits, escaped};
 
 /// A drawing of strips.
 #[derive(Clone, Debug)]
-pub struct Stack {
+pub struct StripFigure {
     /// Unique in the page.
     pub id: String,
     pub title: String,
@@ -63,19 +63,19 @@ const EDGE: f64 = 8.0;
 
 /// The drawing.
 #[must_use]
-pub fn draw(stack: &Stack) -> String {
-    let columns = stack.columns.len().max(1) as f64;
-    let width = (stack.width - EDGE - GAP * (columns - 1.0)) / columns;
+pub fn draw(figure: &StripFigure) -> String {
+    let columns = figure.columns.len().max(1) as f64;
+    let width = (figure.width - EDGE - GAP * (columns - 1.0)) / columns;
     let height = |c: &Vec<Strip>| c.iter().map(|s| s.height + 2.0 * ROOM).sum::<f64>() + AXIS;
-    let total = stack.columns.iter().map(height).fold(0.0, f64::max);
+    let total = figure.columns.iter().map(height).fold(0.0, f64::max);
     let mut svg = format!(
         r#"<svg viewBox="0 0 {} {total:.0}" role="img" aria-labelledby="{id}-t {id}-d" font-family="{FONT}" font-size="{TEXT}"><title id="{id}-t">{}</title><desc id="{id}-d">{}</desc>"#,
-        stack.width,
-        escaped(&stack.title),
-        escaped(&stack.description),
-        id = stack.id,
+        figure.width,
+        escaped(&figure.title),
+        escaped(&figure.description),
+        id = figure.id,
     );
-    for (i, column) in stack.columns.iter().enumerate() {
+    for (i, column) in figure.columns.iter().enumerate() {
         let names = column
             .iter()
             .flat_map(|s| [s.name.chars().count(), s.unit.chars().count()])
@@ -87,7 +87,7 @@ pub fn draw(stack: &Stack) -> String {
             left,
             right,
             from: i as f64 * (width + GAP),
-            time: stack.time,
+            time: figure.time,
         }
         .draw(&mut svg, column);
     }
@@ -245,7 +245,7 @@ impl Column {
             );
         }
         if !dots.is_empty() {
-            let _ = write!(svg, r#"<path d="{dots}" fill="{LEFT_OUT_COLOUR}"/>"#);
+            let _ = write!(svg, r#"<path d="{dots}" fill="{EXCLUDED_COLOUR}"/>"#);
         }
     }
 }
@@ -331,7 +331,7 @@ pub fn ink(points: Vec<(f64, f64)>, width: f64) -> StripLine {
 mod tests {
     use super::*;
 
-    fn stack() -> Stack {
+    fn figure() -> StripFigure {
         let scale = Scale {
             min: -1.0,
             max: 1.0,
@@ -349,7 +349,7 @@ mod tests {
             dots: vec![(2.0, 5.0)],
             class: "c1".into(),
         };
-        Stack {
+        StripFigure {
             id: "s1".into(),
             title: "rates".into(),
             description: "a & b".into(),
@@ -364,8 +364,8 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_is_well_formed_and_says_what_it_shows() {
-        let svg = draw(&stack());
+    fn a_strip_figure_is_well_formed_and_has_alternative_text() {
+        let svg = draw(&figure());
         let document = roxmltree::Document::parse(&svg).expect("well-formed");
         let said: Vec<&str> = document
             .root_element()

@@ -1,18 +1,12 @@
-//! The mark of each maneuver class: shape, solid or hollow, and a dark colour, so that classes stay
-//! apart in print and for the colour-blind.
+//! Markers of maneuver classes: shape, filled or hollow, and a dark colour, so that classes stay
+//! apart in print and for colour-blind readers.
 
 use std::fmt::Write;
 
-use serde::Serialize;
+use super::legend::key;
+use super::style::DARK_COLOURS;
 
-/// One entry of a legend.
-#[derive(Clone, Debug, Serialize)]
-pub struct LegendView {
-    pub key: String,
-    pub label: String,
-}
-
-/// The outline of a mark.
+/// Outline of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
     Circle,
@@ -30,39 +24,35 @@ const SHAPES: [Shape; 5] = [
     Shape::TriangleDown,
 ];
 
-/// Dark enough on white paper, and apart from each other in lightness too.
-const COLOURS: [&str; 6] = [
-    "#111111", "#0060a8", "#b34700", "#6a2c91", "#00664b", "#7a5200",
-];
-
-/// How one class is marked.
+/// Marker of one class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mark {
+pub struct Marker {
     shape: Shape,
     pub hollow: bool,
     pub colour: &'static str,
 }
 
-impl Mark {
-    /// The mark of the n-th class of its axis. Thirty of them differ.
+impl Marker {
+    /// Marker of the n-th class. The first thirty differ.
     #[must_use]
-    pub fn nth(n: usize) -> Mark {
+    pub fn nth(n: usize) -> Marker {
         let shape = SHAPES[n % SHAPES.len()];
-        Mark {
+        Marker {
             shape,
             hollow: n % 2 == 1,
-            colour: COLOURS[(n % 10 + n / 10) % COLOURS.len()],
+            colour: DARK_COLOURS[(n % 10 + n / 10) % DARK_COLOURS.len()],
         }
     }
 
-    /// What it is filled with.
+    /// Fill colour.
     #[must_use]
     pub fn fill(self) -> &'static str {
         if self.hollow { "#ffffff" } else { self.colour }
     }
 
-    /// Appends its outline around a point to the data of an SVG path; `radius` makes all shapes
-    /// look equally large.
+    /// Appends the outline around a point to the data of an SVG path.
+    ///
+    /// Shapes of the same `radius` look equally large.
     pub fn outline(self, path: &mut String, x: f64, y: f64, radius: f64) {
         let polygon = |path: &mut String, corners: &[(f64, f64)]| {
             for (i, (dx, dy)) in corners.iter().enumerate() {
@@ -88,7 +78,7 @@ impl Mark {
         }
     }
 
-    /// The mark as a key for a legend.
+    /// Key of the class in a legend.
     #[must_use]
     pub fn key(self) -> String {
         let mut path = String::new();
@@ -104,30 +94,13 @@ impl Mark {
     }
 }
 
-/// A small drawing that stands before a word of a legend.
-#[must_use]
-pub fn key(width: u32, content: &str) -> String {
-    format!(
-        r#"<svg class="key" viewBox="0 0 {width} 12" width="{width}" height="12" aria-hidden="true">{content}</svg>"#
-    )
-}
-
-/// The content of a key for a line; no dashes when `dash` is empty.
-#[must_use]
-pub fn line(colour: &str, dash: &str, width: f64) -> String {
-    let dash = if dash.is_empty() { "none" } else { dash };
-    format!(
-        r#"<path d="M0 6h24" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}" fill="none"/>"#
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn thirty_classes_of_one_axis_have_marks_of_their_own() {
-        let marks: Vec<Mark> = (0..30).map(Mark::nth).collect();
+    fn thirty_classes_have_different_markers() {
+        let marks: Vec<Marker> = (0..30).map(Marker::nth).collect();
         for (i, mark) in marks.iter().enumerate() {
             assert!(
                 !marks[..i].contains(mark),
@@ -137,8 +110,8 @@ mod tests {
     }
 
     #[test]
-    fn the_first_five_differ_in_shape_alone() {
-        let marks: Vec<Mark> = (0..5).map(Mark::nth).collect();
+    fn the_first_five_markers_differ_in_shape() {
+        let marks: Vec<Marker> = (0..5).map(Marker::nth).collect();
         for (i, mark) in marks.iter().enumerate() {
             assert!(marks[..i].iter().all(|m| m.shape != mark.shape));
         }

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::drawing;
+use super::elements::{has_class, is_block, is_for_screens, plain_text};
 use super::fonts::Fonts;
+use super::inline_text::{Reader, Setting, lines};
 use super::item::{Item, Mark, SOFT, Style};
+use super::svg;
 use super::table;
-use super::text::{Reader, Setting, is_for_screens, lines};
 
 /// Size of running text, pt.
 pub const TEXT: f32 = 9.0;
@@ -22,15 +23,15 @@ const LARGEST: f32 = 1.0;
 
 /// Makes items of elements.
 #[derive(Debug)]
-pub struct Flow<'a> {
+pub struct Blocks<'a> {
     pub fonts: &'a Fonts,
     /// Anchors of elements that have opened but not put anything on the page yet.
     waiting: Vec<String>,
 }
 
-impl<'a> Flow<'a> {
+impl<'a> Blocks<'a> {
     pub fn new(fonts: &'a Fonts) -> Self {
-        Flow {
+        Blocks {
             fonts,
             waiting: Vec::new(),
         }
@@ -167,7 +168,7 @@ impl<'a> Flow<'a> {
         let style = Style::of_size(size).bold();
         let mut items = vec![Item::room(0.7 * size)];
         let mut heading = self.children(node, width, style);
-        let title = plain(node);
+        let title = plain_text(node);
         if let (Some(first), Some(level)) = (heading.first_mut(), level) {
             first.marks.push(Mark::Heading { level, title });
             if level == 0 {
@@ -265,7 +266,7 @@ impl<'a> Flow<'a> {
     }
 
     fn drawing(&mut self, node: Node, width: f32) -> Vec<Item> {
-        let drawing = drawing::drawing(node, self.fonts);
+        let drawing = svg::drawing(node, self.fonts);
         let scale = (width / drawing.width.max(1.0)).min(LARGEST);
         let height = drawing.height * scale;
         let mark = Mark::Drawing {
@@ -320,32 +321,4 @@ fn indented(mut items: Vec<Item>, by: f32) -> Vec<Item> {
         item.marks = item.marks.iter().map(|m| m.moved(by, 0.0)).collect();
     }
     items
-}
-
-/// An element's text in one line, without what is small beside it.
-pub fn plain(node: Node) -> String {
-    let mut text = String::new();
-    for part in node.descendants().filter(Node::is_text) {
-        let is_kept = part
-            .ancestors()
-            .all(|a| !a.is_element() || !(is_for_screens(a) || a.has_tag_name("small")));
-        if let (Some(part), true) = (part.text(), is_kept) {
-            text.push_str(part);
-        }
-    }
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-pub fn has_class(node: Node, class: &str) -> bool {
-    node.attribute("class")
-        .is_some_and(|c| c.split(' ').any(|c| c == class))
-}
-
-fn is_block(node: Node) -> bool {
-    let inline = [
-        "a", "b", "i", "em", "strong", "small", "sub", "span", "br", "code", "title", "desc",
-    ];
-    let name = node.tag_name().name();
-    let is_key = name == "svg" && (has_class(node, "key") || has_class(node, "strip"));
-    !inline.contains(&name) && !is_key
 }

@@ -1,0 +1,75 @@
+//! Everything a report is made from: the campaign's tables, time histories and provenance.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::provenance::Provenance;
+use crate::aero::Axis;
+use crate::error::Problem;
+use crate::lineage::Changes;
+use crate::maneuver::Maneuver;
+use crate::output_error::identifiability::Limits;
+use crate::tables::{
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
+    InstrumentRow, PredictionRow, TrendRow,
+};
+
+/// Input of the report stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Contents<'a> {
+    pub title: &'a str,
+    pub aircraft: &'a str,
+    /// Archive that the flights were read from.
+    pub archive: &'a str,
+    /// Wind-tunnel database and the sources of its values.
+    pub wind_tunnel: &'a str,
+    pub maneuvers: &'a [Maneuver],
+    pub fits: &'a [FitRow],
+    pub estimates: &'a [EstimateRow],
+    /// Outputs of each maneuver, predicted with derivatives estimated from other maneuvers.
+    pub predictions: &'a [PredictionRow],
+    pub correlations: &'a [CorrelationRow],
+    /// Limits above which a correlation, a variance inflation or a condition index is flagged.
+    pub limits: &'a Limits,
+    pub trends: &'a [TrendRow],
+    pub comparison: &'a [ComparisonRow],
+    pub channels: &'a [ChannelRow],
+    pub checks: &'a [CheckRow],
+    pub instruments: &'a [InstrumentRow],
+    pub events: &'a [EventRow],
+    pub problems: &'a [Problem],
+    /// Identifiers of the maneuvers that get a page (see [`super::maneuvers_with_page`]).
+    pub pages: &'a BTreeSet<String>,
+    /// Time histories of those maneuvers, reduced by [`super::thinned`].
+    pub histories: &'a [History],
+    /// Angle of attack nearest to which the representative maneuver of a class lies, deg.
+    pub typical_alpha_deg: f64,
+    pub provenance: &'a Provenance,
+    /// Derivatives in the order of the model.
+    pub order: &'a [String],
+    /// Name, title and axis of each configured class.
+    pub classes: &'a [(String, String, Axis)],
+    /// Differences from the previously published night.
+    pub overnight: &'a Changes,
+}
+
+impl<'a> Contents<'a> {
+    /// Maps each maneuver's identifier to its fit.
+    pub fn fits_by_maneuver(&self) -> BTreeMap<&'a str, &'a FitRow> {
+        self.fits
+            .iter()
+            .map(|fit| (fit.maneuver_id.as_str(), fit))
+            .collect()
+    }
+}
+
+/// Groups rows by a key, in their order.
+pub fn group_by<'a, T>(
+    rows: &'a [T],
+    key: impl Fn(&'a T) -> &'a str,
+) -> BTreeMap<&'a str, Vec<&'a T>> {
+    let mut groups: BTreeMap<&str, Vec<&T>> = BTreeMap::new();
+    for row in rows {
+        groups.entry(key(row)).or_default().push(row);
+    }
+    groups
+}

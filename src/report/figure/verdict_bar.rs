@@ -1,0 +1,78 @@
+//! Small bar that shows the verdicts of one derivative over angle of attack.
+
+use std::fmt::Write;
+
+/// A part of the bar with one verdict.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment<'a> {
+    pub verdict: &'a str,
+    pub from_deg: f64,
+    pub to_deg: f64,
+}
+
+/// Height of the bar, px.
+const HEIGHT: u32 = 14;
+
+/// Top, bottom and colour of a segment. Place and height distinguish verdicts without colour.
+fn style(verdict: &str) -> (f64, f64, &'static str) {
+    match verdict {
+        "agrees" => (5.0, 9.0, "#8a8f98"),
+        "flight higher" => (0.0, 7.0, "#0060a8"),
+        "flight lower" => (7.0, 14.0, "#b34700"),
+        "sign differs" => (0.0, 14.0, "#7a0143"),
+        _ => (6.5, 7.5, "#c9ccd1"),
+    }
+}
+
+/// Draws the segments as SVG; empty if there are none or the range of angle of attack is.
+#[must_use]
+pub fn draw(segments: &[Segment], (from_deg, to_deg): (f64, f64), width: u32) -> String {
+    let scale = f64::from(width) / (to_deg - from_deg);
+    if segments.is_empty() || !scale.is_finite() || scale <= 0.0 {
+        return String::new();
+    }
+    let x = |alpha_deg: f64| ((alpha_deg - from_deg) * scale).clamp(0.0, f64::from(width));
+    let mut svg = format!(
+        r#"<svg class="strip" viewBox="0 0 {width} {HEIGHT}" width="{width}" height="{HEIGHT}" aria-hidden="true">"#
+    );
+    for segment in segments {
+        let (top, bottom, colour) = style(segment.verdict);
+        let (left, right) = (x(segment.from_deg), x(segment.to_deg));
+        // Writing into a String cannot fail.
+        let _ = write!(
+            svg,
+            r#"<rect x="{left:.1}" y="{top}" width="{:.1}" height="{}" fill="{colour}"/>"#,
+            right - left,
+            bottom - top
+        );
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn segments_fill_the_bar_to_scale() {
+        let segment = |verdict, from_deg, to_deg| Segment {
+            verdict,
+            from_deg,
+            to_deg,
+        };
+        let segments = [
+            segment("agrees", 5.0, 15.0),
+            segment("flight higher", 15.0, 35.0),
+        ];
+        let svg = draw(&segments, (5.0, 35.0), 120);
+        assert_eq!(svg.matches("<rect").count(), 2);
+        assert!(svg.contains(r#"x="0.0" y="5" width="40.0""#), "{svg}");
+        assert!(svg.contains(r#"x="40.0" y="0" width="80.0""#), "{svg}");
+    }
+
+    #[test]
+    fn nothing_compared_gives_no_bar() {
+        assert_eq!(draw(&[], (0.0, 1.0), 100), "");
+    }
+}

@@ -1,0 +1,156 @@
+//! Changes since the previously published night, with their causes.
+
+use crate::lineage::{Changes, Moved};
+use crate::report::notation::{angle, number};
+use crate::report::table_view::TableView;
+
+/// Number of causes that the headline names.
+const MOST_CAUSES: usize = 3;
+
+const MOVED_NOTE: &str = "Moved: by more than the larger of the two nights' uncertainties.";
+
+/// The changes and their causes in a sentence.
+pub fn headline(changes: &Changes) -> String {
+    let Some(since) = &changes.since else {
+        return "No complete night was published here before: there is nothing to compare this \
+                one with."
+            .to_owned();
+    };
+    if changes.is_empty() {
+        return format!(
+            "Nothing that was published in night {since} has moved by more than its uncertainty."
+        );
+    }
+    format!(
+        "Since night {since}: {}.{}",
+        counts(changes).join(", "),
+        causes(changes)
+    )
+}
+
+/// Number of changes of each kind that occurs.
+fn counts(changes: &Changes) -> Vec<String> {
+    let maneuvers = |kind: &str| changes.maneuvers.iter().filter(|m| m.what == kind).count();
+    [
+        (maneuvers("new"), "new maneuvers"),
+        (maneuvers("gone"), "maneuvers gone"),
+        (maneuvers("changed"), "maneuvers changed"),
+        (changes.estimates.len(), "estimates moved"),
+        (changes.trends.len(), "trend values moved"),
+        (changes.new_trends.len(), "new trends"),
+        (changes.gone_trends.len(), "trends gone"),
+        (changes.verdicts.len(), "verdicts changed"),
+    ]
+    .iter()
+    .filter(|(n, _)| *n > 0)
+    .map(|(n, kind)| format!("{n} {kind}"))
+    .collect()
+}
+
+/// A sentence with the first causes; empty without any.
+fn causes(changes: &Changes) -> String {
+    let mut causes: Vec<&str> = changes
+        .causes
+        .iter()
+        .map(|c| c.words.as_str())
+        .take(MOST_CAUSES)
+        .collect();
+    if changes.causes.len() > MOST_CAUSES {
+        causes.push("and more");
+    }
+    if causes.is_empty() {
+        String::new()
+    } else {
+        format!(" Causes: {}.", causes.join(", "))
+    }
+}
+
+/// Tables of the changes, without empty ones.
+pub fn tables(changes: &Changes) -> Vec<TableView> {
+    let tables = [
+        input_changes(changes),
+        verdicts(changes),
+        moved("Trends that moved", "group", &changes.trends),
+        trend_names(changes),
+        maneuvers(changes),
+        moved("Estimates that moved", "maneuver", &changes.estimates),
+    ];
+    tables.into_iter().filter(|t| !t.rows.is_empty()).collect()
+}
+
+fn input_changes(changes: &Changes) -> TableView {
+    let rows = changes
+        .causes
+        .iter()
+        .map(|c| vec![c.stage.name().to_owned(), c.words.clone()])
+        .collect();
+    TableView::new("Changed inputs", "", &["first stage", "cause"], rows)
+}
+
+fn verdicts(changes: &Changes) -> TableView {
+    let rows = changes
+        .verdicts
+        .iter()
+        .map(|v| {
+            vec![
+                v.derivative.clone(),
+                angle(v.alpha_deg),
+                v.before.clone(),
+                v.now.clone(),
+                v.because.clone(),
+            ]
+        })
+        .collect();
+    let heads = ["derivative", "α", "before", "now", "because"];
+    TableView::new("Verdicts", "", &heads, rows)
+}
+
+fn trend_names(changes: &Changes) -> TableView {
+    let new = changes.new_trends.iter().map(|name| ("new", name));
+    let gone = changes.gone_trends.iter().map(|name| ("gone", name));
+    let rows = new
+        .chain(gone)
+        .map(|(kind, name)| vec![kind.to_owned(), name.clone()])
+        .collect();
+    TableView::new("Trends new and gone", "", &["", "derivative, group"], rows)
+}
+
+fn maneuvers(changes: &Changes) -> TableView {
+    let rows = changes
+        .maneuvers
+        .iter()
+        .map(|m| {
+            vec![
+                m.what.clone(),
+                m.maneuver_id.clone(),
+                m.class.clone(),
+                m.words.clone(),
+                m.because.clone(),
+            ]
+        })
+        .collect();
+    let heads = ["", "maneuver", "class", "", "because"];
+    TableView::new("Maneuvers", "", &heads, rows)
+}
+
+fn moved(title: &str, owner: &str, rows: &[Moved]) -> TableView {
+    let row = |m: &Moved| {
+        let numbers = [m.before, m.now, m.uncertainty].map(|v| number(Some(v), 4));
+        [
+            vec![m.derivative.clone(), m.of.clone(), angle(m.alpha_deg)],
+            numbers.to_vec(),
+            vec![m.because.clone()],
+        ]
+        .concat()
+    };
+    let heads = [
+        "derivative",
+        owner,
+        "α",
+        "before",
+        "now",
+        "uncertainty",
+        "because",
+    ];
+    TableView::new(title, MOVED_NOTE, &heads, rows.iter().map(row).collect())
+}

@@ -1,0 +1,263 @@
+//! Page of a maneuver: flight condition, outcome of the fit, time history, derivatives.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::class_markers::ClassMarkers;
+use super::history_strips;
+use crate::error::Problem;
+use crate::maneuver::Maneuver;
+use crate::report::contents::{Contents, group_by};
+use crate::report::figure::legend::{self, LegendView};
+use crate::report::notation::{
+    self, Digits, NOTHING, angle, count, fixed, number, outcome_in_words,
+};
+use crate::report::table_view::TableView;
+use crate::tables::{EstimateRow, FitRow, History, PredictionRow};
+
+/// Page of one maneuver.
+#[derive(Clone, Debug, Serialize)]
+pub struct ManeuverPage {
+    pub anchor: String,
+    pub maneuver_id: String,
+    pub class: String,
+    /// Marker of the class in figures.
+    pub marker: String,
+    /// Word by which the page hides the class.
+    pub token: String,
+    /// Names and values under the heading.
+    pub facts: Vec<(String, String)>,
+    /// Time history; empty if no response was computed.
+    pub svg: String,
+    pub legend: Vec<LegendView>,
+    pub estimates: TableView,
+    pub problems: Vec<String>,
+}
+
+/// Maps each maneuver that has a page to the anchor of the page.
+#[must_use]
+pub fn anchors<'a>(contents: &Contents<'a>) -> BTreeMap<&'a str, String> {
+    with_page(contents)
+        .map(|(number, m)| (m.maneuver_id.as_str(), format!("m{number}")))
+        .collect()
+}
+
+/// Maneuvers that have a page, with their numbers in the campaign from one.
+fn with_page<'a>(contents: &Contents<'a>) -> impl Iterator<Item = (usize, &'a Maneuver)> {
+    let pages = contents.pages;
+    (1..)
+        .zip(contents.maneuvers)
+        .filter(|(_, m)| pages.contains(&m.maneuver_id))
+}
+
+/// Makes the pages, in the order of the maneuvers.
+#[must_use]
+pub fn pages(contents: &Contents, markers: &ClassMarkers) -> Vec<ManeuverPage> {
+    let rows = RowsByManeuver {
+        markers,
+        fits: contents.fits_by_maneuver(),
+        histories: group_by(contents.histories, |h| &h.maneuver_id),
+        estimates: group_by(contents.estimates, |e| &e.maneuver_id),
+        predictions: group_by(contents.predictions, |p| &p.maneuver_id),
+        problems: group_by(contents.problems, |p| &p.place),
+    };
+    let maneuvers: Vec<(usize, &Maneuver)> = with_page(contents).collect();
+    maneuvers
+        .into_par_iter()
+        .map(|(number, maneuver)| rows.page(maneuver, number))
+        .collect()
+}
+
+/// Rows of the tables by maneuver.
+struct RowsByManeuver<'a> {
+    markers: &'a ClassMarkers<'a>,
+    fits: BTreeMap<&'a str, &'a FitRow>,
+    histories: BTreeMap<&'a str, Vec<&'a History>>,
+    estimates: BTreeMap<&'a str, Vec<&'a EstimateRow>>,
+    predictions: BTreeMap<&'a str, Vec<&'a PredictionRow>>,
+    problems: BTreeMap<&'a str, Vec<&'a Problem>>,
+}
+
+impl RowsByManeuver<'_> {
+    fn page(&self, maneuver: &Maneuver, number: usize) -> ManeuverPage {
+        let id = maneuver.maneuver_id.as_str();
+        let history = self.histories.get(id).and_then(|h| h.first());
+        let mut facts = flight_condition(maneuver);
+        facts.extend(fit_facts(self.fits.get(id).copied()));
+        facts.extend(self.predictions.get(id).map(|rows| prediction_fact(rows)));
+        ManeuverPage {
+            anchor: format!("m{number}"),
+            maneuver_id: id.to_owned(),
+            class: maneuver.class.clone(),
+            marker: self.markers.key(&maneuver.class),
+            token: self.markers.token(&maneuver.class),
+            facts,
+            svg: history.map_or_else(String::new, |h| {
+                history_strips::draw(h, format!("h{number}"))
+            }),
+            legend: history.map_or_else(Vec::new, |h| {
+                legend::time_history(h.outputs.iter().any(|o| o.marked.contains(&true)))
+            }),
+            estimates: estimates(self.estimates.get(id).map_or(&[], Vec::as_slice)),
+            problems: self
+                .problems
+                .get(id)
+                .into_iter()
+                .flatten()
+                .map(|p| format!("{}: {}", p.stage, p.reason))
+                .collect(),
+        }
+    }
+}
+
+fn fact(name: &str, value: String) -> (String, String) {
+    (name.to_owned(), value)
+}
+
+fn flight_condition(m: &Maneuver) -> Vec<(String, String)> {
+    let window = format!(
+        "{}\u{2013}{} s of {}, {}",
+        fixed(m.start_s, 1),
+        fixed(m.end_s, 1),
+        m.flight_id,
+        m.origin
+    );
+    let condition = format!(
+        "α {}, Mach {}, q̄ {} psf, V {} ft/s, altitude {} ft",
+        angle(m.alpha_deg),
+        fixed(m.mach, 3),
+        fixed(m.qbar_psf, 1),
+        fixed(m.velocity_ft_s, 0),
+        fixed(m.altitude_ft, 0)
+    );
+    let mass = format!(
+        "{} slug, center of gravity at {} ft",
+        fixed(m.mass_slug, 0),
+        fixed(m.x_cg_ft, 2)
+    );
+    vec![
+        fact("Time", window),
+        fact("Flight condition", condition),
+        fact("Mass", mass),
+    ]
+}
+
+fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String)> {
+    let Some(fit) = fit else {
+        return vec![fact("Fit", "none".to_owned())];
+    };
+    let outcome = format!("{}: {}", outcome_in_words(&fit.outcome), fit.reason);
+    let mut facts = vec![fact("Fit", outcome)];
+    if fit.final_cost.is_some() {
+        let cost = format!(
+            "{} to {} in {}; condition number {}",
+            number(fit.initial_cost, 3),
+            number(fit.final_cost, 3),
+            count(fit.iterations, "iteration"),
+            number(fit.condition_number, 3)
+        );
+        facts.push(fact("Cost J", cost));
+    }
+    facts.extend(
+        fit.confounded
+            .as_ref()
+            .map(|groups| fact("Near dependencies", groups.clone())),
+    );
+    facts
+}
+
+fn prediction_fact(rows: &[&PredictionRow]) -> (String, String) {
+    let outputs: Vec<String> = rows
+        .iter()
+        .map(|p| format!("{} {}", p.output, number(p.theil, 2)))
+        .collect();
+    fact(
+        "Cross-validation",
+        format!(
+            "Theil's U with derivatives of other maneuvers: {}",
+            outputs.join(", ")
+        ),
+    )
+}
+
+/// Table of the derivatives, without inactive ones.
+fn estimates(rows: &[&EstimateRow]) -> TableView {
+    let rows = rows
+        .iter()
+        .filter(|row| row.status != "inactive")
+        .map(|row| estimate(row))
+        .collect();
+    let heads = [
+        "derivative",
+        "unit",
+        "status",
+        "value",
+        "bound",
+        "corrected",
+        "wind tunnel",
+        "equation error",
+        "inflation",
+        "part, %",
+    ];
+    TableView::new("Derivatives", "", &heads, rows)
+}
+
+fn estimate(row: &EstimateRow) -> Vec<String> {
+    let digits = Digits::of([row.value, row.wind_tunnel].into_iter().flatten(), 4);
+    vec![
+        row.derivative.clone(),
+        notation::unit(&row.unit),
+        row.status.clone(),
+        digits.write(row.value),
+        number(row.bound, 2),
+        number(row.bound_corrected, 2),
+        digits.write(row.wind_tunnel),
+        digits.write(row.equation_error),
+        number(row.variance_inflation, 2),
+        row.contribution_pct
+            .map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::campaign_fixture::{campaign, problem};
+
+    fn made(contents: &Contents) -> Vec<ManeuverPage> {
+        pages(contents, &ClassMarkers::new(contents))
+    }
+
+    #[test]
+    fn every_maneuver_has_its_page_with_fit_history_and_problems() {
+        let mut campaign = campaign();
+        campaign.problems.push(crate::error::Problem {
+            place: "1-OLON-10".into(),
+            ..problem("it did not settle")
+        });
+        campaign.histories.remove(1);
+        let contents = campaign.contents();
+        let pages = made(&contents);
+        assert_eq!(pages.len(), campaign.maneuvers.len());
+        assert_eq!(pages[0].problems, ["ingest: it did not settle"]);
+        assert!(pages[0].svg.starts_with("<svg") && pages[1].svg.is_empty());
+        let fit = &pages[0]
+            .facts
+            .iter()
+            .find(|f| f.0 == "Fit")
+            .expect("the outcome of the fit")
+            .1;
+        assert!(fit.starts_with("did not converge"), "{fit}");
+        assert_eq!(pages[0].estimates.rows.len(), 4);
+        assert_eq!(anchors(&contents)["1-OLON-20"], pages[1].anchor);
+    }
+
+    #[test]
+    fn inactive_derivatives_are_not_listed() {
+        let mut campaign = campaign();
+        campaign.estimates[0].status = "inactive".into();
+        assert_eq!(made(&campaign.contents())[0].estimates.rows.len(), 3);
+    }
+}

@@ -1,0 +1,129 @@
+//! Sections of the report: from [`Contents`] to the values that the template prints.
+//!
+//! The head of `report.html` documents the values.
+
+mod changes;
+mod class_figures;
+mod class_markers;
+mod class_outcomes;
+mod correlation_triangle;
+mod derivative_page;
+mod derivative_results;
+mod failures;
+mod history_strips;
+mod identifiability_tables;
+mod maneuver_page;
+mod maneuver_table;
+mod prediction_table;
+mod summary;
+mod verdict_ranges;
+mod verdict_table;
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use super::contents::Contents;
+use super::notation::count;
+use super::provenance::Provenance;
+use super::table_view::TableView;
+use class_figures::ClassFigure;
+use class_markers::ClassMarkers;
+use class_outcomes::ClassOutcomes;
+use correlation_triangle::CorrelationTriangle;
+use derivative_page::DerivativeGroup;
+use derivative_results::DerivativeResults;
+use maneuver_page::ManeuverPage;
+use summary::Summary;
+use verdict_table::VerdictGroup;
+
+/// Values that the template prints.
+#[derive(Debug, Serialize)]
+pub struct Page<'a> {
+    title: &'a str,
+    aircraft: &'a str,
+    archive: &'a str,
+    wind_tunnel: &'a str,
+    counts: String,
+    changed: String,
+    changes: Vec<TableView>,
+    summary: Summary,
+    outcome_heads: Vec<&'static str>,
+    classes: Vec<ClassOutcomes>,
+    verdicts: Vec<VerdictGroup>,
+    derivative_groups: Vec<DerivativeGroup>,
+    never_estimated: Vec<&'a str>,
+    inputs: Vec<ClassFigure>,
+    correlated_signals: Vec<ClassFigure>,
+    rates: Vec<ClassFigure>,
+    maneuvers: TableView,
+    predictions: Option<TableView>,
+    correlation_triangles: Vec<CorrelationTriangle>,
+    identifiability: Vec<TableView>,
+    failures: Vec<TableView>,
+    maneuver_pages: Vec<ManeuverPage>,
+    provenance: &'a Provenance,
+    data: TableView,
+}
+
+impl<'a> Page<'a> {
+    /// Assembles all sections.
+    #[must_use]
+    pub fn new(contents: &Contents<'a>) -> Page<'a> {
+        let derivatives = derivative_results::collect(contents);
+        let anchors = derivative_page::anchors(&derivatives);
+        let markers = ClassMarkers::new(contents);
+        let classes = class_outcomes::by_class(contents, &markers);
+        Page {
+            title: contents.title,
+            aircraft: contents.aircraft,
+            archive: contents.archive,
+            wind_tunnel: contents.wind_tunnel,
+            counts: counts(contents, &derivatives),
+            changed: changes::headline(contents.overnight),
+            changes: changes::tables(contents.overnight),
+            summary: summary::summary(contents, &derivatives, &classes),
+            outcome_heads: class_outcomes::heads(),
+            classes,
+            verdicts: verdict_table::by_axis(&derivatives, &anchors),
+            derivative_groups: derivative_page::groups(&derivatives, &anchors, &markers),
+            never_estimated: never_estimated(contents, &derivatives),
+            inputs: class_figures::inputs(contents, &markers),
+            correlated_signals: class_figures::correlated_signals(contents, &markers),
+            rates: class_figures::rates(contents, &markers),
+            maneuvers: maneuver_table::table(contents, &markers),
+            predictions: prediction_table::table(contents),
+            correlation_triangles: correlation_triangle::triangles(contents),
+            identifiability: identifiability_tables::tables(contents),
+            failures: failures::tables(contents),
+            maneuver_pages: maneuver_page::pages(contents, &markers),
+            provenance: contents.provenance,
+            data: contents.provenance.table(),
+        }
+    }
+}
+
+/// Size of the campaign: `18 flights, 504 maneuvers, 9000 estimates`.
+fn counts(contents: &Contents, derivatives: &[DerivativeResults]) -> String {
+    let of_maneuvers = contents.maneuvers.iter().map(|m| m.flight_id.as_str());
+    let of_channels = contents.channels.iter().map(|c| c.flight_id.as_str());
+    let flights: BTreeSet<&str> = of_maneuvers.chain(of_channels).collect();
+    let estimated: usize = derivatives.iter().map(|d| d.points.len()).sum();
+    [
+        count(flights.len(), "flight"),
+        count(contents.maneuvers.len(), "maneuver"),
+        count(estimated, "estimate"),
+    ]
+    .join(", ")
+}
+
+/// Derivatives of the model that no maneuver estimates; the page names them nowhere else.
+fn never_estimated<'a>(contents: &Contents<'a>, derivatives: &[DerivativeResults]) -> Vec<&'a str> {
+    let shown: BTreeSet<&str> = derivatives.iter().map(|d| d.name).collect();
+    contents
+        .order
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !shown.contains(name))
+        .collect()
+}

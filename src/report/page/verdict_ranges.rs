@@ -1,0 +1,195 @@
+//! Verdicts of one derivative over angle of attack: neighbours with the same verdict as a range.
+
+use crate::report::figure::verdict_bar::Segment;
+use crate::report::notation::angle;
+use crate::tables::ComparisonRow;
+
+/// Neighbouring angles of attack with the same verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VerdictRange<'a> {
+    pub verdict: &'a str,
+    pub from_deg: f64,
+    pub to_deg: f64,
+    /// Ends of its segment in the bar: half way to the neighbours.
+    left_deg: f64,
+    right_deg: f64,
+}
+
+impl VerdictRange<'_> {
+    /// Angles of attack in words: `5°–25°`.
+    #[must_use]
+    pub fn angles(&self) -> String {
+        let (from, to) = (angle(self.from_deg), angle(self.to_deg));
+        if from == to {
+            from
+        } else {
+            format!("{from}\u{2013}{to}")
+        }
+    }
+
+    fn width_deg(&self) -> f64 {
+        self.right_deg - self.left_deg
+    }
+}
+
+/// Ranges of equal verdicts, from rows sorted by angle of attack.
+#[must_use]
+pub fn ranges<'a>(rows: &[&'a ComparisonRow]) -> Vec<VerdictRange<'a>> {
+    let mut ranges: Vec<VerdictRange> = Vec::new();
+    for (i, row) in rows.iter().enumerate() {
+        let alpha = row.alpha_deg;
+        let before = i
+            .checked_sub(1)
+            .and_then(|j| rows.get(j))
+            .map(|r| alpha - r.alpha_deg);
+        let after = rows.get(i + 1).map(|r| r.alpha_deg - alpha);
+        let left_deg = alpha - 0.5 * before.or(after).unwrap_or(1.0);
+        let right_deg = alpha + 0.5 * after.or(before).unwrap_or(1.0);
+        match ranges.last_mut() {
+            Some(range) if range.verdict == row.verdict => {
+                range.to_deg = alpha;
+                range.right_deg = right_deg;
+            }
+            _ => ranges.push(VerdictRange {
+                verdict: &row.verdict,
+                from_deg: alpha,
+                to_deg: alpha,
+                left_deg,
+                right_deg,
+            }),
+        }
+    }
+    ranges
+}
+
+/// Segments of the bar that shows the ranges.
+#[must_use]
+pub fn bar_segments<'a>(ranges: &[VerdictRange<'a>]) -> Vec<Segment<'a>> {
+    ranges
+        .iter()
+        .map(|range| Segment {
+            verdict: range.verdict,
+            from_deg: range.left_deg,
+            to_deg: range.right_deg,
+        })
+        .collect()
+}
+
+/// More ranges than these are ordered by verdict, which is easier to read.
+const MOST_RANGES: usize = 4;
+
+/// Ranges in words: `agrees 5°–25°, flight lower 30°–60°`.
+///
+/// Many ranges are grouped by verdict, the widest first: `flight lower 10°, 35°–60°; agrees 5°`.
+#[must_use]
+pub fn phrase(ranges: &[VerdictRange]) -> String {
+    if ranges.len() <= MOST_RANGES {
+        let words: Vec<String> = ranges
+            .iter()
+            .map(|range| format!("{} {}", range.verdict, range.angles()))
+            .collect();
+        return words.join(", ");
+    }
+    let mut verdicts: Vec<(&str, Vec<&VerdictRange>)> = Vec::new();
+    for range in ranges {
+        match verdicts.iter_mut().find(|v| v.0 == range.verdict) {
+            Some(verdict) => verdict.1.push(range),
+            None => verdicts.push((range.verdict, vec![range])),
+        }
+    }
+    verdicts.sort_by(|a, b| total_width_deg(&b.1).total_cmp(&total_width_deg(&a.1)));
+    let words: Vec<String> = verdicts
+        .iter()
+        .map(|(verdict, own)| {
+            let angles: Vec<String> = own.iter().map(|range| range.angles()).collect();
+            format!("{verdict} {}", angles.join(", "))
+        })
+        .collect();
+    words.join("; ")
+}
+
+fn total_width_deg(ranges: &[&VerdictRange]) -> f64 {
+    ranges.iter().map(|range| range.width_deg()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(verdicts: &[(f64, &str)]) -> Vec<ComparisonRow> {
+        let row = |(alpha_deg, verdict): &(f64, &str)| ComparisonRow {
+            derivative: "CN_alpha".into(),
+            unit: "per_deg".into(),
+            group: "all".into(),
+            alpha_deg: *alpha_deg,
+            mach: None,
+            flight: 1.0,
+            standard_error: 0.1,
+            wind_tunnel: None,
+            difference: None,
+            uncertainty: None,
+            difference_pct: None,
+            z: None,
+            verdict: (*verdict).into(),
+        };
+        verdicts.iter().map(row).collect()
+    }
+
+    #[test]
+    fn neighbours_with_equal_verdicts_become_a_range() {
+        let rows = rows(&[
+            (5.0, "agrees"),
+            (10.0, "agrees"),
+            (15.0, "flight lower"),
+            (20.0, "agrees"),
+            (25.0, "agrees"),
+            (30.5, "agrees"),
+        ]);
+        let ranges = ranges(&rows.iter().collect::<Vec<_>>());
+        assert_eq!(
+            phrase(&ranges),
+            "agrees 5°\u{2013}10°, flight lower 15°, agrees 20°\u{2013}30.5°"
+        );
+    }
+
+    #[test]
+    fn many_ranges_are_grouped_by_verdict_the_widest_first() {
+        let verdicts = [
+            "agrees",
+            "flight lower",
+            "flight lower",
+            "agrees",
+            "flight lower",
+            "flight higher",
+        ];
+        let rows = rows(
+            &verdicts
+                .iter()
+                .zip([5.0, 10.0, 15.0, 20.0, 25.0, 30.0])
+                .map(|(v, a)| (a, *v))
+                .collect::<Vec<_>>(),
+        );
+        let ranges = ranges(&rows.iter().collect::<Vec<_>>());
+        assert_eq!(
+            phrase(&ranges),
+            "flight lower 10°\u{2013}15°, 25°; agrees 5°, 20°; flight higher 30°"
+        );
+    }
+
+    #[test]
+    fn the_bar_has_a_segment_per_range_that_meets_its_neighbours() {
+        let rows = rows(&[
+            (10.0, "agrees"),
+            (20.0, "flight higher"),
+            (30.0, "flight higher"),
+        ]);
+        let segments = bar_segments(&ranges(&rows.iter().collect::<Vec<_>>()));
+        let ends: Vec<_> = segments.iter().map(|s| (s.from_deg, s.to_deg)).collect();
+        assert_eq!(ends, [(5.0, 15.0), (15.0, 35.0)]);
+    }
+
+    #[test]
+    fn no_comparison_gives_an_empty_phrase() {
+        assert_eq!(phrase(&ranges(&[])), "");
+    }
+}
