@@ -5,6 +5,8 @@
 //! axes, normal acceleration positive up, axial forward, lateral right; c.g. positions positive
 //! aft, right and above of the reference point.
 
+/// The recorder's clock.
+pub const TIME: &str = "time_s";
 pub const ALPHA_VANE: &str = "alpha_vane_deg";
 pub const BETA_VANE: &str = "beta_vane_deg";
 pub const VELOCITY: &str = "velocity_ft_s";

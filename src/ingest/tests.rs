@@ -5,9 +5,15 @@ use approx::assert_relative_eq;
 
 use super::compatibility::Compatibility;
 use super::*;
+use crate::aircraft::Aircraft;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
+use crate::error::Problem;
 use crate::flight::channel::RawColumn;
+use crate::flight::record::Series;
+use crate::flight::signal::TIME;
+use crate::flight::{Channel, Mark, RawFlight, signal};
 use crate::units::DEG;
+use std::collections::BTreeMap;
 
 const ROWS: usize = 2000;
 const STEP_S: f64 = 0.025;
@@ -173,13 +179,13 @@ impl Flight {
 
     fn of_files(&self, files: &[RawFlight], piece: usize) -> Vec<Ingested> {
         let aircraft = aircraft();
-        let basis = Basis {
+        let context = Context {
             channels: &self.channels,
             constants: &self.constants,
             aircraft: &aircraft,
             settings: &self.settings,
         };
-        records(files, &basis, piece)
+        records(files, &context, piece)
             .unwrap()
             .into_iter()
             .map(Result::unwrap)

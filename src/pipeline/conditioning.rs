@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Flight, INGEST_VERSION, Ingested, Run, inputs, problem};
 use crate::error::{Error, Problem, Result};
-use crate::ingest::{self, Basis, Flow, Signature, Surveyed};
+use crate::ingest::{self, ChannelReader, Context, Refusal, Signature, Stretch};
 use crate::store::archive::{self, FlightFiles, Opened};
 use crate::store::atomic::Draft;
 use crate::store::record_file::{self, About, GROUP, SignalWriter};
@@ -153,9 +153,9 @@ impl Run<'_> {
             .collect()
     }
 
-    fn basis_of_ingest(&self) -> Basis<'_> {
+    fn ingest_context(&self) -> Context<'_> {
         let config = self.config;
-        Basis {
+        Context {
             channels: &config.channels,
             constants: &config.constants,
             aircraft: &config.aircraft,
@@ -305,12 +305,12 @@ impl Run<'_> {
             problems: vec![],
             stretches: vec![(files.flight_id.clone(), Ingested::refused(problem))],
         };
-        let basis = self.basis_of_ingest();
+        let basis = self.ingest_context();
         let opened = match archive::open(files, basis.channels) {
             Ok(opened) => opened,
             Err(problem) => return Ok(refused(problem)),
         };
-        let flows = ingest::flows(&opened, &basis);
+        let flows = ingest::plan_channels(&opened, &basis);
         let surveyed =
             flows.and_then(|f| Ok((f, ingest::survey(&opened, basis.channels, basis.settings)?)));
         let ((plans, mut problems), survey) = match surveyed {
@@ -333,18 +333,18 @@ impl Run<'_> {
     fn ingest_stretch(
         &self,
         opened: &Opened,
-        plans: &[ingest::Plan],
-        stretch: &Surveyed,
+        plans: &[ingest::ChannelPlan],
+        stretch: &Stretch,
         fingerprint: &str,
     ) -> Result<Ingested> {
-        let basis = self.basis_of_ingest();
+        let basis = self.ingest_context();
         let path = self.record_path(&stretch.flight_id, fingerprint);
         let mut draft = Draft::of(&path)?;
-        let mut flows: Vec<Flow> = plans
+        let mut readers: Vec<ChannelReader> = plans
             .iter()
-            .map(|p| Flow::new(p, stretch, basis.settings))
+            .map(|p| ChannelReader::new(p, stretch, basis.settings))
             .collect();
-        let read = self.write_record(opened, stretch, &mut flows, &mut draft);
+        let read = self.write_record(opened, stretch, &mut readers, &mut draft);
         let finished = read.and_then(|()| {
             let written =
                 record_file::open(draft.draft()).map_err(|e| Halt::Store(e.to_string()))?;
@@ -357,8 +357,8 @@ impl Run<'_> {
                     .map_err(|reason| spoilt.lock().map(|mut spoilt| *spoilt = Some(reason)))
                     .ok()
             };
-            let flowed = flows.into_iter().map(Flow::finish).collect();
-            let judged = ingest::judge(stretch, flowed, &basis, &window).map_err(Halt::Refused);
+            let flowed = readers.into_iter().map(ChannelReader::finish).collect();
+            let judged = ingest::assess(stretch, flowed, &basis, &window).map_err(Halt::Refused);
             spoilt
                 .into_inner()
                 .ok()
@@ -389,12 +389,12 @@ impl Run<'_> {
     fn write_record(
         &self,
         opened: &Opened,
-        stretch: &Surveyed,
-        flows: &mut [Flow],
+        stretch: &Stretch,
+        readers: &mut [ChannelReader],
         draft: &mut Draft,
     ) -> std::result::Result<(), Halt> {
         let clock = &stretch.clock;
-        let recorded: Vec<String> = flows.iter().map(|f| f.signal().to_owned()).collect();
+        let recorded: Vec<String> = readers.iter().map(|r| r.signal().to_owned()).collect();
         let constants = self
             .config
             .constants
@@ -418,38 +418,35 @@ impl Run<'_> {
         for from in (0..clock.samples).step_by(GROUP) {
             let until = (from + GROUP).min(clock.samples);
             let writers = writer.group().map_err(Halt::Store)?;
-            let mut work: Vec<(&mut Flow, SignalWriter)> = flows.iter_mut().zip(writers).collect();
+            let mut work: Vec<(&mut ChannelReader, SignalWriter)> =
+                readers.iter_mut().zip(writers).collect();
             let mut spoilt = None;
             let appended = writer.append(|| {
                 if work.is_empty() {
                     return Ok(None);
                 }
                 let batch: Vec<_> = work.drain(..self.shares.batch.min(work.len())).collect();
-                let encode = |(flow, mut signal): (&mut Flow, SignalWriter)| {
-                    flow.run(opened, until, self.shares.piece, &mut |series| {
+                let encode = |(reader, mut signal): (&mut ChannelReader, SignalWriter)| {
+                    reader.read_until(opened, until, self.shares.piece, &mut |series| {
                         signal.push(series)
                     })?;
-                    signal
-                        .close()
-                        .map_err(|reason| (flow.signal().to_owned(), reason))
+                    signal.close().map_err(|reason| Refusal {
+                        place: reader.signal().to_owned(),
+                        reason,
+                    })
                 };
                 let encoded: std::result::Result<Vec<_>, _> =
                     batch.into_par_iter().map(encode).collect();
-                encoded.map(Some).map_err(|why: (String, String)| {
-                    let reason = why.1.clone();
-                    spoilt = Some(why);
+                encoded.map(Some).map_err(|refusal: Refusal| {
+                    let reason = refusal.reason.clone();
+                    spoilt = Some(refusal);
                     reason
                 })
             });
             match (appended, spoilt) {
                 (Ok(()), _) => {}
-                (Err(_), Some((place, reason))) => {
-                    return Err(Halt::Refused(problem(
-                        "ingest",
-                        &stretch.flight_id,
-                        &place,
-                        &reason,
-                    )));
+                (Err(_), Some(refusal)) => {
+                    return Err(Halt::Refused(refusal.into_problem(&stretch.flight_id)));
                 }
                 (Err(reason), None) => return Err(Halt::Store(reason)),
             }

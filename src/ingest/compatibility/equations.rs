@@ -16,10 +16,10 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::instruments::{INPUTS, OUTPUTS};
+use super::parameters::{INPUTS, OUTPUTS};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
-use crate::ingest::motion::atmosphere;
+use crate::ingest::atmosphere::atmosphere;
 use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 

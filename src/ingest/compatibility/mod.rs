@@ -8,10 +8,10 @@
 //! found here.
 
 mod equations;
-mod finding;
-mod fit;
-mod instruments;
-mod response;
+mod findings;
+mod joint_fit;
+mod parameters;
+mod reconstruction;
 mod settings;
 mod window;
 
@@ -20,7 +20,7 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-pub use finding::{Estimate, Finding, Findings};
+pub use findings::{Estimate, Finding, Findings};
 pub use settings::{Action, Compatibility, Error, Errors, OnFault};
 
 use crate::aircraft::Aircraft;
@@ -30,7 +30,7 @@ use window::Window;
 /// The signals that are read of a record.
 #[must_use]
 pub fn signals() -> BTreeSet<String> {
-    instruments::SIGNALS
+    parameters::SIGNALS
         .iter()
         .chain(&[signal::X_CG, signal::Y_CG, signal::Z_CG])
         .map(|s| (*s).to_owned())
@@ -63,6 +63,6 @@ pub fn examine(
             .collect()
     };
     let windows: Vec<Window> = parts.flat_map(of_part).collect();
-    let errors = fit::fit(&windows, aircraft, settings);
+    let errors = joint_fit::fit(&windows, aircraft, settings);
     Findings::of(errors.as_ref(), channels, recorded, settings)
 }

@@ -3,8 +3,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::instruments::Kind;
-
 /// How flight-path reconstruction is done and what follows from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -39,18 +37,6 @@ pub struct Compatibility {
     pub ordinary: Errors,
     /// From where it is no longer an instrument's ordinary error but a fault to be named.
     pub faulty: Errors,
-}
-
-impl Compatibility {
-    /// How many times its bound an error is when it counts as a fault.
-    pub(super) fn needed(&self, kind: Kind, value: f64) -> f64 {
-        let ahead = kind == Kind::Delay && value < 0.0;
-        if ahead {
-            2.0 * self.fault_standard_errors
-        } else {
-            self.fault_standard_errors
-        }
-    }
 }
 
 impl Default for Compatibility {

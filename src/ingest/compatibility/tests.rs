@@ -6,10 +6,10 @@ use nalgebra::{Matrix3, Vector3};
 use pulp::Simd;
 
 use super::equations::{self, Driven, Known, STATES, State, rates, readings};
-use super::instruments::{
+use super::parameters::{
     INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place,
 };
-use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
+use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::window::{self, Window, factor};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
@@ -425,7 +425,7 @@ fn sensitivities_are_those_of_finite_differences() {
 
 #[test]
 fn perfect_instruments_of_a_perfect_flight_have_no_errors() {
-    let errors = fit::fit(&windows(&flight(65.0)), &aircraft(), &settings()).unwrap();
+    let errors = joint_fit::fit(&windows(&flight(65.0)), &aircraft(), &settings()).unwrap();
     for i in 0..INSTRUMENTS {
         assert_abs_diff_eq!(errors.values[place(i, Kind::Delay)], 0.0, epsilon = 5e-4);
         assert_abs_diff_eq!(errors.values[place(i, Kind::Scale)], 0.0, epsilon = 1e-3);
@@ -501,8 +501,8 @@ fn ordinary(seed: u64) -> [f64; PARAMETERS] {
     let mut noise = Noise::new(seed, "ordinary errors");
     let errors = settings().ordinary;
     std::array::from_fn(|j| {
-        let (i, kind) = (j / 3, instruments::ALL_KINDS[j % 3]);
-        let drawn = noise.normal() * instruments::size(&errors, i, kind);
+        let (i, kind) = (j / 3, parameters::ALL_KINDS[j % 3]);
+        let drawn = noise.normal() * parameters::size(&errors, i, kind);
         if kind == Kind::Delay || !observable(i, kind) {
             0.0
         } else {
@@ -603,10 +603,10 @@ fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corre
         fault_standard_errors: 1e6,
         ..settings()
     };
-    let fitted = fit::fit(&windows(&record), &aircraft(), &sure_of_nothing).unwrap();
+    let fitted = joint_fit::fit(&windows(&record), &aircraft(), &sure_of_nothing).unwrap();
     assert_abs_diff_eq!(fitted.prior[j], sure_of_nothing.ordinary.vane_deg.scale);
     assert!(
-        fit::fit(&windows(&record), &aircraft(), &settings())
+        joint_fit::fit(&windows(&record), &aircraft(), &settings())
             .unwrap()
             .prior[j]
             > 0.1

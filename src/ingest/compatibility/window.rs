@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Compatibility;
 use super::equations::{Known, State};
-use super::instruments::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
+use super::parameters::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
+use super::settings::Compatibility;
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::earth::gravity_ft_s2;
 use crate::flight::{Mark, Record, signal as s};

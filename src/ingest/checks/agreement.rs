@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use super::Checks;
-use super::motion::{Blocks, Motion};
+use super::block_means::BlockMeans;
+use super::block_motion::BlockMotion;
 use super::relations::{self, Choice, Relation, Side};
 use crate::aircraft::Aircraft;
+use crate::ingest::sample_count::whole_steps;
+use crate::ingest::settings::Checks;
 use crate::tables::CheckRow;
 
 /// How a relation came out.
@@ -80,7 +82,7 @@ pub struct Fit {
 }
 
 /// All relations whose signals the record has.
-pub fn all(blocks: &Blocks, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
+pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
     let possible = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
     let relations: Vec<Relation> = relations::all(settings)
         .into_iter()
@@ -165,7 +167,7 @@ impl Sides {
 }
 
 /// The signals that some relation confirms.
-pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
+pub fn confirmed_signals(checks: &[Check]) -> Vec<&'static str> {
     let good = checks.iter().filter(|c| c.verdict == Verdict::Ok);
     good.flat_map(|c| c.relation.dominant()).copied().collect()
 }
@@ -174,13 +176,13 @@ pub fn cleared(checks: &[Check]) -> Vec<&'static str> {
 /// window by window: that of a whole flight would be the largest thing in memory.
 fn windows(
     relations: &[Relation],
-    blocks: &Blocks,
+    blocks: &BlockMeans,
     aircraft: &Aircraft,
     settings: &Checks,
 ) -> Vec<Vec<Pair>> {
-    let length = super::gaps::longest(settings.window_s, blocks.block_s).max(1);
+    let length = whole_steps(settings.window_s, blocks.block_s).max(1);
     let mut pairs = vec![Vec::new(); relations.len()];
-    let mut motion: Vec<Option<Motion>> = Vec::new();
+    let mut motion: Vec<Option<BlockMotion>> = Vec::new();
     for (window, start) in (0..blocks.count.saturating_sub(length))
         .step_by(length)
         .enumerate()
@@ -188,11 +190,11 @@ fn windows(
         // The last block of a window is the first of the next.
         let last = motion
             .pop()
-            .unwrap_or_else(|| Motion::of(blocks, start, aircraft, settings));
+            .unwrap_or_else(|| BlockMotion::of(blocks, start, aircraft, settings));
         motion.clear();
         motion.push(last);
         motion.extend(
-            (start + 1..=start + length).map(|k| Motion::of(blocks, k, aircraft, settings)),
+            (start + 1..=start + length).map(|k| BlockMotion::of(blocks, k, aircraft, settings)),
         );
         for (relation, pairs) in relations.iter().zip(&mut pairs) {
             let value =
@@ -211,8 +213,8 @@ fn windows(
 /// A side over a window of blocks, per second: the change of its state plus the trapezoidal
 /// integral of its rate. The mean over a block smooths states and rates alike, so the two stay
 /// consistent.
-fn over(side: &Side, window: &[Option<Motion>], block_s: f64) -> Option<f64> {
-    let window: Vec<&Motion> = window.iter().map(Option::as_ref).collect::<Option<_>>()?;
+fn over(side: &Side, window: &[Option<BlockMotion>], block_s: f64) -> Option<f64> {
+    let window: Vec<&BlockMotion> = window.iter().map(Option::as_ref).collect::<Option<_>>()?;
     let (first, last) = (window.first()?, window.last()?);
     let steps = (window.len() - 1) as f64;
     let change = side.state.map_or(0.0, |state| {

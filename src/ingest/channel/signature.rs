@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::clock::{Clock, index};
 use crate::flight::Mark;
 use crate::flight::record::Series;
+use crate::ingest::clock::Clock;
+use crate::ingest::sample_count::nearest;
 
 /// From one time to the next, s.
 const EVERY_S: f64 = 10.0;
@@ -18,7 +19,7 @@ const FEWEST: usize = 3;
 
 /// The bits of one signal at the times of the signature.
 #[derive(Clone, Debug)]
-pub struct Samples {
+pub struct SignatureSamples {
     start_s: f64,
     step_s: f64,
     next: usize,
@@ -26,10 +27,10 @@ pub struct Samples {
     found: BTreeMap<i64, u64>,
 }
 
-impl Samples {
+impl SignatureSamples {
     #[must_use]
-    pub fn of(clock: &Clock) -> Samples {
-        Samples {
+    pub fn of(clock: &Clock) -> SignatureSamples {
+        SignatureSamples {
             start_s: clock.start_s,
             step_s: clock.step_s,
             next: 0,
@@ -53,7 +54,7 @@ impl Samples {
     pub fn push(&mut self, series: &Series) {
         if self.at == 0 && self.next == 0 {
             let first_s = (self.start_s / EVERY_S).ceil() * EVERY_S;
-            self.next = index((first_s - self.start_s) / self.step_s);
+            self.next = nearest((first_s - self.start_s) / self.step_s);
         }
         while let Some(k) = self
             .next
@@ -65,7 +66,7 @@ impl Samples {
                 self.found.insert(time, series.values[k].to_bits());
             }
             let then_s = (time + 1) as f64 * EVERY_S;
-            self.next = index((then_s - self.start_s) / self.step_s).max(self.next + 1);
+            self.next = nearest((then_s - self.start_s) / self.step_s).max(self.next + 1);
         }
         self.at += series.values.len();
     }
@@ -77,7 +78,7 @@ pub struct Signature(Vec<(i64, u64)>);
 
 impl Signature {
     /// Of all signals but those whose value depends on where the record begins.
-    pub fn of(signals: impl Iterator<Item = Samples>) -> Signature {
+    pub fn of(signals: impl Iterator<Item = SignatureSamples>) -> Signature {
         let mut all: BTreeMap<i64, u64> = BTreeMap::new();
         for signal in signals {
             for (time, bits) in signal.found {
@@ -122,7 +123,7 @@ mod tests {
             ..Clock::default()
         };
         let value = |k: usize| (clock.time_s(k) * 40.0).round().sin() + offset;
-        let mut signal = Samples::of(&clock);
+        let mut signal = SignatureSamples::of(&clock);
         for from in (0..samples).step_by(777) {
             let values: Vec<f64> = (from..(from + 777).min(samples)).map(value).collect();
             signal.push(&Series {

@@ -10,9 +10,11 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, long_runs, recorded};
-use super::{Settings, gaps, spikes};
+use super::{gaps, spikes};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
+use crate::ingest::sample_count::whole_steps;
+use crate::ingest::settings::Settings;
 use crate::units::{Quantity, Unit};
 
 /// The unit of a flag: engaged or not, nothing between.
@@ -57,7 +59,7 @@ impl Unwrap {
             .map(|f| 360.0 * f);
         let stated = channel.wraps_at.map(|period| (period, 0.5));
         let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
-        let longest = gaps::longest(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
+        let longest = whole_steps(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
         let about_zero = channel.wraps_at.is_none();
         Some(Unwrap {
             period,
@@ -125,7 +127,7 @@ impl Unwrap {
 
 /// What was done to a channel.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Done {
+pub struct ChannelStatistics {
     /// How many samples have each mark, by its number.
     pub marks: [usize; 6],
     pub wraps: usize,
@@ -137,7 +139,7 @@ pub struct Done {
     pub stuck: Vec<(usize, usize)>,
 }
 
-impl Done {
+impl ChannelStatistics {
     #[must_use]
     pub fn count(&self, mark: Mark) -> usize {
         self.marks[mark as usize]
@@ -163,7 +165,7 @@ pub struct Conditioner {
     latest: Character,
     noises: Vec<f64>,
     periods: Vec<usize>,
-    done: Done,
+    statistics: ChannelStatistics,
 }
 
 impl Conditioner {
@@ -191,7 +193,7 @@ impl Conditioner {
             latest: Character::UNKNOWN,
             noises: Vec::new(),
             periods: Vec::new(),
-            done: Done::default(),
+            statistics: ChannelStatistics::default(),
         }
     }
 
@@ -269,8 +271,11 @@ impl Conditioner {
         self.noises
             .extend(character.noise.is_finite().then_some(character.noise));
         self.periods.push(character.rate.period);
-        let finer = |a: f64| self.done.quantisation.map_or(a, |b: f64| b.min(a));
-        self.done.quantisation = character.quantisation.map(finer).or(self.done.quantisation);
+        let finer = |a: f64| self.statistics.quantisation.map_or(a, |b: f64| b.min(a));
+        self.statistics.quantisation = character
+            .quantisation
+            .map(finer)
+            .or(self.statistics.quantisation);
         self.latest = character;
         self.characters.push_back(character);
     }
@@ -312,16 +317,16 @@ impl Conditioner {
     fn count(&mut self, marks: &[Mark]) {
         let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
         if measured == marks.len() {
-            self.done.marks[Mark::Measured as usize] += measured;
+            self.statistics.marks[Mark::Measured as usize] += measured;
             return;
         }
         for (k, mark) in marks.iter().enumerate() {
-            self.done.marks[*mark as usize] += 1;
+            self.statistics.marks[*mark as usize] += 1;
             if *mark == Mark::Stuck {
                 let sample = self.settled + k;
-                match self.done.stuck.last_mut().filter(|s| s.1 == sample) {
+                match self.statistics.stuck.last_mut().filter(|s| s.1 == sample) {
                     Some(run) => run.1 = sample + 1,
-                    None => self.done.stuck.push((sample, sample + 1)),
+                    None => self.statistics.stuck.push((sample, sample + 1)),
                 }
             }
         }
@@ -427,7 +432,7 @@ impl Conditioner {
     }
 
     fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
-        let longest = gaps::longest(self.settings.longest_bridge_s, self.step_s);
+        let longest = whole_steps(self.settings.longest_bridge_s, self.step_s);
         let bridge = if self.flag {
             gaps::Bridge::Held
         } else {
@@ -439,23 +444,23 @@ impl Conditioner {
 
     /// What was done; the channel is over.
     #[must_use]
-    pub fn finish(mut self) -> Done {
+    pub fn finish(mut self) -> ChannelStatistics {
         let middle = |n: usize| n / 2;
         self.noises.sort_by(f64::total_cmp);
         self.periods.sort_unstable();
-        self.done.noise = self
+        self.statistics.noise = self
             .noises
             .get(middle(self.noises.len()))
             .copied()
             .filter(|_| !self.flag);
-        self.done.quantisation = self.done.quantisation.filter(|_| !self.flag);
-        self.done.period = self
+        self.statistics.quantisation = self.statistics.quantisation.filter(|_| !self.flag);
+        self.statistics.period = self
             .periods
             .get(middle(self.periods.len()))
             .copied()
             .unwrap_or(1);
-        self.done.wraps = self.unwrap.map_or(0, |u| u.wraps);
-        self.done
+        self.statistics.wraps = self.unwrap.map_or(0, |u| u.wraps);
+        self.statistics
     }
 }
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{self, STATES, State};
-use super::instruments::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
+use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
 use super::window::{Window, factor};
 use crate::aircraft::Aircraft;
 use crate::flight::taps::Taps;

@@ -7,8 +7,9 @@
 
 use std::ops::Range;
 
-use super::Stuck;
 use super::spikes;
+use crate::ingest::sample_count::nearest;
+use crate::ingest::settings::Stuck;
 
 /// The samples of a spell: some minutes of a usual recorder, long enough for statistics, short
 /// against a flight.
@@ -258,7 +259,7 @@ pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
 /// How many recorded values may be the same one after the other: only a channel whose noise changes
 /// most of them can be stuck.
 fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> Option<usize> {
-    let least = super::clock::index(settings.least_s / step_s).max(4);
+    let least = nearest(settings.least_s / step_s).max(4);
     let known = values.iter().filter(|v| v.is_finite()).count();
     let first = values.first().is_some_and(|v| v.is_finite());
     let anew =
@@ -278,7 +279,7 @@ fn stuck(values: &[f64], step_s: f64, before: &Character, settings: &Stuck) -> O
         return None;
     }
     let chance = CHANCE.ln() / (CENTRED * repeats).max(f64::EPSILON).ln();
-    let longest = least.max(super::clock::index(chance));
+    let longest = least.max(nearest(chance));
     // The runs at the ends may be parts of longer ones. Between chance and stuck there is nothing.
     let finite = |v: &f64| v.is_finite();
     let (first, last) = (

@@ -9,9 +9,9 @@
 //! - v̇ + ω × v − g = f at the c.g.; a sensor adds the acceleration of its arm
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ, q̄ = ρ V²/2, M = V/a
 
-use super::Checks;
-use super::motion::Motion;
+use super::block_motion::BlockMotion;
 use crate::flight::signal as s;
+use crate::ingest::settings::Checks;
 use crate::units::{DEG, G0_FT_S2};
 
 /// Which windows say something.
@@ -32,7 +32,7 @@ impl Choice {
     }
 }
 
-type Term = fn(&Motion) -> f64;
+type Term = fn(&BlockMotion) -> f64;
 
 /// One side of a relation: the change of `state` plus the integral of `rate`, per second, times
 /// `unit`.
@@ -294,7 +294,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             ],
             4,
             change(|m| m.altitude),
-            integral(Motion::climb),
+            integral(BlockMotion::climb),
             Choice::Above(settings.excitation.climb_ft_s),
         ),
         relation(

@@ -5,7 +5,7 @@
 //! attitudes, altitude and the pressures are compared with what the equations make of them
 //! (outputs).
 
-use super::settings::{Error, Errors};
+use super::settings::{Compatibility, Error, Errors};
 use crate::flight::signal as s;
 
 pub const INPUTS: usize = 6;
@@ -80,4 +80,15 @@ pub fn observable(instrument: usize, kind: Kind) -> bool {
         (SIGNALS[instrument], kind),
         (s::PSI, Kind::Bias | Kind::Scale) | (s::ALTITUDE, Kind::Bias)
     )
+}
+
+/// Number of standard errors from which an error counts as a fault. A channel ahead of the others
+/// needs twice as many: instruments and recorders delay, so all others would have to be late alike.
+pub fn fault_standard_errors(settings: &Compatibility, kind: Kind, value: f64) -> f64 {
+    let is_ahead = kind == Kind::Delay && value < 0.0;
+    if is_ahead {
+        2.0 * settings.fault_standard_errors
+    } else {
+        settings.fault_standard_errors
+    }
 }

@@ -9,17 +9,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Checks;
-use super::checks::{self, Check, Verdict};
-use super::motion::Blocks;
+use super::agreement::{Check, Verdict, check_relations, confirmed_signals};
+use super::block_means::BlockMeans;
 use super::relations;
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, signal};
+use crate::ingest::settings::Checks;
 use crate::units::Unit;
 
 /// A channel that fails its checks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Guilty {
+pub struct FaultyChannel {
     pub channel: String,
     pub signal: String,
     /// What is probably wrong with it, where a correction makes the relations hold.
@@ -30,8 +30,13 @@ pub struct Guilty {
     pub alone: bool,
 }
 
-impl Guilty {
-    /// For the `channels` table.
+impl FaultyChannel {
+    /// `true` where this channel alone explains the failed relations and a factor corrects it.
+    pub fn is_correctable(&self) -> bool {
+        self.alone && self.factor.is_some()
+    }
+
+    /// Verdict for the table `channels`.
     pub fn verdict(&self) -> String {
         let cause = self
             .cause
@@ -47,7 +52,7 @@ impl Guilty {
 
 /// The accused channels of a flight in words.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Accusation {
+pub struct FaultReport {
     pub place: String,
     pub reason: String,
     /// Whether an accused channel is one that the equations cannot do without.
@@ -62,14 +67,14 @@ const AS_GOOD: f64 = 3.0;
 const FAULTS: usize = 3;
 
 /// The channels that make relations fail; `recorded` are the signals that come from channels.
-pub fn find(
-    blocks: &Blocks,
+pub fn find_faulty_channels(
+    blocks: &BlockMeans,
     found: &[Check],
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
     aircraft: &Aircraft,
     settings: &Checks,
-) -> Vec<Guilty> {
+) -> Vec<FaultyChannel> {
     let still = still(blocks, recorded, settings);
     let dead = |s: &str| {
         still.contains(&s)
@@ -89,7 +94,8 @@ pub fn find(
         let mut trials = Vec::new();
         for (name, channel) in suspects(&found, channels, recorded) {
             for (factor, cause) in corrections(channel) {
-                let checks = checks::all(&blocks.with(&channel.signal, factor), aircraft, settings);
+                let checks =
+                    check_relations(&blocks.with(&channel.signal, factor), aircraft, settings);
                 trials.push(Trial {
                     name,
                     channel,
@@ -119,7 +125,7 @@ pub fn find(
 
 /// The instruments that never change while the aircraft flies and most of the others do change:
 /// whatever relation they are in, it may say nothing for want of them.
-fn still(blocks: &Blocks, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
+fn still(blocks: &BlockMeans, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
     let instruments: BTreeSet<&'static str> = relations::all(settings)
         .iter()
         .flat_map(|r| r.dominant().iter().copied())
@@ -135,7 +141,7 @@ fn still(blocks: &Blocks, recorded: &[String], settings: &Checks) -> Vec<&'stati
 }
 
 /// A signal that never changes, in a relation whose other signals do.
-fn is_dead(signal: &str, check: &Check, blocks: &Blocks) -> bool {
+fn is_dead(signal: &str, check: &Check, blocks: &BlockMeans) -> bool {
     blocks.still(signal) && check.relation.signals.iter().any(|s| !blocks.still(s))
 }
 
@@ -151,8 +157,8 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn guilty(&self, alone: bool) -> Guilty {
-        Guilty {
+    fn guilty(&self, alone: bool) -> FaultyChannel {
+        FaultyChannel {
             channel: self.name.to_owned(),
             signal: self.channel.signal.clone(),
             cause: Some(self.cause.clone()),
@@ -224,7 +230,7 @@ fn misfit(checks: &[Check]) -> f64 {
 
 /// The best trial and the best ones of other channels that explain the failure as well: with as
 /// small a misfit, and with as few windows in which the record would have to jump.
-fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
+fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
     let mut chosen: Vec<&Trial> = Vec::new();
     let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
     let as_few = |t: &&Trial| jumps(t) <= jumps(best);
@@ -245,11 +251,11 @@ fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<Guilty> {
 /// where the failed relations share none, every unconfirmed channel that dominates one of them.
 fn common(
     found: &[Check],
-    blocks: &Blocks,
+    blocks: &BlockMeans,
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
-) -> Vec<Guilty> {
-    let cleared = checks::cleared(found);
+) -> Vec<FaultyChannel> {
+    let cleared = confirmed_signals(found);
     let failed: Vec<&Check> = found.iter().filter(|c| c.verdict.failed()).collect();
     let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
     let dominates = |s: &str| failed.iter().any(|c| c.relation.dominant().contains(&s));
@@ -273,14 +279,14 @@ fn common(
 fn accused(
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
-    blocks: &Blocks,
+    blocks: &BlockMeans,
     test: &dyn Fn(&str) -> bool,
-) -> Vec<Guilty> {
+) -> Vec<FaultyChannel> {
     let suspects = channels
         .iter()
         .filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal));
-    let mut guilty: Vec<Guilty> = suspects
-        .map(|(name, channel)| Guilty {
+    let mut guilty: Vec<FaultyChannel> = suspects
+        .map(|(name, channel)| FaultyChannel {
             channel: name.clone(),
             signal: channel.signal.clone(),
             cause: blocks
@@ -299,7 +305,7 @@ fn accused(
 
 /// What the failed checks and the guilty channels amount to; none where nothing failed and none is
 /// dead.
-pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
+pub fn report(guilty: &[FaultyChannel], found: &[Check]) -> Option<FaultReport> {
     let failed: Vec<String> = found
         .iter()
         .filter(|c| c.verdict.failed())
@@ -308,7 +314,7 @@ pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
     if failed.is_empty() && guilty.is_empty() {
         return None;
     }
-    let named = |g: &Guilty| format!("`{}`", g.channel);
+    let named = |g: &FaultyChannel| format!("`{}`", g.channel);
     let causes: Vec<String> = guilty
         .iter()
         .filter_map(|g| Some(format!("`{}`: {}", g.channel, g.cause.as_ref()?)))
@@ -349,7 +355,7 @@ pub fn accusation(guilty: &[Guilty], found: &[Check]) -> Option<Accusation> {
         || guilty
             .iter()
             .any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
-    Some(Accusation {
+    Some(FaultReport {
         place: format!("{place} {}", names.join(", ")),
         reason,
         required,

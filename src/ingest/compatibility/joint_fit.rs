@@ -19,11 +19,12 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Compatibility;
-use super::instruments::{
-    ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place, size,
+use super::parameters::{
+    ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, fault_standard_errors,
+    observable, place, size,
 };
-use super::response::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
+use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
+use super::settings::Compatibility;
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
 use crate::numerics::row_products::Rows;
@@ -472,7 +473,8 @@ impl Problem<'_> {
         let freed =
             |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
         let large = |j: &usize| shared[*j].abs() > size_of(&self.settings.faulty, *j);
-        let needed = |j: usize| self.settings.needed(ALL_KINDS[j % KINDS], shared[j]);
+        let needed =
+            |j: usize| fault_standard_errors(self.settings, ALL_KINDS[j % KINDS], shared[j]);
         let unsure = |j: &usize| shared[*j].abs() <= needed(*j) * bounds[*j];
         (0..PARAMETERS)
             .filter(freed)

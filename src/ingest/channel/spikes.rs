@@ -8,7 +8,8 @@
 
 use std::ops::Range;
 
-use super::Spikes;
+use crate::ingest::sample_count::whole_steps;
+use crate::ingest::settings::Spikes;
 
 /// Standard deviations of a normal distribution in its median absolute deviation.
 const MAD: f64 = 1.482_602_218_505_602;
@@ -58,7 +59,7 @@ pub fn remove(
     if !settings.remove {
         return Vec::new();
     }
-    let window = super::gaps::longest(settings.window_s, step_s).max(4);
+    let window = whole_steps(settings.window_s, step_s).max(4);
     let mut spikes = Vec::new();
     for (range, floor) in floors {
         let (from, to) = (

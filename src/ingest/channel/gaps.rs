@@ -11,18 +11,6 @@ pub enum Bridge {
     Held,
 }
 
-/// The largest number of samples that a gap of this length lacks.
-pub fn longest(bridge_s: f64, step_s: f64) -> usize {
-    let samples = (bridge_s / step_s + 1e-6).floor().max(0.0);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "floored and not negative"
-    )]
-    let samples = samples as usize;
-    samples
-}
-
 /// Bridges the gaps (NaN) of at most `longest` samples in place and says what every sample is now.
 /// A gap at either end of the record has only one side and stays missing. Where a channel is
 /// recorded once in several samples (`period`), a gap that is no longer is none: it lies between
@@ -114,12 +102,5 @@ mod tests {
         let mut values = [0.0, GAP, GAP, 1.0];
         fill(&mut values, 5, Bridge::Held, |_| 1);
         assert_eq!(values, [0.0, 0.0, 0.0, 1.0]);
-    }
-
-    #[test]
-    fn a_gap_of_exactly_the_longest_length_is_bridged() {
-        assert_eq!(longest(0.25, 0.025), 10);
-        assert_eq!(longest(0.25, 0.024_999_98), 10);
-        assert_eq!(longest(0.0, 0.025), 0);
     }
 }

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::fit::{Errors, MODEL_SCALE};
-use super::instruments::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, observable, place, size};
+use super::joint_fit::{Errors, MODEL_SCALE};
+use super::parameters::{
+    ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, fault_standard_errors, observable, place, size,
+};
 use super::settings::{Action, Compatibility, OnFault};
 use crate::error::Problem;
 use crate::flight::{Channel, Correction, signal};
@@ -152,7 +154,7 @@ impl Findings {
 
     /// All faults in one sentence; none where there is none.
     #[must_use]
-    pub fn accusations(&self) -> Option<String> {
+    pub fn fault_summary(&self) -> Option<String> {
         let all: Vec<String> = self
             .0
             .iter()
@@ -193,7 +195,7 @@ fn estimate(
     }
     let bound = errors.bounds[j].hypot(model);
     let limit = size(&settings.faulty, instrument, kind);
-    let surely = settings.needed(kind, value) * errors.fault_bounds[j].hypot(model);
+    let surely = fault_standard_errors(settings, kind, value) * errors.fault_bounds[j].hypot(model);
     let fault = value.abs() > limit && value.abs() > surely;
     let action = match kind {
         Kind::Bias => settings.bias,
@@ -323,7 +325,7 @@ fn name(kind: Kind) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::instruments::PARAMETERS;
+    use super::super::parameters::PARAMETERS;
     use super::*;
 
     /// What is said of the first vane's error of a kind.

@@ -1,14 +1,17 @@
-//! The uniform clock of a stretch, and the sample on it that each recorded row is.
+//! The uniform clock of a stretch, and the sample of each recorded row on it.
 //!
 //! A recorder's time jitters by some tenths of a millisecond, loses frames and runs a little off
-//! its nominal rate. Rows keep their values: they are put into the sample nearest to their time,
-//! nothing is interpolated. Rows without a hole between them are one [`Run`], so a long flight's
+//! its nominal rate. Rows keep their values: each goes into the sample nearest to its time, and
+//! nothing is interpolated. Rows without a gap between them are one [`Run`], so a long flight's
 //! clock is a short list.
 
-use super::Settings;
-use super::stretches::{Stretch, Used};
+use std::ops::Range;
 
-/// Rows that are samples one after the other: row `row + i` of the file is sample `sample + i`.
+use super::merge::{PiecePart, PieceSequence};
+use crate::ingest::sample_count::nearest;
+use crate::ingest::settings::Settings;
+
+/// Consecutive rows that are consecutive samples: row `row + i` of the file is sample `sample + i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     pub file: usize,
@@ -17,7 +20,7 @@ pub struct Run {
     pub count: usize,
 }
 
-/// Sample `k` is at `start_s + k step_s`.
+/// Uniform clock of a stretch: sample `k` is at `start_s + k step_s`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Clock {
     pub start_s: f64,
@@ -26,49 +29,54 @@ pub struct Clock {
     pub runs: Vec<Run>,
     /// Rows used.
     pub rows: usize,
-    /// Rows left out because their sample was there already.
-    pub again: usize,
+    /// Rows left out because their sample has a row already.
+    pub repeated: usize,
     /// Standard deviation of the time stamps about the clock, s.
     pub jitter_s: f64,
 }
 
-/// More empty samples than this per recorded row, and the step is not the recorder's.
+/// Largest number of samples per recorded row. With more empty samples than that the step is not
+/// the recorder's.
 const SAMPLES_PER_ROW: usize = 10;
 
-/// How far a configured rate may be from the recorded one, relative.
+/// Largest relative difference between the configured rate and the recorded one.
 const RATE_TOLERANCE: f64 = 0.05;
 
-/// How fast the clock follows a drift of the recorder's phase, per sample: slow against jitter,
-/// fast against drift.
+/// Gain of the filter that follows a drift of the recorder's phase, per sample: slow against
+/// jitter, fast against drift.
 const PHASE_GAIN: f64 = 0.05;
 
-/// A row that is early by less than this share of a step is the next sample, one that is earlier is
-/// there twice.
-const NEXT: f64 = 0.75;
+/// Share of a step by which a row may be early and still be the next sample. Beyond it the row
+/// repeats a sample.
+const EARLY: f64 = 0.75;
 
-/// Time stamps that scatter by more than this share of a step do not tell which sample a row is.
+/// Largest scatter of the time stamps, as a share of a step, for which the nearest sample is a
+/// row's own.
 const MOST_JITTER: f64 = 0.3;
 
-/// The second pass over the times of a stretch: row by row into samples.
+/// Second pass over the times of a sequence: assigns its rows to samples.
 #[derive(Clone, Debug)]
-pub struct Slots {
+pub struct ClockBuilder {
+    /// Step by which samples are counted, s; the finished clock's follows from the last row.
     step_s: f64,
+    /// Running mean of the time stamps' deviation from their samples, in steps.
     phase: f64,
     last_s: f64,
+    /// Sum of the squared deviations from the phase, in steps².
     squares: f64,
     clock: Clock,
 }
 
-impl Slots {
+impl ClockBuilder {
     #[must_use]
-    pub fn of(stretch: &Stretch) -> Slots {
+    pub fn of(sequence: &PieceSequence) -> ClockBuilder {
         let clock = Clock {
-            start_s: stretch.start_s,
-            step_s: stretch.step_s,
+            start_s: sequence.start_s,
+            step_s: sequence.step_s,
             ..Clock::default()
         };
-        Slots {
-            step_s: stretch.step_s,
+        ClockBuilder {
+            step_s: sequence.step_s,
             phase: 0.0,
             last_s: f64::NAN,
             squares: 0.0,
@@ -76,52 +84,43 @@ impl Slots {
         }
     }
 
-    /// Times of rows of a piece, from row `row` of its file on.
-    pub fn push(&mut self, used: &Used, row: usize, times: &[f64]) {
+    /// Takes the times of rows of a piece, from row `row` of its file on.
+    pub fn push(&mut self, part: &PiecePart, row: usize, times: &[f64]) {
         for (i, time) in times.iter().enumerate() {
-            if *time > used.after_s {
-                self.row(used.piece.file, row + i, *time);
+            if *time > part.after_s {
+                self.push_row(part.piece.file, row + i, *time);
             } else {
-                self.clock.again += 1;
+                self.clock.repeated += 1;
             }
         }
     }
 
-    fn row(&mut self, file: usize, row: usize, time: f64) {
+    fn push_row(&mut self, file: usize, row: usize, time: f64) {
         let steps = (time - self.clock.start_s) / self.step_s;
-        let mut sample = index(steps - self.phase);
-        let next = self.clock.samples;
-        // Jitter may put a row a little before its sample: it is the next one, unless there is no
-        // time for it.
-        if sample < next && steps - self.phase > next as f64 - NEXT && time > self.last_s {
-            sample = next;
-        }
-        if sample < next {
-            self.clock.again += 1;
+        let Some(sample) = self.sample_of(steps, time) else {
+            self.clock.repeated += 1;
             return;
-        }
-        let off = steps - sample as f64 - self.phase;
-        self.phase += PHASE_GAIN * off;
-        self.squares += off * off;
-        self.last_s = time;
-        let clock = &mut self.clock;
-        clock.rows += 1;
-        clock.samples = sample + 1;
-        let goes_on = |run: &&mut Run| {
-            run.file == file && run.row + run.count == row && run.sample + run.count == sample
         };
-        match clock.runs.last_mut().filter(goes_on) {
-            Some(run) => run.count += 1,
-            None => clock.runs.push(Run {
-                file,
-                row,
-                sample,
-                count: 1,
-            }),
-        }
+        let deviation = steps - sample as f64 - self.phase;
+        self.phase += PHASE_GAIN * deviation;
+        self.squares += deviation * deviation;
+        self.last_s = time;
+        self.clock.append_row(file, row, sample);
     }
 
-    /// The clock of all rows; the stretch is over.
+    /// Sample of a row that is `steps` after the first one; `None` where the sample has a row
+    /// already. A row early by jitter becomes the next sample.
+    fn sample_of(&self, steps: f64, time: f64) -> Option<usize> {
+        let sample = nearest(steps - self.phase);
+        let next = self.clock.samples;
+        if sample >= next {
+            return Some(sample);
+        }
+        let is_early = steps - self.phase > next as f64 - EARLY && time > self.last_s;
+        is_early.then_some(next)
+    }
+
+    /// Returns the clock of all rows.
     ///
     /// # Errors
     /// In words: too few rows, a step that is not steady, or a rate other than the configured one.
@@ -142,11 +141,11 @@ impl Slots {
             ));
         }
         clock.jitter_s = (self.squares / clock.rows as f64).sqrt() * self.step_s;
-        if clock.samples / SAMPLES_PER_ROW > clock.rows
-            || clock.jitter_s > MOST_JITTER * self.step_s
-        {
+        let is_sparse = clock.samples / SAMPLES_PER_ROW > clock.rows;
+        if is_sparse || clock.jitter_s > MOST_JITTER * self.step_s {
             return Err(format!(
-                "{} rows span {:.1} s, {} steps of {:.3} ms, and scatter about them by {:.3} ms: the time step is not steady",
+                "{} rows span {:.1} s, {} steps of {:.3} ms, and scatter about them by {:.3} ms: \
+                 the time step is not steady",
                 clock.rows,
                 self.last_s - clock.start_s,
                 clock.samples - 1,
@@ -159,74 +158,83 @@ impl Slots {
     }
 }
 
-/// The nearest whole number, not below zero.
-pub(super) fn index(value: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "rounded and not negative"
-    )]
-    let index = value.round().max(0.0) as usize;
-    index
+impl Run {
+    /// `true` where the run goes on with this row of a file as this sample.
+    fn continues_with(&self, file: usize, row: usize, sample: usize) -> bool {
+        self.file == file && self.row + self.count == row && self.sample + self.count == sample
+    }
 }
 
 impl Clock {
-    /// The time of a sample, s.
+    /// Time of a sample, s.
     #[must_use]
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + sample as f64 * self.step_s
     }
 
-    /// The runs of a range of samples, cut to it.
-    pub fn runs_of(&self, samples: std::ops::Range<usize>) -> impl Iterator<Item = Run> + '_ {
+    /// Runs of a range of samples, cut to the range.
+    pub fn runs_in(&self, samples: Range<usize>) -> impl Iterator<Item = Run> + '_ {
         let first = self
             .runs
-            .partition_point(|r| r.sample + r.count <= samples.start);
+            .partition_point(|run| run.sample + run.count <= samples.start);
         let within = self
             .runs
             .iter()
             .skip(first)
-            .take_while(move |r| r.sample < samples.end);
-        let (from, to) = (samples.start, samples.end);
-        within.map(move |r| {
-            let skipped = from.saturating_sub(r.sample);
-            let count = (r.sample + r.count).min(to) - r.sample - skipped;
+            .take_while(move |run| run.sample < samples.end);
+        within.map(move |run| {
+            let skipped = samples.start.saturating_sub(run.sample);
+            let count = (run.sample + run.count).min(samples.end) - run.sample - skipped;
             Run {
-                row: r.row + skipped,
-                sample: r.sample + skipped,
+                row: run.row + skipped,
+                sample: run.sample + skipped,
                 count,
-                ..*r
+                ..*run
             }
         })
+    }
+
+    /// Appends a row as a sample after all others.
+    fn append_row(&mut self, file: usize, row: usize, sample: usize) {
+        self.rows += 1;
+        self.samples = sample + 1;
+        match self.runs.last_mut() {
+            Some(run) if run.continues_with(file, row, sample) => run.count += 1,
+            _ => self.runs.push(Run {
+                file,
+                row,
+                sample,
+                count: 1,
+            }),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::pieces::{Piece, Scan};
-    use super::super::stretches;
+    use super::super::merge::merge_pieces;
+    use super::super::pieces::{Piece, PieceScanner};
     use super::*;
     use approx::assert_abs_diff_eq;
 
-    /// The clock of rows of one file that are one stretch.
+    /// The clock of rows of one file that are one sequence.
     fn clock(times: &[f64]) -> Result<Clock, String> {
         with(times, &Settings::default())
     }
 
     fn with(times: &[f64], settings: &Settings) -> Result<Clock, String> {
-        let mut scan = Scan::of_file(0);
-        scan.push(times);
-        let never = |_: &Piece, _: &Piece| Ok(false);
-        let plan = stretches::plan(&[scan.finish()], settings, &|_| String::new(), &mut {
-            never
-        })?;
-        let stretch = plan.stretches.first().ok_or("no rows")?;
-        let mut slots = Slots::of(stretch);
-        for used in &stretch.pieces {
-            let row = used.piece.row;
-            slots.push(used, row, &times[row..row + used.piece.rows]);
+        let mut scanner = PieceScanner::of_file(0);
+        scanner.push(times);
+        let name = |_| String::new();
+        let mut never = |_: &Piece, _: &Piece| Ok(false);
+        let merged = merge_pieces(&[scanner.finish()], settings, &name, &mut never)?;
+        let sequence = merged.sequences.first().ok_or("no rows")?;
+        let mut builder = ClockBuilder::of(sequence);
+        for part in &sequence.parts {
+            let row = part.piece.row;
+            builder.push(part, row, &times[row..row + part.piece.rows]);
         }
-        slots.finish(settings)
+        builder.finish(settings)
     }
 
     /// The sample of every row that has one.
@@ -243,7 +251,7 @@ mod tests {
         let clock = clock(&[0.0, 0.025, 0.05, 0.125, 0.15]).unwrap();
         assert_eq!(samples(&clock), [0, 1, 2, 5, 6]);
         assert_eq!((clock.samples, clock.rows, clock.runs.len()), (7, 5, 2));
-        let cut: Vec<Run> = clock.runs_of(1..6).collect();
+        let cut: Vec<Run> = clock.runs_in(1..6).collect();
         let run = |row, sample, count| Run {
             file: 0,
             row,
@@ -251,7 +259,7 @@ mod tests {
             count,
         };
         assert_eq!(cut, [run(1, 1, 2), run(3, 5, 1)]);
-        assert_eq!(clock.runs_of(3..5).count(), 0);
+        assert_eq!(clock.runs_in(3..5).count(), 0);
     }
 
     #[test]
@@ -275,7 +283,7 @@ mod tests {
         let off = |k: usize| if k % 50 == 10 { -0.014 } else { 0.0 };
         let times: Vec<f64> = (0..3000).map(|k| k as f64 * 0.025 + off(k)).collect();
         let clock = clock(&times).unwrap();
-        assert_eq!((clock.rows, clock.samples, clock.again), (3000, 3000, 0));
+        assert_eq!((clock.rows, clock.samples, clock.repeated), (3000, 3000, 0));
     }
 
     #[test]
@@ -325,6 +333,6 @@ mod tests {
     #[test]
     fn two_rows_for_one_sample_are_one() {
         let clock = clock(&[0.0, 0.025, 0.05, 0.050_1, 0.075, 0.1]).unwrap();
-        assert_eq!((clock.samples, clock.again), (5, 1));
+        assert_eq!((clock.samples, clock.repeated), (5, 1));
     }
 }

@@ -1,0 +1,363 @@
+//! Assessment of a stretch after all of its channels are read: counts, kinematic relations and
+//! instrument errors.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::channel::{
+    ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel,
+};
+use super::checks::{
+    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, check_relations,
+    confirmed_signals, find_faulty_channels, report,
+};
+use super::clock::{Clock, Stretch};
+use super::compatibility::{self, Findings, OnFault};
+use super::context::Context;
+use super::refusal::Refusal;
+use super::settings::OnFailedCheck;
+use crate::error::Problem;
+use crate::flight::{Channel, Correction, Mark, Record, signal};
+use crate::tables::{ChannelRow, CheckRow, InstrumentRow};
+
+/// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
+/// that memory does not grow with the record.
+const PART_SAMPLES: usize = 1 << 17;
+
+/// Results of ingest for one stretch, besides its record.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assessment {
+    pub channels: Vec<ChannelRow>,
+    pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
+    /// Corrections that are applied to signals when the record is read.
+    pub corrections: Vec<Correction>,
+    pub problems: Vec<Problem>,
+    pub signature: Signature,
+}
+
+/// Reads signals of a record over a range of its samples; `None` where they cannot be read.
+type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
+
+/// Assesses a stretch from its conditioned channels. `read` reads signals of its record over a
+/// range of samples.
+///
+/// # Errors
+/// A problem that refuses the stretch: a required channel without any number, or one that the
+/// relations prove wrong.
+pub fn assess(
+    stretch: &Stretch,
+    channels: Vec<ConditionedChannel>,
+    context: &Context,
+    read: &RecordReader,
+) -> Result<Assessment, Problem> {
+    let flight_id = stretch.flight_id.as_str();
+    let mut recording = Recording::of(stretch, channels, context)?;
+    let mut problems = std::mem::take(&mut recording.problems);
+    let examination = Examination {
+        clock: &stretch.clock,
+        context,
+        recorded: recording.block_means.keys().cloned().collect(),
+        read,
+    };
+    let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
+    let (relations, findings) = examination.reconcile(&blocks);
+    if let Some(report) = &relations.report {
+        let problem = relation_problem(report, &findings, flight_id);
+        if context.settings.on_failed_check == OnFailedCheck::Refuse && report.required {
+            return Err(problem);
+        }
+        problems.push(problem);
+    }
+    let faults = findings.problems(flight_id);
+    if context.settings.compatibility.fault == OnFault::Refuse && findings.required_faulty() {
+        return Err(joined(&faults, flight_id));
+    }
+    problems.extend(faults);
+    Ok(Assessment {
+        channels: channel_rows(
+            stretch,
+            context.channels,
+            &recording.channels,
+            &relations,
+            &findings,
+        ),
+        checks: relations.check_rows(flight_id),
+        instruments: findings.rows(flight_id),
+        corrections: findings.corrections(),
+        problems,
+        signature: recording.signature,
+    })
+}
+
+/// A channel with its name and the statistics of its conditioning.
+type ReadChannel<'a> = (&'a str, &'a Channel, ChannelStatistics);
+
+/// Conditioned channels of a stretch, sorted by use.
+struct Recording<'a> {
+    channels: Vec<ReadChannel<'a>>,
+    /// Block means by signal, of channels that a relation uses.
+    block_means: BTreeMap<String, BlockAverager>,
+    problems: Vec<Problem>,
+    signature: Signature,
+}
+
+impl<'a> Recording<'a> {
+    fn of(
+        stretch: &Stretch,
+        conditioned: Vec<ConditionedChannel<'a>>,
+        context: &Context,
+    ) -> Result<Recording<'a>, Problem> {
+        let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
+        let (mut channels, mut problems) = (Vec::new(), Vec::new());
+        let mut block_means = BTreeMap::new();
+        let mut signature_samples = Vec::new();
+        for one in conditioned {
+            let (name, channel, statistics) = (one.name, one.channel, one.statistics);
+            if statistics.count(Mark::Missing) == clock.samples {
+                let problem = empty_channel(name, channel, clock.rows).into_problem(flight_id);
+                if !context.is_optional(&channel.signal) {
+                    return Err(problem);
+                }
+                problems.push(problem);
+            } else {
+                let stuck = stuck_channel(name, &statistics, clock);
+                problems.extend(stuck.map(|refusal| refusal.into_problem(flight_id)));
+                block_means.extend(one.block_means.map(|means| (channel.signal.clone(), means)));
+                // The turns of an unwrapped angle depend on where the record begins.
+                if statistics.wraps == 0 && channel.wraps_at.is_none() {
+                    signature_samples.push(one.signature_samples);
+                }
+            }
+            channels.push((name, channel, statistics));
+        }
+        Ok(Recording {
+            channels,
+            block_means,
+            problems,
+            signature: Signature::of(signature_samples.into_iter()),
+        })
+    }
+}
+
+/// Inputs of the relation checks and of flight-path reconstruction.
+struct Examination<'a> {
+    clock: &'a Clock,
+    context: &'a Context<'a>,
+    /// Signals that come from channels.
+    recorded: Vec<String>,
+    read: &'a RecordReader<'a>,
+}
+
+impl Examination<'_> {
+    /// Block means of the recorded signals and of the constants.
+    fn blocks(&self, mut means: BTreeMap<String, BlockAverager>) -> BlockMeans {
+        let (clock, checks) = (self.clock, &self.context.settings.checks);
+        for (signal, value) in self.context.constants {
+            let constant =
+                BlockAverager::constant(signal, *value, clock.samples, clock.step_s, checks);
+            if let Some(constant) = constant {
+                means.entry(signal.clone()).or_insert(constant);
+            }
+        }
+        BlockMeans::of(means, clock.samples, clock.step_s, checks)
+    }
+
+    /// Reconciles gross faults with instrument errors.
+    ///
+    /// Where a sign or a unit is wrong, the errors of the other instruments are estimated with that
+    /// channel corrected, and the record is left as it is. A relation that no sign and no unit
+    /// explains may fail because of a delay: where it holds once the delays are removed, the delay
+    /// is the fault.
+    fn reconcile(&self, blocks: &BlockMeans) -> (RelationResult, Findings) {
+        let relations = self.check(blocks);
+        let faulty = &relations.faulty;
+        if !faulty.is_empty() && faulty.iter().all(FaultyChannel::is_correctable) {
+            let findings = self.reconstruct(|record| correct_by_factors(record, faulty));
+            return (relations, findings.reported());
+        }
+        // With a dead channel or with one fault among several there is nothing to go by.
+        if faulty.iter().any(|f| f.cause.is_some()) {
+            return (relations, Findings::default());
+        }
+        let findings = self.reconstruct(|_| ());
+        if relations.report.is_none() {
+            return (relations, findings);
+        }
+        if findings.faulty() {
+            let corrected = blocks.corrected(&findings.freed().corrections());
+            let again = self.check(&corrected);
+            if again.report.is_none() {
+                return (again, findings);
+            }
+        }
+        (relations, Findings::default())
+    }
+
+    /// Checks the kinematic relations and isolates the faulty channels.
+    fn check(&self, blocks: &BlockMeans) -> RelationResult {
+        let Context {
+            channels,
+            aircraft,
+            settings,
+            ..
+        } = *self.context;
+        let checks = check_relations(blocks, aircraft, &settings.checks);
+        let faulty = find_faulty_channels(
+            blocks,
+            &checks,
+            channels,
+            &self.recorded,
+            aircraft,
+            &settings.checks,
+        );
+        RelationResult {
+            confirmed: confirmed_signals(&checks),
+            report: report(&faulty, &checks),
+            checks,
+            faulty,
+        }
+    }
+
+    /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
+    /// record, each part after `correct`.
+    fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
+        let samples = self.clock.samples;
+        let count = samples.div_ceil(PART_SAMPLES);
+        let signals = compatibility::signals();
+        let parts = (0..count).filter_map(|i| {
+            let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
+            let mut record = (self.read)(&signals, range)?;
+            correct(&mut record);
+            Some(record)
+        });
+        compatibility::examine(
+            parts,
+            count,
+            self.context.channels,
+            &self.recorded,
+            self.context.aircraft,
+            &self.context.settings.compatibility,
+        )
+    }
+}
+
+/// Multiplies the signals of faulty channels by the factors that correct them.
+fn correct_by_factors(record: &mut Record, faulty: &[FaultyChannel]) {
+    for fault in faulty {
+        let series = record.signals.get_mut(&fault.signal);
+        if let (Some(factor), Some(series)) = (fault.factor, series) {
+            series.values.iter_mut().for_each(|v| *v *= factor);
+        }
+    }
+}
+
+/// Outcome of the kinematic relations of one stretch.
+struct RelationResult {
+    checks: Vec<Check>,
+    faulty: Vec<FaultyChannel>,
+    /// Signals that a relation confirms.
+    confirmed: Vec<&'static str>,
+    report: Option<FaultReport>,
+}
+
+impl RelationResult {
+    fn check_rows(&self, flight_id: &str) -> Vec<CheckRow> {
+        self.checks.iter().map(|c| c.row(flight_id)).collect()
+    }
+
+    fn verdict(&self, signal: &str) -> String {
+        match self.faulty.iter().find(|f| f.signal == signal) {
+            Some(fault) => fault.verdict(),
+            None if self.confirmed.contains(&signal) => "ok".to_owned(),
+            None => "not checked".to_owned(),
+        }
+    }
+}
+
+/// Problem of the failed relations, with the instrument faults found besides.
+fn relation_problem(report: &FaultReport, findings: &Findings, flight_id: &str) -> Problem {
+    let besides = findings
+        .fault_summary()
+        .map(|faults| format!(". Besides, {faults}"))
+        .unwrap_or_default();
+    let refusal = Refusal {
+        place: report.place.clone(),
+        reason: format!("{}{besides}", report.reason),
+    };
+    refusal.into_problem(flight_id)
+}
+
+/// One problem that joins the places and reasons of several.
+fn joined(problems: &[Problem], flight_id: &str) -> Problem {
+    let places: Vec<&str> = problems.iter().map(|p| p.place.as_str()).collect();
+    let reasons: Vec<&str> = problems.iter().map(|p| p.reason.as_str()).collect();
+    let refusal = Refusal {
+        place: places.join(", "),
+        reason: reasons.join(". "),
+    };
+    refusal.into_problem(flight_id)
+}
+
+/// Rows of the table `channels`: one for each channel read and one for the clock, in the order of
+/// the channel map.
+fn channel_rows(
+    stretch: &Stretch,
+    channel_map: &BTreeMap<String, Channel>,
+    channels: &[ReadChannel],
+    relations: &RelationResult,
+    findings: &Findings,
+) -> Vec<ChannelRow> {
+    let of_channel = |(name, channel, statistics): &ReadChannel| {
+        let fault = findings.verdict(&channel.signal);
+        let verdict = fault.unwrap_or_else(|| relations.verdict(&channel.signal));
+        channel_row(stretch, name, channel, statistics, verdict)
+    };
+    let time = channel_map
+        .iter()
+        .find(|(_, channel)| channel.signal == signal::TIME)
+        .map(|(name, channel)| time_row(stretch, name, channel));
+    let mut rows: Vec<ChannelRow> = channels.iter().map(of_channel).chain(time).collect();
+    rows.sort_by(|a, b| a.channel.cmp(&b.channel));
+    rows
+}
+
+fn channel_row(
+    stretch: &Stretch,
+    name: &str,
+    channel: &Channel,
+    statistics: &ChannelStatistics,
+    verdict: String,
+) -> ChannelRow {
+    let clock = &stretch.clock;
+    ChannelRow {
+        flight_id: stretch.flight_id.clone(),
+        channel: name.to_owned(),
+        signal: channel.signal.clone(),
+        samples: clock.samples,
+        rate_hz: Some(1.0 / clock.step_s / statistics.period as f64),
+        between: statistics.count(Mark::Between),
+        bridged: statistics.count(Mark::Bridged),
+        despiked: statistics.count(Mark::Despiked),
+        missing: statistics.count(Mark::Missing),
+        stuck: statistics.count(Mark::Stuck),
+        wraps: statistics.wraps,
+        quantisation: statistics.quantisation,
+        noise: statistics.noise,
+        verdict,
+    }
+}
+
+/// Row of the clock. A lost frame counts as bridged: its time is one step after the frame before.
+fn time_row(stretch: &Stretch, name: &str, channel: &Channel) -> ChannelRow {
+    let clock = &stretch.clock;
+    let statistics = ChannelStatistics {
+        period: 1,
+        noise: Some(clock.jitter_s),
+        ..ChannelStatistics::default()
+    };
+    ChannelRow {
+        bridged: clock.samples - clock.rows,
+        ..channel_row(stretch, name, channel, &statistics, "ok".to_owned())
+    }
+}

@@ -1,0 +1,13 @@
+//! Units and signs of the channels checked against each other by kinematic relations.
+
+mod agreement;
+mod block_means;
+mod block_motion;
+mod fault_isolation;
+mod relations;
+
+pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
+pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};
+pub(in crate::ingest) use fault_isolation::{
+    FaultReport, FaultyChannel, find_faulty_channels, report,
+};

@@ -1,0 +1,127 @@
+//! Comparison of pieces whose times overlap: the same rows recorded twice, or a clock that was
+//! started anew.
+
+use std::collections::BTreeSet;
+
+use super::pieces::Piece;
+use super::time_channels::TimeChannels;
+use crate::ingest::source::Source;
+
+/// Rows of either piece that are compared: some seconds of a usual recorder.
+const COMPARED_ROWS: usize = 256;
+
+/// Share of equal values from which two pieces hold the same rows. A file exported twice may round
+/// or lose some values; rows of another time agree in none but constant channels.
+const EQUAL_SHARE: f64 = 0.9;
+
+/// Times that differ by less are equal, s: a microsecond, the finest resolution of usual recorders.
+const SAME_TIME_S: f64 = 1e-6;
+
+/// Relative difference below which two times are equal: times since 1970 in doubles are no finer.
+const SAME_TIME: f64 = 1e-9;
+
+/// `true` where the rows of the second piece that have times of the first hold its values again, as
+/// far as channels of these names change at all.
+///
+/// # Errors
+/// The reason for which a file cannot be read.
+pub fn are_same_rows<S: Source + ?Sized>(
+    times: &TimeChannels<S>,
+    columns: &BTreeSet<String>,
+    first: &Piece,
+    second: &Piece,
+) -> Result<bool, String> {
+    let from_s = first.start_s.max(second.start_s);
+    let a = Rows::from_time(times, first, from_s)?;
+    let b = Rows::from_time(times, second, from_s)?;
+    let pairs = simultaneous(&a, &b);
+    let source = times.source;
+    let (mut equal, mut all) = (0_usize, 0_usize);
+    for name in columns {
+        if !source.has(first.file, name) || !source.has(second.file, name) {
+            continue;
+        }
+        let x = a.values(source, first.file, name)?;
+        let y = b.values(source, second.file, name)?;
+        let is_constant = x.windows(2).all(|p| p[0].to_bits() == p[1].to_bits());
+        if is_constant {
+            continue;
+        }
+        for (i, j) in &pairs {
+            if let (Some(x), Some(y)) = (x.get(*i), y.get(*j)) {
+                all += 1;
+                equal += usize::from(x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()));
+            }
+        }
+    }
+    Ok(all > 0 && equal as f64 >= EQUAL_SHARE * all as f64)
+}
+
+/// Consecutive rows with their times.
+struct Rows {
+    /// The first row.
+    row: usize,
+    times: Vec<f64>,
+}
+
+impl Rows {
+    /// The first rows of a piece at or after a time.
+    fn from_time<S: Source + ?Sized>(
+        times: &TimeChannels<S>,
+        piece: &Piece,
+        from_s: f64,
+    ) -> Result<Rows, String> {
+        let mut found = Rows {
+            row: piece.row,
+            times: Vec::new(),
+        };
+        let mut row = piece.row;
+        let mut collect = |times: &[f64]| {
+            for time in times {
+                if *time >= from_s && found.times.len() < COMPARED_ROWS {
+                    if found.times.is_empty() {
+                        found.row = row;
+                    }
+                    found.times.push(*time);
+                }
+                row += 1;
+            }
+        };
+        let rows = piece.row..piece.row + piece.rows;
+        times
+            .read(piece.file, rows, &mut collect)
+            .map_err(|refusal| refusal.reason)?;
+        Ok(found)
+    }
+
+    /// Values of a column in these rows.
+    fn values<S: Source + ?Sized>(
+        &self,
+        source: &S,
+        file: usize,
+        column: &str,
+    ) -> Result<Vec<f64>, String> {
+        let mut values = Vec::new();
+        let range = self.row..self.row + self.times.len();
+        let mut append = |part: &[f64]| values.extend_from_slice(part);
+        source.read(file, column, range, &mut append)?;
+        Ok(values)
+    }
+}
+
+/// Pairs of rows that have the same time.
+fn simultaneous(a: &Rows, b: &Rows) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    let mut j = 0;
+    for (i, time) in a.times.iter().enumerate() {
+        let tolerance = SAME_TIME_S.max(SAME_TIME * time.abs());
+        while b.times.get(j).is_some_and(|t| *t < time - tolerance) {
+            j += 1;
+        }
+        let other = b.times.get(j);
+        if other.is_some_and(|t| (t - time).abs() <= tolerance) {
+            pairs.push((i, j));
+        }
+    }
+    pairs
+}

@@ -1,0 +1,12 @@
+//! First pass over a flight: its time channels become stretches, each on a uniform clock.
+
+mod duplicates;
+mod merge;
+mod pieces;
+mod sample_clock;
+mod survey;
+mod time_channels;
+
+pub use sample_clock::Clock;
+pub(in crate::ingest) use sample_clock::Run;
+pub use survey::{Stretch, Survey, survey};

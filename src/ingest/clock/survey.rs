@@ -1,0 +1,353 @@
+//! The survey of a flight: its files, their clocks, and the stretches that they make, from the time
+//! channels alone.
+//!
+//! Files that hold the same channels are one stream: parts of a flight, copies, overlapping pieces.
+//! Files that hold other channels are streams of their own, with clocks and rates of their own. The
+//! stream with the most channels is the main stream and gives the record its clock. The channels of
+//! the other streams are interpolated to that clock.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::duplicates::are_same_rows;
+use super::merge::{MergedPieces, PieceSequence, merge_pieces};
+use super::pieces::{Piece, PieceScanner, ScannedFile, UnusableRows};
+use super::sample_clock::{Clock, ClockBuilder};
+use super::time_channels::TimeChannels;
+use crate::error::Problem;
+use crate::flight::{Channel, signal::TIME};
+use crate::ingest::refusal::Refusal;
+use crate::ingest::settings::Settings;
+use crate::ingest::source::Source;
+
+/// Share of rows without a usable time above which a clock is refused: the remaining times would
+/// leave gaps in most maneuvers.
+const MOST_UNUSABLE: f64 = 0.1;
+
+/// A stretch of a flight on its clock.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// The flight's own id for its first stretch, then `<flight>.2`, `<flight>.3`…
+    pub flight_id: String,
+    pub clock: Clock,
+    /// Clocks of the other streams.
+    pub other_clocks: Vec<Clock>,
+}
+
+/// Stretches of a flight, with the faults of its clocks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Survey {
+    pub stretches: Vec<Stretch>,
+    /// Faults of the clocks and their consequences.
+    pub problems: Vec<Problem>,
+}
+
+/// Surveys a flight.
+///
+/// # Errors
+/// A problem that refuses the flight: no time channel, or one that cannot be followed.
+pub fn survey(
+    source: &(impl Source + ?Sized),
+    channels: &BTreeMap<String, Channel>,
+    settings: &Settings,
+) -> Result<Survey, Problem> {
+    let surveyor = Surveyor {
+        times: TimeChannels::of(source, channels),
+        channels,
+        settings,
+        problems: Vec::new(),
+    };
+    surveyor
+        .survey()
+        .map_err(|refusal| refusal.into_problem(source.flight_id()))
+}
+
+struct Surveyor<'a, S: Source + ?Sized> {
+    times: TimeChannels<'a, S>,
+    channels: &'a BTreeMap<String, Channel>,
+    settings: &'a Settings,
+    problems: Vec<Problem>,
+}
+
+/// Files that hold the same channels.
+struct Stream {
+    columns: BTreeSet<String>,
+    files: Vec<ScannedFile>,
+    merged: MergedPieces,
+}
+
+impl Stream {
+    /// `true` where a file holds at least half of the stream's columns, or the stream half of its.
+    fn shares_half(&self, columns: &BTreeSet<String>) -> bool {
+        let common = self.columns.intersection(columns).count();
+        2 * common >= self.columns.len().min(columns.len())
+    }
+
+    fn step_s(&self) -> f64 {
+        self.files.first().map_or(f64::INFINITY, |f| f.step_s)
+    }
+
+    /// Order of streams: the most channels first, then the highest rate.
+    fn by_size(a: &Stream, b: &Stream) -> Ordering {
+        let columns = b.columns.len().cmp(&a.columns.len());
+        columns.then(a.step_s().total_cmp(&b.step_s()))
+    }
+
+    fn rows(&self) -> usize {
+        self.files.iter().map(|f| f.rows).sum()
+    }
+
+    /// Rows whose time is no number or fits nowhere.
+    fn unreadable(&self) -> UnusableRows {
+        let mut unreadable = UnusableRows::default();
+        for file in &self.files {
+            unreadable.merge(&file.unreadable);
+        }
+        for piece in &self.merged.strays {
+            for row in piece.row..piece.row + piece.rows {
+                unreadable.add(piece.file, row);
+            }
+        }
+        unreadable
+    }
+
+    /// Rows whose time is that of the row before.
+    fn repeated(&self) -> UnusableRows {
+        let mut repeated = UnusableRows::default();
+        for file in &self.files {
+            repeated.merge(&file.repeated);
+        }
+        repeated
+    }
+}
+
+impl<S: Source + ?Sized> Surveyor<'_, S> {
+    fn survey(mut self) -> Result<Survey, Refusal> {
+        let mut streams = self.streams()?;
+        for stream in &mut streams {
+            stream.merged = self.merge(stream)?;
+        }
+        streams.sort_by(Stream::by_size);
+        for stream in &streams {
+            self.report_unusable_rows(stream)?;
+            self.report_duplicates(stream);
+        }
+        let Some((main, others)) = streams.split_first() else {
+            return Err(self.times.refusal("there are no files".to_owned()));
+        };
+        Ok(Survey {
+            stretches: self.stretches(main, others)?,
+            problems: self.problems,
+        })
+    }
+
+    /// Scans each file and groups the files by their channels.
+    fn streams(&self) -> Result<Vec<Stream>, Refusal> {
+        let mut streams: Vec<Stream> = Vec::new();
+        for file in 0..self.times.source.files() {
+            let columns = self.columns(file);
+            let scanned = self.scan(file)?;
+            match streams.iter_mut().find(|s| s.shares_half(&columns)) {
+                Some(stream) => {
+                    stream.columns.extend(columns);
+                    stream.files.push(scanned);
+                }
+                None => streams.push(Stream {
+                    columns,
+                    files: vec![scanned],
+                    merged: MergedPieces::default(),
+                }),
+            }
+        }
+        Ok(streams)
+    }
+
+    /// Mapped columns of a file, without its time.
+    fn columns(&self, file: usize) -> BTreeSet<String> {
+        let mapped = self.channels.iter().filter(|(_, c)| c.signal != TIME);
+        mapped
+            .map(|(name, _)| name.clone())
+            .filter(|name| self.times.source.has(file, name))
+            .collect()
+    }
+
+    fn scan(&self, file: usize) -> Result<ScannedFile, Refusal> {
+        let mut scanner = PieceScanner::of_file(file);
+        let rows = 0..self.times.source.rows(file);
+        self.times
+            .read(file, rows, &mut |times| scanner.push(times))?;
+        Ok(scanner.finish())
+    }
+
+    fn merge(&self, stream: &Stream) -> Result<MergedPieces, Refusal> {
+        let file_name = |file| self.times.source.name(file);
+        let mut same_rows =
+            |a: &Piece, b: &Piece| are_same_rows(&self.times, &stream.columns, a, b);
+        merge_pieces(&stream.files, self.settings, &file_name, &mut same_rows)
+            .map_err(|reason| self.times.refusal(reason))
+    }
+
+    fn report(&mut self, refusal: Refusal) {
+        let flight_id = self.times.source.flight_id();
+        self.problems.push(refusal.into_problem(flight_id));
+    }
+
+    /// Reports the rows of a stream that have no usable time.
+    ///
+    /// # Errors
+    /// A refusal where they are too many.
+    fn report_unusable_rows(&mut self, stream: &Stream) -> Result<(), Refusal> {
+        let (unreadable, repeated) = (stream.unreadable(), stream.repeated());
+        let unusable = unreadable.rows + repeated.rows;
+        if unusable == 0 {
+            return Ok(());
+        }
+        let rows = stream.rows();
+        if unusable as f64 > MOST_UNUSABLE * rows as f64 {
+            let first = if unreadable.rows > 0 {
+                &unreadable
+            } else {
+                &repeated
+            };
+            return Err(self.times.refusal(format!(
+                "of {rows} rows {} have a time that is not a number or fits nowhere and {} one \
+                 that stands still, the first in {}: the clock cannot be followed",
+                unreadable.rows,
+                repeated.rows,
+                self.first_row(first)
+            )));
+        }
+        if unreadable.rows > 0 {
+            self.report(self.times.refusal(format!(
+                "{} rows have a time that is not a number or fits nowhere, the first is {}; they \
+                 are left out",
+                unreadable.rows,
+                self.first_row(&unreadable)
+            )));
+        }
+        if repeated.rows > 0 {
+            self.report(self.times.refusal(format!(
+                "time stands still in {} rows, the first is {}; they are left out",
+                repeated.rows,
+                self.first_row(&repeated)
+            )));
+        }
+        Ok(())
+    }
+
+    /// Place of the first of some rows, in words.
+    fn first_row(&self, rows: &UnusableRows) -> String {
+        rows.first
+            .map(|(file, row)| format!("row {row} of {}", self.times.source.name(file)))
+            .unwrap_or_default()
+    }
+
+    /// Reports the pieces of a stream whose rows another piece holds already.
+    fn report_duplicates(&mut self, stream: &Stream) {
+        for piece in &stream.merged.duplicates {
+            let Piece {
+                file,
+                row,
+                rows,
+                start_s,
+                end_s,
+            } = *piece;
+            self.report(Refusal {
+                place: self.times.source.name(file),
+                reason: format!(
+                    "rows from row {} on ({rows} rows, {start_s:.3} s to {end_s:.3} s) are there \
+                     already, as far as the times overlap; they are used once",
+                    row + 1
+                ),
+            });
+        }
+    }
+
+    /// Stretches of the main stream with their clocks, and the clocks of the other streams.
+    fn stretches(&mut self, main: &Stream, others: &[Stream]) -> Result<Vec<Stretch>, Refusal> {
+        let mut other_clocks = Vec::new();
+        for stream in others {
+            let sequences = stream.merged.sequences.iter();
+            let clocks: Result<Vec<Clock>, Refusal> = sequences.map(|s| self.clock(s)).collect();
+            other_clocks.push(clocks?);
+        }
+        let sequences = &main.merged.sequences;
+        let mut stretches = Vec::new();
+        for (i, sequence) in sequences.iter().enumerate() {
+            let flight_id = self.stretch_id(i);
+            if sequences.len() > 1 && sequence.length_s() < self.settings.least_stretch_s {
+                self.report_short_stretch(&flight_id, sequence);
+                continue;
+            }
+            let clock = self.clock(sequence)?;
+            if let Some(cause) = &sequence.cause {
+                self.report(Refusal {
+                    place: format!("stretch `{flight_id}`"),
+                    reason: format!("{cause}: what follows is a record of its own, `{flight_id}`"),
+                });
+            }
+            // A stream with as many stretches as the main one was interrupted where it was.
+            let beside = |clocks: &Vec<Clock>| match clocks.get(i) {
+                Some(own) if clocks.len() == sequences.len() => vec![own.clone()],
+                _ => clocks.clone(),
+            };
+            stretches.push(Stretch {
+                flight_id,
+                clock,
+                other_clocks: other_clocks.iter().flat_map(beside).collect(),
+            });
+        }
+        if stretches.is_empty() {
+            return Err(self.times.refusal(no_stretch(sequences.len())));
+        }
+        Ok(stretches)
+    }
+
+    fn stretch_id(&self, index: usize) -> String {
+        let flight_id = self.times.source.flight_id();
+        if index == 0 {
+            flight_id.to_owned()
+        } else {
+            format!("{flight_id}.{}", index + 1)
+        }
+    }
+
+    fn report_short_stretch(&mut self, flight_id: &str, sequence: &PieceSequence) {
+        self.report(Refusal {
+            place: format!("stretch `{flight_id}`"),
+            reason: format!(
+                "the stretch from {:.3} s to {:.3} s is shorter than least_stretch_s = {} s; it \
+                 is left out",
+                sequence.start_s, sequence.end_s, self.settings.least_stretch_s
+            ),
+        });
+    }
+
+    /// Reads the times of a sequence of pieces again and assigns their rows to samples.
+    fn clock(&self, sequence: &PieceSequence) -> Result<Clock, Refusal> {
+        let mut builder = ClockBuilder::of(sequence);
+        for part in &sequence.parts {
+            let mut row = part.piece.row;
+            let rows = row..row + part.piece.rows;
+            let mut push = |times: &[f64]| {
+                builder.push(part, row, times);
+                row += times.len();
+            };
+            self.times.read(part.piece.file, rows, &mut push)?;
+        }
+        builder
+            .finish(self.settings)
+            .map_err(|reason| self.times.refusal(reason))
+    }
+}
+
+/// Reason for which a flight has no stretch, by the number of its sequences of pieces.
+fn no_stretch(sequences: usize) -> String {
+    match sequences {
+        0 => "0 rows are no record; at least 2 are needed".to_owned(),
+        _ => format!(
+            "time jumps {} times and leaves no stretch that is long enough",
+            sequences - 1
+        ),
+    }
+}

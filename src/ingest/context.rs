@@ -1,0 +1,25 @@
+//! Configuration with which ingest reads a flight.
+
+use std::collections::BTreeMap;
+
+use super::settings::Settings;
+use crate::aircraft::Aircraft;
+use crate::flight::{Channel, signal};
+
+/// Channel map, constants, aircraft and settings of ingest.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// Channels by the name of their column.
+    pub channels: &'a BTreeMap<String, Channel>,
+    /// Values of signals that the aircraft does not record, in their units.
+    pub constants: &'a BTreeMap<String, f64>,
+    pub aircraft: &'a Aircraft,
+    pub settings: &'a Settings,
+}
+
+impl Context<'_> {
+    /// `true` where a flight can do without the channel of a signal.
+    pub(super) fn is_optional(&self, signal: &str) -> bool {
+        self.constants.contains_key(signal) || !signal::REQUIRED.contains(&signal)
+    }
+}

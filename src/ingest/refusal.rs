@@ -1,0 +1,32 @@
+//! Reasons for which ingest refuses a flight, a stretch or a channel.
+
+use crate::error::Problem;
+
+/// A place in the recording and the reason for which it cannot be used; a [`Problem`] without its
+/// flight.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    pub place: String,
+    pub reason: String,
+}
+
+impl Refusal {
+    /// A refusal at a channel, by its name in the channel map.
+    pub fn of_channel(name: &str, reason: String) -> Refusal {
+        Refusal {
+            place: format!("channel `{name}`"),
+            reason,
+        }
+    }
+
+    /// The problem of a flight or stretch.
+    #[must_use]
+    pub fn into_problem(self, flight_id: &str) -> Problem {
+        Problem {
+            stage: "ingest".to_owned(),
+            flight_id: flight_id.to_owned(),
+            place: self.place,
+            reason: self.reason,
+        }
+    }
+}
