@@ -4,6 +4,7 @@
 //! that).
 
 // Vocabulary: what the words mean.
+pub mod schema;
 pub mod units;
 pub mod numerics;
 pub mod error;

@@ -3,14 +3,17 @@
 use serde::{Deserialize, Serialize};
 
 use crate::flight::signal;
+use crate::schema::words;
 use crate::units::{DEG, Unit};
 
-/// The two sets of equations: chapter 2 and chapter 3 of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Axis {
-    Longitudinal,
-    Lateral,
+words! {
+    /// Set of equations: chapter 2 or chapter 3 of the paper.
+    pub enum Axis {
+        /// Chapter 2: pitch, normal and axial force.
+        Longitudinal = "longitudinal",
+        /// Chapter 3: roll, yaw and side force.
+        Lateral = "lateral",
+    }
 }
 
 impl Axis {
@@ -35,14 +38,6 @@ impl Axis {
                 Output::Ax,
             ],
             Axis::Lateral => [Output::Beta, Output::P, Output::R, Output::Phi, Output::Ay],
-        }
-    }
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Axis::Longitudinal => "longitudinal",
-            Axis::Lateral => "lateral",
         }
     }
 }
@@ -83,20 +78,30 @@ impl Coefficient {
     }
 }
 
-/// A measured response that the estimation matches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Output {
-    Alpha,
-    Q,
-    Theta,
-    An,
-    Ax,
-    Beta,
-    P,
-    R,
-    Phi,
-    Ay,
+words! {
+    /// Measured response that the estimation matches.
+    pub enum Output {
+        /// Angle of attack at the vane.
+        Alpha = "alpha",
+        /// Pitch rate.
+        Q = "q",
+        /// Pitch attitude.
+        Theta = "theta",
+        /// Normal acceleration.
+        An = "an",
+        /// Longitudinal acceleration.
+        Ax = "ax",
+        /// Sideslip at the vane.
+        Beta = "beta",
+        /// Roll rate.
+        P = "p",
+        /// Yaw rate.
+        R = "r",
+        /// Roll attitude.
+        Phi = "phi",
+        /// Lateral acceleration.
+        Ay = "ay",
+    }
 }
 
 impl Output {
@@ -114,23 +119,6 @@ impl Output {
             Output::R => signal::R,
             Output::Phi => signal::PHI,
             Output::Ay => signal::AY,
-        }
-    }
-
-    /// As in the YAML and in the names of columns.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Output::Alpha => "alpha",
-            Output::Q => "q",
-            Output::Theta => "theta",
-            Output::An => "an",
-            Output::Ax => "ax",
-            Output::Beta => "beta",
-            Output::P => "p",
-            Output::R => "r",
-            Output::Phi => "phi",
-            Output::Ay => "ay",
         }
     }
 
@@ -178,42 +166,29 @@ impl Regressor {
     }
 }
 
-/// The unit of a derivative, spelled as in the wind-tunnel tables.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DerivativeUnit {
-    #[serde(rename = "-")]
-    Number,
-    #[serde(rename = "per_deg")]
-    PerDeg,
-    #[serde(rename = "per_rad")]
-    PerRad,
-    #[serde(rename = "lbf_per_deg")]
-    LbfPerDeg,
-    #[serde(rename = "ftlbf_per_deg")]
-    FtLbfPerDeg,
-    #[serde(rename = "g")]
-    G,
-    #[serde(rename = "deg_s")]
-    DegPerS,
-    #[serde(rename = "deg")]
-    Deg,
+words! {
+    /// Unit of a derivative or bias, spelled as in the wind-tunnel tables.
+    pub enum DerivativeUnit {
+        /// A coefficient, without a unit.
+        Number = "-",
+        /// Per degree: static and control derivatives.
+        PerDeg = "per_deg",
+        /// Per radian of p b/2V, q c̄/2V or r b/2V: rate derivatives.
+        PerRad = "per_rad",
+        /// Force of a thrust-vectoring vane, lbf per degree.
+        LbfPerDeg = "lbf_per_deg",
+        /// Moment of a thrust-vectoring vane, ft·lbf per degree.
+        FtLbfPerDeg = "ftlbf_per_deg",
+        /// Bias of an accelerometer.
+        G = "g",
+        /// Bias of a rate gyro, deg/s.
+        DegPerS = "deg_s",
+        /// Bias of an attitude or a vane, deg.
+        Deg = "deg",
+    }
 }
 
 impl DerivativeUnit {
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            DerivativeUnit::Number => "-",
-            DerivativeUnit::PerDeg => "per_deg",
-            DerivativeUnit::PerRad => "per_rad",
-            DerivativeUnit::LbfPerDeg => "lbf_per_deg",
-            DerivativeUnit::FtLbfPerDeg => "ftlbf_per_deg",
-            DerivativeUnit::G => "g",
-            DerivativeUnit::DegPerS => "deg_s",
-            DerivativeUnit::Deg => "deg",
-        }
-    }
-
     /// The factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`,
     /// `nd`) to values in this one; exactly one for its own name, none where the two do not measure
     /// the same.

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use super::{Settings, Verdict, judge};
+use super::{Settings, judge};
 use crate::tables::{ChangeRow, PublishedTrend, TrendRow};
 use crate::trend;
 
@@ -75,12 +75,6 @@ pub fn changes(
             before.map(|(value, error)| (value, Some(error))),
             settings,
         );
-        let verdict = match judged.verdict {
-            Verdict::NothingThere => "not there before",
-            Verdict::Higher => "higher than before",
-            Verdict::Lower => "lower than before",
-            other => other.of_tunnel(),
-        };
         ChangeRow {
             against: earlier.name.clone(),
             derivative: t.derivative.clone(),
@@ -94,7 +88,7 @@ pub fn changes(
             difference: judged.difference,
             difference_pct: judged.difference_pct,
             z: judged.z,
-            verdict: verdict.to_owned(),
+            verdict: judged.agreement.into(),
         }
     };
     trends.iter().filter(speaks).map(row).collect()
@@ -103,7 +97,7 @@ pub fn changes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::PublishedTrend;
+    use crate::tables::{ChangeVerdict, PublishedTrend};
     use approx::assert_relative_eq;
 
     fn now(alpha_deg: f64, value: f64) -> TrendRow {
@@ -152,14 +146,14 @@ mod tests {
             &trend::Settings::default(),
             &Settings::default(),
         );
-        let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.as_str()).collect();
+        let verdicts: Vec<ChangeVerdict> = rows.iter().map(|r| r.verdict).collect();
         assert_eq!(
             verdicts,
             [
-                "agrees",
-                "higher than before",
-                "lower than before",
-                "not there before"
+                ChangeVerdict::Agrees,
+                ChangeVerdict::Higher,
+                ChangeVerdict::Lower,
+                ChangeVerdict::NotThereBefore
             ]
         );
         assert_relative_eq!(rows[1].before.expect("before"), 3.0);

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::aero::wind_tunnel::{Beyond, Extrapolation};
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Maneuver;
-use crate::tables::{BeyondRow, ComparisonRow, EstimateRow};
+use crate::tables::{BeyondRow, ComparisonRow, EstimateRow, Treatment};
 
 /// One row per maneuver (or α of the comparison), variable and range of tables, with the
 /// derivatives it concerns.
@@ -72,8 +72,8 @@ fn at<'a>(
         }
     }
     let treatment = match tunnel.settings().extrapolation {
-        Extrapolation::Clamp => "clamped",
-        Extrapolation::Refuse => "refused",
+        Extrapolation::Clamp => Treatment::Clamped,
+        Extrapolation::Refuse => Treatment::Refused,
     };
     let row = |(beyond, names): (Beyond, Vec<&str>)| BeyondRow {
         maneuver_id: maneuver_id.to_owned(),
@@ -83,7 +83,7 @@ fn at<'a>(
         read_at: beyond.read_at,
         tabulated_from: beyond.from,
         tabulated_to: beyond.to,
-        treatment: treatment.to_owned(),
+        treatment,
         derivatives: names.join(" "),
     };
     found.into_values().map(row).collect()

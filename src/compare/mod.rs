@@ -18,7 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
-use crate::tables::{ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow};
+use crate::tables::{
+    ChangeVerdict, ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow, TunnelVerdict,
+};
 use crate::trend;
 
 /// What the analyst decides about the comparison.
@@ -133,7 +135,7 @@ pub fn comparison(
             uncertainty: judged.uncertainty,
             difference_pct: judged.difference_pct,
             z: judged.z,
-            verdict: judged.verdict.of_tunnel().to_owned(),
+            verdict: judged.agreement.into(),
         })
     };
     trends.iter().filter_map(row).collect()
@@ -180,12 +182,12 @@ pub fn of_maneuvers(
             uncertainty: judged.uncertainty,
             difference_pct: judged.difference_pct,
             z: judged.z,
-            verdict: judged.verdict.of_tunnel().to_owned(),
+            verdict: judged.agreement.into(),
         })
     };
     estimates
         .iter()
-        .filter(|e| e.status == Status::Estimated.name())
+        .filter(|e| e.status == Status::Estimated)
         .filter_map(row)
         .collect()
 }
@@ -230,24 +232,61 @@ pub(crate) fn condition_near<'a>(
     })
 }
 
-/// What two values of one derivative say of each other.
+/// Result of comparing a value of flight with another value of the same derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    NothingThere,
+pub(crate) enum Agreement {
+    /// There is no other value.
+    NoValue,
     Agrees,
     Higher,
     Lower,
     SignDiffers,
 }
 
-impl Verdict {
-    pub(crate) fn of_tunnel(self) -> &'static str {
-        match self {
-            Verdict::NothingThere => "no tunnel value",
-            Verdict::Agrees => "agrees",
-            Verdict::Higher => "flight higher",
-            Verdict::Lower => "flight lower",
-            Verdict::SignDiffers => "sign differs",
+impl From<Agreement> for TunnelVerdict {
+    fn from(agreement: Agreement) -> TunnelVerdict {
+        match agreement {
+            Agreement::NoValue => TunnelVerdict::NoTunnelValue,
+            Agreement::Agrees => TunnelVerdict::Agrees,
+            Agreement::Higher => TunnelVerdict::FlightHigher,
+            Agreement::Lower => TunnelVerdict::FlightLower,
+            Agreement::SignDiffers => TunnelVerdict::SignDiffers,
+        }
+    }
+}
+
+impl From<TunnelVerdict> for Agreement {
+    fn from(verdict: TunnelVerdict) -> Agreement {
+        match verdict {
+            TunnelVerdict::NoTunnelValue => Agreement::NoValue,
+            TunnelVerdict::Agrees => Agreement::Agrees,
+            TunnelVerdict::FlightHigher => Agreement::Higher,
+            TunnelVerdict::FlightLower => Agreement::Lower,
+            TunnelVerdict::SignDiffers => Agreement::SignDiffers,
+        }
+    }
+}
+
+impl From<Agreement> for ChangeVerdict {
+    fn from(agreement: Agreement) -> ChangeVerdict {
+        match agreement {
+            Agreement::NoValue => ChangeVerdict::NotThereBefore,
+            Agreement::Agrees => ChangeVerdict::Agrees,
+            Agreement::Higher => ChangeVerdict::Higher,
+            Agreement::Lower => ChangeVerdict::Lower,
+            Agreement::SignDiffers => ChangeVerdict::SignDiffers,
+        }
+    }
+}
+
+impl From<ChangeVerdict> for Agreement {
+    fn from(verdict: ChangeVerdict) -> Agreement {
+        match verdict {
+            ChangeVerdict::NotThereBefore => Agreement::NoValue,
+            ChangeVerdict::Agrees => Agreement::Agrees,
+            ChangeVerdict::Higher => Agreement::Higher,
+            ChangeVerdict::Lower => Agreement::Lower,
+            ChangeVerdict::SignDiffers => Agreement::SignDiffers,
         }
     }
 }
@@ -260,7 +299,7 @@ pub(crate) struct Judged {
     /// Of the other value's magnitude.
     pub difference_pct: Option<f64>,
     pub z: Option<f64>,
-    pub verdict: Verdict,
+    pub agreement: Agreement,
 }
 
 /// Judges a value with its standard error by another, whose own may not be known.
@@ -271,29 +310,28 @@ pub(crate) fn judge(
     settings: &Settings,
 ) -> Judged {
     let Some((other, stated)) = other else {
-        let verdict = Verdict::NothingThere;
         return Judged {
             difference: None,
             uncertainty: None,
             difference_pct: None,
             z: None,
-            verdict,
+            agreement: Agreement::NoValue,
         };
     };
     let other_error = stated.unwrap_or(0.0);
     let (difference, uncertainty) = (flight - other, error.hypot(other_error));
     let is_nonzero = |value: f64, error: f64| value.abs() > settings.agreement_z * error;
-    let verdict =
+    let agreement =
         if flight * other < 0.0 && is_nonzero(flight, error) && is_nonzero(other, other_error) {
-            Verdict::SignDiffers
+            Agreement::SignDiffers
         } else if difference.abs() <= settings.agreement_z * uncertainty
             || difference.abs() <= settings.agreement_pct / 100.0 * other.abs()
         {
-            Verdict::Agrees
+            Agreement::Agrees
         } else if difference > 0.0 {
-            Verdict::Higher
+            Agreement::Higher
         } else {
-            Verdict::Lower
+            Agreement::Lower
         };
     let finite = |v: f64| v.is_finite().then_some(v);
     Judged {
@@ -301,7 +339,7 @@ pub(crate) fn judge(
         uncertainty: Some(uncertainty),
         difference_pct: finite(100.0 * difference / other.abs()),
         z: finite(difference / uncertainty),
-        verdict,
+        agreement,
     }
 }
 
@@ -310,6 +348,7 @@ mod tests {
     use super::*;
     use crate::aero::Axis;
     use crate::aero::wind_tunnel::TunnelPoint;
+    use crate::maneuver::ManeuverOrigin;
     use approx::assert_relative_eq;
 
     fn flight(value: f64, standard_error: f64) -> TrendRow {
@@ -348,7 +387,7 @@ mod tests {
             mass_slug: 1050.0,
             x_cg_ft: 38.0,
             samples: 401,
-            origin: "found".into(),
+            origin: ManeuverOrigin::Found,
             recognised: crate::maneuver::Recognised::default(),
             quality: crate::maneuver::Quality::default(),
         }
@@ -382,20 +421,29 @@ mod tests {
         rows.remove(0)
     }
 
-    fn says(trend: TrendRow, value: f64, uncertainty: Option<f64>) -> String {
+    fn says(trend: TrendRow, value: f64, uncertainty: Option<f64>) -> TunnelVerdict {
         one(trend, &tunnel(value, uncertainty), &Settings::default()).verdict
     }
 
     #[test]
     fn flight_and_tunnel_agree_within_two_standard_errors() {
-        assert_eq!(says(flight(1.19, 0.1), 1.0, None), "agrees");
-        assert_eq!(says(flight(1.21, 0.1), 1.0, None), "flight higher");
-        assert_eq!(says(flight(0.79, 0.1), 1.0, None), "flight lower");
+        assert_eq!(says(flight(1.19, 0.1), 1.0, None), TunnelVerdict::Agrees);
+        assert_eq!(
+            says(flight(1.21, 0.1), 1.0, None),
+            TunnelVerdict::FlightHigher
+        );
+        assert_eq!(
+            says(flight(0.79, 0.1), 1.0, None),
+            TunnelVerdict::FlightLower
+        );
     }
 
     #[test]
     fn the_tunnel_s_uncertainty_counts() {
-        assert_eq!(says(flight(1.25, 0.1), 1.0, Some(0.1)), "agrees");
+        assert_eq!(
+            says(flight(1.25, 0.1), 1.0, Some(0.1)),
+            TunnelVerdict::Agrees
+        );
         let row = one(
             flight(1.5, 0.3),
             &tunnel(1.0, Some(0.4)),
@@ -406,16 +454,31 @@ mod tests {
 
     #[test]
     fn a_small_difference_agrees_however_well_it_is_determined() {
-        assert_eq!(says(flight(-1.04, 1e-6), -1.0, None), "agrees");
-        assert_eq!(says(flight(-1.06, 1e-6), -1.0, None), "flight lower");
-        assert_eq!(says(flight(-0.94, 1e-6), -1.0, None), "flight higher");
+        assert_eq!(says(flight(-1.04, 1e-6), -1.0, None), TunnelVerdict::Agrees);
+        assert_eq!(
+            says(flight(-1.06, 1e-6), -1.0, None),
+            TunnelVerdict::FlightLower
+        );
+        assert_eq!(
+            says(flight(-0.94, 1e-6), -1.0, None),
+            TunnelVerdict::FlightHigher
+        );
     }
 
     #[test]
     fn signs_differ_only_where_both_are_sure() {
-        assert_eq!(says(flight(-0.5, 0.1), 1.0, Some(0.1)), "sign differs");
-        assert_eq!(says(flight(-0.1, 0.1), 1.0, Some(0.1)), "flight lower");
-        assert_eq!(says(flight(0.5, 0.1), -0.1, Some(0.1)), "flight higher");
+        assert_eq!(
+            says(flight(-0.5, 0.1), 1.0, Some(0.1)),
+            TunnelVerdict::SignDiffers
+        );
+        assert_eq!(
+            says(flight(-0.1, 0.1), 1.0, Some(0.1)),
+            TunnelVerdict::FlightLower
+        );
+        assert_eq!(
+            says(flight(0.5, 0.1), -0.1, Some(0.1)),
+            TunnelVerdict::FlightHigher
+        );
     }
 
     #[test]
@@ -431,7 +494,7 @@ mod tests {
         };
         let refused = one(flight(1.0, 0.1), &tunnel(1.0, None), &settings);
         for row in [none, refused] {
-            assert_eq!(row.verdict, "no tunnel value");
+            assert_eq!(row.verdict, TunnelVerdict::NoTunnelValue);
             assert_eq!(
                 (row.wind_tunnel, row.difference, row.difference_pct, row.z),
                 (None, None, None, None)
@@ -451,8 +514,8 @@ mod tests {
         assert_relative_eq!(row.z.expect("z"), 2.0);
         let zero = one(flight(1.0, 0.0), &tunnel(0.0, None), &Settings::default());
         assert_eq!(
-            (zero.difference_pct, zero.z, zero.verdict.as_str()),
-            (None, None, "flight higher")
+            (zero.difference_pct, zero.z, zero.verdict),
+            (None, None, TunnelVerdict::FlightHigher)
         );
     }
 
@@ -570,7 +633,7 @@ mod tests {
             mach: 0.3,
             derivative: "d".into(),
             unit: "per_deg".into(),
-            status: "estimated".into(),
+            status: Status::Estimated,
             value: Some(4.0),
             bound: Some(0.1),
             bound_held: None,
@@ -601,8 +664,8 @@ mod tests {
             100.0 / 3.0,
             max_relative = 1e-14
         );
-        assert_eq!(rows[0].verdict, "agrees");
-        estimate.status = "held".into();
+        assert_eq!(rows[0].verdict, TunnelVerdict::Agrees);
+        estimate.status = Status::Held;
         assert_eq!(
             of_maneuvers(&[estimate], &maneuvers, &tunnel, &Settings::default()),
             []

@@ -2,9 +2,9 @@
 //! sentence, and the ranges that disagree are ranked by how much of the derivative's size they are
 //! apart.
 
-use super::Settings;
+use super::{Agreement, Settings};
 use crate::aero::WindTunnel;
-use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, VerdictRow};
+use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
 /// One compared angle of attack, of whichever comparison.
 #[derive(Clone, Copy, Debug)]
@@ -13,7 +13,8 @@ struct Place<'a> {
     unit: &'a str,
     group: &'a str,
     alpha_deg: f64,
-    verdict: &'a str,
+    verdict: Verdict,
+    agreement: Agreement,
     flight: f64,
     other: Option<f64>,
     difference_pct: Option<f64>,
@@ -27,7 +28,8 @@ impl<'a> Place<'a> {
             unit: &r.unit,
             group: &r.group,
             alpha_deg: r.alpha_deg,
-            verdict: &r.verdict,
+            verdict: Verdict::Tunnel(r.verdict),
+            agreement: r.verdict.into(),
             flight: r.flight,
             other: r.wind_tunnel,
             difference_pct: r.difference_pct,
@@ -41,7 +43,8 @@ impl<'a> Place<'a> {
             unit: &r.unit,
             group: &r.group,
             alpha_deg: r.alpha_deg,
-            verdict: &r.verdict,
+            verdict: Verdict::Change(r.verdict),
+            agreement: r.verdict.into(),
             flight: r.flight,
             other: r.before,
             difference_pct: r.difference_pct,
@@ -109,7 +112,7 @@ fn ranges(
                 group: first.group.to_owned(),
                 alpha_from_deg: first.alpha_deg,
                 alpha_to_deg: last.alpha_deg,
-                verdict: first.verdict.to_owned(),
+                verdict: first.verdict,
                 difference_pct: median(run.iter().filter_map(|p| p.difference_pct)),
                 words: words.clone(),
             });
@@ -128,10 +131,7 @@ fn ranges(
 /// The worst angle of attack of a range that disagrees.
 fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Option<DisagreementRow> {
     let apart = |p: &Place| p.other.map(|other| p.flight - other);
-    let disagrees = !matches!(
-        run[0].verdict,
-        "agrees" | "no tunnel value" | "not there before"
-    );
+    let disagrees = !matches!(run[0].agreement, Agreement::Agrees | Agreement::NoValue);
     let far = |p: &Place| apart(p).map_or(0.0, f64::abs);
     let p = run
         .iter()
@@ -167,29 +167,29 @@ fn words(
     } else {
         format!("from {}° to {}°", first.alpha_deg, last.alpha_deg)
     };
-    match first.verdict {
-        "agrees"
+    match first.agreement {
+        Agreement::Agrees
             if run
                 .iter()
                 .all(|p| p.z.is_some_and(|z| z.abs() <= settings.agreement_z)) =>
         {
             format!("agrees within its uncertainty {range}")
         }
-        "agrees" => format!(
+        Agreement::Agrees => format!(
             "agrees within its uncertainty or {}% {range}",
             settings.agreement_pct
         ),
-        "flight higher" | "higher than before" => {
+        Agreement::Higher => {
             format!("flight higher than {called} {range}{}", by(run))
         }
-        "flight lower" | "lower than before" => {
+        Agreement::Lower => {
             format!("flight lower than {called} {range}{}", by(run))
         }
-        "sign differs" => match before_deg.filter(|_| to_the_end) {
+        Agreement::SignDiffers => match before_deg.filter(|_| to_the_end) {
             Some(before) => format!("sign differs above {before}°"),
             None => format!("sign differs {range}"),
         },
-        other => format!("{other} {range}"),
+        Agreement::NoValue => format!("{} {range}", first.verdict),
     }
 }
 
@@ -248,9 +248,15 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::aero::wind_tunnel::TunnelPoint;
+    use crate::tables::TunnelVerdict;
     use approx::assert_relative_eq;
 
-    fn row(alpha_deg: f64, flight: f64, tunnel: Option<f64>, verdict: &str) -> ComparisonRow {
+    fn row(
+        alpha_deg: f64,
+        flight: f64,
+        tunnel: Option<f64>,
+        verdict: TunnelVerdict,
+    ) -> ComparisonRow {
         ComparisonRow {
             derivative: "d".into(),
             unit: "per_deg".into(),
@@ -266,7 +272,7 @@ mod tests {
                 .filter(|t| *t != 0.0)
                 .map(|t| 100.0 * (flight - t) / t.abs()),
             z: tunnel.map(|t| (flight - t) / 0.1),
-            verdict: verdict.into(),
+            verdict,
         }
     }
 
@@ -296,11 +302,11 @@ mod tests {
     #[test]
     fn neighbours_with_one_verdict_become_one_sentence() {
         let rows = [
-            row(5.0, 2.1, Some(2.0), "agrees"),
-            row(10.0, 2.1, Some(2.0), "agrees"),
-            row(35.0, 1.4, Some(2.0), "flight lower"),
-            row(40.0, 1.4, Some(2.0), "flight lower"),
-            row(60.0, 1.38, Some(2.0), "flight lower"),
+            row(5.0, 2.1, Some(2.0), TunnelVerdict::Agrees),
+            row(10.0, 2.1, Some(2.0), TunnelVerdict::Agrees),
+            row(35.0, 1.4, Some(2.0), TunnelVerdict::FlightLower),
+            row(40.0, 1.4, Some(2.0), TunnelVerdict::FlightLower),
+            row(60.0, 1.38, Some(2.0), TunnelVerdict::FlightLower),
         ];
         assert_eq!(
             said(&rows),
@@ -314,10 +320,10 @@ mod tests {
     #[test]
     fn a_sign_that_differs_to_the_end_differs_above_the_last_that_does_not() {
         let rows = [
-            row(35.0, 2.0, None, "no tunnel value"),
-            row(40.0, 2.5, Some(0.0), "flight higher"),
-            row(45.0, 1.0, Some(-2.0), "sign differs"),
-            row(50.0, 1.0, Some(-2.0), "sign differs"),
+            row(35.0, 2.0, None, TunnelVerdict::NoTunnelValue),
+            row(40.0, 2.5, Some(0.0), TunnelVerdict::FlightHigher),
+            row(45.0, 1.0, Some(-2.0), TunnelVerdict::SignDiffers),
+            row(50.0, 1.0, Some(-2.0), TunnelVerdict::SignDiffers),
         ];
         assert_eq!(
             said(&rows),
@@ -332,9 +338,9 @@ mod tests {
     #[test]
     fn uneven_differences_are_told_with_their_extremes() {
         let rows = [
-            row(5.0, 2.2, Some(2.0), "flight higher"),
-            row(10.0, 2.6, Some(2.0), "flight higher"),
-            row(15.0, 3.0, Some(2.0), "flight higher"),
+            row(5.0, 2.2, Some(2.0), TunnelVerdict::FlightHigher),
+            row(10.0, 2.6, Some(2.0), TunnelVerdict::FlightHigher),
+            row(15.0, 3.0, Some(2.0), TunnelVerdict::FlightHigher),
         ];
         assert_eq!(
             said(&rows),
@@ -345,7 +351,7 @@ mod tests {
     #[test]
     fn agreement_by_percent_alone_says_so() {
         assert_eq!(
-            said(&[row(5.0, 2.3, Some(2.0), "agrees")]),
+            said(&[row(5.0, 2.3, Some(2.0), TunnelVerdict::Agrees)]),
             ["agrees within its uncertainty or 5% at 5°"]
         );
     }
@@ -353,10 +359,10 @@ mod tests {
     #[test]
     fn the_worst_disagreement_is_the_one_furthest_apart_for_the_derivative_s_size() {
         let rows = [
-            row(5.0, 0.05, Some(0.01), "flight higher"),
-            row(10.0, 2.0, Some(2.0), "agrees"),
-            row(15.0, 1.5, Some(2.0), "flight lower"),
-            row(20.0, 1.2, Some(2.0), "flight lower"),
+            row(5.0, 0.05, Some(0.01), TunnelVerdict::FlightHigher),
+            row(10.0, 2.0, Some(2.0), TunnelVerdict::Agrees),
+            row(15.0, 1.5, Some(2.0), TunnelVerdict::FlightLower),
+            row(20.0, 1.2, Some(2.0), TunnelVerdict::FlightLower),
         ];
         let (_, worst) = of_tunnel(&rows, &tunnel(), &Settings::default());
         assert_eq!(

@@ -18,12 +18,12 @@ use super::{Basis, Estimated, Ready, Run, calibration, covariance, values_of};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
-use crate::maneuver::{Class, Maneuver, Quality, Recognised, Status};
+use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::consider::{self, Considered};
 use crate::output_error::{
     Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation, mean,
 };
-use crate::tables::{EstimateRow, JointRow};
+use crate::tables::{EstimateRow, JointRow, Participation, StartingValues};
 
 /// Which maneuvers are estimated together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -206,14 +206,18 @@ fn together<const NX: usize, E: Equations<NX>>(
             estimated.fit.reason, maneuver.maneuver_id
         );
     }
-    let row = |maneuver: &Maneuver, part: &str| row(&whole, parts.len(), maneuver, part);
+    let row = |maneuver: &Maneuver, part: Participation| row(&whole, parts.len(), maneuver, part);
     let joined = parts.iter().enumerate().map(|(i, p)| JointRow {
         cost_alone: p.alone.final_cost,
         cost_joint: costs.get(i).copied(),
-        ..row(p.run.maneuver, "joined")
+        ..row(p.run.maneuver, Participation::Joined)
     });
     let rows = joined
-        .chain(left_out.iter().map(|(m, reason)| row(m, reason)))
+        .chain(
+            left_out
+                .into_iter()
+                .map(|(m, reason)| row(m, Participation::LeftOut(reason))),
+        )
         .collect();
     Joined {
         estimated,
@@ -283,9 +287,8 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     let names = joint.names().to_vec();
     let (fit, _) = fit.with_response(Response::default());
     // What each maneuver keeps to itself is no row of what they share.
-    let is_shared = |row: &EstimateRow| {
-        row.status != Status::Estimated.name() || names.contains(&row.derivative)
-    };
+    let is_shared =
+        |row: &EstimateRow| row.status != Status::Estimated || names.contains(&row.derivative);
     let shared = run.rows(Some((&names, &fit))).into_iter().filter(is_shared);
     let left_out = parts.iter().map(|p| p.ready.left_out).sum::<f64>() / parts.len().max(1) as f64;
     let estimated = Estimated {
@@ -294,7 +297,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
         correlations: vec![],
         covariance: covariance(&names, &fit),
         history: None,
-        fit: run.fit_row(&fit, left_out, "single estimates"),
+        fit: run.fit_row(&fit, left_out, StartingValues::SingleEstimates),
     };
     Ok((estimated, costs))
 }
@@ -407,7 +410,7 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
         mass_slug: mean(|m| m.mass_slug),
         x_cg_ft: mean(|m| m.x_cg_ft),
         samples: maneuvers.iter().map(|m| m.samples).sum(),
-        origin: "joint".to_owned(),
+        origin: ManeuverOrigin::Joint,
         recognised: Recognised::default(),
         quality: Quality::default(),
     }
@@ -421,7 +424,7 @@ fn nothing(whole: &Maneuver) -> Joined {
     }
 }
 
-fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: &str) -> JointRow {
+fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: Participation) -> JointRow {
     JointRow {
         joint_id: whole.maneuver_id.clone(),
         class: whole.class.clone(),
@@ -432,7 +435,7 @@ fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: &str) -> Joi
         flight_id: member.flight_id.clone(),
         alpha_deg: member.alpha_deg,
         mach: member.mach,
-        part: part.to_owned(),
+        part,
         cost_alone: None,
         cost_joint: None,
     }

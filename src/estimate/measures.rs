@@ -11,7 +11,7 @@ use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
 use crate::output_error::{Case, Fit, Model, cost, equation_error};
-use crate::tables::{CorrelationRow, EstimateRow};
+use crate::tables::{CorrelationKind, CorrelationRow, EstimateRow};
 
 /// A derivative's regressor as flown.
 struct Flown<'a> {
@@ -185,7 +185,7 @@ impl Run<'_> {
         let pairs = (0..seen.len()).flat_map(|i| (i + 1..seen.len()).map(move |j| (i, j)));
         let row = |(i, j): (usize, usize)| {
             let both = correlation(&seen[i].1, &seen[j].1)?;
-            Some(self.correlation("regressors", &seen[i].0, &seen[j].0, both))
+            Some(self.correlation(CorrelationKind::Regressors, &seen[i].0, &seen[j].0, both))
         };
         pairs.filter_map(row).collect()
     }
@@ -199,13 +199,20 @@ impl Run<'_> {
         let pairs = (0..names.len()).flat_map(|i| (i + 1..names.len()).map(move |j| (i, j)));
         pairs
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
-            .map(|(i, j)| self.correlation("estimates", &names[i], &names[j], matrix[(i, j)]))
+            .map(|(i, j)| {
+                self.correlation(
+                    CorrelationKind::Estimates,
+                    &names[i],
+                    &names[j],
+                    matrix[(i, j)],
+                )
+            })
             .collect()
     }
 
     fn correlation(
         &self,
-        kind: &str,
+        kind: CorrelationKind,
         first: &str,
         second: &str,
         correlation: f64,
@@ -213,7 +220,7 @@ impl Run<'_> {
         CorrelationRow {
             maneuver_id: self.maneuver.maneuver_id.clone(),
             class: self.class.name.clone(),
-            kind: kind.to_owned(),
+            kind,
             first: first.to_owned(),
             second: second.to_owned(),
             correlation,

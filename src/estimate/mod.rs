@@ -27,7 +27,7 @@ use crate::output_error::newton_raphson;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{consider, equation_error};
-use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput};
+use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput, StartingValues};
 use crate::units::Unit;
 
 /// What an inactive surface that moves a little all the same (feedback stays closed) does to the
@@ -67,13 +67,11 @@ pub enum Hold {
     Evidence,
 }
 
-impl Start {
-    /// As the table `fits` says it.
-    #[must_use]
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Start::EquationError => "equation error",
-            Start::WindTunnel => "wind tunnel",
+impl From<Start> for StartingValues {
+    fn from(start: Start) -> StartingValues {
+        match start {
+            Start::EquationError => StartingValues::EquationError,
+            Start::WindTunnel => StartingValues::WindTunnel,
         }
     }
 }
@@ -309,7 +307,7 @@ impl<'a> Run<'a> {
             covariance: covariance(&case.names, &fit),
             correlations: vec![],
             history: Some(self.history(&case.measurements, &fit, &ready.window, &ready.surfaces)),
-            fit: self.fit_row(&fit, ready.left_out, start.in_words()),
+            fit: self.fit_row(&fit, ready.left_out, start.into()),
         };
         self.measure(case, &ready.window, &ready.model, &fit, &mut estimated);
         Ok(estimated)
@@ -672,7 +670,7 @@ impl<'a> Run<'a> {
             mach: self.maneuver.mach,
             derivative: name.to_owned(),
             unit: unit.to_owned(),
-            status: status.name().to_owned(),
+            status,
             value: None,
             bound: None,
             bound_held: None,
@@ -687,13 +685,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn fit_row(&self, fit: &Fit, left_out: f64, start: &str) -> FitRow {
+    fn fit_row(&self, fit: &Fit, left_out: f64, start: StartingValues) -> FitRow {
         FitRow {
             maneuver_id: self.maneuver.maneuver_id.clone(),
             class: self.class.name.clone(),
-            outcome: fit.outcome.name().to_owned(),
+            outcome: fit.outcome,
             reason: fit.reason.clone(),
-            start: Some(start.to_owned()),
+            start: Some(start),
             iterations: fit.iterations,
             initial_cost: fit.initial_cost,
             final_cost: fit.final_cost,
@@ -754,7 +752,7 @@ fn rejected(maneuver: &Maneuver, reason: String) -> FitRow {
     FitRow {
         maneuver_id: maneuver.maneuver_id.clone(),
         class: maneuver.class.clone(),
-        outcome: Outcome::Rejected.name().to_owned(),
+        outcome: Outcome::Rejected,
         reason,
         start: None,
         iterations: 0,

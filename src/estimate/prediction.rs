@@ -20,7 +20,7 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
-use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow};
+use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow, PredictionStatus};
 use crate::units::Unit;
 
 /// From which others a maneuver is predicted.
@@ -56,7 +56,7 @@ impl Predicted {
     pub fn none(reason: impl Into<String>, others: usize) -> Predicted {
         let predicted_from = (others > 0).then_some(others);
         let summary = PredictedRow {
-            prediction: Some(reason.into()),
+            prediction: Some(PredictionStatus::NotPredicted(reason.into())),
             predicted_from,
             ..PredictedRow::default()
         };
@@ -77,7 +77,7 @@ pub fn others(
 ) -> Vec<Option<Vec<usize>>> {
     let converged: Vec<bool> = fits
         .iter()
-        .map(|f| f.outcome == Outcome::Converged.name())
+        .map(|f| f.outcome == Outcome::Converged)
         .collect();
     let is_sound = |i: usize| converged.get(i).copied().unwrap_or(false);
     let near = |a: &Maneuver, b: &Maneuver| {
@@ -226,8 +226,7 @@ fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<
 }
 
 fn value(estimated: &Estimated, name: &str) -> Option<f64> {
-    let of_it =
-        |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated.name();
+    let of_it = |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated;
     estimated.estimates.iter().find(of_it)?.value
 }
 
@@ -290,7 +289,7 @@ fn rows<const NX: usize, E: Equations<NX>>(
     let named = || run.class.axis.outputs().into_iter().zip(&agreements);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
-        prediction: Some("predicted".into()),
+        prediction: Some(PredictionStatus::Predicted),
         predicted_from: Some(others),
         predicted_cost: Some(cost),
         theil: whole.map(|t| t.coefficient),
@@ -316,7 +315,7 @@ fn row(run: &Run, output: Output, agreement: &Agreement) -> PredictionRow {
         maneuver_id: run.maneuver.maneuver_id.clone(),
         class: run.class.name.clone(),
         alpha_deg: run.maneuver.alpha_deg,
-        output: output.name().to_owned(),
+        output,
         unit: Unit::of_signal(output.signal()).name.to_owned(),
         samples: agreement.samples,
         root_mean_square: agreement.root_mean_square(),

@@ -18,7 +18,7 @@ use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
 use crate::error::Problem;
 use crate::flight::{Channel, Correction, Mark, Record, signal};
-use crate::tables::{ChannelRow, CheckRow, InstrumentRow};
+use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, InstrumentRow};
 
 /// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
 /// that memory does not grow with the record.
@@ -266,11 +266,11 @@ impl RelationResult {
         self.checks.iter().map(|c| c.row(flight_id)).collect()
     }
 
-    fn verdict(&self, signal: &str) -> String {
+    fn verdict(&self, signal: &str) -> ChannelVerdict {
         match self.faulty.iter().find(|f| f.signal == signal) {
-            Some(fault) => fault.verdict(),
-            None if self.confirmed.contains(&signal) => "ok".to_owned(),
-            None => "not checked".to_owned(),
+            Some(fault) => ChannelVerdict::Fault(fault.verdict()),
+            None if self.confirmed.contains(&signal) => ChannelVerdict::Ok,
+            None => ChannelVerdict::NotChecked,
         }
     }
 }
@@ -310,7 +310,8 @@ fn channel_rows(
 ) -> Vec<ChannelRow> {
     let of_channel = |(name, channel, statistics): &ReadChannel| {
         let fault = findings.verdict(&channel.signal);
-        let verdict = fault.unwrap_or_else(|| relations.verdict(&channel.signal));
+        let verdict =
+            fault.map_or_else(|| relations.verdict(&channel.signal), ChannelVerdict::Fault);
         channel_row(stretch, name, channel, statistics, verdict)
     };
     let time = channel_map
@@ -327,7 +328,7 @@ fn channel_row(
     name: &str,
     channel: &Channel,
     statistics: &ChannelStatistics,
-    verdict: String,
+    verdict: ChannelVerdict,
 ) -> ChannelRow {
     let clock = &stretch.clock;
     ChannelRow {
@@ -358,6 +359,6 @@ fn time_row(stretch: &Stretch, name: &str, channel: &Channel) -> ChannelRow {
     };
     ChannelRow {
         bridged: clock.samples - clock.rows,
-        ..channel_row(stretch, name, channel, &statistics, "ok".to_owned())
+        ..channel_row(stretch, name, channel, &statistics, ChannelVerdict::Ok)
     }
 }

@@ -12,6 +12,7 @@ use crate::flight::channel::RawColumn;
 use crate::flight::record::Series;
 use crate::flight::signal::TIME;
 use crate::flight::{Channel, Mark, RawFlight, signal};
+use crate::tables::{ChannelVerdict, CheckVerdict};
 use crate::units::DEG;
 use std::collections::BTreeMap;
 
@@ -207,7 +208,7 @@ impl Flight {
     }
 }
 
-fn verdict(ingested: &Ingested, channel: &str) -> String {
+fn verdict(ingested: &Ingested, channel: &str) -> ChannelVerdict {
     ingested
         .channels
         .iter()
@@ -225,15 +226,15 @@ fn steady_flight_is_a_record_without_problems() {
     assert_eq!((record.flight_id.as_str(), record.samples), ("007", ROWS));
     assert_relative_eq!(record.step_s, STEP_S, max_relative = 1e-12);
     assert_eq!(record.signals.len(), steady().len());
-    assert_eq!(verdict(&ingested, "an"), "ok");
-    assert_eq!(verdict(&ingested, "V"), "ok");
-    assert_eq!(verdict(&ingested, "q_deg_s"), "not checked");
+    assert_eq!(verdict(&ingested, "an"), ChannelVerdict::Ok);
+    assert_eq!(verdict(&ingested, "V"), ChannelVerdict::Ok);
+    assert_eq!(verdict(&ingested, "q_deg_s"), ChannelVerdict::NotChecked);
     let rate = ingested
         .checks
         .iter()
         .find(|c| c.relation == "theta rate against q and r")
         .unwrap();
-    assert_eq!((rate.slope, rate.verdict.as_str()), (None, "not excited"));
+    assert_eq!((rate.slope, rate.verdict), (None, CheckVerdict::NotExcited));
 }
 
 #[test]
@@ -448,7 +449,10 @@ fn a_wrong_channel_refuses_the_flight_or_is_reported_as_the_settings_say() {
     flight.settings.on_failed_check = OnFailedCheck::Report;
     let ingested = flight.ingest().unwrap();
     assert_eq!(ingested.problems, [problem]);
-    assert_eq!(verdict(&ingested, "an"), "its sign is reversed");
+    assert_eq!(
+        verdict(&ingested, "an"),
+        ChannelVerdict::Fault("its sign is reversed".into())
+    );
 }
 
 #[test]

@@ -4,14 +4,27 @@
 use serde::{Deserialize, Serialize};
 
 use super::differences::Cause;
+use crate::schema::words;
+use crate::tables::TunnelVerdict;
+
+words! {
+    /// Difference of a maneuver between two nights.
+    pub enum ManeuverDifference {
+        /// Only the later night has it.
+        New = "new",
+        /// Only the earlier night has it.
+        Gone = "gone",
+        /// Class, times or outcome differ.
+        Changed = "changed",
+    }
+}
 
 /// A maneuver that is new, gone, or no longer what it was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManeuverChange {
     pub maneuver_id: String,
     pub class: String,
-    /// `new`, `gone` or `changed`.
-    pub what: String,
+    pub what: ManeuverDifference,
     /// What is different about a changed one; the outcome of a new one.
     pub words: String,
     pub because: String,
@@ -36,8 +49,8 @@ pub struct Moved {
 pub struct VerdictChange {
     pub derivative: String,
     pub alpha_deg: f64,
-    pub before: String,
-    pub now: String,
+    pub before: TunnelVerdict,
+    pub now: TunnelVerdict,
     pub because: String,
 }
 

@@ -6,7 +6,7 @@ mod differences;
 mod parts;
 mod stage;
 
-pub use changes::{Changes, ManeuverChange, Moved, VerdictChange};
+pub use changes::{Changes, ManeuverChange, ManeuverDifference, Moved, VerdictChange};
 pub use differences::{Cause, Origin};
 pub use parts::{Code, Lineage};
 pub use stage::Stage;

@@ -1,41 +1,27 @@
 //! The stages of a campaign, in order.
 
-use serde::{Deserialize, Serialize};
+use crate::schema::words;
 
-/// The stages in order.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    #[default]
-    Ingest,
-    Segment,
-    Estimate,
-    Trend,
-    Compare,
-    Report,
+words! {
+    /// Stage of a run, in order.
+    pub enum Stage {
+        /// Flights to records.
+        Ingest = "ingest",
+        /// Records to maneuvers.
+        Segment = "segment",
+        /// Maneuvers to derivatives.
+        Estimate = "estimate",
+        /// Derivatives to trends across angle of attack.
+        Trend = "trend",
+        /// Trends against the tunnel and earlier campaigns.
+        Compare = "compare",
+        /// The report.
+        Report = "report",
+    }
 }
 
-impl Stage {
-    pub const ALL: [Stage; 6] = [
-        Stage::Ingest,
-        Stage::Segment,
-        Stage::Estimate,
-        Stage::Trend,
-        Stage::Compare,
-        Stage::Report,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::Ingest => "ingest",
-            Stage::Segment => "segment",
-            Stage::Estimate => "estimate",
-            Stage::Trend => "trend",
-            Stage::Compare => "compare",
-            Stage::Report => "report",
-        }
+impl Default for Stage {
+    fn default() -> Stage {
+        Stage::Ingest
     }
 }

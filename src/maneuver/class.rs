@@ -6,27 +6,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Output};
+use crate::schema::words;
 
-/// What becomes of a derivative in a maneuver of a class (Tables 1 and 3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Free (✓).
-    Estimated,
-    /// Held at the wind-tunnel value (W/T).
-    Held,
-    /// Its surface is not used by the class (N/A).
-    Inactive,
-}
-
-impl Status {
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::Estimated => "estimated",
-            Status::Held => "held",
-            Status::Inactive => "inactive",
-        }
+words! {
+    /// Status of a derivative or bias in the estimation of a maneuver (Tables 1 and 3).
+    pub enum Status {
+        /// Free (✓).
+        Estimated = "estimated",
+        /// Held at the wind tunnel's value (W/T).
+        Held = "held",
+        /// The class does not use its surface (N/A).
+        Inactive = "inactive",
     }
 }
 

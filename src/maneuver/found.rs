@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Condition, WindTunnel};
+use crate::schema::words;
 
 /// One line of the analyst's list of events.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,8 +35,7 @@ pub struct Maneuver {
     pub mass_slug: f64,
     pub x_cg_ft: f64,
     pub samples: usize,
-    /// `found` in the record or `given` by the analyst.
-    pub origin: String,
+    pub origin: ManeuverOrigin,
     pub recognised: Recognised,
     pub quality: Quality,
 }
@@ -44,7 +44,7 @@ impl Maneuver {
     /// Whether it should not be estimated.
     #[must_use]
     pub fn is_rejected(&self) -> bool {
-        self.quality.verdict == REJECTED
+        self.quality.verdict == Acceptance::Rejected
     }
 }
 
@@ -63,17 +63,41 @@ pub struct Recognised {
     pub evidence: String,
 }
 
-/// [`Quality::verdict`] of a maneuver that is estimated.
-pub const ACCEPTED: &str = "accepted";
-/// [`Quality::verdict`] of a maneuver that is not estimated.
-pub const REJECTED: &str = "rejected";
+words! {
+    /// Origin of a maneuver.
+    pub enum ManeuverOrigin {
+        /// Recognised in the record.
+        Found = "found",
+        /// Given in the analyst's list of events.
+        Given = "given",
+        /// Mean of maneuvers that are estimated together; not in the table `maneuvers`.
+        Joint = "joint",
+        /// Flown by the simulator; not in the table `maneuvers`.
+        Flown = "flown",
+    }
+}
+
+words! {
+    /// Verdict on a maneuver's quality.
+    pub enum Acceptance {
+        /// The maneuver is estimated. The analyst's own maneuvers always are.
+        Accepted = "accepted",
+        /// The maneuver is not estimated; the reason names the limits that it exceeds.
+        Rejected = "rejected",
+    }
+}
+
+impl Default for Acceptance {
+    fn default() -> Acceptance {
+        Acceptance::Accepted
+    }
+}
 
 /// What a maneuver is worth before it is estimated; a measure that could not be taken does not
 /// exist.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// [`ACCEPTED`] or [`REJECTED`].
-    pub verdict: String,
+    pub verdict: Acceptance,
     /// Every limit that it is beyond, in words.
     pub reason: String,
     /// Angular rates of its axis in the lead-in over those in the maneuver, both root mean square

@@ -5,4 +5,4 @@ pub mod class;
 pub mod found;
 
 pub use class::{Class, Overrides, Pulses, Recognition, Status, StepCount, Sweep};
-pub use found::{Event, Maneuver, Quality, Recognised, Unknown};
+pub use found::{Acceptance, Event, Maneuver, ManeuverOrigin, Quality, Recognised, Unknown};

@@ -8,11 +8,11 @@ use crate::config::Config;
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Estimated;
 use crate::lineage::Stage;
-use crate::maneuver::{Maneuver, Status};
+use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
 use crate::pipeline::{Flight, Progress, Run};
 use crate::store::Store;
 use crate::store::archive::{self, FlightFiles};
-use crate::tables::EstimateRow;
+use crate::tables::{EstimateRow, StartingValues};
 
 /// The story as text.
 ///
@@ -129,7 +129,7 @@ fn origin(text: &mut String, config: &Config, m: &Maneuver) {
         .map_or("a class that is no longer configured", |c| c.title.as_str());
     let _ = writeln!(text, "{}: {}, {title}", m.maneuver_id, m.class);
     line(text, "flight", &m.flight_id);
-    let origin = if m.origin == "given" {
+    let origin = if m.origin == ManeuverOrigin::Given {
         "given in the analyst's list of events"
     } else {
         "found in the record"
@@ -179,7 +179,7 @@ fn samples(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
         .ingested
         .checks
         .iter()
-        .filter(|c| !matches!(&*c.verdict, "ok" | "not excited"));
+        .filter(|c| !c.verdict.passed());
     let failed: Vec<String> = failed
         .map(|c| format!("{}: {}", c.relation, c.verdict))
         .collect();
@@ -198,7 +198,7 @@ fn fitted(text: &mut String, estimated: &Estimated) {
     let fit = &estimated.fit;
     heading(text, "Fit");
     line(text, "outcome", &format!("{}: {}", fit.outcome, fit.reason));
-    line(text, "start", fit.start.as_deref().unwrap_or("-"));
+    line(text, "start", fit.start.map_or("-", StartingValues::name));
     line(text, "iterations", &fit.iterations.to_string());
     line(
         text,
@@ -251,13 +251,13 @@ fn derivatives(text: &mut String, estimated: &Estimated) {
     estimated
         .estimates
         .iter()
-        .filter(|e| e.status != Status::Inactive.name())
+        .filter(|e| e.status != Status::Inactive)
         .for_each(|e| row(text, e));
     estimated.combined.iter().for_each(|e| row(text, e));
     let inactive = estimated
         .estimates
         .iter()
-        .filter(|e| e.status == Status::Inactive.name());
+        .filter(|e| e.status == Status::Inactive);
     let inactive: Vec<&str> = inactive.map(|e| e.derivative.as_str()).collect();
     line(
         text,
@@ -280,7 +280,7 @@ fn correlations(text: &mut String, estimated: &Estimated, limit: f64) {
     for c in &strong {
         line(
             text,
-            &c.kind,
+            c.kind.name(),
             &format!("{} {} {:.3}", c.first, c.second, c.correlation),
         );
     }

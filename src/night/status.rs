@@ -230,7 +230,7 @@ impl Run<'_> {
             });
             if let Some(Estimated { fit, .. }) = estimated {
                 status.fresh += 1;
-                if fit.outcome != Outcome::Converged.name() {
+                if fit.outcome != Outcome::Converged {
                     status
                         .failed
                         .push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));

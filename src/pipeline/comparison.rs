@@ -25,7 +25,7 @@ pub(crate) fn converged(config: &Config, campaign: &Campaign) -> Vec<EstimateRow
     let converged: BTreeSet<&str> = campaign
         .fits
         .iter()
-        .filter(|f| f.outcome == Outcome::Converged.name())
+        .filter(|f| f.outcome == Outcome::Converged)
         .map(|f| f.maneuver_id.as_str())
         .collect();
     let names = config.derivative_names();

@@ -164,7 +164,7 @@ impl Campaign {
     pub fn converged(&self) -> usize {
         self.fits
             .iter()
-            .filter(|f| f.outcome == Outcome::Converged.name())
+            .filter(|f| f.outcome == Outcome::Converged)
             .count()
     }
 }
@@ -395,7 +395,7 @@ impl Run<'_> {
         self.predict(campaign, &paths, &estimated)?;
         for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimated) {
             let fit = estimated.fit;
-            if fit.outcome != Outcome::Converged.name() {
+            if fit.outcome != Outcome::Converged {
                 let reason = format!("{}: {}", fit.outcome, fit.reason);
                 campaign.problems.push(problem(
                     "estimate",

@@ -79,7 +79,7 @@ impl Run<'_> {
             .joined
             .iter()
             .map(|j| &j.estimated.fit)
-            .filter(|f| f.outcome != Outcome::Converged.name())
+            .filter(|f| f.outcome != Outcome::Converged)
         {
             let reason = format!("{}: {}", fit.outcome, fit.reason);
             campaign

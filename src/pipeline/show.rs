@@ -185,7 +185,7 @@ impl Run<'_> {
             .open(&self.store)?;
         let record = file.part(None, maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S)?;
         // Computed again rather than stored, as for the report.
-        let history = if fit.outcome == Outcome::Rejected.name() {
+        let history = if fit.outcome == Outcome::Rejected {
             None
         } else {
             self.estimate_maneuver(&record, maneuver).history

@@ -6,11 +6,12 @@ use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::Problem;
 use crate::lineage::Changes;
-use crate::maneuver::{Maneuver, Quality, Recognised};
+use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
-    HistoryOutput, InstrumentRow, PredictionRow, TrendRow,
+    ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow, CorrelationRow, EstimateRow,
+    EventRow, EventVerdict, FitRow, History, HistoryOutput, InstrumentRow, Outcome, PredictionRow,
+    TrendRow, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -117,7 +118,7 @@ pub fn campaign() -> Campaign {
             "title: a campaign\n  deeper: 1\n".into(),
         )],
     };
-    campaign.fits[0].outcome = "not_converged".into();
+    campaign.fits[0].outcome = Outcome::NotConverged;
     campaign.estimates[5].value = Some(1e6);
     campaign.checks.push(CheckRow {
         flight_id: "1".into(),
@@ -125,7 +126,7 @@ pub fn campaign() -> Campaign {
         signals: "theta_deg q_deg_s".into(),
         slope: Some(-1.0),
         correlation: None,
-        verdict: "wrong sign".into(),
+        verdict: CheckVerdict::WrongSign,
     });
     campaign.channels.push(ChannelRow {
         flight_id: "1".into(),
@@ -141,7 +142,7 @@ pub fn campaign() -> Campaign {
         wraps: 0,
         quantisation: None,
         noise: Some(0.02),
-        verdict: "ok".into(),
+        verdict: ChannelVerdict::Ok,
     });
     campaign.problems.push(problem("a file that is no record"));
     campaign.events.push(EventRow {
@@ -152,7 +153,7 @@ pub fn campaign() -> Campaign {
         found_class: None,
         found_start_s: None,
         found_end_s: None,
-        verdict: "not found".into(),
+        verdict: EventVerdict::NotFound,
     });
     campaign
 }
@@ -183,14 +184,14 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         mass_slug: 1_050.0,
         x_cg_ft: 20.0,
         samples: 600,
-        origin: "found".into(),
+        origin: ManeuverOrigin::Found,
         recognised: Recognised::default(),
         quality: Quality::default(),
     });
     campaign.fits.push(FitRow {
         maneuver_id: maneuver_id.clone(),
         class: class.into(),
-        outcome: "converged".into(),
+        outcome: Outcome::Converged,
         reason: "steps below the tolerance".into(),
         start: None,
         iterations: 6,
@@ -214,7 +215,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             mach: 0.3,
             derivative: name.into(),
             unit: unit.into(),
-            status: "estimated".into(),
+            status: Status::Estimated,
             value: Some(0.05 - 0.001 * alpha_deg),
             bound: Some(0.002),
             bound_held: None,
@@ -292,10 +293,9 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         difference_pct: Some(100.0 * (value - 0.05) / 0.05),
         z: Some(-3.0),
         verdict: if alpha_deg < 25.0 {
-            "agrees"
+            TunnelVerdict::Agrees
         } else {
-            "flight lower"
-        }
-        .into(),
+            TunnelVerdict::FlightLower
+        },
     });
 }

@@ -4,26 +4,27 @@
 use minijinja::HtmlEscape;
 
 use crate::aero::{Axis, Coefficient};
+use crate::tables::Outcome;
 use crate::units::Unit;
 
 /// Dash in place of a missing value.
 pub const NOTHING: &str = "\u{2013}";
 
 /// Outcomes of a fit with their names in the report, in the order of its columns.
-pub const OUTCOMES: [(&str, &str); 4] = [
-    ("converged", "converged"),
-    ("not_converged", "did not converge"),
-    ("unidentifiable", "unidentifiable"),
-    ("rejected", "rejected"),
+pub const OUTCOMES: [(Outcome, &str); 4] = [
+    (Outcome::Converged, "converged"),
+    (Outcome::NotConverged, "did not converge"),
+    (Outcome::Unidentifiable, "unidentifiable"),
+    (Outcome::Rejected, "rejected"),
 ];
 
 /// Outcome of a fit in words.
 #[must_use]
-pub fn outcome_in_words(outcome: &str) -> &str {
+pub fn outcome_in_words(outcome: Outcome) -> &'static str {
     OUTCOMES
         .iter()
-        .find(|(name, _)| *name == outcome)
-        .map_or(outcome, |(_, words)| words)
+        .find(|(other, _)| *other == outcome)
+        .map_or(outcome.name(), |(_, words)| words)
 }
 
 /// Coefficient of a derivative named `<coefficient>_<regressor>`; `None` for a bias.

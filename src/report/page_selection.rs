@@ -46,7 +46,7 @@ pub fn maneuvers_with_page(
 /// Maneuvers whose fit converged.
 pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
     fits.iter()
-        .filter(|f| f.outcome == Outcome::Converged.name())
+        .filter(|f| f.outcome == Outcome::Converged)
         .map(|f| f.maneuver_id.as_str())
         .collect()
 }
@@ -93,14 +93,14 @@ fn add_evenly<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lineage::ManeuverChange;
+    use crate::lineage::{ManeuverChange, ManeuverDifference};
     use crate::report::campaign_fixture;
 
     fn change(maneuver_id: &str) -> ManeuverChange {
         ManeuverChange {
             maneuver_id: maneuver_id.to_owned(),
             class: String::new(),
-            what: "changed".to_owned(),
+            what: ManeuverDifference::Changed,
             words: String::new(),
             because: String::new(),
         }
@@ -125,7 +125,7 @@ mod tests {
         let failed: Vec<&str> = campaign
             .fits
             .iter()
-            .filter(|f| f.outcome != "converged")
+            .filter(|f| f.outcome != Outcome::Converged)
             .map(|f| f.maneuver_id.as_str())
             .collect();
         let classes: BTreeSet<&str> = campaign

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 
 use super::campaign_fixture::{Campaign, campaign, problem};
 use super::*;
+use crate::tables::Outcome;
 
 fn render(campaign: &Campaign) -> String {
     html(&campaign.contents(), None).expect("a page")
@@ -178,7 +179,6 @@ fn what_stands_in_the_data_cannot_become_markup() {
     campaign.histories[0].controls[0].0 = hostile.into();
     for row in campaign.comparison.iter_mut().take(5) {
         (row.derivative, row.unit, row.group) = (hostile.into(), hostile.into(), hostile.into());
-        row.verdict = hostile.into();
     }
     let page = render(&campaign);
     assert_eq!(page.matches("<script").count(), 1, "the page's own");
@@ -202,7 +202,7 @@ fn a_campaign_where_everything_failed_has_a_page_that_says_why() {
     campaign.comparison.clear();
     campaign.histories.clear();
     for fit in &mut campaign.fits {
-        (fit.outcome, fit.reason) = ("rejected".into(), "the vane was stuck".into());
+        (fit.outcome, fit.reason) = (Outcome::Rejected, "the vane was stuck".into());
         (fit.initial_cost, fit.final_cost) = (None, Some(f64::NAN));
     }
     let page = render(&campaign);

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::flight::{Record, signal};
-use crate::maneuver::{Class, Maneuver, Quality, Recognised};
+use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::units::DEG;
 
 use super::quality::{self, Limits};
@@ -65,7 +65,11 @@ pub(super) fn maneuver(
         mass_slug: mean(signal::MASS)?,
         x_cg_ft: mean(signal::X_CG)?,
         samples: last - first + 1,
-        origin: if given { "given" } else { "found" }.to_owned(),
+        origin: if given {
+            ManeuverOrigin::Given
+        } else {
+            ManeuverOrigin::Found
+        },
         recognised: recognised.unwrap_or_default(),
         quality: Quality::default(),
     };

@@ -4,7 +4,7 @@ use crate::aircraft::Aircraft;
 use crate::error::did_you_mean;
 use crate::flight::Record;
 use crate::maneuver::{Class, Event, Maneuver};
-use crate::tables::EventRow;
+use crate::tables::{EventRow, EventVerdict};
 
 use super::quality::Limits;
 use super::{Segmented, condition, problem};
@@ -122,15 +122,15 @@ fn most_overlapping<'a>(event: &Event, found: &'a [Maneuver]) -> Option<&'a Mane
 
 fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
     let verdict = match (given, found) {
-        (Some(_), None) => "not found",
-        (None, _) => "not given",
-        (Some(g), Some(f)) if g.class != f.class => "other class",
+        (Some(_), None) => EventVerdict::NotFound,
+        (None, _) => EventVerdict::NotGiven,
+        (Some(g), Some(f)) if g.class != f.class => EventVerdict::OtherClass,
         (Some(g), Some(f)) => {
             let apart_s = (g.start_s - f.start_s).abs().max((g.end_s - f.end_s).abs());
             if apart_s <= AGREEMENT_S {
-                "agrees"
+                EventVerdict::Agrees
             } else {
-                "other times"
+                EventVerdict::OtherTimes
             }
         }
     };
@@ -146,6 +146,6 @@ fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
         found_class: found.map(|f| f.class.clone()),
         found_start_s: found.map(|f| f.start_s),
         found_end_s: found.map(|f| f.end_s),
-        verdict: verdict.into(),
+        verdict,
     }
 }

@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::aero::Axis;
 use crate::flight::{Record, signal};
-use crate::maneuver::found::{ACCEPTED, REJECTED};
-use crate::maneuver::{Class, Maneuver, Quality};
+use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 
 /// Where a surface stops and how fast its actuator is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,12 +101,12 @@ pub(super) fn of(
     };
     let reason = beyond(&measured, limits).join("; ");
     let verdict = if reason.is_empty() || given {
-        ACCEPTED
+        Acceptance::Accepted
     } else {
-        REJECTED
+        Acceptance::Rejected
     };
     Quality {
-        verdict: verdict.to_owned(),
+        verdict,
         reason,
         ..measured
     }

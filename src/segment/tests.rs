@@ -8,7 +8,8 @@ use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
 use crate::maneuver::Quality;
-use crate::maneuver::{Event, Pulses, Recognition, StepCount, Sweep};
+use crate::maneuver::{Acceptance, Event, Pulses, Recognition, StepCount, Sweep};
+use crate::tables::EventVerdict;
 
 const STEP_S: f64 = 0.025;
 
@@ -324,7 +325,7 @@ fn doublets_of_surfaces_are_found_with_their_window_and_condition() {
     assert_one(&r, "DOUBLETS", 20.0, 29.5);
     let m = &found(&r).maneuvers[0];
     assert_eq!(
-        (m.maneuver_id.as_str(), m.origin.as_str()),
+        (m.maneuver_id.as_str(), m.origin.name()),
         ("f1_t00020", "found")
     );
     assert_abs_diff_eq!(
@@ -996,7 +997,7 @@ fn quality(spoil: impl Fn(&mut Record)) -> Quality {
 fn a_sound_maneuver_is_accepted() {
     let sound = quality(|_| {});
     assert_eq!(
-        (sound.verdict.as_str(), sound.reason.as_str()),
+        (sound.verdict.name(), sound.reason.as_str()),
         ("accepted", "")
     );
     assert!(sound.signal_to_noise.is_some_and(|v| v > 20.0), "{sound:?}");
@@ -1009,7 +1010,7 @@ fn a_sound_maneuver_is_accepted() {
 
 fn is_rejected(spoil: impl Fn(&mut Record), because: &str) {
     let spoiled = quality(spoil);
-    assert_eq!(spoiled.verdict, "rejected", "{spoiled:?}");
+    assert_eq!(spoiled.verdict, Acceptance::Rejected, "{spoiled:?}");
     assert!(
         spoiled.reason.contains(because) && !spoiled.reason.contains(';'),
         "{spoiled:?}"
@@ -1068,7 +1069,7 @@ fn samples_between_those_of_a_slow_channel_are_no_fault() {
         }
     });
     assert_eq!(
-        (slow.verdict.as_str(), slow.marked_share),
+        (slow.verdict.name(), slow.marked_share),
         ("accepted", Some(0.0)),
         "{slow:?}"
     );
@@ -1077,7 +1078,7 @@ fn samples_between_those_of_a_slow_channel_are_no_fault() {
 #[test]
 fn a_slow_turn_is_no_motion_of_the_other_axis() {
     let turning = quality(|r| add(r, signal::R, |t| 3.0 + 0.1 * t));
-    assert_eq!(turning.verdict, "accepted", "{turning:?}");
+    assert_eq!(turning.verdict, Acceptance::Accepted, "{turning:?}");
 }
 
 #[test]
@@ -1108,7 +1109,7 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
         "{at_stop:?}"
     );
     assert_eq!(
-        (at_stop.rate_limited_share, at_stop.verdict.as_str()),
+        (at_stop.rate_limited_share, at_stop.verdict.name()),
         (Some(0.0), "accepted")
     );
     limited.quality.saturated_share = 0.1;
@@ -1144,9 +1145,9 @@ fn what_the_analyst_gave_is_measured_and_never_rejected() {
         &aircraft(),
         &settings().quality,
     );
-    assert_eq!(rows[0].verdict, "agrees");
+    assert_eq!(rows[0].verdict, EventVerdict::Agrees);
     let quality = &given.maneuvers[0].quality;
-    assert_eq!(quality.verdict, "accepted");
+    assert_eq!(quality.verdict, Acceptance::Accepted);
     assert!(
         quality.reason.contains("the other axis moves"),
         "{quality:?}"
@@ -1204,7 +1205,7 @@ fn events_replace_what_overlaps_and_are_compared_with_it() {
     let said: Vec<(&str, &str)> = segmented
         .maneuvers
         .iter()
-        .map(|m| (m.class.as_str(), m.origin.as_str()))
+        .map(|m| (m.class.as_str(), m.origin.name()))
         .collect();
     assert_eq!(
         said,
@@ -1216,7 +1217,7 @@ fn events_replace_what_overlaps_and_are_compared_with_it() {
         ]
     );
     assert_abs_diff_eq!(segmented.maneuvers[0].start_s, 20.2, epsilon = 1e-9);
-    let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.as_str()).collect();
+    let verdicts: Vec<&str> = rows.iter().map(|r| r.verdict.name()).collect();
     assert_eq!(
         verdicts,
         ["agrees", "other class", "not found", "not given"]
@@ -1251,7 +1252,7 @@ fn events_of_unknown_class_or_outside_the_record_become_problems() {
     );
     assert_eq!(segmented.maneuvers.len(), 1);
     assert_eq!(
-        rows.iter().map(|r| r.verdict.as_str()).collect::<Vec<_>>(),
+        rows.iter().map(|r| r.verdict.name()).collect::<Vec<_>>(),
         ["not given"]
     );
 }

@@ -13,6 +13,7 @@ use super::atomic;
 use crate::aero::{Axis, Output};
 use crate::error::{Error, Problem, Result};
 use crate::maneuver::{Maneuver, Unknown};
+use crate::schema::Words;
 use crate::tables::{
     BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow,
     DisagreementRow, EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow,
@@ -139,9 +140,25 @@ impl Cell for Option<usize> {
     }
 }
 
-impl Cell for Axis {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[&str], _>(name, cells.map(|a| a.name()).collect::<Vec<_>>())
+impl<W: Words> Cell for W {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
+    where
+        Self: 'a,
+    {
+        column::<[Option<&str>], _>(
+            name,
+            cells.map(|cell| Some(cell.word())).collect::<Vec<_>>(),
+        )
+    }
+}
+
+impl<W: Words> Cell for Option<W> {
+    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
+    where
+        Self: 'a,
+    {
+        let words = cells.map(|cell| cell.as_ref().map(Words::word));
+        column::<[Option<&str>], _>(name, words.collect::<Vec<_>>())
     }
 }
 
@@ -319,6 +336,7 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tables::CheckVerdict;
 
     #[test]
     fn a_table_without_rows_has_its_columns() {
@@ -341,7 +359,7 @@ mod tests {
             signals: "theta_deg q_deg_s".into(),
             slope: None,
             correlation: Some(f64::NAN),
-            verdict: "not excited".into(),
+            verdict: CheckVerdict::NotExcited,
         };
         publish(&Shelf::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();

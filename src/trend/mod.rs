@@ -241,7 +241,7 @@ fn by_derivative<'a>(
     let mut order: Vec<(&str, Vec<&EstimateRow>)> = Vec::new();
     let mut place: BTreeMap<&str, usize> = BTreeMap::new();
     let is_free = |e: &&EstimateRow| {
-        e.status == Status::Estimated.name() && !settings.leave_out.contains(&e.derivative)
+        e.status == Status::Estimated && !settings.leave_out.contains(&e.derivative)
     };
     for estimate in estimates.iter().filter(is_free) {
         let at = *place.entry(&estimate.derivative).or_insert(order.len());

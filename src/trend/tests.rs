@@ -19,7 +19,7 @@ pub(super) fn estimate(
         mach: 0.3,
         derivative: derivative.into(),
         unit: "per_deg".into(),
-        status: "estimated".into(),
+        status: Status::Estimated,
         value: Some(value),
         bound: Some(bound / 5.0),
         bound_held: None,
@@ -219,7 +219,7 @@ fn held_unbounded_and_left_out_estimates_have_no_part() {
         change(&mut row);
         row
     };
-    estimates.push(wrong(&|e| e.status = "held".into()));
+    estimates.push(wrong(&|e| e.status = Status::Held));
     estimates.push(wrong(&|e| (e.bound, e.bound_corrected) = (None, None)));
     estimates.push(wrong(&|e| e.bound_corrected = Some(f64::INFINITY)));
     estimates.push(wrong(&|e| e.derivative = "bias".into()));

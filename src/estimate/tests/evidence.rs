@@ -15,6 +15,7 @@ use crate::maneuver::class::Recognition;
 use crate::output_error::tests::{
     NOISE, Noise, SAMPLES, derivative, nothing_measured, record, surface, truth,
 };
+use crate::tables::CorrelationKind;
 
 /// The longitudinal derivatives that are true, and what is flown with them.
 struct Flown {
@@ -131,7 +132,7 @@ fn held(estimated: &Estimated) -> Vec<(&str, &str)> {
     let held = estimated
         .estimates
         .iter()
-        .filter(|row| row.status == "held");
+        .filter(|row| row.status == Status::Held);
     held.map(|row| {
         (
             row.derivative.as_str(),
@@ -154,7 +155,8 @@ fn evidence_holds_nothing_where_all_is_excited() {
     let flown = fly(truth(Axis::Longitudinal), |_| {});
     let estimated = flown.estimated(Hold::Evidence, 0.5);
     assert_eq!(
-        estimated.fit.outcome, "converged",
+        estimated.fit.outcome,
+        Outcome::Converged,
         "{}",
         estimated.fit.reason
     );
@@ -168,7 +170,8 @@ fn evidence_holds_exactly_the_surface_that_did_not_move() {
     });
     let estimated = flown.estimated(Hold::Evidence, 0.5);
     assert_eq!(
-        estimated.fit.outcome, "converged",
+        estimated.fit.outcome,
+        Outcome::Converged,
         "{}",
         estimated.fit.reason
     );
@@ -177,7 +180,7 @@ fn evidence_holds_exactly_the_surface_that_did_not_move() {
     for row in estimated
         .estimates
         .iter()
-        .filter(|row| row.status == "held")
+        .filter(|row| row.status == Status::Held)
     {
         assert_eq!(
             (row.value, row.excitation),
@@ -194,7 +197,7 @@ fn evidence_holds_what_a_tunnel_without_error_knows_better_but_no_constant() {
     let free: Vec<&str> = estimated
         .estimates
         .iter()
-        .filter(|r| r.status == "estimated")
+        .filter(|r| r.status == Status::Estimated)
         .map(|r| r.derivative.as_str())
         .collect();
     assert_eq!(free, ["CN_0", "Cm_0", "CA_0"]);
@@ -233,7 +236,8 @@ fn with_twin() -> Flown {
 fn surfaces_that_move_in_proportion_are_unidentifiable_named_and_have_no_bound() {
     let estimated = with_twin().estimated(Hold::Table, 0.5);
     assert_eq!(
-        estimated.fit.outcome, "unidentifiable",
+        estimated.fit.outcome,
+        Outcome::Unidentifiable,
         "{}",
         estimated.fit.reason
     );
@@ -253,7 +257,7 @@ fn surfaces_that_move_in_proportion_are_unidentifiable_named_and_have_no_bound()
         );
     }
     let of = |c: &&CorrelationRow| {
-        c.kind == "regressors" && c.first == "de_deg" && c.second == "twin_deg"
+        c.kind == CorrelationKind::Regressors && c.first == "de_deg" && c.second == "twin_deg"
     };
     assert_relative_eq!(
         estimated.correlations.iter().find(of).unwrap().correlation,
@@ -261,7 +265,10 @@ fn surfaces_that_move_in_proportion_are_unidentifiable_named_and_have_no_bound()
         max_relative = 1e-12
     );
     assert!(
-        !estimated.correlations.iter().any(|c| c.kind == "estimates"),
+        !estimated
+            .correlations
+            .iter()
+            .any(|c| c.kind == CorrelationKind::Estimates),
         "there is no inverse to take them from"
     );
 }
@@ -272,7 +279,8 @@ fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_
     let flown = with_twin();
     let estimated = flown.estimated(Hold::Evidence, 0.5);
     assert_eq!(
-        estimated.fit.outcome, "converged",
+        estimated.fit.outcome,
+        Outcome::Converged,
         "{}",
         estimated.fit.reason
     );
@@ -315,7 +323,7 @@ fn of_surfaces_that_move_in_proportion_neither_can_be_held_without_a_tunnel_and_
         .cloned()
         .collect();
     let estimated = flown.estimated_with(Hold::Evidence, &tunnel(&known, 0.5));
-    assert_eq!(estimated.fit.outcome, "unidentifiable");
+    assert_eq!(estimated.fit.outcome, Outcome::Unidentifiable);
     let reason = &estimated.fit.reason;
     assert!(
         reason.ends_with(

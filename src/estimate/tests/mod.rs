@@ -11,8 +11,9 @@ use super::*;
 use crate::dynamics::tests::aircraft;
 use crate::flight::record::Series;
 use crate::flight::signal;
-use crate::maneuver::Recognition;
+use crate::maneuver::{ManeuverOrigin, Recognition};
 use crate::output_error::tests::{NOISE, Noise, SAMPLES, TABLE, record, truth};
+use crate::tables::{Participation, PredictionStatus};
 
 /// The aircraft, model, class and settings of the tests.
 struct Bench {
@@ -132,7 +133,7 @@ fn maneuver(id: &str, alpha_deg: f64) -> Maneuver {
         mass_slug: 1040.0,
         x_cg_ft: 38.2,
         samples: SAMPLES,
-        origin: "found".into(),
+        origin: ManeuverOrigin::Found,
         recognised: crate::maneuver::Recognised::default(),
         quality: crate::maneuver::Quality::default(),
     }
@@ -205,7 +206,7 @@ fn maneuvers_joined_have_smaller_bounds_and_no_biases_and_a_spoiled_one_is_left_
     ];
     let joined = joint::estimate("joint/steps/20.20", &members, &bench.class, &bench.basis());
     let fit = &joined.estimated.fit;
-    assert_eq!(fit.outcome, "converged", "{}", fit.reason);
+    assert_eq!(fit.outcome, Outcome::Converged, "{}", fit.reason);
     assert!(
         fit.reason
             .contains("left out: c (40% of its output samples are marked)"),
@@ -231,7 +232,11 @@ fn maneuvers_joined_have_smaller_bounds_and_no_biases_and_a_spoiled_one_is_left_
     assert_relative_eq!(both.alpha_deg, 20.2, max_relative = 1e-9);
     assert_eq!(joined.members.len(), 3);
     assert_eq!(
-        joined.members.iter().filter(|m| m.part == "joined").count(),
+        joined
+            .members
+            .iter()
+            .filter(|m| m.part == Participation::Joined)
+            .count(),
         2
     );
     assert!(joined.members.iter().all(|m| m.maneuvers == 2));
@@ -246,7 +251,7 @@ fn with_one_sound_maneuver_there_is_nothing_to_join_and_the_row_says_so() {
     let maneuvers = [maneuver("a", 20.0), maneuver("c", 20.2)];
     let members = [(&a, &maneuvers[0]), (&spoiled, &maneuvers[1])];
     let joined = joint::estimate("joint/steps/20.10", &members, &bench.class, &bench.basis());
-    assert_eq!(joined.estimated.fit.outcome, "rejected");
+    assert_eq!(joined.estimated.fit.outcome, Outcome::Rejected);
     assert!(
         joined
             .estimated
@@ -272,8 +277,8 @@ fn a_maneuver_of_which_nothing_is_free_is_rejected_and_no_panic() {
         bench.settings.hold = hold;
         let fit = bench.estimate(&record, &maneuver("a", 20.0)).fit;
         assert_eq!(
-            (fit.outcome.as_str(), fit.reason.as_str()),
-            ("rejected", "nothing is free to be estimated")
+            (fit.outcome, fit.reason.as_str()),
+            (Outcome::Rejected, "nothing is free to be estimated")
         );
     }
 }
@@ -299,8 +304,8 @@ fn maneuvers_with_the_same_derivatives_predict_each_other_to_the_noise() {
     let predicted = predicted(1.0);
     let summary = &predicted.summary;
     assert_eq!(
-        (summary.prediction.as_deref(), summary.predicted_from),
-        (Some("predicted"), Some(2))
+        (summary.prediction.as_ref(), summary.predicted_from),
+        (Some(&PredictionStatus::Predicted), Some(2))
     );
     assert_eq!(predicted.outputs.len(), OUTPUTS);
     for (row, noise) in predicted.outputs.iter().zip(NOISE) {
@@ -349,7 +354,7 @@ fn others_are_those_of_the_class_that_are_near_and_converged() {
         .map(|m| rejected(m, String::new()))
         .collect();
     for fit in &mut fits[..2] {
-        fit.outcome = Outcome::Converged.name().into();
+        fit.outcome = Outcome::Converged;
     }
     let settings = bench.settings.prediction.unwrap();
     assert_eq!(

@@ -16,6 +16,7 @@ use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
 use crate::lab::simulator::air_data::AirData;
+use crate::maneuver::{ManeuverOrigin, Status};
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
 
@@ -65,7 +66,7 @@ fn maneuver(maneuver_id: &str, class: &str, mach: f64) -> Maneuver {
         mass_slug: 1050.0,
         x_cg_ft: 38.0,
         samples: 401,
-        origin: "found".into(),
+        origin: ManeuverOrigin::Found,
         recognised: crate::maneuver::Recognised::default(),
         quality: crate::maneuver::Quality::default(),
     }
@@ -80,7 +81,7 @@ fn estimate(maneuver_id: &str, class: &str, derivative: &str) -> EstimateRow {
         mach: 0.3,
         derivative: derivative.into(),
         unit: "per_deg".into(),
-        status: "estimated".into(),
+        status: Status::Estimated,
         value: Some(1.0),
         bound: Some(0.1),
         bound_held: None,

@@ -8,39 +8,13 @@ use super::relations::{self, Choice, Relation, Side};
 use crate::aircraft::Aircraft;
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
-use crate::tables::CheckRow;
-
-/// How a relation came out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    Ok,
-    NotExcited,
-    WrongSign,
-    WrongScale,
-    DoesNotAgree,
-}
-
-impl Verdict {
-    pub fn words(self) -> &'static str {
-        match self {
-            Verdict::Ok => "ok",
-            Verdict::NotExcited => "not excited",
-            Verdict::WrongSign => "wrong sign",
-            Verdict::WrongScale => "wrong scale",
-            Verdict::DoesNotAgree => "does not agree",
-        }
-    }
-
-    pub fn failed(self) -> bool {
-        !matches!(self, Verdict::Ok | Verdict::NotExcited)
-    }
-}
+use crate::tables::{CheckRow, CheckVerdict};
 
 /// One relation of one flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
     pub relation: Relation,
-    pub verdict: Verdict,
+    pub verdict: CheckVerdict,
     pub fit: Option<Fit>,
     /// In how many windows the record jumps.
     pub jumps: usize,
@@ -54,7 +28,7 @@ impl Check {
             signals: self.relation.signals.join(" "),
             slope: self.fit.map(|f| f.slope),
             correlation: self.fit.map(|f| f.correlation),
-            verdict: self.verdict.words().to_owned(),
+            verdict: self.verdict,
         }
     }
 }
@@ -123,7 +97,7 @@ impl Sides {
     /// makes jumps too, and must not hide in them where it shows its sign or its unit.
     fn check(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
         let own = self.without(&self.jumps.iter().copied().collect(), settings);
-        let disagrees = own.verdict == Verdict::DoesNotAgree && own.fit.is_some();
+        let disagrees = own.verdict == CheckVerdict::DoesNotAgree && own.fit.is_some();
         if disagrees {
             self.without(jumped, settings)
         } else {
@@ -144,7 +118,7 @@ impl Sides {
         if pairs.len() < settings.least_windows.max(2) {
             return Check {
                 relation,
-                verdict: Verdict::NotExcited,
+                verdict: CheckVerdict::NotExcited,
                 fit: None,
                 jumps,
             };
@@ -153,8 +127,8 @@ impl Sides {
         // A side of nothing but zeros has no slope: a dead channel where the other side is beyond a
         // level.
         let dead = match relation.choice {
-            Choice::Above(_) => Verdict::DoesNotAgree,
-            Choice::Largest { .. } => Verdict::NotExcited,
+            Choice::Above(_) => CheckVerdict::DoesNotAgree,
+            Choice::Largest { .. } => CheckVerdict::NotExcited,
         };
         let verdict = fit.map_or(dead, |f| judge(&f, &relation, settings));
         Check {
@@ -168,7 +142,7 @@ impl Sides {
 
 /// The signals that some relation confirms.
 pub fn confirmed_signals(checks: &[Check]) -> Vec<&'static str> {
-    let good = checks.iter().filter(|c| c.verdict == Verdict::Ok);
+    let good = checks.iter().filter(|c| c.verdict == CheckVerdict::Ok);
     good.flat_map(|c| c.relation.dominant()).copied().collect()
 }
 
@@ -332,23 +306,23 @@ const BIAS: f64 = 0.5;
 /// A verdict needs the slope to be wrong by several standard errors and by more than biases can
 /// make it. Correlation counts only where the windows were chosen by a level that noise does not
 /// reach.
-fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
+fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> CheckVerdict {
     let margin =
         settings.standard_errors * fit.standard_error + BIAS * relation.choice.level() / fit.size;
     let (low, high) = (fit.slope - margin, fit.slope + margin);
     let level = matches!(relation.choice, Choice::Above(_));
     if level && fit.correlation.abs() < relation.correlation {
-        Verdict::DoesNotAgree
+        CheckVerdict::DoesNotAgree
     } else if high < 0.0 {
-        Verdict::WrongSign
+        CheckVerdict::WrongSign
     } else if fit.slope < 0.0 {
-        Verdict::NotExcited
+        CheckVerdict::NotExcited
     } else if low > settings.slope_factor || high < 1.0 / settings.slope_factor {
-        Verdict::WrongScale
+        CheckVerdict::WrongScale
     } else if low <= 0.0 {
-        Verdict::NotExcited
+        CheckVerdict::NotExcited
     } else {
-        Verdict::Ok
+        CheckVerdict::Ok
     }
 }
 
@@ -356,7 +330,7 @@ fn judge(fit: &Fit, relation: &Relation, settings: &Checks) -> Verdict {
 mod tests {
     use super::*;
 
-    fn verdict(choice: Choice, slope: f64, standard_error: f64, correlation: f64) -> Verdict {
+    fn verdict(choice: Choice, slope: f64, standard_error: f64, correlation: f64) -> CheckVerdict {
         let settings = Checks::default();
         let relation = Relation {
             choice,
@@ -379,19 +353,19 @@ mod tests {
     #[test]
     fn verdicts_need_several_standard_errors() {
         let level = Choice::Above(1.0);
-        assert_eq!(verdict(level, 0.98, 0.01, 0.99), Verdict::Ok);
-        assert_eq!(verdict(level, -1.0, 0.01, -0.99), Verdict::WrongSign);
-        assert_eq!(verdict(level, 57.3, 0.5, 0.99), Verdict::WrongScale);
-        assert_eq!(verdict(level, 0.02, 0.001, 0.99), Verdict::WrongScale);
-        assert_eq!(verdict(level, 0.1, 0.1, 0.1), Verdict::DoesNotAgree);
-        assert_eq!(verdict(level, 0.6, 0.05, 0.8), Verdict::Ok);
+        assert_eq!(verdict(level, 0.98, 0.01, 0.99), CheckVerdict::Ok);
+        assert_eq!(verdict(level, -1.0, 0.01, -0.99), CheckVerdict::WrongSign);
+        assert_eq!(verdict(level, 57.3, 0.5, 0.99), CheckVerdict::WrongScale);
+        assert_eq!(verdict(level, 0.02, 0.001, 0.99), CheckVerdict::WrongScale);
+        assert_eq!(verdict(level, 0.1, 0.1, 0.1), CheckVerdict::DoesNotAgree);
+        assert_eq!(verdict(level, 0.6, 0.05, 0.8), CheckVerdict::Ok);
         let weak = Choice::Largest {
             share: 0.05,
             level: 0.01,
         };
-        assert_eq!(verdict(weak, 0.4, 0.15, 0.3), Verdict::NotExcited);
-        assert_eq!(verdict(weak, 0.9, 0.1, 0.7), Verdict::Ok);
-        assert_eq!(verdict(weak, -0.9, 0.1, -0.7), Verdict::WrongSign);
+        assert_eq!(verdict(weak, 0.4, 0.15, 0.3), CheckVerdict::NotExcited);
+        assert_eq!(verdict(weak, 0.9, 0.1, 0.7), CheckVerdict::Ok);
+        assert_eq!(verdict(weak, -0.9, 0.1, -0.7), CheckVerdict::WrongSign);
     }
 
     fn pairs(sides: &[(f64, f64)]) -> Vec<Pair> {
@@ -480,11 +454,11 @@ mod tests {
         assert!(jumping.jumps.is_empty(), "too many for jumps of its own");
         assert_eq!(
             verdicts(&jumping),
-            (Verdict::DoesNotAgree, Verdict::NotExcited)
+            (CheckVerdict::DoesNotAgree, CheckVerdict::NotExcited)
         );
         assert_eq!(
             verdicts(&compared(-1.0)),
-            (Verdict::WrongSign, Verdict::WrongSign)
+            (CheckVerdict::WrongSign, CheckVerdict::WrongSign)
         );
     }
 

@@ -9,12 +9,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::agreement::{Check, Verdict, check_relations, confirmed_signals};
+use super::agreement::{Check, check_relations, confirmed_signals};
 use super::block_means::BlockMeans;
 use super::relations;
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, signal};
 use crate::ingest::settings::Checks;
+use crate::tables::CheckVerdict;
 use crate::units::Unit;
 
 /// A channel that fails its checks.
@@ -36,7 +37,7 @@ impl FaultyChannel {
         self.alone && self.factor.is_some()
     }
 
-    /// Verdict for the table `channels`.
+    /// CheckVerdict for the table `channels`.
     pub fn verdict(&self) -> String {
         let cause = self
             .cause
@@ -79,7 +80,7 @@ pub fn find_faulty_channels(
     let dead = |s: &str| {
         still.contains(&s)
             || found.iter().any(|c| {
-                c.verdict.failed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks)
+                !c.verdict.passed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks)
             })
     };
     let mut guilty = accused(channels, recorded, blocks, &dead);
@@ -88,7 +89,7 @@ pub fn find_faulty_channels(
     }
     let (mut blocks, mut found) = (blocks.clone(), found.to_vec());
     for _ in 0..FAULTS {
-        if !found.iter().any(|c| c.verdict.failed()) {
+        if !found.iter().any(|c| !c.verdict.passed()) {
             return guilty;
         }
         let mut trials = Vec::new();
@@ -177,7 +178,7 @@ fn suspects<'a>(
     let failed = |signal: &str| {
         found
             .iter()
-            .any(|c| c.verdict.failed() && c.relation.signals.contains(&signal))
+            .any(|c| !c.verdict.passed() && c.relation.signals.contains(&signal))
     };
     let suspect = |c: &Channel| recorded.contains(&c.signal) && failed(&c.signal);
     channels
@@ -210,18 +211,21 @@ fn corrections(channel: &Channel) -> Vec<(f64, String)> {
 
 /// Relations that fail, or that say nothing any more though they did before.
 fn bad(checks: &[Check], before: &[Check]) -> usize {
-    let silenced =
-        |c: &Check, b: &Check| c.verdict == Verdict::NotExcited && b.verdict != Verdict::NotExcited;
+    let silenced = |c: &Check, b: &Check| {
+        c.verdict == CheckVerdict::NotExcited && b.verdict != CheckVerdict::NotExcited
+    };
     checks
         .iter()
         .zip(before)
-        .filter(|(c, b)| c.verdict.failed() || silenced(c, b))
+        .filter(|(c, b)| !c.verdict.passed() || silenced(c, b))
         .count()
 }
 
 /// The sum of the squared misfits of the relations that say something.
 fn misfit(checks: &[Check]) -> f64 {
-    let excited = checks.iter().filter(|c| c.verdict != Verdict::NotExcited);
+    let excited = checks
+        .iter()
+        .filter(|c| c.verdict != CheckVerdict::NotExcited);
     excited
         .filter_map(|c| c.fit)
         .map(|f| f.misfit.powi(2))
@@ -256,7 +260,7 @@ fn common(
     recorded: &[String],
 ) -> Vec<FaultyChannel> {
     let cleared = confirmed_signals(found);
-    let failed: Vec<&Check> = found.iter().filter(|c| c.verdict.failed()).collect();
+    let failed: Vec<&Check> = found.iter().filter(|c| !c.verdict.passed()).collect();
     let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
     let dominates = |s: &str| failed.iter().any(|c| c.relation.dominant().contains(&s));
     let unconfirmed = |s: &str| !cleared.contains(&s);
@@ -308,7 +312,7 @@ fn accused(
 pub fn report(guilty: &[FaultyChannel], found: &[Check]) -> Option<FaultReport> {
     let failed: Vec<String> = found
         .iter()
-        .filter(|c| c.verdict.failed())
+        .filter(|c| !c.verdict.passed())
         .map(described)
         .collect();
     if failed.is_empty() && guilty.is_empty() {
@@ -367,7 +371,7 @@ fn one<'a>(names: &[String], singular: &'a str, plural: &'a str) -> &'a str {
 }
 
 fn described(check: &Check) -> String {
-    let words = check.verdict.words();
+    let words = check.verdict;
     match check.fit {
         Some(fit) => format!("{}: slope {:.3}, {words}", check.relation.name, fit.slope),
         None => format!("{}: {words}", check.relation.name),

@@ -9,7 +9,7 @@ use super::parameters::{
 use super::settings::{Action, Compatibility, OnFault};
 use crate::error::Problem;
 use crate::flight::{Channel, Correction, signal};
-use crate::tables::InstrumentRow;
+use crate::tables::{InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
 
 /// The equations themselves are held to be no better than this, nor the clock.
@@ -293,10 +293,10 @@ impl Finding {
         let faults = self.faults();
         let told = self.estimates.iter().any(Option::is_some);
         let verdict = match (faults.is_empty(), told) {
-            (false, _) => faults.join(", "),
-            (true, true) if of(Kind::Delay).is_none() => InstrumentRow::NO_DELAY.to_owned(),
-            (true, true) => "ok".to_owned(),
-            (true, false) => "not excited".to_owned(),
+            (false, _) => InstrumentVerdict::Fault(faults.join(", ")),
+            (true, true) if of(Kind::Delay).is_none() => InstrumentVerdict::NoDelay,
+            (true, true) => InstrumentVerdict::Ok,
+            (true, false) => InstrumentVerdict::NotExcited,
         };
         InstrumentRow {
             flight_id: flight_id.to_owned(),

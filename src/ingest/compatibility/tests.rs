@@ -16,6 +16,7 @@ use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal as s};
 use crate::lab::simulator::noise::Noise;
+use crate::tables::InstrumentVerdict;
 use crate::units::{DEG, G0_FT_S2};
 
 const STEP_S: f64 = 0.025;
@@ -629,7 +630,7 @@ fn of_too_short_a_flight_nothing_is_said() {
         findings
             .rows("f")
             .iter()
-            .all(|r| r.verdict == "not excited" && r.applied.is_empty())
+            .all(|r| r.verdict == InstrumentVerdict::NotExcited && r.applied.is_empty())
     );
 }
 

@@ -28,7 +28,7 @@ pub fn coverage(
         .collect();
     let converged: Vec<&Estimated> = estimated
         .iter()
-        .filter(|e| e.fit.outcome == Outcome::Converged.name())
+        .filter(|e| e.fit.outcome == Outcome::Converged)
         .collect();
     let row = |truth: &TrueDerivative| {
         let rows: Vec<&EstimateRow> = converged
@@ -73,7 +73,7 @@ fn row_of<'a>(estimated: &'a Estimated, derivative: &str) -> Option<&'a Estimate
     estimated
         .estimates
         .iter()
-        .find(|r| r.derivative == derivative && r.status == Status::Estimated.name())
+        .find(|r| r.derivative == derivative && r.status == Status::Estimated)
 }
 
 /// Mean and standard deviation of errors.

@@ -9,7 +9,7 @@ use crate::estimate::{self, Basis, Estimated, Start};
 use crate::lab::simulator::noise::seed_of;
 use crate::lab::simulator::{Flown, TrueDerivative};
 use crate::output_error::Outcome;
-use crate::tables::{EstimateRow, StartRow};
+use crate::tables::{EstimateRow, StartRow, StartingValues};
 
 /// The minimum is the same when no derivative differs by more than this share of its bound.
 const SAME: f64 = 0.1;
@@ -75,7 +75,7 @@ pub fn starts(
             let found = subject.from(&elsewhere, setting, seed);
             let same = same(&reference, &found);
             (
-                same && found.fit.start.as_deref() == Some(Start::WindTunnel.in_words()),
+                same && found.fit.start == Some(StartingValues::WindTunnel),
                 same,
             )
         };
@@ -116,7 +116,7 @@ impl Subject<'_> {
 }
 
 fn same(a: &Estimated, b: &Estimated) -> bool {
-    let converged = |e: &Estimated| e.fit.outcome == Outcome::Converged.name();
+    let converged = |e: &Estimated| e.fit.outcome == Outcome::Converged;
     let near = |(a, b): (&EstimateRow, &EstimateRow)| match (a.value, b.value, a.bound) {
         (Some(at), Some(found), Some(bound)) => (at - found).abs() <= SAME * bound,
         // Held, or inactive.

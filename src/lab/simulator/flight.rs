@@ -12,7 +12,7 @@ use super::trim::Trim;
 use super::{Card, Flown, Simulator, Tables, TrueDerivative, sensors, turbulence};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
-use crate::maneuver::{Maneuver, Quality, Recognised};
+use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::units::DEG;
 
 /// α and β beyond which the build-up means nothing and the maneuver is lost, deg.
@@ -358,7 +358,7 @@ impl<'a> Flight<'a> {
             mass_slug: of(signal::MASS),
             x_cg_ft: of(signal::X_CG),
             samples: last - first + 1,
-            origin: "flown".to_owned(),
+            origin: ManeuverOrigin::Flown,
             recognised: Recognised::default(),
             quality: Quality::default(),
         }

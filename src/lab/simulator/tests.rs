@@ -16,6 +16,7 @@ use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Basis, Estimated};
 use crate::flight::signal;
 use crate::lab::campaign::SimulatedCampaign;
+use crate::tables::Outcome;
 use crate::units::DEG;
 
 fn simulation() -> SimulatedCampaign {
@@ -348,7 +349,7 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
             .fly(&simulation.card(class, alpha).unwrap())
             .unwrap();
         let estimated = estimated(&simulation, &flown);
-        assert_eq!(estimated.fit.outcome, "converged");
+        assert_eq!(estimated.fit.outcome, Outcome::Converged);
         for name in derivatives {
             let truth = flown
                 .truth

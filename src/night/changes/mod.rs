@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::flight::is_stretch;
 use crate::lineage::{
-    Cause, Changes, Lineage, ManeuverChange, Moved, Origin, Stage, VerdictChange,
+    Cause, Changes, Lineage, ManeuverChange, ManeuverDifference, Moved, Origin, Stage,
+    VerdictChange,
 };
 use crate::maneuver::Status;
-use crate::output_error::Outcome;
-use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
+use crate::tables::{EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict};
 
 /// What a maneuver was taken for, of the table `maneuvers`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,7 +69,10 @@ pub fn between(since: &str, before: &Tables, now: &Tables) -> Changes {
         || !changes.trends.is_empty()
         || !changes.gone_trends.is_empty()
         || !changes.verdicts.is_empty()
-        || changes.maneuvers.iter().any(|m| m.what != "new");
+        || changes
+            .maneuvers
+            .iter()
+            .any(|m| m.what != ManeuverDifference::New);
     changes
 }
 
@@ -148,7 +151,7 @@ impl Reasons {
         for row in now
             .estimates
             .iter()
-            .filter(|e| e.status == Status::Estimated.name())
+            .filter(|e| e.status == Status::Estimated)
         {
             if let Some(because) = why.get(row.maneuver_id.as_str()) {
                 add(&row.derivative, &row.class, because);
@@ -236,20 +239,20 @@ fn maneuvers(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<ManeuverCh
     let (old, new, old_fits, new_fits) = (by_id(before), by_id(now), fits(before), fits(now));
     let outcome = |fits: &BTreeMap<&str, &FitRow>, id: &str| {
         fits.get(id)
-            .map_or_else(|| "no fit".to_owned(), |f| f.outcome.clone())
+            .map_or_else(|| "no fit".to_owned(), |f| f.outcome.to_string())
     };
     let ids: BTreeSet<&str> = old.keys().chain(new.keys()).copied().collect();
     let mut changes = Vec::new();
     for id in ids {
         let (what, words, window) = match (old.get(id), new.get(id)) {
-            (None, Some(window)) => ("new", outcome(&new_fits, id), *window),
-            (Some(window), None) => ("gone", String::new(), *window),
+            (None, Some(window)) => (ManeuverDifference::New, outcome(&new_fits, id), *window),
+            (Some(window), None) => (ManeuverDifference::Gone, String::new(), *window),
             (Some(a), Some(b)) => {
                 let words = difference(a, b, &outcome(&old_fits, id), &outcome(&new_fits, id));
                 if words.is_empty() {
                     continue;
                 }
-                ("changed", words, *b)
+                (ManeuverDifference::Changed, words, *b)
             }
             (None, None) => continue,
         };
@@ -258,7 +261,7 @@ fn maneuvers(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<ManeuverCh
         changes.push(ManeuverChange {
             maneuver_id,
             class,
-            what: what.to_owned(),
+            what,
             words,
             because,
         });
@@ -287,15 +290,13 @@ fn estimates(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<Moved> {
     let converged = |t: &Tables| -> BTreeSet<String> {
         t.fits
             .iter()
-            .filter(|f| f.outcome == Outcome::Converged.name())
+            .filter(|f| f.outcome == Outcome::Converged)
             .map(|f| f.maneuver_id.clone())
             .collect()
     };
     let (a, b) = (converged(before), converged(now));
     let counts = |e: &&EstimateRow| {
-        e.status == Status::Estimated.name()
-            && a.contains(&e.maneuver_id)
-            && b.contains(&e.maneuver_id)
+        e.status == Status::Estimated && a.contains(&e.maneuver_id) && b.contains(&e.maneuver_id)
     };
     let old: BTreeMap<(&str, &str), &EstimateRow> = before
         .estimates
@@ -373,8 +374,8 @@ fn verdicts(before: &Tables, now: &Tables, reasons: &Reasons) -> Vec<VerdictChan
         (was.verdict != c.verdict).then(|| VerdictChange {
             derivative: c.derivative.clone(),
             alpha_deg: c.alpha_deg,
-            before: was.verdict.clone(),
-            now: c.verdict.clone(),
+            before: was.verdict,
+            now: c.verdict,
             because: reasons.of_trend(&c.derivative, "", Stage::Compare),
         })
     };

@@ -1,6 +1,7 @@
 //! Two nights that differ in one thing: that is found, with its cause, and nothing else is.
 
 use super::*;
+use crate::tables::TunnelVerdict;
 
 #[derive(Clone)]
 struct Campaign {
@@ -53,7 +54,7 @@ impl Campaign {
             mach: 0.3,
             derivative: "Cm_de".into(),
             unit: "per_deg".into(),
-            status: "estimated".into(),
+            status: Status::Estimated,
             value: Some(value),
             bound: Some(0.05),
             bound_held: None,
@@ -73,7 +74,7 @@ fn fit(maneuver_id: &str, class: &str) -> FitRow {
     FitRow {
         maneuver_id: maneuver_id.to_owned(),
         class: class.to_owned(),
-        outcome: "converged".into(),
+        outcome: Outcome::Converged,
         reason: String::new(),
         start: None,
         iterations: 5,
@@ -108,7 +109,7 @@ fn campaign() -> Campaign {
     campaign.verdicts.push(PublishedVerdict {
         derivative: "Cm_de".into(),
         alpha_deg: 30.0,
-        verdict: "agrees".into(),
+        verdict: TunnelVerdict::Agrees,
     });
     campaign
 }
@@ -124,13 +125,13 @@ fn a_new_flight_brings_new_maneuvers_and_is_why_a_trend_moved() {
     let mut now = campaign();
     now.fly("f3", "one", 3.0);
     now.trends[0].value = 1.7;
-    now.verdicts[0].verdict = "flight higher".into();
+    now.verdicts[0].verdict = TunnelVerdict::FlightHigher;
     let changes = between("0001", &campaign().tables(), &now.tables());
     assert_eq!(changes.maneuvers.len(), 1);
     let new = &changes.maneuvers[0];
     assert_eq!(
-        (&*new.maneuver_id, &*new.what, &*new.because),
-        ("f3_one", "new", "new flight f3")
+        (&*new.maneuver_id, new.what, &*new.because),
+        ("f3_one", ManeuverDifference::New, "new flight f3")
     );
     assert_eq!(
         (changes.trends.len(), &*changes.trends[0].because),
@@ -199,7 +200,7 @@ fn a_maneuver_is_gone_with_its_flight_or_no_longer_what_it_was() {
     now.estimates.remove(1);
     now.lineage.flights.remove("f2");
     now.maneuvers[0].end_s = 21.0;
-    now.fits[0].outcome = "not_converged".into();
+    now.fits[0].outcome = Outcome::NotConverged;
     now.lineage.flights.insert("f1".into(), "02".into());
     let changes = between("0001", &campaign().tables(), &now.tables());
     let of = |id: &str| {
@@ -215,8 +216,11 @@ fn a_maneuver_is_gone_with_its_flight_or_no_longer_what_it_was() {
     );
     assert_eq!(of("f1_one").because, "the file of flight f1 changed");
     assert_eq!(
-        (&*of("f2_two").what, &*of("f2_two").because),
-        ("gone", "flight f2 is gone from the archive")
+        (of("f2_two").what, &*of("f2_two").because),
+        (
+            ManeuverDifference::Gone,
+            "flight f2 is gone from the archive"
+        )
     );
     assert!(changes.alert);
 }

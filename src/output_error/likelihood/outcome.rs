@@ -4,32 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::dynamics::OUTPUTS;
 use crate::output_error::kernel::response::Response;
-
-/// The end of an estimation, in the words of the `fits` table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The minimum is reached.
-    Converged,
-    /// It is not: the reason says what stopped the iteration.
-    NotConverged,
-    /// The data do not determine some direction of the parameters: the reason names the
-    /// derivatives.
-    Unidentifiable,
-    /// The maneuver was not estimated at all.
-    Rejected,
-}
-
-impl Outcome {
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Outcome::Converged => "converged",
-            Outcome::NotConverged => "not_converged",
-            Outcome::Unidentifiable => "unidentifiable",
-            Outcome::Rejected => "rejected",
-        }
-    }
-}
+pub use crate::tables::Outcome;
 
 /// The result of an estimation; `R` is the response of one maneuver, or of several joined.
 #[derive(Clone, Debug)]

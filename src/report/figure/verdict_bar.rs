@@ -2,10 +2,12 @@
 
 use std::fmt::Write;
 
+use crate::tables::TunnelVerdict;
+
 /// A part of the bar with one verdict.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment<'a> {
-    pub verdict: &'a str,
+pub struct Segment {
+    pub verdict: TunnelVerdict,
     pub from_deg: f64,
     pub to_deg: f64,
 }
@@ -14,13 +16,13 @@ pub struct Segment<'a> {
 const HEIGHT: u32 = 14;
 
 /// Top, bottom and colour of a segment. Place and height distinguish verdicts without colour.
-fn style(verdict: &str) -> (f64, f64, &'static str) {
+fn style(verdict: TunnelVerdict) -> (f64, f64, &'static str) {
     match verdict {
-        "agrees" => (5.0, 9.0, "#8a8f98"),
-        "flight higher" => (0.0, 7.0, "#0060a8"),
-        "flight lower" => (7.0, 14.0, "#b34700"),
-        "sign differs" => (0.0, 14.0, "#7a0143"),
-        _ => (6.5, 7.5, "#c9ccd1"),
+        TunnelVerdict::Agrees => (5.0, 9.0, "#8a8f98"),
+        TunnelVerdict::FlightHigher => (0.0, 7.0, "#0060a8"),
+        TunnelVerdict::FlightLower => (7.0, 14.0, "#b34700"),
+        TunnelVerdict::SignDiffers => (0.0, 14.0, "#7a0143"),
+        TunnelVerdict::NoTunnelValue => (6.5, 7.5, "#c9ccd1"),
     }
 }
 
@@ -62,8 +64,8 @@ mod tests {
             to_deg,
         };
         let segments = [
-            segment("agrees", 5.0, 15.0),
-            segment("flight higher", 15.0, 35.0),
+            segment(TunnelVerdict::Agrees, 5.0, 15.0),
+            segment(TunnelVerdict::FlightHigher, 15.0, 35.0),
         ];
         let svg = draw(&segments, (5.0, 35.0), 120);
         assert_eq!(svg.matches("<rect").count(), 2);

@@ -1,6 +1,6 @@
 //! Changes since the previously published night, with their causes.
 
-use crate::lineage::{Changes, Moved};
+use crate::lineage::{Changes, ManeuverDifference, Moved};
 use crate::report::notation::{angle, number};
 use crate::report::table_view::TableView;
 
@@ -30,11 +30,11 @@ pub fn headline(changes: &Changes) -> String {
 
 /// Number of changes of each kind that occurs.
 fn counts(changes: &Changes) -> Vec<String> {
-    let maneuvers = |kind: &str| changes.maneuvers.iter().filter(|m| m.what == kind).count();
+    let maneuvers = |kind| changes.maneuvers.iter().filter(|m| m.what == kind).count();
     [
-        (maneuvers("new"), "new maneuvers"),
-        (maneuvers("gone"), "maneuvers gone"),
-        (maneuvers("changed"), "maneuvers changed"),
+        (maneuvers(ManeuverDifference::New), "new maneuvers"),
+        (maneuvers(ManeuverDifference::Gone), "maneuvers gone"),
+        (maneuvers(ManeuverDifference::Changed), "maneuvers changed"),
         (changes.estimates.len(), "estimates moved"),
         (changes.trends.len(), "trend values moved"),
         (changes.new_trends.len(), "new trends"),
@@ -95,8 +95,8 @@ fn verdicts(changes: &Changes) -> TableView {
             vec![
                 v.derivative.clone(),
                 angle(v.alpha_deg),
-                v.before.clone(),
-                v.now.clone(),
+                v.before.to_string(),
+                v.now.to_string(),
                 v.because.clone(),
             ]
         })
@@ -121,7 +121,7 @@ fn maneuvers(changes: &Changes) -> TableView {
         .iter()
         .map(|m| {
             vec![
-                m.what.clone(),
+                m.what.to_string(),
                 m.maneuver_id.clone(),
                 m.class.clone(),
                 m.words.clone(),

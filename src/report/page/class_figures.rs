@@ -15,7 +15,7 @@ use crate::report::figure::strip_figure::{self, Strip, StripFigure, StripLine};
 use crate::report::figure::style::DARK_COLOURS;
 use crate::report::history;
 use crate::report::notation::{angle, fixed, without_unit};
-use crate::tables::{CorrelationRow, History};
+use crate::tables::{CorrelationKind, CorrelationRow, History};
 
 /// A figure of one class, or of all classes of an axis.
 #[derive(Clone, Debug, Serialize)]
@@ -142,7 +142,7 @@ fn flagged_pairs<'a>(pairs: &[&'a CorrelationRow], limit: f64) -> Vec<&'a Correl
     let mut flagged: Vec<&CorrelationRow> = pairs
         .iter()
         .copied()
-        .filter(|p| p.kind == "regressors" && p.correlation.abs() > limit)
+        .filter(|p| p.kind == CorrelationKind::Regressors && p.correlation.abs() > limit)
         .collect();
     flagged.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
     flagged
@@ -378,7 +378,7 @@ mod tests {
         campaign.correlations.push(CorrelationRow {
             maneuver_id: "1-OLON-30".into(),
             class: "OLON".into(),
-            kind: "regressors".into(),
+            kind: CorrelationKind::Regressors,
             first: "alpha".into(),
             second: "de_deg".into(),
             correlation: -0.95,

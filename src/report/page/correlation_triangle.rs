@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::report::contents::{Contents, group_by};
 use crate::report::history;
 use crate::report::notation::{NOTHING, angle, fixed, without_unit};
-use crate::tables::{CorrelationRow, History};
+use crate::tables::{CorrelationKind, CorrelationRow, History};
 
 /// Correlations of one maneuver below the diagonal: a row per regressor but the first, a column per
 /// regressor but the last.
@@ -50,7 +50,7 @@ pub fn triangles(contents: &Contents) -> Vec<CorrelationTriangle> {
                 .get(history.maneuver_id.as_str())?
                 .iter()
                 .copied()
-                .filter(|pair| pair.kind == "regressors")
+                .filter(|pair| pair.kind == CorrelationKind::Regressors)
                 .collect();
             (!pairs.is_empty()).then(|| triangle(history, &pairs, contents.limits.correlation))
         })
@@ -146,7 +146,7 @@ mod tests {
             campaign.correlations.push(CorrelationRow {
                 maneuver_id: "1-OLON-30".into(),
                 class: "OLON".into(),
-                kind: "regressors".into(),
+                kind: CorrelationKind::Regressors,
                 first: first.into(),
                 second: second.into(),
                 correlation,

@@ -316,7 +316,7 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
             c.difference_pct
                 .map_or_else(|| NOTHING.to_owned(), |p| fixed(p, 1)),
             c.z.map_or_else(|| NOTHING.to_owned(), |z| fixed(z, 1)),
-            c.verdict.clone(),
+            c.verdict.to_string(),
         ]
     };
     let heads = [
@@ -356,6 +356,7 @@ mod tests {
     use super::super::derivative_results;
     use super::*;
     use crate::report::campaign_fixture;
+    use crate::tables::TunnelVerdict;
 
     #[test]
     fn every_derivative_has_one_page_and_anchors_differ_without_case() {
@@ -375,7 +376,7 @@ mod tests {
     fn a_derivative_without_tunnel_value_shows_none() {
         let mut campaign = campaign_fixture::campaign();
         for row in &mut campaign.comparison {
-            (row.wind_tunnel, row.verdict) = (None, "no tunnel value".into());
+            (row.wind_tunnel, row.verdict) = (None, TunnelVerdict::NoTunnelValue);
         }
         let contents = campaign.contents();
         let derivatives = derivative_results::collect(&contents);

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::aero::{Axis, Coefficient};
+use crate::maneuver::Status;
 use crate::report::contents::{Contents, group_by};
 use crate::report::notation::coefficient_of;
-use crate::tables::{ComparisonRow, EstimateRow, TrendRow};
+use crate::tables::{ComparisonRow, EstimateRow, Outcome, TrendRow};
 
 /// One estimate as it is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,7 +94,7 @@ fn names<'a>(contents: &Contents<'a>) -> Vec<&'a str> {
     let estimated = contents
         .estimates
         .iter()
-        .filter(|e| e.status == "estimated")
+        .filter(|e| e.status == Status::Estimated)
         .map(|e| e.derivative.as_str());
     let trends = contents.trends.iter().map(|t| t.derivative.as_str());
     let compared = contents.comparison.iter().map(|c| c.derivative.as_str());
@@ -113,7 +114,7 @@ fn failed_fits<'a>(contents: &Contents<'a>) -> BTreeSet<&'a str> {
     contents
         .fits
         .iter()
-        .filter(|f| matches!(f.outcome.as_str(), "not_converged" | "rejected"))
+        .filter(|f| matches!(f.outcome, Outcome::NotConverged | Outcome::Rejected))
         .map(|f| f.maneuver_id.as_str())
         .collect()
 }
@@ -136,7 +137,7 @@ impl<'a> DerivativeRows<'a, '_> {
             .estimates
             .iter()
             .copied()
-            .filter(|e| e.status == "estimated" && e.value.is_some())
+            .filter(|e| e.status == Status::Estimated && e.value.is_some())
             .collect();
         let (unconverged, sound): (Vec<&EstimateRow>, Vec<&EstimateRow>) = estimated
             .iter()

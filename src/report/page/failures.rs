@@ -8,16 +8,10 @@ use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
 use crate::report::notation::{NOTHING, angle, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
-use crate::tables::{ChannelRow, CheckRow, EventRow, FitRow, InstrumentRow};
-
-/// `true` for a check that passed, or that lacked excitation.
-#[must_use]
-pub fn is_check_passed(verdict: &str) -> bool {
-    matches!(
-        verdict,
-        "ok" | InstrumentRow::NO_DELAY | "not excited" | "not checked"
-    )
-}
+use crate::schema::Words;
+use crate::tables::{
+    ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, InstrumentRow, InstrumentVerdict, Outcome,
+};
 
 /// The tables of failures, without empty ones.
 #[must_use]
@@ -58,7 +52,7 @@ fn fits(contents: &Contents) -> TableView {
     let failed = contents
         .fits
         .iter()
-        .filter(|f| f.outcome != "converged")
+        .filter(|f| f.outcome != Outcome::Converged)
         .map(|f| failed_fit(f, maneuvers.get(f.maneuver_id.as_str()).copied()));
     let missing = contents
         .maneuvers
@@ -79,7 +73,7 @@ fn failed_fit(fit: &FitRow, maneuver: Option<&Maneuver>) -> Vec<String> {
         fit.maneuver_id.clone(),
         fit.class.clone(),
         maneuver.map_or_else(|| NOTHING.to_owned(), |m| angle(m.alpha_deg)),
-        outcome_in_words(&fit.outcome).to_owned(),
+        outcome_in_words(fit.outcome).to_owned(),
         fit.reason.clone(),
     ]
 }
@@ -99,7 +93,7 @@ fn events(contents: &Contents) -> TableView {
     let rows = contents
         .events
         .iter()
-        .filter(|e| e.verdict != "agrees")
+        .filter(|e| e.verdict != EventVerdict::Agrees)
         .map(event)
         .collect();
     let heads = [
@@ -125,7 +119,7 @@ fn event(event: &EventRow) -> Vec<String> {
         times(event.given_start_s, event.given_end_s),
         class(&event.found_class),
         times(event.found_start_s, event.found_end_s),
-        event.verdict.clone(),
+        event.verdict.to_string(),
     ]
 }
 
@@ -137,13 +131,13 @@ fn checks(contents: &Contents) -> TableView {
             c.signals.clone(),
             number(c.slope, 3),
             number(c.correlation, 3),
-            c.verdict.clone(),
+            c.verdict.to_string(),
         ]
     };
     let rows = contents
         .checks
         .iter()
-        .filter(|c| !is_check_passed(&c.verdict))
+        .filter(|c| !c.verdict.passed())
         .map(row)
         .collect();
     let heads = [
@@ -165,7 +159,7 @@ fn instruments(contents: &Contents) -> TableView {
     for row in contents
         .instruments
         .iter()
-        .filter(|row| row.verdict != "not excited")
+        .filter(|row| row.verdict != InstrumentVerdict::NotExcited)
     {
         by_channel
             .entry((&row.channel, &row.unit))
@@ -193,7 +187,7 @@ fn instruments(contents: &Contents) -> TableView {
 
 fn instrument(channel: &str, unit: &str, rows: &[&InstrumentRow]) -> Vec<String> {
     let corrected = rows.iter().filter(|r| !r.applied.is_empty()).count();
-    let faults = rows.iter().filter(|r| !is_check_passed(&r.verdict)).count();
+    let faults = rows.iter().filter(|r| !r.verdict.passed()).count();
     vec![
         channel.to_owned(),
         unit.to_owned(),
@@ -223,7 +217,9 @@ fn range(values: impl Iterator<Item = f64> + Clone, decimals: usize) -> String {
 fn channels(contents: &Contents) -> TableView {
     let mut sums: BTreeMap<(&str, &str, &str), (usize, [usize; 5])> = BTreeMap::new();
     for c in contents.channels.iter().filter(|c| is_noteworthy(c)) {
-        let (flights, counts) = sums.entry((&c.channel, &c.signal, &c.verdict)).or_default();
+        let (flights, counts) = sums
+            .entry((&c.channel, &c.signal, c.verdict.word()))
+            .or_default();
         *flights += 1;
         for (sum, n) in counts
             .iter_mut()
@@ -252,5 +248,5 @@ fn channels(contents: &Contents) -> TableView {
 
 fn is_noteworthy(channel: &ChannelRow) -> bool {
     channel.bridged + channel.despiked + channel.missing + channel.stuck > 0
-        || !is_check_passed(&channel.verdict)
+        || !channel.verdict.passed()
 }

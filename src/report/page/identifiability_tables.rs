@@ -4,10 +4,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::maneuver::Status;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::{extent, quantile};
 use crate::report::notation::{NOTHING, fixed};
 use crate::report::table_view::TableView;
+use crate::tables::CorrelationKind;
 
 /// Number of rows of a class in a table; the published tables have all.
 const MOST_ROWS: usize = 8;
@@ -31,7 +33,7 @@ pub fn tables(contents: &Contents) -> Vec<TableView> {
 const PAIR_HEADS: [&str; 4] = ["class", "pair", "maneuvers", "correlation"];
 
 fn correlated_regressors(contents: &Contents) -> TableView {
-    let rows = correlated_pairs(contents, "regressors", |_| true);
+    let rows = correlated_pairs(contents, CorrelationKind::Regressors, |_| true);
     let note = format!(
         "Histories over the maneuver, |ρ| above {}; at most {MOST_ROWS} pairs of a class.",
         fixed(contents.limits.correlation, 2)
@@ -46,7 +48,9 @@ fn correlated_regressors(contents: &Contents) -> TableView {
 
 fn correlated_estimates(contents: &Contents) -> TableView {
     let with_regressor = derivatives_with_regressor(contents);
-    let rows = correlated_pairs(contents, "estimates", |name| with_regressor.contains(name));
+    let rows = correlated_pairs(contents, CorrelationKind::Estimates, |name| {
+        with_regressor.contains(name)
+    });
     let note = format!(
         "From the inverse of the information matrix, |ρ| above {}; at most {MOST_ROWS} pairs of a \
          class. Constants, biases and initial states are correlated by nature: only the table of \
@@ -62,7 +66,11 @@ fn correlated_estimates(contents: &Contents) -> TableView {
 }
 
 /// Correlations beyond the limit of one kind, between names that are shown.
-fn correlated_pairs(contents: &Contents, kind: &str, is_shown: impl Fn(&str) -> bool) -> ClassRows {
+fn correlated_pairs(
+    contents: &Contents,
+    kind: CorrelationKind,
+    is_shown: impl Fn(&str) -> bool,
+) -> ClassRows {
     let limit = contents.limits.correlation;
     let mut rows = ClassRows::new();
     for row in contents.correlations {
@@ -84,7 +92,7 @@ fn inflated_variances(contents: &Contents) -> TableView {
     let estimated = contents
         .estimates
         .iter()
-        .filter(|r| r.status == "estimated");
+        .filter(|r| r.status == Status::Estimated);
     for row in estimated.filter(|r| with_regressor.contains(r.derivative.as_str())) {
         if let Some(inflation) = row.variance_inflation.filter(|v| *v > limit) {
             rows.entry((class_position(contents, &row.class), row.derivative.clone()))
@@ -247,10 +255,10 @@ mod tests {
     use crate::report::campaign_fixture::{Campaign, campaign};
     use crate::tables::CorrelationRow;
 
-    fn correlated(campaign: &mut Campaign, class: &str, kind: &str, correlation: f64) {
+    fn correlated(campaign: &mut Campaign, class: &str, kind: CorrelationKind, correlation: f64) {
         let text = str::to_owned;
         let (first, second) = (text("de_deg"), text("dpv_deg"));
-        let (maneuver_id, class, kind) = (text("1"), text(class), text(kind));
+        let (maneuver_id, class) = (text("1"), text(class));
         campaign.correlations.push(CorrelationRow {
             maneuver_id,
             class,
@@ -265,9 +273,14 @@ mod tests {
     fn pairs_beyond_the_limit_are_counted_by_class() {
         let mut campaign = campaign();
         for correlation in [-0.97, -0.93, -0.5] {
-            correlated(&mut campaign, "3211", "regressors", correlation);
+            correlated(
+                &mut campaign,
+                "3211",
+                CorrelationKind::Regressors,
+                correlation,
+            );
         }
-        correlated(&mut campaign, "OLON", "estimates", 0.5);
+        correlated(&mut campaign, "OLON", CorrelationKind::Estimates, 0.5);
         let tables = tables(&campaign.contents());
         let table = tables
             .iter()
@@ -295,7 +308,7 @@ mod tests {
     fn near_dependencies_and_derivatives_held_by_evidence_are_listed() {
         let mut campaign = campaign();
         campaign.fits[0].confounded = Some("CN_0, CN_alpha; Cm_de, Cm_dpv".into());
-        campaign.estimates[2].status = "held".into();
+        campaign.estimates[2].status = Status::Held;
         campaign.estimates[2].held_because = Some("de_deg did not move".into());
         let tables = tables(&campaign.contents());
         let rows = |start: &str| {

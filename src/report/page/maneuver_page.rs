@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::class_markers::ClassMarkers;
 use super::history_strips;
 use crate::error::Problem;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Status};
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{self, LegendView};
 use crate::report::notation::{
@@ -148,7 +148,7 @@ fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String)> {
     let Some(fit) = fit else {
         return vec![fact("Fit", "none".to_owned())];
     };
-    let outcome = format!("{}: {}", outcome_in_words(&fit.outcome), fit.reason);
+    let outcome = format!("{}: {}", outcome_in_words(fit.outcome), fit.reason);
     let mut facts = vec![fact("Fit", outcome)];
     if fit.final_cost.is_some() {
         let cost = format!(
@@ -186,7 +186,7 @@ fn prediction_fact(rows: &[&PredictionRow]) -> (String, String) {
 fn estimates(rows: &[&EstimateRow]) -> TableView {
     let rows = rows
         .iter()
-        .filter(|row| row.status != "inactive")
+        .filter(|row| row.status != Status::Inactive)
         .map(|row| estimate(row))
         .collect();
     let heads = [
@@ -209,7 +209,7 @@ fn estimate(row: &EstimateRow) -> Vec<String> {
     vec![
         row.derivative.clone(),
         notation::unit(&row.unit),
-        row.status.clone(),
+        row.status.to_string(),
         digits.write(row.value),
         number(row.bound, 2),
         number(row.bound_corrected, 2),
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn inactive_derivatives_are_not_listed() {
         let mut campaign = campaign();
-        campaign.estimates[0].status = "inactive".into();
+        campaign.estimates[0].status = Status::Inactive;
         assert_eq!(made(&campaign.contents())[0].estimates.rows.len(), 3);
     }
 }

@@ -8,7 +8,7 @@ use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
 use crate::report::notation::{NOTHING, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
-use crate::tables::FitRow;
+use crate::tables::{FitRow, Outcome};
 
 const HEADS: [&str; 14] = [
     "maneuver",
@@ -81,13 +81,13 @@ fn row(maneuver: &Maneuver, fits: &BTreeMap<&str, &FitRow>) -> Vec<String> {
 
 fn fit_cells(fit: &FitRow) -> [String; 7] {
     // Beside a converged fit, a reason would be noise.
-    let reason = if fit.outcome == "converged" {
+    let reason = if fit.outcome == Outcome::Converged {
         String::new()
     } else {
         fit.reason.clone()
     };
     [
-        outcome_in_words(&fit.outcome).to_owned(),
+        outcome_in_words(fit.outcome).to_owned(),
         fit.iterations.to_string(),
         number(fit.initial_cost, 3),
         number(fit.final_cost, 3),

@@ -1,5 +1,6 @@
 //! Quality of prediction by class and output: medians, and the maneuver predicted worst.
 
+use crate::aero::Output;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::quantile;
 use crate::report::notation::{NOTHING, fixed, number};
@@ -31,11 +32,11 @@ const HEADS: [&str; 9] = [
 pub fn table(contents: &Contents) -> Option<TableView> {
     let mut rows = Vec::new();
     for (class, _, _) in contents.classes {
-        let mut by_output: Vec<(&str, Vec<&PredictionRow>)> = Vec::new();
+        let mut by_output: Vec<(Output, Vec<&PredictionRow>)> = Vec::new();
         for row in contents.predictions.iter().filter(|p| p.class == *class) {
             match by_output.iter_mut().find(|o| o.0 == row.output) {
                 Some(output) => output.1.push(row),
-                None => by_output.push((&row.output, vec![row])),
+                None => by_output.push((row.output, vec![row])),
             }
         }
         for (output, predictions) in by_output {
@@ -45,14 +46,14 @@ pub fn table(contents: &Contents) -> Option<TableView> {
     (!rows.is_empty()).then(|| TableView::new("Class and output", NOTE, &HEADS, rows))
 }
 
-fn cells(class: &str, output: &str, predictions: &[&PredictionRow]) -> Vec<String> {
+fn cells(class: &str, output: Output, predictions: &[&PredictionRow]) -> Vec<String> {
     let worst = predictions
         .iter()
         .filter_map(|p| Some((p.theil?, p)))
         .max_by(|a, b| a.0.total_cmp(&b.0));
     vec![
         class.to_owned(),
-        output.to_owned(),
+        output.to_string(),
         predictions.len().to_string(),
         number(median(predictions, |p| p.theil), 2),
         percent(median(predictions, |p| p.theil_bias)),
@@ -87,7 +88,7 @@ mod tests {
             maneuver_id: maneuver.into(),
             class: "OLON".into(),
             alpha_deg: 20.0,
-            output: "q".into(),
+            output: Output::Q,
             unit: "deg/s".into(),
             samples: 100,
             root_mean_square: 0.1,

@@ -6,12 +6,11 @@ use serde::Serialize;
 
 use super::class_outcomes::{self, ClassOutcomes};
 use super::derivative_results::DerivativeResults;
-use super::failures;
 use super::verdict_ranges::{self, VerdictRange};
 use super::verdict_table::LARGEST_PERCENTAGE;
 use crate::report::contents::Contents;
 use crate::report::notation::{angle, count, fixed, outcome_in_words};
-use crate::tables::{ComparisonRow, FitRow};
+use crate::tables::{ComparisonRow, EventVerdict, FitRow, Outcome, TunnelVerdict};
 
 /// The sentences, by subject.
 #[derive(Clone, Debug, Serialize)]
@@ -72,7 +71,10 @@ fn flown(contents: &Contents, classes: &[ClassOutcomes]) -> String {
 fn agreeing_share(derivative: &DerivativeResults) -> Option<f64> {
     let rows = &derivative.comparison;
     let compared = rows.iter().filter(|c| c.wind_tunnel.is_some()).count();
-    let agreeing = rows.iter().filter(|c| c.verdict == "agrees").count();
+    let agreeing = rows
+        .iter()
+        .filter(|c| c.verdict == TunnelVerdict::Agrees)
+        .count();
     (compared > 0).then(|| agreeing as f64 / compared as f64)
 }
 
@@ -111,7 +113,7 @@ fn opposite_signs(derivatives: &[DerivativeResults]) -> Option<String> {
     for derivative in derivatives {
         let angles: Vec<String> = verdict_ranges::ranges(&derivative.comparison)
             .iter()
-            .filter(|range| range.verdict == "sign differs")
+            .filter(|range| range.verdict == TunnelVerdict::SignDiffers)
             .map(VerdictRange::angles)
             .collect();
         if !angles.is_empty() {
@@ -130,7 +132,7 @@ fn worst_disagreement<'a>(derivative: &DerivativeResults<'a>) -> Option<Disagree
     derivative
         .comparison
         .iter()
-        .filter(|row| row.verdict != "agrees")
+        .filter(|row| row.verdict != TunnelVerdict::Agrees)
         .filter_map(|row| Some((row.z.filter(|z| z.is_finite())?.abs(), *row)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
@@ -170,7 +172,7 @@ fn failed(contents: &Contents) -> Vec<String> {
     let failed_fits: Vec<&FitRow> = contents
         .fits
         .iter()
-        .filter(|fit| fit.outcome != "converged")
+        .filter(|fit| fit.outcome != Outcome::Converged)
         .collect();
     let mut lines = Vec::new();
     lines.extend(failed_fits_line(&failed_fits));
@@ -193,7 +195,7 @@ fn failed_fits_line(fits: &[&FitRow]) -> Option<String> {
         listed.push(format!(
             "{} ({})",
             fit.maneuver_id,
-            outcome_in_words(&fit.outcome)
+            outcome_in_words(fit.outcome)
         ));
     }
     let more = match fits.len() - listed.len() {
@@ -213,7 +215,7 @@ fn checks_line(contents: &Contents) -> Option<String> {
     let failed = contents
         .checks
         .iter()
-        .filter(|c| !failures::is_check_passed(&c.verdict))
+        .filter(|c| !c.verdict.passed())
         .count();
     (!contents.checks.is_empty()).then(|| {
         format!(
@@ -227,7 +229,7 @@ fn events_line(contents: &Contents) -> Option<String> {
     let agreeing = contents
         .events
         .iter()
-        .filter(|e| e.verdict == "agrees")
+        .filter(|e| e.verdict == EventVerdict::Agrees)
         .count();
     (!contents.events.is_empty()).then(|| {
         format!(
@@ -247,7 +249,7 @@ mod tests {
     #[test]
     fn opposite_signs_are_in_the_summary() {
         let mut campaign = campaign();
-        campaign.comparison[0].verdict = "sign differs".into();
+        campaign.comparison[0].verdict = TunnelVerdict::SignDiffers;
         let contents = campaign.contents();
         let lines = summary(
             &contents,

@@ -2,12 +2,12 @@
 
 use crate::report::figure::verdict_bar::Segment;
 use crate::report::notation::angle;
-use crate::tables::ComparisonRow;
+use crate::tables::{ComparisonRow, TunnelVerdict};
 
 /// Neighbouring angles of attack with the same verdict.
 #[derive(Clone, Debug, PartialEq)]
-pub struct VerdictRange<'a> {
-    pub verdict: &'a str,
+pub struct VerdictRange {
+    pub verdict: TunnelVerdict,
     pub from_deg: f64,
     pub to_deg: f64,
     /// Ends of its segment in the bar: half way to the neighbours.
@@ -15,7 +15,7 @@ pub struct VerdictRange<'a> {
     right_deg: f64,
 }
 
-impl VerdictRange<'_> {
+impl VerdictRange {
     /// Angles of attack in words: `5°–25°`.
     #[must_use]
     pub fn angles(&self) -> String {
@@ -34,7 +34,7 @@ impl VerdictRange<'_> {
 
 /// Ranges of equal verdicts, from rows sorted by angle of attack.
 #[must_use]
-pub fn ranges<'a>(rows: &[&'a ComparisonRow]) -> Vec<VerdictRange<'a>> {
+pub fn ranges(rows: &[&ComparisonRow]) -> Vec<VerdictRange> {
     let mut ranges: Vec<VerdictRange> = Vec::new();
     for (i, row) in rows.iter().enumerate() {
         let alpha = row.alpha_deg;
@@ -51,7 +51,7 @@ pub fn ranges<'a>(rows: &[&'a ComparisonRow]) -> Vec<VerdictRange<'a>> {
                 range.right_deg = right_deg;
             }
             _ => ranges.push(VerdictRange {
-                verdict: &row.verdict,
+                verdict: row.verdict,
                 from_deg: alpha,
                 to_deg: alpha,
                 left_deg,
@@ -64,7 +64,7 @@ pub fn ranges<'a>(rows: &[&'a ComparisonRow]) -> Vec<VerdictRange<'a>> {
 
 /// Segments of the bar that shows the ranges.
 #[must_use]
-pub fn bar_segments<'a>(ranges: &[VerdictRange<'a>]) -> Vec<Segment<'a>> {
+pub fn bar_segments(ranges: &[VerdictRange]) -> Vec<Segment> {
     ranges
         .iter()
         .map(|range| Segment {
@@ -90,7 +90,7 @@ pub fn phrase(ranges: &[VerdictRange]) -> String {
             .collect();
         return words.join(", ");
     }
-    let mut verdicts: Vec<(&str, Vec<&VerdictRange>)> = Vec::new();
+    let mut verdicts: Vec<(TunnelVerdict, Vec<&VerdictRange>)> = Vec::new();
     for range in ranges {
         match verdicts.iter_mut().find(|v| v.0 == range.verdict) {
             Some(verdict) => verdict.1.push(range),
@@ -116,8 +116,8 @@ fn total_width_deg(ranges: &[&VerdictRange]) -> f64 {
 mod tests {
     use super::*;
 
-    fn rows(verdicts: &[(f64, &str)]) -> Vec<ComparisonRow> {
-        let row = |(alpha_deg, verdict): &(f64, &str)| ComparisonRow {
+    fn rows(verdicts: &[(f64, TunnelVerdict)]) -> Vec<ComparisonRow> {
+        let row = |(alpha_deg, verdict): &(f64, TunnelVerdict)| ComparisonRow {
             derivative: "CN_alpha".into(),
             unit: "per_deg".into(),
             group: "all".into(),
@@ -130,7 +130,7 @@ mod tests {
             uncertainty: None,
             difference_pct: None,
             z: None,
-            verdict: (*verdict).into(),
+            verdict: *verdict,
         };
         verdicts.iter().map(row).collect()
     }
@@ -138,12 +138,12 @@ mod tests {
     #[test]
     fn neighbours_with_equal_verdicts_become_a_range() {
         let rows = rows(&[
-            (5.0, "agrees"),
-            (10.0, "agrees"),
-            (15.0, "flight lower"),
-            (20.0, "agrees"),
-            (25.0, "agrees"),
-            (30.5, "agrees"),
+            (5.0, TunnelVerdict::Agrees),
+            (10.0, TunnelVerdict::Agrees),
+            (15.0, TunnelVerdict::FlightLower),
+            (20.0, TunnelVerdict::Agrees),
+            (25.0, TunnelVerdict::Agrees),
+            (30.5, TunnelVerdict::Agrees),
         ]);
         let ranges = ranges(&rows.iter().collect::<Vec<_>>());
         assert_eq!(
@@ -155,12 +155,12 @@ mod tests {
     #[test]
     fn many_ranges_are_grouped_by_verdict_the_widest_first() {
         let verdicts = [
-            "agrees",
-            "flight lower",
-            "flight lower",
-            "agrees",
-            "flight lower",
-            "flight higher",
+            TunnelVerdict::Agrees,
+            TunnelVerdict::FlightLower,
+            TunnelVerdict::FlightLower,
+            TunnelVerdict::Agrees,
+            TunnelVerdict::FlightLower,
+            TunnelVerdict::FlightHigher,
         ];
         let rows = rows(
             &verdicts
@@ -179,9 +179,9 @@ mod tests {
     #[test]
     fn the_bar_has_a_segment_per_range_that_meets_its_neighbours() {
         let rows = rows(&[
-            (10.0, "agrees"),
-            (20.0, "flight higher"),
-            (30.0, "flight higher"),
+            (10.0, TunnelVerdict::Agrees),
+            (20.0, TunnelVerdict::FlightHigher),
+            (30.0, TunnelVerdict::FlightHigher),
         ]);
         let segments = bar_segments(&ranges(&rows.iter().collect::<Vec<_>>()));
         let ends: Vec<_> = segments.iter().map(|s| (s.from_deg, s.to_deg)).collect();

@@ -15,7 +15,7 @@ use super::notation::{angle, fixed, number, outcome_in_words, without_unit};
 use crate::error::Problem;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Class, Maneuver, Unknown};
-use crate::tables::{EventRow, FitRow, History, HistoryOutput};
+use crate::tables::{EventRow, EventVerdict, FitRow, History, HistoryOutput};
 use crate::units::Unit;
 use envelope::{Columns, Shown, envelope, runs};
 
@@ -257,7 +257,7 @@ fn heading(view: &ManeuverView) -> Vec<String> {
         fixed(m.velocity_ft_s, 0),
         fixed(m.altitude_ft, 0),
     );
-    let mut outcome = format!("{}: {}", outcome_in_words(&fit.outcome), fit.reason);
+    let mut outcome = format!("{}: {}", outcome_in_words(fit.outcome), fit.reason);
     if let (Some(first), Some(last)) = (fit.initial_cost, fit.final_cost) {
         let (first, last) = (number(Some(first), 4), number(Some(last), 4));
         // Writing into a String cannot fail.
@@ -518,8 +518,8 @@ fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
     let verdict = events
         .iter()
         .find(same)
-        .map(|e| e.verdict.as_str())
-        .filter(|v| *v != "agrees");
+        .map(|e| e.verdict)
+        .filter(|v| *v != EventVerdict::Agrees);
     let rejected = if maneuver.is_rejected() {
         ", rejected"
     } else {

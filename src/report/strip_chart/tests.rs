@@ -3,6 +3,8 @@
 use super::*;
 use crate::aero::Axis;
 use crate::flight::record::Series;
+use crate::maneuver::ManeuverOrigin;
+use crate::tables::Outcome;
 
 fn groups() -> Groups {
     Groups {
@@ -59,17 +61,17 @@ fn maneuver_at(start_s: f64) -> Maneuver {
         mass_slug: 1000.0,
         x_cg_ft: 32.0,
         samples: 401,
-        origin: "found".into(),
+        origin: ManeuverOrigin::Found,
         recognised: crate::maneuver::Recognised::default(),
         quality: crate::maneuver::Quality::default(),
     }
 }
 
-fn fit(outcome: &str, reason: &str) -> FitRow {
+fn fit(outcome: Outcome, reason: &str) -> FitRow {
     FitRow {
         maneuver_id: "f_t00020".into(),
         class: "STEPS".into(),
-        outcome: outcome.into(),
+        outcome,
         reason: reason.into(),
         start: None,
         iterations: 5,
@@ -197,7 +199,7 @@ fn marks_are_drawn_where_there_are_some_and_explained() {
 
 #[test]
 fn the_analyst_s_events_stand_over_what_was_found() {
-    let row = |given: Option<&str>, found: Option<&str>, verdict: &str| EventRow {
+    let row = |given: Option<&str>, found: Option<&str>, verdict: EventVerdict| EventRow {
         flight_id: "f".into(),
         given_class: given.map(str::to_owned),
         given_start_s: given.map(|_| 20.0),
@@ -205,9 +207,9 @@ fn the_analyst_s_events_stand_over_what_was_found() {
         found_class: found.map(str::to_owned),
         found_start_s: found.map(|_| 20.5),
         found_end_s: found.map(|_| 31.0),
-        verdict: verdict.into(),
+        verdict,
     };
-    let events = [row(Some("STEPS"), Some("OTHER"), "other class")];
+    let events = [row(Some("STEPS"), Some("OTHER"), EventVerdict::OtherClass)];
     let svg = drawn(&record(4000), &[maneuver_at(20.0)], &events);
     assert!(svg.contains("STEPS f_t00020, other class"));
     assert_eq!(
@@ -223,7 +225,11 @@ fn the_analyst_s_events_stand_over_what_was_found() {
 #[test]
 fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() {
     let record = record(12_000);
-    let svg = drawn_maneuver(&record, &fit("converged", "done"), Some(&history(&record)));
+    let svg = drawn_maneuver(
+        &record,
+        &fit(Outcome::Converged, "done"),
+        Some(&history(&record)),
+    );
     assert_eq!(svg.matches(">residual</text>").count(), 5);
     assert!(svg.contains("left out of the cost") && svg.contains("5 iterations"));
     assert_eq!(
@@ -237,7 +243,11 @@ fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() 
         "a sample that was left out has no residual and stretches no scale"
     );
 
-    let svg = drawn_maneuver(&record, &fit("rejected", "too many marked samples"), None);
+    let svg = drawn_maneuver(
+        &record,
+        &fit(Outcome::Rejected, "too many marked samples"),
+        None,
+    );
     assert!(!svg.contains("residual") && svg.contains("too many marked samples"));
     assert_eq!(svg.matches("class=\"strip\"").count(), 2 + 5 + 1);
 }

@@ -5,9 +5,17 @@
 
 use std::collections::BTreeMap;
 
+mod words;
+
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::aero::Output;
+use crate::maneuver::Status;
+
+pub use words::{
+    ChangeVerdict, ChannelVerdict, CheckVerdict, CorrelationKind, EventVerdict, InstrumentVerdict,
+    Outcome, Participation, PredictionStatus, StartingValues, Treatment, TunnelVerdict, Verdict,
+};
 
 /// `channels`: what ingest did to one channel of one flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,9 +42,8 @@ pub struct ChannelRow {
     /// unit. Of the clock: the jitter of its time stamps, s.
     pub quantisation: Option<f64>,
     pub noise: Option<f64>,
-    /// Worst verdict of the checks that name this channel: `ok`, `not checked`, or what is wrong in
-    /// words.
-    pub verdict: String,
+    /// Worst verdict of the checks that name this channel.
+    pub verdict: ChannelVerdict,
 }
 
 /// `checks`: how one kinematic relation between channels came out in one flight.
@@ -51,8 +58,7 @@ pub struct CheckRow {
     /// signs are right.
     pub slope: Option<f64>,
     pub correlation: Option<f64>,
-    /// `ok`, `not excited`, `wrong sign`, `wrong scale`, `does not agree`.
-    pub verdict: String,
+    pub verdict: CheckVerdict,
 }
 
 /// `instruments`: what the kinematic equations say of one instrument of one flight, y = (scale) x(t
@@ -74,14 +80,7 @@ pub struct InstrumentRow {
     pub delay_bound_s: Option<f64>,
     /// What the record was corrected by: `bias scale delay`, some of them or none.
     pub applied: String,
-    /// `ok`, `ok; its delay is not told`, `not excited`, or what is wrong in words.
-    pub verdict: String,
-}
-
-impl InstrumentRow {
-    /// The verdict on an instrument that is not known to be off and whose delay the flight does not
-    /// tell, for it moves it too little.
-    pub const NO_DELAY: &str = "ok; its delay is not told";
+    pub verdict: InstrumentVerdict,
 }
 
 /// `events`: the analyst's events against what segment found in the record.
@@ -94,8 +93,7 @@ pub struct EventRow {
     pub found_class: Option<String>,
     pub found_start_s: Option<f64>,
     pub found_end_s: Option<f64>,
-    /// `agrees`, `other class`, `other times`, `not found`, `not given`.
-    pub verdict: String,
+    pub verdict: EventVerdict,
 }
 
 /// `fits`: how the estimation of one maneuver ended.
@@ -103,13 +101,11 @@ pub struct EventRow {
 pub struct FitRow {
     pub maneuver_id: String,
     pub class: String,
-    /// `converged`, `not_converged`, `unidentifiable` or `rejected`.
-    pub outcome: String,
+    pub outcome: Outcome,
     /// Why it ended so, in words.
     pub reason: String,
-    /// Where the iteration that led to it began: `equation error`, `wind tunnel`, `single
-    /// estimates`.
-    pub start: Option<String>,
+    /// Starting values of the iteration that led to the outcome.
+    pub start: Option<StartingValues>,
     pub iterations: usize,
     /// J of eq. 1.2 at the start of the iteration and at the end.
     pub initial_cost: Option<f64>,
@@ -130,8 +126,8 @@ pub struct FitRow {
 /// maneuver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PredictedRow {
-    /// `predicted`, or why it was not; none for maneuvers joined.
-    pub prediction: Option<String>,
+    /// None for maneuvers estimated together.
+    pub prediction: Option<PredictionStatus>,
     /// How many others it was predicted from.
     pub predicted_from: Option<usize>,
     /// J of eq. 1.2 of the prediction, to be held against `final_cost`.
@@ -154,7 +150,7 @@ pub struct PredictionRow {
     pub maneuver_id: String,
     pub class: String,
     pub alpha_deg: f64,
-    pub output: String,
+    pub output: Output,
     pub unit: String,
     /// That count.
     pub samples: usize,
@@ -182,8 +178,7 @@ pub struct JointRow {
     pub flight_id: String,
     pub alpha_deg: f64,
     pub mach: f64,
-    /// `joined`, or why it was left out.
-    pub part: String,
+    pub part: Participation,
     /// J of eq. 1.2 of this maneuver with its own derivatives, and with the shared ones.
     pub cost_alone: Option<f64>,
     pub cost_joint: Option<f64>,
@@ -199,8 +194,7 @@ pub struct EstimateRow {
     pub mach: f64,
     pub derivative: String,
     pub unit: String,
-    /// `estimated`, `held` or `inactive`.
-    pub status: String,
+    pub status: Status,
     /// The estimate, or the value it was held at; none when inactive.
     pub value: Option<f64>,
     /// Cramér-Rao bound in its sandwich form, with the uncertainty of the held values propagated;
@@ -235,8 +229,7 @@ pub struct EstimateRow {
 pub struct CorrelationRow {
     pub maneuver_id: String,
     pub class: String,
-    /// `regressors`: histories as flown; `estimates`: from the inverse of the information matrix.
-    pub kind: String,
+    pub kind: CorrelationKind,
     pub first: String,
     pub second: String,
     pub correlation: f64,
@@ -308,8 +301,7 @@ pub struct ComparisonRow {
     pub difference_pct: Option<f64>,
     /// Difference over its standard error.
     pub z: Option<f64>,
-    /// `agrees`, `flight higher`, `flight lower`, `sign differs`, `no tunnel value`.
-    pub verdict: String,
+    pub verdict: TunnelVerdict,
 }
 
 /// `maneuver_comparison`: one derivative of one maneuver against the tunnel at the maneuver's own α
@@ -331,13 +323,12 @@ pub struct ManeuverComparisonRow {
     pub uncertainty: Option<f64>,
     pub difference_pct: Option<f64>,
     pub z: Option<f64>,
-    /// As in `comparison`.
-    pub verdict: String,
+    pub verdict: TunnelVerdict,
 }
 
 /// `verdicts`: neighbouring angles of attack at which one derivative has the same verdict, in
 /// words.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerdictRow {
     /// `wind tunnel`, or the folder of an earlier campaign.
     pub against: String,
@@ -346,8 +337,7 @@ pub struct VerdictRow {
     pub group: String,
     pub alpha_from_deg: f64,
     pub alpha_to_deg: f64,
-    /// As in `comparison` and `changes`.
-    pub verdict: String,
+    pub verdict: Verdict,
     /// Median over the range.
     pub difference_pct: Option<f64>,
     /// `flight lower than tunnel from 35° to 60°, by 30%`.
@@ -388,8 +378,7 @@ pub struct ChangeRow {
     pub difference: Option<f64>,
     pub difference_pct: Option<f64>,
     pub z: Option<f64>,
-    /// `agrees`, `higher than before`, `lower than before`, `sign differs`, `not there before`.
-    pub verdict: String,
+    pub verdict: ChangeVerdict,
 }
 
 /// A number of a published table; one that does not exist is an empty field there, and no number
@@ -430,16 +419,15 @@ impl From<&TrendRow> for PublishedTrend {
 pub struct PublishedVerdict {
     pub derivative: String,
     pub alpha_deg: f64,
-    pub verdict: String,
+    pub verdict: TunnelVerdict,
 }
 
 impl From<&ComparisonRow> for PublishedVerdict {
     fn from(row: &ComparisonRow) -> PublishedVerdict {
-        let (derivative, verdict) = (row.derivative.clone(), row.verdict.clone());
         PublishedVerdict {
-            derivative,
+            derivative: row.derivative.clone(),
             alpha_deg: row.alpha_deg,
-            verdict,
+            verdict: row.verdict,
         }
     }
 }
@@ -473,8 +461,7 @@ pub struct BeyondRow {
     pub read_at: f64,
     pub tabulated_from: f64,
     pub tabulated_to: f64,
-    /// `clamped`: the value at the end was taken; `refused`: none was.
-    pub treatment: String,
+    pub treatment: Treatment,
     pub derivatives: String,
 }
 
