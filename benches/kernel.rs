@@ -13,7 +13,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use harvest::aero::{Derivative, Regressor};
 use harvest::dynamics::motion::Window;
 use harvest::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion, OUTPUTS};
-use harvest::lab::standard_case::{self, Subject};
+use harvest::lab::standard_case::{self, StandardCase};
 use harvest::output_error::Detail;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
@@ -25,7 +25,7 @@ type X = SVector<f64, NX>;
 struct Plain<'a> {
     motion: Vec<Motion>,
     window: &'a Window,
-    subject: &'a Subject,
+    subject: &'a StandardCase,
     free: Vec<&'a Derivative>,
 }
 

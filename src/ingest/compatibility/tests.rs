@@ -15,7 +15,7 @@ use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal as s};
-use crate::lab::simulator::noise::Noise;
+use crate::lab::simulator::random::RandomStream;
 use crate::tables::InstrumentVerdict;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -375,7 +375,7 @@ fn sensitivities_are_those_of_finite_differences() {
         &aircraft(),
         &short,
     );
-    let mut noise = Noise::new(3, "errors");
+    let mut noise = RandomStream::new(3, "errors");
     let shared: [f64; PARAMETERS] = std::array::from_fn(|_| 0.01 * noise.normal());
     let mut local = [0.0; LOCAL];
     local
@@ -446,7 +446,7 @@ const NOISE: [f64; INSTRUMENTS] = [
 fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
     let mut record = exact.clone();
     for (i, name) in SIGNALS.iter().enumerate() {
-        let mut noise = Noise::new(seed, name);
+        let mut noise = RandomStream::new(seed, name);
         let values = &mut record.signals.get_mut(*name).unwrap().values;
         let before = values.clone();
         let [bias, scale, delay] =
@@ -499,7 +499,7 @@ fn faults(findings: &Findings) -> Vec<(&'static str, String)> {
 
 /// Ordinary errors of every instrument, drawn.
 fn ordinary(seed: u64) -> [f64; PARAMETERS] {
-    let mut noise = Noise::new(seed, "ordinary errors");
+    let mut noise = RandomStream::new(seed, "ordinary errors");
     let errors = settings().ordinary;
     std::array::from_fn(|j| {
         let (i, kind) = (j / 3, parameters::ALL_KINDS[j % 3]);

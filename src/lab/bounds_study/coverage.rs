@@ -1,30 +1,30 @@
-//! Bias, scatter and coverage of the estimates of one maneuver recorded many times.
+//! Bias and scatter of the estimates of one maneuver, and coverage of their intervals.
 
 use rayon::prelude::*;
 
-use super::recordings::{Setting, Subject};
+use super::recordings::{Scenario, StudyManeuver};
 use crate::estimate::Estimated;
 use crate::lab::simulator::TrueDerivative;
-use crate::lab::simulator::noise::seed_of;
+use crate::lab::simulator::random::derived_seed;
 use crate::maneuver::Status;
 use crate::output_error::Outcome;
 use crate::tables::{CoverageRow, EstimateRow};
 
-/// Half widths of the intervals that hold a normal deviate in 68 and 95 of 100 cases.
+/// Half widths of the intervals that contain a normal deviate with probability 0.68 and 0.95.
 const HALF_68: f64 = 0.994_458;
 const HALF_95: f64 = 1.959_964;
 
-/// A row per estimated derivative.
+/// Estimates a maneuver from many recordings: a row per estimated derivative.
 #[must_use]
 pub fn coverage(
-    subject: &Subject,
-    setting: Setting,
+    maneuver: &StudyManeuver,
+    scenario: Scenario,
     realisations: usize,
     seed: u64,
 ) -> Vec<CoverageRow> {
     let estimated: Vec<Estimated> = (0..realisations)
         .into_par_iter()
-        .map(|i| subject.estimate(setting, seed_of(seed, &format!("realisation {i}"))))
+        .map(|i| maneuver.estimate(scenario, derived_seed(seed, &format!("realisation {i}"))))
         .collect();
     let converged: Vec<&Estimated> = estimated
         .iter()
@@ -40,23 +40,23 @@ pub fn coverage(
                 .iter()
                 .filter_map(|r| Some(r.value? - truth.value))
                 .collect();
-            let spread = Spread::of(&errors);
-            let white = Intervals::new(&errors, &spread, rows.iter().map(|r| r.bound));
+            let statistics = ErrorStatistics::of(&errors);
+            let white = Intervals::new(&errors, &statistics, rows.iter().map(|r| r.bound));
             let corrected =
-                Intervals::new(&errors, &spread, rows.iter().map(|r| r.bound_corrected));
+                Intervals::new(&errors, &statistics, rows.iter().map(|r| r.bound_corrected));
             CoverageRow {
-                class: subject.class.name.clone(),
-                alpha_deg: subject.flown.maneuver.alpha_deg,
-                residuals: setting.residuals.name().to_owned(),
-                weights: setting.weights.name().to_owned(),
+                class: maneuver.class.name.clone(),
+                alpha_deg: maneuver.flown.maneuver.alpha_deg,
+                residuals: scenario.residuals.name().to_owned(),
+                weights: scenario.weights.name().to_owned(),
                 derivative: truth.derivative.clone(),
                 unit: truth.unit.to_owned(),
                 truth: truth.value,
                 realisations,
                 converged: converged.len(),
-                bias: spread.mean,
-                scatter: spread.deviation,
-                bias_over_scatter: spread.mean / spread.deviation,
+                bias: statistics.mean,
+                scatter: statistics.deviation,
+                bias_over_scatter: statistics.mean / statistics.deviation,
                 scatter_over_bound: white.ratio,
                 coverage_68: white.share_68,
                 coverage_95: white.share_95,
@@ -66,7 +66,7 @@ pub fn coverage(
             }
         })
     };
-    subject.flown.truth.iter().filter_map(row).collect()
+    maneuver.flown.truth.iter().filter_map(row).collect()
 }
 
 fn row_of<'a>(estimated: &'a Estimated, derivative: &str) -> Option<&'a EstimateRow> {
@@ -77,36 +77,38 @@ fn row_of<'a>(estimated: &'a Estimated, derivative: &str) -> Option<&'a Estimate
 }
 
 /// Mean and standard deviation of errors.
-struct Spread {
+struct ErrorStatistics {
     mean: f64,
     deviation: f64,
 }
 
-impl Spread {
-    fn of(errors: &[f64]) -> Spread {
+impl ErrorStatistics {
+    fn of(errors: &[f64]) -> ErrorStatistics {
         let n = errors.len() as f64;
         let mean = errors.iter().sum::<f64>() / n;
         let square: f64 = errors.iter().map(|e| (e - mean) * (e - mean)).sum();
-        Spread {
+        ErrorStatistics {
             mean,
             deviation: (square / (n - 1.0).max(1.0)).sqrt(),
         }
     }
 }
 
-/// What one kind of bound is worth.
+/// Comparison of one kind of bound with the errors.
 struct Intervals {
-    /// Scatter over the root mean square of the bounds.
+    /// Standard deviation of the errors over the root mean square of the bounds.
     ratio: f64,
+    /// Share of the 68% intervals that contain the truth.
     share_68: f64,
+    /// Share of the 95% intervals that contain the truth.
     share_95: f64,
 }
 
 impl Intervals {
-    /// A bound that does not exist holds nothing.
+    /// Compares errors with bounds; a missing bound covers nothing.
     fn new(
         errors: &[f64],
-        spread: &Spread,
+        statistics: &ErrorStatistics,
         bounds: impl Iterator<Item = Option<f64>>,
     ) -> Intervals {
         let bounds: Vec<f64> = bounds.map(|b| b.unwrap_or(0.0)).collect();
@@ -121,7 +123,7 @@ impl Intervals {
         };
         let square = bounds.iter().map(|b| b * b).sum::<f64>() / n;
         Intervals {
-            ratio: spread.deviation / square.sqrt(),
+            ratio: statistics.deviation / square.sqrt(),
             share_68: within(HALF_68),
             share_95: within(HALF_95),
         }
@@ -135,17 +137,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_interval_holds_the_truth_where_the_error_is_within_its_half_width() {
+    fn an_interval_covers_the_truth_if_the_error_is_within_its_half_width() {
         let errors = [0.5, -0.9, 1.5, -3.0];
-        let spread = Spread::of(&errors);
-        assert_relative_eq!(spread.mean, -0.475);
+        let statistics = ErrorStatistics::of(&errors);
+        assert_relative_eq!(statistics.mean, -0.475);
         let found = Intervals::new(
             &errors,
-            &spread,
+            &statistics,
             [Some(1.0), Some(1.0), Some(1.0), None].into_iter(),
         );
         assert_relative_eq!(found.share_68, 0.5);
         assert_relative_eq!(found.share_95, 0.75);
-        assert_relative_eq!(found.ratio, spread.deviation / 0.75_f64.sqrt());
+        assert_relative_eq!(found.ratio, statistics.deviation / 0.75_f64.sqrt());
     }
 }

@@ -1,5 +1,13 @@
-//! The conductor of the study of bounds: flies the test points of the cards, records them many
-//! times, and writes the tables and the page that say what the bounds are worth.
+//! Study of the bounds: simulated maneuvers with known derivatives are recorded many times, each time
+//! with fresh noise, and estimated. The scatter of the estimates is compared with their bounds.
+//!
+//! Instruments have noise only, and held values are true. Writes the tables `coverage` and `starts`
+//! and a page of the documentation.
+
+mod recordings;
+mod coverage;
+mod starts;
+mod page;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,22 +16,17 @@ use crate::aero::WindTunnel;
 use crate::error::{Problem, Result};
 use crate::estimate::{self, Basis};
 use crate::lab::campaign::SimulatedCampaign;
-use crate::lab::simulator::Flown;
-use crate::lab::simulator::noise::seed_of;
+use crate::lab::simulator::FlownManeuver;
+use crate::lab::simulator::random::derived_seed;
 use crate::maneuver::Class;
 use crate::output_error::estimation::Weights;
 use crate::pipeline::Progress;
 use crate::store::{atomic, table};
 use crate::tables::{CoverageRow, StartRow};
 
-mod coverage;
-mod page;
-mod recordings;
-mod starts;
+use recordings::{Residuals, Scenario, StudyManeuver};
 
-use recordings::{Residuals, Setting, Subject};
-
-/// What a study found.
+/// Tables of a study.
 #[derive(Clone, Debug, Default)]
 pub struct BoundsStudy {
     pub coverage: Vec<CoverageRow>,
@@ -32,8 +35,8 @@ pub struct BoundsStudy {
     pub problems: Vec<Problem>,
 }
 
-/// The ways in which every maneuver is recorded and weighted.
-const SETTINGS: [(Residuals, Weights); 5] = [
+/// Combinations of residuals and weights in the study of coverage.
+const COMBINATIONS: [(Residuals, Weights); 5] = [
     (Residuals::White, Weights::Table),
     (Residuals::White, Weights::Estimated),
     (Residuals::Coloured, Weights::Table),
@@ -41,122 +44,151 @@ const SETTINGS: [(Residuals, Weights); 5] = [
     (Residuals::EveryChannel, Weights::Table),
 ];
 
-/// One in so many records serves for the study of starting values, which estimates each six times.
+/// Records of the coverage study per record of the study of starting values, which estimates each
+/// record six times.
 const RECORDS_PER_START: usize = 10;
 
-/// Makes the study and writes `coverage` and `starts` into a folder, and the page.
+/// Makes the study, writes its tables into a folder, and its page.
 ///
 /// # Errors
-/// A disk that says no.
+/// [`crate::error::Error::Io`] or [`crate::error::Error::Store`] naming the file.
 pub fn run(
-    simulation: &SimulatedCampaign,
+    campaign: &SimulatedCampaign,
     out: &Path,
     page: &Path,
     command: &str,
     progress: &dyn Progress,
 ) -> Result<BoundsStudy> {
-    let mut found = BoundsStudy::default();
-    let mut flown: Vec<(&Class, Flown)> = Vec::new();
-    for class in &simulation.config.classes {
-        for alpha_deg in angles(simulation, &class.name) {
-            let Some(card) = simulation.card(&class.name, alpha_deg) else {
-                continue;
-            };
-            match simulation.simulator.fly(&card) {
-                Ok(maneuver) => flown.push((class, maneuver)),
-                Err(problem) => found.problems.push(problem),
-            }
-        }
-    }
-    // Held values are true and instruments calibrated: what bounds count of either is nothing that
-    // the scatter could show.
-    let settings = estimate::Settings {
-        held_uncertainty_pct: 0.0,
-        calibration: BTreeMap::new(),
-        ..simulation.config.estimate.clone()
-    };
-    let study = simulation.cards.study;
-    progress.begin("validate", flown.len() * (SETTINGS.len() + 1));
-    for (residuals, weights) in SETTINGS {
-        for (class, maneuver) in &flown {
-            let (truth, seed) = (
-                recordings::tunnel_of_truth(maneuver),
-                seed_of(simulation.cards.seed, &name(maneuver)),
-            );
-            let subject = subject(simulation, class, maneuver, &truth, &settings);
-            let setting = Setting {
-                residuals,
-                coloured_time_s: study.coloured_time_s,
-                weights,
-            };
-            found.coverage.extend(coverage::coverage(
-                &subject,
-                setting,
-                study.realisations,
-                seed,
-            ));
-            progress.advance(&name(maneuver));
-        }
-    }
-    for (class, maneuver) in &flown {
-        let (truth, seed) = (
-            recordings::tunnel_of_truth(maneuver),
-            seed_of(simulation.cards.seed, &name(maneuver)),
-        );
-        let subject = subject(simulation, class, maneuver, &truth, &settings);
-        let setting = Setting {
-            residuals: Residuals::White,
-            coloured_time_s: 0.0,
-            weights: Weights::Table,
+    let mut study = BoundsStudy::default();
+    let flown = fly_test_points(campaign, &mut study.problems);
+    progress.begin("validate", flown.len() * (COMBINATIONS.len() + 1));
+    for (residuals, weights) in COMBINATIONS {
+        let scenario = Scenario {
+            residuals,
+            coloured_time_s: campaign.cards.study.coloured_time_s,
+            weights,
         };
-        let records = study.realisations.div_ceil(RECORDS_PER_START);
-        found
-            .starts
-            .extend(starts::starts(&subject, setting, records, seed));
-        progress.advance(&name(maneuver));
+        for maneuver in &flown {
+            study
+                .coverage
+                .extend(study_coverage(campaign, maneuver, scenario));
+            progress.advance(maneuver.name());
+        }
+    }
+    for maneuver in &flown {
+        study.starts.extend(study_starts(campaign, maneuver));
+        progress.advance(maneuver.name());
     }
     progress.end();
     let shelf = table::Shelf::of(out);
-    table::publish(&shelf, &found.coverage)?;
-    table::publish(&shelf, &found.starts)?;
-    atomic::place(
-        page,
-        page::page(command, &found.coverage, &found.starts).as_bytes(),
-    )?;
-    Ok(found)
+    table::publish(&shelf, &study.coverage)?;
+    table::publish(&shelf, &study.starts)?;
+    let text = page::page(command, &study.coverage, &study.starts);
+    atomic::place(page, text.as_bytes())?;
+    Ok(study)
 }
 
-fn name(maneuver: &Flown) -> String {
-    maneuver.maneuver.flight_id.clone()
-}
-
-fn subject<'a>(
-    simulation: &'a SimulatedCampaign,
+/// A flown test point with its class and true derivatives.
+struct TestPoint<'a> {
     class: &'a Class,
-    flown: &'a Flown,
-    truth: &'a WindTunnel,
-    settings: &'a estimate::Settings,
-) -> Subject<'a> {
-    let config = &simulation.config;
-    let basis = Basis::new(&config.aircraft, &config.buildup, truth, settings);
-    Subject {
-        class,
-        flown,
-        instruments: &simulation.cards.instruments,
-        basis,
+    flown: FlownManeuver,
+    truth: WindTunnel,
+}
+
+impl TestPoint<'_> {
+    fn name(&self) -> &str {
+        &self.flown.maneuver.flight_id
     }
 }
 
-/// Angles of attack for a class's study, spread over those that its cards have.
-fn angles(simulation: &SimulatedCampaign, class: &str) -> Vec<f64> {
-    let flights = simulation.cards.flights.values();
+fn fly_test_points<'a>(
+    campaign: &'a SimulatedCampaign,
+    problems: &mut Vec<Problem>,
+) -> Vec<TestPoint<'a>> {
+    let mut points = Vec::new();
+    for class in &campaign.config.classes {
+        for alpha_deg in angles_of_attack(campaign, &class.name) {
+            let Some(card) = campaign.card(&class.name, alpha_deg) else {
+                continue;
+            };
+            match campaign.simulator.fly(&card) {
+                Ok(flown) => points.push(TestPoint {
+                    class,
+                    truth: recordings::true_tables(&flown.truth),
+                    flown,
+                }),
+                Err(problem) => problems.push(problem),
+            }
+        }
+    }
+    points
+}
+
+/// Angles of attack of a class's study, spread over those of its cards.
+fn angles_of_attack(campaign: &SimulatedCampaign, class: &str) -> Vec<f64> {
+    let flights = campaign.cards.flights.values();
     let points = flights.flat_map(|f| &f.points).filter(|p| p.class == class);
     let mut angles: Vec<f64> = points.flat_map(|p| p.alpha_deg.iter().copied()).collect();
     angles.sort_by(f64::total_cmp);
     angles.dedup();
-    let wanted = simulation.cards.study.points.clamp(1, angles.len().max(1));
-    let place = |k: usize| k * angles.len().saturating_sub(1) / (wanted - 1).max(1);
-    (0..wanted.min(angles.len()))
-        .map(|k| angles[place(k)])
+    let count = campaign.cards.study.points.clamp(1, angles.len().max(1));
+    let index = |k: usize| k * angles.len().saturating_sub(1) / (count - 1).max(1);
+    (0..count.min(angles.len()))
+        .map(|k| angles[index(k)])
         .collect()
+}
+
+/// Settings of the estimates: no uncertainty of held values and instruments, which the study does not
+/// vary.
+fn study_settings(campaign: &SimulatedCampaign) -> estimate::Settings {
+    estimate::Settings {
+        held_uncertainty_pct: 0.0,
+        calibration: BTreeMap::new(),
+        ..campaign.config.estimate.clone()
+    }
+}
+
+fn study_coverage(
+    campaign: &SimulatedCampaign,
+    point: &TestPoint,
+    scenario: Scenario,
+) -> Vec<CoverageRow> {
+    let settings = study_settings(campaign);
+    let maneuver = study_maneuver(campaign, point, &settings);
+    let realisations = campaign.cards.study.realisations;
+    coverage::coverage(&maneuver, scenario, realisations, seed(campaign, point))
+}
+
+fn study_starts(campaign: &SimulatedCampaign, point: &TestPoint) -> Vec<StartRow> {
+    let settings = study_settings(campaign);
+    let maneuver = study_maneuver(campaign, point, &settings);
+    let scenario = Scenario {
+        residuals: Residuals::White,
+        coloured_time_s: 0.0,
+        weights: Weights::Table,
+    };
+    let records = campaign
+        .cards
+        .study
+        .realisations
+        .div_ceil(RECORDS_PER_START);
+    starts::starts(&maneuver, scenario, records, seed(campaign, point))
+}
+
+fn seed(campaign: &SimulatedCampaign, point: &TestPoint) -> u64 {
+    derived_seed(campaign.cards.seed, point.name())
+}
+
+fn study_maneuver<'a>(
+    campaign: &'a SimulatedCampaign,
+    point: &'a TestPoint,
+    settings: &'a estimate::Settings,
+) -> StudyManeuver<'a> {
+    let config = &campaign.config;
+    StudyManeuver {
+        class: point.class,
+        flown: &point.flown,
+        instruments: &campaign.cards.instruments,
+        basis: Basis::new(&config.aircraft, &config.buildup, &point.truth, settings),
+    }
 }

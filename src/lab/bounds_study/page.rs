@@ -1,72 +1,76 @@
-//! The page of the documentation that says what the bounds are worth: Markdown from the study's
-//! tables.
+//! Page of the documentation with the results of the study, Markdown.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use crate::tables::{CoverageRow, StartRow};
 
-/// What is wanted of every derivative: bias under this share of the scatter, and coverage of the
-/// 95% interval between these.
+/// Criterion for the bias of a derivative: below this share of the scatter.
 const BIAS: f64 = 0.1;
+
+/// Criterion for the coverage of the 95% interval of a derivative.
 const COVERED: std::ops::RangeInclusive<f64> = 0.92..=0.98;
 
-/// The page. `command` is what makes it again.
+/// Page of a study; `command` repeats it.
 #[must_use]
 pub fn page(command: &str, coverage: &[CoverageRow], starts: &[StartRow]) -> String {
-    let mut page = format!(
-        "# What the bounds are worth\n\n\
-         Made by `{command}`. Simulated maneuvers are recorded many times, each time with other noise, and estimated; \
-         held values are the true ones. *White* and *coloured* are noise of the five outputs, as the theory has it; \
-         coloured noise is a first-order process of the same size. *Noise on every channel* is white, also on surfaces, \
-         airspeed and the other axis, which the estimator takes as exact.\n\n\
-         *Scatter* is the standard deviation of the estimates, *bound* the root mean square of the bounds they state. \
-         Coverage is how often an interval holds the truth; of {records} records it is known to \
-         {error:.1} % (one standard error at 95 %), a bias over scatter to {bias:.2}.\n\n",
-        records = coverage.iter().map(|r| r.realisations).max().unwrap_or(0),
-        error = 100.0 * counting_error(coverage),
-        bias = bias_error(coverage),
-    );
+    let mut page = introduction(command, coverage);
     page += &summary(coverage);
     page += &starts_table(starts);
-    for (residuals, weights) in settings(coverage) {
+    for (residuals, weights) in scenarios(coverage) {
         let rows = coverage
             .iter()
             .filter(|r| r.residuals == residuals && r.weights == weights);
         let _ = write!(page, "\n## {residuals} residuals, weights: {weights}\n\n");
-        page += &derivatives(rows);
+        page += &derivatives_table(rows);
     }
     page
 }
 
+fn introduction(command: &str, coverage: &[CoverageRow]) -> String {
+    format!(
+        "# Coverage of the bounds\n\n\
+         Made by `{command}`, harvest {version}, sources {sources}.\n\n\
+         Simulated maneuvers with known derivatives are recorded {records} times each, with fresh noise, and \
+         estimated. Held derivatives have their true values. *White* and *coloured* noise act on the five \
+         outputs, as the theory assumes; coloured noise is a first-order process with the same standard \
+         deviation. *Noise on every channel* is white and acts also on surfaces, airspeed and the other axis, \
+         which the estimator takes as exact.\n\n\
+         *Scatter* is the standard deviation of the estimates, *bound* the root mean square of their bounds. \
+         *Coverage* is the share of the intervals that contain the truth. The number of records leaves a \
+         standard error of {error:.1} % in a coverage of 95 %, and of {bias:.2} in a ratio of bias to \
+         scatter.\n\n",
+        version = env!("CARGO_PKG_VERSION"),
+        sources = env!("HARVEST_SOURCE"),
+        records = coverage.iter().map(|r| r.realisations).max().unwrap_or(0),
+        error = 100.0 * coverage_error(coverage),
+        bias = bias_error(coverage),
+    )
+}
+
+/// Least number of converged records of any maneuver.
+fn least_converged(coverage: &[CoverageRow]) -> f64 {
+    let converged = coverage.iter().map(|r| r.converged);
+    converged.min().unwrap_or(1).max(1) as f64
+}
+
 /// Standard error of a coverage of 95%.
-fn counting_error(coverage: &[CoverageRow]) -> f64 {
-    let n = coverage
-        .iter()
-        .map(|r| r.converged)
-        .min()
-        .unwrap_or(1)
-        .max(1) as f64;
-    (0.95 * 0.05 / n).sqrt()
+fn coverage_error(coverage: &[CoverageRow]) -> f64 {
+    (0.95 * 0.05 / least_converged(coverage)).sqrt()
 }
 
+/// Standard error of the ratio of bias to scatter.
 fn bias_error(coverage: &[CoverageRow]) -> f64 {
-    1.0 / (coverage
-        .iter()
-        .map(|r| r.converged)
-        .min()
-        .unwrap_or(1)
-        .max(1) as f64)
-        .sqrt()
+    1.0 / least_converged(coverage).sqrt()
 }
 
-/// The ways of recording and weighting, in the order they come.
-fn settings(coverage: &[CoverageRow]) -> Vec<(&str, &str)> {
+/// Pairs of residuals and weights, in order of appearance.
+fn scenarios(coverage: &[CoverageRow]) -> Vec<(&str, &str)> {
     let mut found = Vec::new();
     for row in coverage {
-        let setting = (row.residuals.as_str(), row.weights.as_str());
-        if !found.contains(&setting) {
-            found.push(setting);
+        let scenario = (row.residuals.as_str(), row.weights.as_str());
+        if !found.contains(&scenario) {
+            found.push(scenario);
         }
     }
     found
@@ -78,6 +82,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+/// Percentage of rows that satisfy a condition.
 fn share<'a>(
     rows: impl Iterator<Item = &'a CoverageRow> + Clone,
     holds: impl Fn(&CoverageRow) -> bool,
@@ -85,13 +90,14 @@ fn share<'a>(
     100.0 * rows.clone().filter(|r| holds(r)).count() as f64 / rows.count().max(1) as f64
 }
 
+/// Medians over maneuvers and derivatives: a row per scenario.
 fn summary(coverage: &[CoverageRow]) -> String {
     let mut text = String::from(
         "| residuals | weights | maneuvers × derivatives | `bound`: scatter / bound, coverage of 95 % | \
-         `bound_corrected`: scatter / bound, coverage of 68 %, of 95 % | 95 % covered 92 to 98 % of the time | \
-         bias under 0.1 scatter |\n|---|---|---|---|---|---|---|\n",
+         `bound_corrected`: scatter / bound, coverage of 68 %, of 95 % | coverage of 95 % between 92 and 98 % | \
+         bias below 0.1 scatter |\n|---|---|---|---|---|---|---|\n",
     );
-    for (residuals, weights) in settings(coverage) {
+    for (residuals, weights) in scenarios(coverage) {
         let rows = coverage
             .iter()
             .filter(|r| r.residuals == residuals && r.weights == weights);
@@ -112,33 +118,34 @@ fn summary(coverage: &[CoverageRow]) -> String {
     text + "\nRatios and coverages are medians over maneuvers and derivatives.\n"
 }
 
+/// Minima reached from other starting values: a row per kind of start.
 fn starts_table(starts: &[StartRow]) -> String {
     if starts.is_empty() {
         return String::new();
     }
     let mut text = String::from(
-        "\n## Starting elsewhere\n\nHow often the iteration reaches the minimum that it reaches from the truth (no \
-         derivative differs by more than a tenth of its bound): by itself, and as the program does it, from the \
-         equation error's solution where it does not converge from the given values.\n\n\
-         | starting values | records | reached by itself | reached |\n|---|---|---|---|\n",
+        "\n## Other starting values\n\nShare of the records whose iteration reaches the same minimum as from the true \
+         values (no derivative differs by more than a tenth of its bound): unaided, and with the program's second \
+         start from the equation-error solution.\n\n\
+         | starting values | records | reached unaided | reached |\n|---|---|---|---|\n",
     );
     let kinds: BTreeSet<&str> = starts.iter().map(|r| r.start.as_str()).collect();
     for kind in kinds {
         let rows = starts.iter().filter(|r| r.start == kind);
-        let sum = |f: fn(&StartRow) -> usize| rows.clone().map(f).sum::<usize>();
+        let sum = |count: fn(&StartRow) -> usize| rows.clone().map(count).sum::<usize>();
         let records = sum(|r| r.records);
         let percent = |count: usize| 100.0 * count as f64 / records.max(1) as f64;
-        let (alone, reached) = (percent(sum(|r| r.alone)), percent(sum(|r| r.reached)));
+        let (unaided, reached) = (percent(sum(|r| r.alone)), percent(sum(|r| r.reached)));
         let _ = writeln!(
             text,
-            "| {kind} | {records} | {alone:.1} % | {reached:.1} % |"
+            "| {kind} | {records} | {unaided:.1} % | {reached:.1} % |"
         );
     }
     text
 }
 
-/// A row per class and derivative, over its angles of attack.
-fn derivatives<'a>(rows: impl Iterator<Item = &'a CoverageRow>) -> String {
+/// Results by class and derivative, over the angles of attack.
+fn derivatives_table<'a>(rows: impl Iterator<Item = &'a CoverageRow>) -> String {
     let mut groups: Vec<(&str, &str)> = Vec::new();
     let mut members: BTreeMap<(&str, &str), Vec<&CoverageRow>> = BTreeMap::new();
     for row in rows {
@@ -204,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_how_many_intervals_keep_their_promise() {
+    fn the_page_counts_the_derivatives_that_meet_the_criteria() {
         let rows = [
             row("white", 10.0, 0.95),
             row("white", 20.0, 0.90),

@@ -1,30 +1,26 @@
-//! Is what the bounds say true? Maneuvers with known derivatives are recorded many times, each time
-//! with other noise, and estimated; how far the estimates scatter is held against what each of them
-//! said of itself.
-//!
-//! The maneuvers are the simulator's, whose equations of motion are not the estimator's.
-//! Instruments have noise only; held values are the true ones.
+//! Recordings of one maneuver with fresh noise, and the estimate from each.
 
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Output, WindTunnel};
 use crate::estimate::{self, Basis, Estimated};
-use crate::lab::simulator::{Flown, Instrument, Instruments};
+use crate::lab::simulator::{FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::maneuver::Class;
 use crate::output_error::estimation::Weights;
 
-/// What noise the records have.
+/// Noise of the recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Residuals {
     /// White noise of the outputs.
     White,
-    /// Coloured noise of the outputs, of the same size.
+    /// Coloured noise of the outputs with the same standard deviation.
     Coloured,
-    /// White noise on every channel, also those that the estimator takes as exact: surfaces,
+    /// White noise of every channel, including those that the estimator takes as exact: surfaces,
     /// airspeed, the other axis.
     EveryChannel,
 }
 
 impl Residuals {
+    /// Name in the tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -35,29 +31,29 @@ impl Residuals {
     }
 }
 
-/// A maneuver that is recorded again and again.
+/// A maneuver to be recorded many times.
 #[derive(Clone, Debug)]
-pub struct Subject<'a> {
+pub struct StudyManeuver<'a> {
     pub class: &'a Class,
-    pub flown: &'a Flown,
-    /// What each signal's noise is.
+    pub flown: &'a FlownManeuver,
+    /// Instruments with the noise of each signal.
     pub instruments: &'a Instruments,
     pub basis: Basis<'a>,
 }
 
-/// One way of recording and weighting; the time constant is that of coloured noise.
+/// Noise of the recordings and weights of the estimates; the time constant is that of coloured noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
+pub struct Scenario {
     pub residuals: Residuals,
     pub coloured_time_s: f64,
     pub weights: Weights,
 }
 
-/// A table that says everywhere what was true in a maneuver.
+/// Tunnel tables that hold given derivatives at every angle of attack.
 #[must_use]
-pub fn tunnel_of_truth(flown: &Flown) -> WindTunnel {
-    let mut tunnel = WindTunnel::default();
-    for truth in &flown.truth {
+pub fn true_tables(derivatives: &[TrueDerivative]) -> WindTunnel {
+    let mut tables = WindTunnel::default();
+    for truth in derivatives {
         for alpha_deg in [-180.0, 180.0] {
             let point = TunnelPoint {
                 alpha_deg,
@@ -66,41 +62,38 @@ pub fn tunnel_of_truth(flown: &Flown) -> WindTunnel {
                 uncertainty: None,
                 source: None,
             };
-            tunnel.insert(&truth.derivative, point);
+            tables.insert(&truth.derivative, point);
         }
     }
-    tunnel
+    tables
 }
 
-impl Subject<'_> {
-    /// The estimate from one record.
-    pub fn estimate(&self, setting: Setting, seed: u64) -> Estimated {
-        let record = self.flown.recorded(&self.noise_only(setting), seed);
+impl StudyManeuver<'_> {
+    /// Records the maneuver once and estimates it.
+    pub fn estimate(&self, scenario: Scenario, seed: u64) -> Estimated {
+        let record = self.flown.recorded(&self.noise_only(scenario), seed);
         let settings = estimate::Settings {
-            weights: setting.weights,
+            weights: scenario.weights,
             ..self.basis.settings.clone()
         };
-        estimate::maneuver(
-            &record,
-            &self.flown.maneuver,
-            self.class,
-            &Basis {
-                settings: &settings,
-                ..self.basis
-            },
-        )
+        let basis = Basis {
+            settings: &settings,
+            ..self.basis
+        };
+        estimate::maneuver(&record, &self.flown.maneuver, self.class, &basis)
     }
 
-    /// Instruments with nothing but noise.
-    fn noise_only(&self, setting: Setting) -> Instruments {
+    /// Instruments with the noise of a scenario and no other errors.
+    fn noise_only(&self, scenario: Scenario) -> Instruments {
         let outputs = self.class.axis.outputs().map(Output::signal);
-        let only = |(signal, instrument): (&String, &Instrument)| {
-            let (noise, is_output) = (instrument.noise, outputs.contains(&signal.as_str()));
+        let noise_only = |(signal, instrument): (&String, &Instrument)| {
+            let is_output = outputs.contains(&signal.as_str());
+            let noise = instrument.noise;
             let perfect = Instrument::default();
-            let instrument = match setting.residuals {
+            let instrument = match scenario.residuals {
                 Residuals::Coloured if is_output => Instrument {
                     coloured: noise,
-                    coloured_time_s: setting.coloured_time_s,
+                    coloured_time_s: scenario.coloured_time_s,
                     ..perfect
                 },
                 Residuals::White if is_output => Instrument { noise, ..perfect },
@@ -109,6 +102,6 @@ impl Subject<'_> {
             };
             (signal.clone(), instrument)
         };
-        Instruments(self.instruments.0.iter().map(only).collect())
+        Instruments(self.instruments.0.iter().map(noise_only).collect())
     }
 }

@@ -1,126 +1,154 @@
-//! Does the iteration find the same minimum from elsewhere? The same record is estimated from the
-//! true values, from values off by a factor of two, and from surfaces without effect.
+//! Dependence of the minimum on the starting values: each record is estimated from the true values,
+//! from twice and half of them, and from ineffective surfaces.
 
 use rayon::prelude::*;
 
-use super::recordings::{Setting, Subject, tunnel_of_truth};
+use super::recordings::{Scenario, StudyManeuver, true_tables};
 use crate::aero::{Buildup, WindTunnel};
 use crate::estimate::{self, Basis, Estimated, Start};
-use crate::lab::simulator::noise::seed_of;
-use crate::lab::simulator::{Flown, TrueDerivative};
+use crate::lab::simulator::TrueDerivative;
+use crate::lab::simulator::random::derived_seed;
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, StartRow, StartingValues};
 
-/// The minimum is the same when no derivative differs by more than this share of its bound.
-const SAME: f64 = 0.1;
+/// Greatest difference between equal minima, as a share of each derivative's bound. The criterion of
+/// `docs/coverage.md`.
+const SAME_MINIMUM: f64 = 0.1;
 
-/// What the true values are changed to.
+/// Starting values relative to the true ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum From {
+enum StartVariant {
     Double,
     Half,
     NoSurfaces,
 }
 
-impl From {
+impl StartVariant {
     fn name(self) -> &'static str {
         match self {
-            From::Double => "twice the truth",
-            From::Half => "half the truth",
-            From::NoSurfaces => "surfaces without effect",
+            StartVariant::Double => "twice the truth",
+            StartVariant::Half => "half the truth",
+            StartVariant::NoSurfaces => "surfaces without effect",
         }
     }
 
-    fn table(self, flown: &Flown, buildup: &Buildup) -> WindTunnel {
-        let surface = |name: &str| {
+    /// Tunnel tables with these values.
+    fn tables(self, truth: &[TrueDerivative], buildup: &Buildup) -> WindTunnel {
+        let is_surface = |name: &str| {
             buildup
                 .derivatives
                 .iter()
                 .any(|d| d.name == name && d.regressor.surface().is_some())
         };
-        let factor = |t: &TrueDerivative| match self {
-            From::Double => 2.0,
-            From::Half => 0.5,
-            From::NoSurfaces => f64::from(u8::from(!surface(&t.derivative))),
+        let factor = |name: &str| match self {
+            StartVariant::Double => 2.0,
+            StartVariant::Half => 0.5,
+            StartVariant::NoSurfaces if is_surface(name) => 0.0,
+            StartVariant::NoSurfaces => 1.0,
         };
-        let truth = flown
-            .truth
+        let changed: Vec<TrueDerivative> = truth
             .iter()
             .map(|t| TrueDerivative {
-                value: factor(t) * t.value,
+                value: factor(&t.derivative) * t.value,
                 ..t.clone()
             })
             .collect();
-        tunnel_of_truth(&Flown {
-            truth,
-            ..flown.clone()
-        })
+        true_tables(&changed)
     }
 }
 
-/// A row per kind of start, over `realisations` records.
+/// Minimum reached from other starting values, compared with the minimum from the true values.
+#[derive(Clone, Copy, Debug)]
+struct Reached {
+    /// Reached, possibly from the equation-error start.
+    same: bool,
+    /// Reached from the given values.
+    unaided: bool,
+}
+
+/// Estimates a maneuver from each kind of starting values: a row per kind.
 #[must_use]
 pub fn starts(
-    subject: &Subject,
-    setting: Setting,
+    maneuver: &StudyManeuver,
+    scenario: Scenario,
     realisations: usize,
     seed: u64,
 ) -> Vec<StartRow> {
-    let truth = tunnel_of_truth(subject.flown);
-    let reached = |from: From| -> Vec<(bool, bool)> {
-        let elsewhere = from.table(subject.flown, subject.basis.buildup);
-        let one = |i: usize| {
-            let seed = seed_of(seed, &format!("start {i}"));
-            let reference = subject.from(&truth, setting, seed);
-            let found = subject.from(&elsewhere, setting, seed);
-            let same = same(&reference, &found);
-            (
-                same && found.fit.start == Some(StartingValues::WindTunnel),
-                same,
-            )
-        };
-        (0..realisations).into_par_iter().map(one).collect()
-    };
-    let row = |from: From| {
-        let reached = reached(from);
+    let row = |values: StartVariant| {
+        let reached = reached(maneuver, scenario, values, realisations, seed);
         StartRow {
-            class: subject.class.name.clone(),
-            alpha_deg: subject.flown.maneuver.alpha_deg,
-            start: from.name().to_owned(),
+            class: maneuver.class.name.clone(),
+            alpha_deg: maneuver.flown.maneuver.alpha_deg,
+            start: values.name().to_owned(),
             records: realisations,
-            alone: reached.iter().filter(|r| r.0).count(),
-            reached: reached.iter().filter(|r| r.1).count(),
+            alone: reached.iter().filter(|r| r.unaided).count(),
+            reached: reached.iter().filter(|r| r.same).count(),
         }
     };
-    [From::Double, From::Half, From::NoSurfaces].map(row).into()
+    [
+        StartVariant::Double,
+        StartVariant::Half,
+        StartVariant::NoSurfaces,
+    ]
+    .map(row)
+    .into()
 }
 
-impl Subject<'_> {
-    /// The estimate from one record whose iteration starts from the values of a table.
-    fn from(&self, start: &WindTunnel, setting: Setting, seed: u64) -> Estimated {
-        let settings = estimate::Settings {
-            start: Start::WindTunnel,
-            ..self.basis.settings.clone()
-        };
-        let basis = Basis {
-            settings: &settings,
-            start,
-            ..self.basis
-        };
-        Subject {
-            basis,
-            ..self.clone()
-        }
-        .estimate(setting, seed)
+fn reached(
+    maneuver: &StudyManeuver,
+    scenario: Scenario,
+    values: StartVariant,
+    realisations: usize,
+    seed: u64,
+) -> Vec<Reached> {
+    let truth = true_tables(&maneuver.flown.truth);
+    let start = values.tables(&maneuver.flown.truth, maneuver.basis.buildup);
+    (0..realisations)
+        .into_par_iter()
+        .map(|i| {
+            let seed = derived_seed(seed, &format!("start {i}"));
+            let reference = estimate_from(maneuver, &truth, scenario, seed);
+            let estimated = estimate_from(maneuver, &start, scenario, seed);
+            let same = is_same_minimum(&reference, &estimated);
+            Reached {
+                same,
+                unaided: same && estimated.fit.start == Some(StartingValues::WindTunnel),
+            }
+        })
+        .collect()
+}
+
+/// Estimates one record from the values of given tables.
+fn estimate_from(
+    maneuver: &StudyManeuver,
+    start: &WindTunnel,
+    scenario: Scenario,
+    seed: u64,
+) -> Estimated {
+    let settings = estimate::Settings {
+        start: Start::WindTunnel,
+        ..maneuver.basis.settings.clone()
+    };
+    let basis = Basis {
+        settings: &settings,
+        start,
+        ..maneuver.basis
+    };
+    StudyManeuver {
+        basis,
+        ..maneuver.clone()
     }
+    .estimate(scenario, seed)
 }
 
-fn same(a: &Estimated, b: &Estimated) -> bool {
+/// Compares two estimates of one record.
+fn is_same_minimum(reference: &Estimated, estimated: &Estimated) -> bool {
     let converged = |e: &Estimated| e.fit.outcome == Outcome::Converged;
-    let near = |(a, b): (&EstimateRow, &EstimateRow)| match (a.value, b.value, a.bound) {
-        (Some(at), Some(found), Some(bound)) => (at - found).abs() <= SAME * bound,
-        // Held, or inactive.
+    let is_near = |(a, b): (&EstimateRow, &EstimateRow)| match (a.value, b.value, a.bound) {
+        (Some(at), Some(found), Some(bound)) => (at - found).abs() <= SAME_MINIMUM * bound,
+        // Held or inactive derivatives have no bound.
         (at, found, _) => at == found,
     };
-    converged(a) && converged(b) && a.estimates.iter().zip(&b.estimates).all(near)
+    let mut rows = reference.estimates.iter().zip(&estimated.estimates);
+    converged(reference) && converged(estimated) && rows.all(is_near)
 }

@@ -1,55 +1,55 @@
-//! Cards as they are written, YAML: the simulated aircraft, its truth and instruments, the programs
-//! of the maneuvers, and the flights with their test points.
+//! Test cards as written in YAML: simulated aircraft, true derivatives, instruments, programs of the
+//! maneuver classes, flights with their test points.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lab::simulator::{Input, Instruments, Program, Settings, Tables, Turbulence};
+use crate::lab::simulator::{DerivativeLookup, Instruments, Program, Settings, Turbulence};
 
-/// A campaign to be simulated. Paths are relative to the folder harvest is run in.
+/// A file of test cards. Paths are relative to the working directory.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cards {
-    /// The pipeline whose aircraft, channel map and build-up hold: a folder, or the name of one
-    /// under `pipelines/`.
+    /// Pipeline with aircraft, channel map and build-up: a folder, or the name of one under
+    /// `pipelines/`.
     pub pipeline: PathBuf,
-    /// The true derivatives, CSV as a wind-tunnel table.
+    /// True derivatives: CSV in the form of a wind-tunnel table.
     pub truth: PathBuf,
     pub seed: u64,
-    #[serde(default)]
-    pub tables: Tables,
+    /// Source of the derivatives during a maneuver.
+    #[serde(default, rename = "tables")]
+    pub derivatives: DerivativeLookup,
     pub aircraft: Settings,
     #[serde(default)]
     pub instruments: Instruments,
     #[serde(default)]
-    pub wind_tunnel: Tunnel,
-    /// Maneuver class → what is done in it.
+    pub wind_tunnel: TunnelErrors,
+    /// Programs by maneuver class.
     pub programs: BTreeMap<String, Program>,
-    /// Name of the flight → what it flies.
+    /// Flights by name.
     pub flights: BTreeMap<String, FlightCard>,
-    /// How `harvest validate` records the test points.
+    /// Settings of `harvest lab validate`.
     #[serde(default)]
-    pub study: Study,
+    pub study: StudySettings,
 }
 
-/// How the bounds are put to the test: maneuvers of the cards recorded many times.
+/// Settings of the study of the bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Study {
-    /// Records of each maneuver.
+pub struct StudySettings {
+    /// Number of records of each maneuver.
     pub realisations: usize,
-    /// Angles of attack of each class, spread over those that its cards have.
+    /// Number of angles of attack of each class, spread over those of its cards.
     pub points: usize,
-    /// Time constant of the outputs' noise where it is coloured; its size is that of the white
-    /// noise.
+    /// Time constant of the coloured noise; its standard deviation is that of the white noise.
     pub coloured_time_s: f64,
 }
 
-impl Default for Study {
+impl Default for StudySettings {
     fn default() -> Self {
-        Study {
+        StudySettings {
             realisations: 200,
             points: 3,
             coloured_time_s: 0.5,
@@ -57,26 +57,26 @@ impl Default for Study {
     }
 }
 
-/// How the wind-tunnel database differs from the truth.
+/// Errors of the simulated wind-tunnel database.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Tunnel {
-    /// Standard deviation of a derivative's error over the whole table, in percent of its root mean
-    /// square.
+pub struct TunnelErrors {
+    /// Standard deviation of the error common to a derivative's table, percent of the table's root
+    /// mean square.
     pub error_pct: f64,
-    /// The same for each of its points.
+    /// Standard deviation of the further error of each point, in the same unit.
     pub scatter_pct: f64,
-    /// Derivatives and combined sums that the tunnel does not have.
+    /// Derivatives and combined sums left out of the database.
     pub leave_out: Vec<String>,
 }
 
-/// One flight.
+/// Test points and conditions of one flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlightCard {
     pub altitude_ft: f64,
     pub mass_slug: f64,
-    /// Mass burnt from one test point to the next.
+    /// Mass burnt between consecutive test points.
     #[serde(default)]
     pub burnt_slug: f64,
     #[serde(default)]
@@ -86,32 +86,17 @@ pub struct FlightCard {
     pub points: Vec<TestPoint>,
 }
 
-/// A maneuver class at some angles of attack.
+/// A maneuver class at several angles of attack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestPoint {
     pub class: String,
     pub alpha_deg: Vec<f64>,
-    /// All inputs are this many times their program's.
+    /// Scale of all inputs of the program.
     #[serde(default = "one")]
     pub scale: f64,
 }
 
 fn one() -> f64 {
     1.0
-}
-
-impl Program {
-    /// The program with its inputs this many times as large.
-    #[must_use]
-    pub fn scaled(&self, scale: f64) -> Program {
-        let input = |i: &Input| Input {
-            size: scale * i.size,
-            ..i.clone()
-        };
-        Program {
-            inputs: self.inputs.iter().map(input).collect(),
-            ..self.clone()
-        }
-    }
 }

@@ -1,4 +1,4 @@
-//! Actuators: ẍ = ω²(c − x) − 2ζω ẋ, with the rate and the position held to their limits.
+//! Actuators: ẍ = ω²(c − x) − 2ζω ẋ with rate and position limits.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,42 +9,43 @@ pub struct Actuator {
     pub lower_deg: f64,
     pub upper_deg: f64,
     pub rate_deg_s: f64,
-    /// ω, rad/s.
+    /// ω.
     pub frequency_rad_s: f64,
     /// ζ.
     pub damping: f64,
 }
 
-/// Where a surface stands and how fast it moves, deg and deg/s.
+/// Position and rate of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Surface {
+pub struct SurfaceState {
     pub deg: f64,
     pub deg_s: f64,
 }
 
-/// Parts of a control step in which an actuator is integrated: ω times a part stays well under one.
-const PARTS: u32 = 4;
+/// Integration steps per control step: ω times one step stays well below 1.
+const STEPS: u32 = 4;
 
 impl Actuator {
-    /// The surface after a time under a constant command, by Runge-Kutta steps of second order.
+    /// Moves a surface for a time under a constant command, by the midpoint rule.
     #[must_use]
-    pub fn advance(&self, surface: Surface, command_deg: f64, time_s: f64) -> Surface {
+    pub fn advance(&self, surface: SurfaceState, command_deg: f64, time_s: f64) -> SurfaceState {
         let command = command_deg.clamp(self.lower_deg, self.upper_deg);
-        let h = time_s / f64::from(PARTS);
-        let pull = |s: &Surface| {
+        let h = time_s / f64::from(STEPS);
+        let acceleration = |s: &SurfaceState| {
             self.frequency_rad_s
                 * (self.frequency_rad_s * (command - s.deg) - 2.0 * self.damping * s.deg_s)
         };
         let mut now = surface;
-        for _ in 0..PARTS {
-            let half = Surface {
+        for _ in 0..STEPS {
+            let half = SurfaceState {
                 deg: now.deg + 0.5 * h * now.deg_s,
-                deg_s: now.deg_s + 0.5 * h * pull(&now),
+                deg_s: now.deg_s + 0.5 * h * acceleration(&now),
             };
-            let rate = (now.deg_s + h * pull(&half)).clamp(-self.rate_deg_s, self.rate_deg_s);
-            let between = half.deg_s.clamp(-self.rate_deg_s, self.rate_deg_s);
-            let deg = now.deg + h * between;
-            now = Surface {
+            let rate =
+                (now.deg_s + h * acceleration(&half)).clamp(-self.rate_deg_s, self.rate_deg_s);
+            let mean_rate = half.deg_s.clamp(-self.rate_deg_s, self.rate_deg_s);
+            let deg = now.deg + h * mean_rate;
+            now = SurfaceState {
                 deg: deg.clamp(self.lower_deg, self.upper_deg),
                 deg_s: rate,
             };
@@ -71,8 +72,8 @@ mod tests {
         damping: 0.509,
     };
 
-    fn history(command: f64, steps: usize) -> Vec<Surface> {
-        let mut surface = Surface::default();
+    fn history(command: f64, steps: usize) -> Vec<SurfaceState> {
+        let mut surface = SurfaceState::default();
         (0..steps)
             .map(|_| {
                 surface = STABILATOR.advance(surface, command, 0.0125);
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_rate_nor_position_passes_its_limit() {
+    fn neither_rate_nor_position_exceeds_its_limit() {
         let moved = history(50.0, 80);
         let mut before = 0.0;
         for surface in &moved {

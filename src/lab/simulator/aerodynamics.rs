@@ -1,8 +1,7 @@
-//! The build-up 2.10-2.13, 3.9-3.13 as forces and moments: coefficients from the true tables and
-//! what multiplies them.
+//! Aerodynamic force and moment: the build-up 2.10-2.13, 3.9-3.13 with the true derivatives.
 //!
-//! X = −q̄S CA, Y = q̄S CY, Z = −q̄S CN; L = q̄Sb Cl, M = q̄Sc̄ Cm, N = q̄Sb Cn, about the actual
-//! c.g. A vane's derivative is a force or a moment itself.
+//! X = −q̄S CA, Y = q̄S CY, Z = −q̄S CN; L = q̄Sb Cl, M = q̄Sc̄ Cm, N = q̄Sb Cn, about the c.g. The
+//! derivative of a thrust-vectoring vane is dimensional: a force or moment per degree.
 
 use nalgebra::Vector3;
 
@@ -11,59 +10,58 @@ use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::units::DEG;
 
-/// The values of the build-up's derivatives, in its order.
-pub type Values = Vec<f64>;
-
-/// The build-up with its true tables.
+/// The build-up with the tables of the true derivatives.
 #[derive(Clone, Debug)]
 pub struct Aerodynamics {
     buildup: Buildup,
-    /// For each derivative the place of its surface among the simulated ones.
-    surfaces: Vec<Option<usize>>,
+    /// Index of each derivative's surface among the simulated surfaces.
+    surface_indices: Vec<Option<usize>>,
     truth: WindTunnel,
 }
 
 impl Aerodynamics {
+    /// Pairs a build-up with its true tables.
+    ///
     /// # Errors
-    /// A derivative without a true value, or one of a surface that is not simulated.
+    /// A derivative has no true value, or its surface is not simulated.
     pub fn new(
         buildup: &Buildup,
         truth: WindTunnel,
         surfaces: &[String],
     ) -> Result<Aerodynamics, String> {
-        let place = |d: &Derivative| {
+        let surface_index = |d: &Derivative| {
             let Some(name) = d.regressor.surface() else {
                 return Ok(None);
             };
-            let place = surfaces.iter().position(|s| s == name);
-            place
+            let index = surfaces.iter().position(|s| s == name);
+            index
                 .map(Some)
                 .ok_or_else(|| format!("{}: `surfaces` has no `{name}`", d.name))
         };
         if let Some(d) = buildup.derivatives.iter().find(|d| !truth.has(&d.name)) {
             return Err(format!("the truth has no value of {}", d.name));
         }
-        let surfaces = buildup
+        let surface_indices = buildup
             .derivatives
             .iter()
-            .map(place)
+            .map(surface_index)
             .collect::<Result<_, _>>()?;
         Ok(Aerodynamics {
             buildup: buildup.clone(),
-            surfaces,
+            surface_indices,
             truth,
         })
     }
 
-    /// The derivatives in the order of their values.
+    /// Derivatives in the order of [`Aerodynamics::values`].
     #[must_use]
     pub fn derivatives(&self) -> &[Derivative] {
         &self.buildup.derivatives
     }
 
-    /// The tables read at an angle of attack, deg, and a Mach number.
+    /// Values of the derivatives at an angle of attack, deg, and a Mach number.
     #[must_use]
-    pub fn values(&self, alpha_deg: f64, mach: f64) -> Values {
+    pub fn values(&self, alpha_deg: f64, mach: f64) -> Vec<f64> {
         let value = |d: &Derivative| {
             self.truth
                 .value(&d.name, alpha_deg, mach)
@@ -72,7 +70,7 @@ impl Aerodynamics {
         self.buildup.derivatives.iter().map(value).collect()
     }
 
-    /// Force, lbf, and moment, ft lbf, in body axes.
+    /// Force, lbf, and moment about the c.g., ft lbf, in body axes.
     #[must_use]
     pub fn loads(
         &self,
@@ -86,14 +84,14 @@ impl Aerodynamics {
         let area = air.qbar_psf * aircraft.wing_area_ft2;
         let (span, chord) = (aircraft.span_ft, aircraft.chord_ft);
         let per_speed = 0.5 / air.velocity_ft_s;
-        for ((derivative, value), surface) in self
+        for ((derivative, value), surface_index) in self
             .buildup
             .derivatives
             .iter()
             .zip(values)
-            .zip(&self.surfaces)
+            .zip(&self.surface_indices)
         {
-            let deflection = surface
+            let deflection = surface_index
                 .and_then(|i| surfaces.get(i))
                 .copied()
                 .unwrap_or(0.0);

@@ -1,14 +1,11 @@
-//! Air data: the flow that the aircraft meets, from its velocity over the ground, the gusts and the
-//! atmosphere.
-//!
-//! With u v w the velocity relative to the air: V² = u² + v² + w², tan α = w/u, sin β = v/V, q̄ =
-//! ρV²/2.
+//! Air data from the velocity relative to the air, u v w: V² = u² + v² + w², tan α = w/u,
+//! sin β = v/V, q̄ = ρV²/2.
 
 use nalgebra::Vector3;
 
 use crate::earth::air;
 
-/// The flow at the c.g.; angles in rad.
+/// Air data at the c.g.; angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AirData {
     pub velocity_ft_s: f64,
@@ -19,7 +16,7 @@ pub struct AirData {
 }
 
 impl AirData {
-    /// From the velocity relative to the air in body axes, ft/s.
+    /// Computes the air data of a velocity relative to the air in body axes, ft/s.
     #[must_use]
     pub fn new(relative: &Vector3<f64>, altitude_ft: f64) -> AirData {
         let air = air(altitude_ft);
@@ -33,7 +30,7 @@ impl AirData {
         }
     }
 
-    /// The velocity relative to the air in body axes that has this speed and these angles, rad.
+    /// Velocity relative to the air in body axes from speed and flow angles, rad.
     #[must_use]
     pub fn velocity(speed_ft_s: f64, alpha: f64, beta: f64) -> Vector3<f64> {
         Vector3::new(

@@ -2,28 +2,28 @@
 //! rates p q r in body axes, the attitude as a quaternion, and the engines' angular momentum h
 //! along +x.
 //!
-//! Written from Newton's and Euler's laws in vector form, and not from the estimator's equations of
-//! α, β and V: each is a check of the other. The earth is flat and does not turn; gravity is that
-//! of [`crate::earth::gravity_ft_s2`].
+//! Written from the laws of Newton and Euler in vector form, independently of the estimator's
+//! equations in α, β and V, so that each checks the other. Flat, non-rotating earth; gravity from
+//! [`crate::earth::gravity_ft_s2`].
 
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 
 use super::loading::Loading;
 
-/// Velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude (body to earth: north, east,
-/// down) as scalar and vector part; position north, east and up, ft.
+/// State of the body: velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude, body to
+/// earth (north, east, down); position north, east and up, ft.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub struct BodyState {
     pub velocity: Vector3<f64>,
     pub rates: Vector3<f64>,
     pub attitude: Quaternion<f64>,
     pub position: Vector3<f64>,
 }
 
-/// Rates of the state, in the same layout.
-pub type Slope = State;
+/// Time derivative of the state, in the same layout.
+pub type StateRate = BodyState;
 
-/// Angles of attitude, rad.
+/// Euler angles, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Euler {
     pub phi: f64,
@@ -32,29 +32,29 @@ pub struct Euler {
 }
 
 impl Euler {
-    /// The attitude: yaw, then pitch, then roll.
+    /// Attitude quaternion: yaw, then pitch, then roll.
     #[must_use]
     pub fn attitude(self) -> Quaternion<f64> {
         *UnitQuaternion::from_euler_angles(self.phi, self.theta, self.psi)
     }
 }
 
-impl State {
-    /// The sum of this state and `factor` times a slope.
+impl BodyState {
+    /// Adds `factor` times a rate.
     #[must_use]
-    pub fn plus(&self, slope: &Slope, factor: f64) -> State {
-        State {
-            velocity: self.velocity + slope.velocity * factor,
-            rates: self.rates + slope.rates * factor,
-            attitude: self.attitude + slope.attitude * factor,
-            position: self.position + slope.position * factor,
+    pub fn plus(&self, rate: &StateRate, factor: f64) -> BodyState {
+        BodyState {
+            velocity: self.velocity + rate.velocity * factor,
+            rates: self.rates + rate.rates * factor,
+            attitude: self.attitude + rate.attitude * factor,
+            position: self.position + rate.position * factor,
         }
     }
 
-    /// The state with its attitude brought back to length one, from which rounding takes it.
+    /// Restores the unit length of the attitude quaternion.
     #[must_use]
-    pub fn normalised(self) -> State {
-        State {
+    pub fn normalised(self) -> BodyState {
+        BodyState {
             attitude: self.attitude.normalize(),
             ..self
         }
@@ -67,7 +67,7 @@ impl State {
         values.iter().all(|v| v.is_finite()) && self.attitude.norm().is_finite()
     }
 
-    /// The rotation from body to earth axes.
+    /// Rotation matrix from body to earth axes.
     #[must_use]
     pub fn to_earth(&self) -> Matrix3<f64> {
         UnitQuaternion::from_quaternion(self.attitude)
@@ -75,7 +75,7 @@ impl State {
             .into_inner()
     }
 
-    /// Angles of attitude; ψ between −π and π.
+    /// Euler angles; ψ between −π and π.
     #[must_use]
     pub fn euler(&self) -> Euler {
         let m = self.to_earth();
@@ -86,10 +86,10 @@ impl State {
         }
     }
 
-    /// Rates of φ and θ, rad/s, from the quaternion's rate.
+    /// Rates of φ and θ, rad/s, from the rate of the quaternion.
     #[must_use]
-    pub fn euler_rates(&self, slope: &Slope) -> (f64, f64) {
-        let (a, d) = (self.attitude, slope.attitude);
+    pub fn euler_rates(&self, rate: &StateRate) -> (f64, f64) {
+        let (a, d) = (self.attitude, rate.attitude);
         let (up, up_dot) = (
             2.0 * (a.w * a.j - a.k * a.i),
             2.0 * (d.w * a.j + a.w * d.j - d.k * a.i - a.k * d.i),
@@ -107,41 +107,47 @@ impl State {
     }
 }
 
-/// What acts on the body.
+/// Loads on the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Action {
-    /// Forces but for gravity, lbf, and moments about the c.g., ft lbf, in body axes.
+pub struct Loads {
+    /// Force without gravity in body axes, lbf.
     pub force: Vector3<f64>,
+    /// Moment about the c.g. in body axes, ft lbf.
     pub moment: Vector3<f64>,
-    /// Of the engines along +x, slug ft²/s.
+    /// Angular momentum of the engines along +x, slug ft²/s.
     pub engine_momentum: f64,
     pub gravity_ft_s2: f64,
 }
 
-/// The rates of the state under an action.
+/// Time derivative of the state under loads.
 #[must_use]
-pub fn slope(state: &State, loading: &Loading, action: &Action) -> Slope {
+pub fn state_rate(state: &BodyState, loading: &Loading, loads: &Loads) -> StateRate {
     let (v, w) = (state.velocity, state.rates);
     let to_earth = state.to_earth();
-    let gravity = to_earth.transpose() * Vector3::new(0.0, 0.0, action.gravity_ft_s2);
+    let gravity = to_earth.transpose() * Vector3::new(0.0, 0.0, loads.gravity_ft_s2);
     let inertia = loading.inertia();
-    let momentum = inertia * w + Vector3::new(action.engine_momentum, 0.0, 0.0);
-    let turning = action.moment - w.cross(&momentum);
+    let momentum = inertia * w + Vector3::new(loads.engine_momentum, 0.0, 0.0);
+    let turning = loads.moment - w.cross(&momentum);
     let over_ground = to_earth * v;
-    State {
-        velocity: action.force / loading.mass_slug + gravity - w.cross(&v),
+    BodyState {
+        velocity: loads.force / loading.mass_slug + gravity - w.cross(&v),
         rates: loading.inverse_inertia() * turning,
         attitude: state.attitude * Quaternion::from_imag(w) * 0.5,
         position: Vector3::new(over_ground.x, over_ground.y, -over_ground.z),
     }
 }
 
-/// One fourth-order Runge-Kutta step; `at` gives the slope of a state at 0, 1/2 and 1 of the step.
-pub fn step(state: &State, step_s: f64, at: impl Fn(&State, f64) -> Slope) -> State {
-    let k1 = at(state, 0.0);
-    let k2 = at(&state.plus(&k1, step_s / 2.0), 0.5);
-    let k3 = at(&state.plus(&k2, step_s / 2.0), 0.5);
-    let k4 = at(&state.plus(&k3, step_s), 1.0);
+/// One classical fourth-order Runge-Kutta step; `rate_at` gives the rate of a state at 0, 1/2 and 1
+/// of the step.
+pub fn runge_kutta_step(
+    state: &BodyState,
+    step_s: f64,
+    rate_at: impl Fn(&BodyState, f64) -> StateRate,
+) -> BodyState {
+    let k1 = rate_at(state, 0.0);
+    let k2 = rate_at(&state.plus(&k1, step_s / 2.0), 0.5);
+    let k3 = rate_at(&state.plus(&k2, step_s / 2.0), 0.5);
+    let k4 = rate_at(&state.plus(&k3, step_s), 1.0);
     state
         .plus(&k1, step_s / 6.0)
         .plus(&k2, step_s / 3.0)
@@ -165,15 +171,15 @@ mod tests {
         iz_slug_ft2: 187_600.0,
         ixz_slug_ft2: -2073.0,
     };
-    const FREE: Action = Action {
+    const FREE: Loads = Loads {
         force: Vector3::new(0.0, 0.0, 0.0),
         moment: Vector3::new(0.0, 0.0, 0.0),
         engine_momentum: 0.0,
         gravity_ft_s2: 0.0,
     };
 
-    fn tumbling() -> State {
-        State {
+    fn tumbling() -> BodyState {
+        BodyState {
             velocity: Vector3::new(250.0, 10.0, 120.0),
             rates: Vector3::new(1.2, 0.4, -0.3),
             attitude: Euler {
@@ -186,16 +192,16 @@ mod tests {
         }
     }
 
-    fn after(state: State, time_s: u32, action: &Action) -> State {
+    fn after(state: BodyState, time_s: u32, loads: &Loads) -> BodyState {
         (0..time_s * 400).fold(state, |s, _| {
-            step(&s, 1.0 / 400.0, |at, _| slope(at, &LOADING, action))
+            runge_kutta_step(&s, 1.0 / 400.0, |at, _| state_rate(at, &LOADING, loads))
         })
     }
 
     #[test]
     fn free_of_moments_energy_and_the_angular_momentum_in_space_stay() {
-        let energy = |s: &State| 0.5 * s.rates.dot(&(LOADING.inertia() * s.rates));
-        let momentum = |s: &State| s.to_earth() * (LOADING.inertia() * s.rates);
+        let energy = |s: &BodyState| 0.5 * s.rates.dot(&(LOADING.inertia() * s.rates));
+        let momentum = |s: &BodyState| s.to_earth() * (LOADING.inertia() * s.rates);
         let (start, end) = (tumbling(), after(tumbling(), 20, &FREE));
         assert!((start.rates - end.rates).norm() > 0.1, "it does tumble");
         assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-9);
@@ -207,45 +213,45 @@ mod tests {
 
     #[test]
     fn falling_trades_height_for_speed() {
-        let action = Action {
+        let loads = Loads {
             gravity_ft_s2: 32.1,
             ..FREE
         };
-        let energy = |s: &State| 0.5 * s.velocity.norm_squared() + 32.1 * s.position.z;
-        let (start, end) = (tumbling(), after(tumbling(), 5, &action));
+        let energy = |s: &BodyState| 0.5 * s.velocity.norm_squared() + 32.1 * s.position.z;
+        let (start, end) = (tumbling(), after(tumbling(), 5, &loads));
         assert!(end.position.z < start.position.z);
         assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-10);
     }
 
     #[test]
     fn engines_turning_with_their_momentum_forward_push_the_nose_down_in_a_right_turn() {
-        let action = Action {
+        let loads = Loads {
             engine_momentum: 7500.0,
             ..FREE
         };
-        let state = State {
+        let state = BodyState {
             rates: Vector3::new(0.0, 0.0, 0.2),
             ..tumbling()
         };
-        let with = slope(&state, &LOADING, &action).rates;
-        let without = slope(&state, &LOADING, &FREE).rates;
+        let with = state_rate(&state, &LOADING, &loads).rates;
+        let without = state_rate(&state, &LOADING, &FREE).rates;
         assert_relative_eq!(
             (with - without).y,
             -0.2 * 7500.0 / LOADING.iy_slug_ft2,
             max_relative = 1e-9
         );
-        // And a pitch up turns it right.
-        let state = State {
+        // A pitch-up yaws the nose right.
+        let state = BodyState {
             rates: Vector3::new(0.0, 0.2, 0.0),
             ..tumbling()
         };
-        assert!(slope(&state, &LOADING, &action).rates.z > 0.0);
+        assert!(state_rate(&state, &LOADING, &loads).rates.z > 0.0);
     }
 
     #[test]
     fn angles_and_their_rates_are_those_of_the_attitude() {
         let (state, h) = (tumbling(), 1e-6);
-        let s = slope(&state, &LOADING, &FREE);
+        let s = state_rate(&state, &LOADING, &FREE);
         let (phi_dot, theta_dot) = state.euler_rates(&s);
         let (up, down) = (state.plus(&s, h).euler(), state.plus(&s, -h).euler());
         assert_abs_diff_eq!(phi_dot, (up.phi - down.phi) / (2.0 * h), epsilon = 1e-8);

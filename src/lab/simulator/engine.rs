@@ -1,5 +1,5 @@
-//! Engines: thrust lags the throttle by a first order, its greatest value falls with density, and
-//! speed follows power.
+//! Engines: thrust lags the throttle by a first order; maximum thrust falls with density; speed is
+//! linear in thrust.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,17 +9,17 @@ use crate::earth::air;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Engine {
-    /// The greatest thrust of all engines together, at `at_altitude_ft`.
+    /// Maximum thrust at `at_altitude_ft`.
     pub max_thrust_lbf: f64,
     pub at_altitude_ft: f64,
-    /// Greatest thrust goes with this power of the density.
+    /// Exponent of the density ratio in the maximum thrust.
     #[serde(default = "default_lapse")]
     pub lapse_exponent: f64,
-    /// Of the thrust behind the throttle.
+    /// Time constant of the thrust.
     pub lag_s: f64,
     pub idle_rpm: f64,
     pub max_rpm: f64,
-    /// Fuel burnt per second and lbf of thrust; 0 keeps the mass.
+    /// Fuel flow per lbf of thrust; 0 keeps the mass constant.
     #[serde(default)]
     pub fuel_slug_per_lbf_s: f64,
 }
@@ -29,21 +29,21 @@ fn default_lapse() -> f64 {
 }
 
 impl Engine {
-    /// The greatest thrust at a height, lbf.
+    /// Maximum thrust at an altitude, lbf.
     #[must_use]
     pub fn max_thrust(&self, altitude_ft: f64) -> f64 {
         let ratio = air(altitude_ft).density_slug_ft3 / air(self.at_altitude_ft).density_slug_ft3;
         self.max_thrust_lbf * ratio.powf(self.lapse_exponent)
     }
 
-    /// The thrust after a time under a constant command, lbf.
+    /// Moves the thrust, lbf, for a time under a constant command.
     #[must_use]
     pub fn advance(&self, thrust_lbf: f64, command_lbf: f64, altitude_ft: f64, time_s: f64) -> f64 {
         let command = command_lbf.clamp(0.0, self.max_thrust(altitude_ft).max(thrust_lbf));
         command + (thrust_lbf - command) * (-time_s / self.lag_s.max(1e-6)).exp()
     }
 
-    /// The speed of each engine.
+    /// Speed of each engine, 1/min.
     #[must_use]
     pub fn rpm(&self, thrust_lbf: f64) -> f64 {
         self.idle_rpm

@@ -1,37 +1,43 @@
-//! Flying a card: trim, control steps, samples.
+//! Flight of a card: trim, control steps, recorded samples.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::actuators::Surface;
-use super::body::State;
-use super::control::{Feedback, Law};
-use super::plant::{Given, Instant};
-use super::trim::Trim;
-use super::{Card, Flown, Simulator, Tables, TrueDerivative, sensors, turbulence};
+use super::actuators::SurfaceState;
+use super::body::BodyState;
+use super::card::{Card, DerivativeLookup};
+use super::control::Feedback;
+use super::flown::{FlownManeuver, TrueDerivative};
+use super::law::ControlLaw;
+use super::plant::{Plant, PlantInputs, PlantOutputs};
+use super::settings::Settings;
+use super::trim::{self, Trim, TrimPoint};
+use super::{sensors, turbulence};
+use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::units::DEG;
 
-/// α and β beyond which the build-up means nothing and the maneuver is lost, deg.
-const LOST_DEG: f64 = 90.0;
+/// Limit of |α| and |β|, deg: the build-up has no meaning beyond it.
+const DEPARTURE_DEG: f64 = 90.0;
 
-/// The aircraft between two control steps.
-struct Moment {
-    state: State,
-    given: Given,
-    surfaces: Vec<Surface>,
-    /// α that each scheduled surface follows, deg.
-    followed: Vec<f64>,
+/// State of the aircraft at a control step.
+struct AircraftState {
+    body: BodyState,
+    inputs: PlantInputs,
+    surfaces: Vec<SurfaceState>,
+    /// Lagged α of each surface's schedule, deg.
+    schedule_alpha_deg: Vec<f64>,
 }
 
-/// What stays the same over a card.
-struct Flight<'a> {
-    simulator: &'a Simulator,
+/// Constants of a card's flight.
+struct CardFlight<'a> {
+    plant: &'a Plant,
+    settings: &'a Settings,
     card: &'a Card,
-    law: &'a Law,
+    law: &'a ControlLaw,
     trim: Trim,
     feedback: Feedback,
     frozen: Option<Vec<f64>>,
@@ -39,88 +45,98 @@ struct Flight<'a> {
     step_s: f64,
 }
 
-pub(super) fn fly(simulator: &Simulator, card: &Card) -> Result<Flown, String> {
-    let flight = Flight::new(simulator, card)?;
-    let per_sample = simulator.settings.steps_per_sample();
-    let samples = count(card.program.duration_s * simulator.settings.rate_hz) + 1;
-    let mut moment = flight.begin();
+/// Flies a card from trim.
+///
+/// # Errors
+/// The reason: no trim, no stabilising feedback, or a departure.
+pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeuver, String> {
+    let flight = CardFlight::new(plant, settings, card)?;
+    let per_sample = settings.steps_per_sample();
+    let samples = rounded_count(card.program.duration_s * settings.rate_hz) + 1;
+    let mut state = flight.initial_state();
     let mut signals: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    let mut alphas = Vec::with_capacity(samples);
-    for k in 0..samples * per_sample {
-        let instant = flight.instant(&moment);
-        if !(moment.state.is_finite() && within(&instant)) {
-            let time_s = k as f64 * flight.step_s;
+    let mut alphas_deg = Vec::with_capacity(samples);
+    for step in 0..samples * per_sample {
+        let outputs = flight.evaluate(&state);
+        if has_departed(&state, &outputs) {
+            let time_s = step as f64 * flight.step_s;
             return Err(format!("the aircraft departs at {time_s:.1} s of the card"));
         }
-        if k % per_sample == 0 {
-            alphas.push(instant.air.alpha * DEG);
-            for (name, value) in flight.read(&moment, &instant, k) {
+        if step % per_sample == 0 {
+            alphas_deg.push(outputs.air.alpha * DEG);
+            for (name, value) in flight.signals(&state, &outputs, step) {
                 signals.entry(name).or_default().push(value);
             }
         }
-        moment = flight.next(&moment, &instant, k);
+        state = flight.advance(&state, &outputs, step);
     }
-    if let Some(psi) = signals.get_mut(signal::PSI) {
-        unwrap(psi);
+    if let Some(heading) = signals.get_mut(signal::PSI) {
+        unwrap_heading(heading);
     }
-    Ok(flight.flown(signals, &alphas))
+    Ok(flight.flown(signals, &alphas_deg))
 }
 
-/// A whole number of steps from a number that is one but for rounding.
-fn count(steps: f64) -> usize {
+/// Rounds a non-negative count that is whole but for rounding errors.
+fn rounded_count(count: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "rounded and not negative"
     )]
-    let steps = steps.round().max(0.0) as usize;
-    steps
+    let count = count.round().max(0.0) as usize;
+    count
 }
 
-fn within(instant: &Instant) -> bool {
-    let limit = LOST_DEG / DEG;
-    instant.air.alpha.abs() < limit && instant.air.beta.abs() < limit
+fn has_departed(state: &AircraftState, outputs: &PlantOutputs) -> bool {
+    let limit = DEPARTURE_DEG / DEG;
+    let within = outputs.air.alpha.abs() < limit && outputs.air.beta.abs() < limit;
+    !(state.body.is_finite() && within)
 }
 
-/// A heading without the jumps of ±360°, as a recorder's own filter leaves it.
-fn unwrap(heading: &mut [f64]) {
-    let mut turns = 0.0;
-    let mut before = heading.first().copied().unwrap_or(0.0);
+/// Removes the jumps of ±360° from a heading.
+fn unwrap_heading(heading: &mut [f64]) {
+    let mut offset = 0.0;
+    let mut previous = heading.first().copied().unwrap_or(0.0);
     for value in heading {
-        let jump = *value - before;
-        before = *value;
-        turns -= if jump.abs() > 180.0 {
+        let jump = *value - previous;
+        previous = *value;
+        offset -= if jump.abs() > 180.0 {
             360.0 * jump.signum()
         } else {
             0.0
         };
-        *value += turns;
+        *value += offset;
     }
 }
 
-impl<'a> Flight<'a> {
-    fn new(simulator: &'a Simulator, card: &'a Card) -> Result<Flight<'a>, String> {
-        let (plant, settings) = (&simulator.plant, &simulator.settings);
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+impl<'a> CardFlight<'a> {
+    fn new(
+        plant: &'a Plant,
+        settings: &'a Settings,
+        card: &'a Card,
+    ) -> Result<CardFlight<'a>, String> {
         let law = settings.laws.get(&card.program.law).ok_or_else(|| {
-            let near = crate::error::did_you_mean(
-                &card.program.law,
-                settings.laws.keys().map(String::as_str),
-            );
+            let near = did_you_mean(&card.program.law, settings.laws.keys().map(String::as_str));
             format!("no law `{}`{near}", card.program.law)
         })?;
-        let trim = simulator.trim(card)?;
+        let trim = trim::trim(plant, settings, TrimPoint::of(card))?;
         let at_trim = plant.aerodynamics.values(card.alpha_deg, trim.air.mach);
         let feedback = Feedback::new(plant, settings, law, &trim, &at_trim)?;
         let step_s = 1.0 / settings.control_hz;
-        let steps =
-            (count(card.program.duration_s * settings.rate_hz) + 2) * settings.steps_per_sample();
+        let steps = (rounded_count(card.program.duration_s * settings.rate_hz) + 2)
+            * settings.steps_per_sample();
         let gusts = card.turbulence.as_ref().map_or_else(
             || vec![Vector3::zeros(); steps],
             |t| turbulence::gusts(t, trim.air.velocity_ft_s, step_s, steps, card.seed),
         );
-        let frozen = (card.tables == Tables::Frozen).then_some(at_trim);
-        Ok(Flight {
-            simulator,
+        let frozen = (card.derivatives == DerivativeLookup::Frozen).then_some(at_trim);
+        Ok(CardFlight {
+            plant,
+            settings,
             card,
             law,
             trim,
@@ -131,216 +147,228 @@ impl<'a> Flight<'a> {
         })
     }
 
-    fn begin(&self) -> Moment {
-        let mut given = self.trim.given.clone();
-        given.gust = self.gust(0);
-        // The aircraft meets the first gust at its trimmed speed through the air.
-        let state = State {
-            velocity: self.trim.state.velocity + given.gust,
+    /// Trimmed state in the first gust, at the trimmed airspeed.
+    fn initial_state(&self) -> AircraftState {
+        let mut inputs = self.trim.inputs.clone();
+        inputs.gust = self.gust(0);
+        let body = BodyState {
+            velocity: self.trim.state.velocity + inputs.gust,
             ..self.trim.state
         };
-        let surfaces = given
+        let surfaces = inputs
             .surfaces
             .iter()
-            .map(|deg| Surface {
+            .map(|deg| SurfaceState {
                 deg: *deg,
                 deg_s: 0.0,
             })
             .collect();
-        Moment {
-            state,
+        AircraftState {
+            body,
             surfaces,
-            followed: vec![self.card.alpha_deg; given.surfaces.len()],
-            given,
+            schedule_alpha_deg: vec![self.card.alpha_deg; inputs.surfaces.len()],
+            inputs,
         }
     }
 
-    fn gust(&self, k: usize) -> Vector3<f64> {
-        self.gusts.get(k).copied().unwrap_or_default()
+    fn gust(&self, step: usize) -> Vector3<f64> {
+        self.gusts.get(step).copied().unwrap_or_default()
     }
 
-    fn instant(&self, moment: &Moment) -> Instant {
-        self.simulator
-            .plant
-            .instant(&moment.state, &moment.given, self.frozen.as_deref())
+    fn evaluate(&self, state: &AircraftState) -> PlantOutputs {
+        self.plant
+            .evaluate(&state.body, &state.inputs, self.frozen.as_deref())
     }
 
-    /// The sum of the inputs on a signal at a control step.
-    fn input(&self, name: &str, k: usize) -> f64 {
-        let time_s = k as f64 * self.step_s;
+    /// Sum of the test inputs on a signal at a control step.
+    fn test_input(&self, name: &str, step: usize) -> f64 {
+        let time_s = step as f64 * self.step_s;
         self.card
             .program
             .inputs
             .iter()
-            .filter(|i| i.signal == name)
-            .map(|i| i.at(time_s))
+            .filter(|input| input.signal == name)
+            .map(|input| input.deflection_at(time_s))
             .sum()
     }
 
-    /// What the surfaces are told at a control step, deg.
-    fn commands(&self, moment: &Moment, instant: &Instant, k: usize) -> Vec<f64> {
-        let settings = &self.simulator.settings;
-        let mut commands = self.trim.given.surfaces.clone();
-        for ((command, name), followed) in commands
+    /// Surface commands at a control step, deg: trim or schedule, test inputs, gearing, feedback.
+    fn commands(&self, state: &AircraftState, outputs: &PlantOutputs, step: usize) -> Vec<f64> {
+        let mut commands = self.trim.inputs.surfaces.clone();
+        for ((command, name), alpha_deg) in commands
             .iter_mut()
-            .zip(&settings.surface_names)
-            .zip(&moment.followed)
+            .zip(&self.settings.surface_names)
+            .zip(&state.schedule_alpha_deg)
         {
-            if let Some(schedule) = settings.schedules.get(name) {
-                *command = schedule.at(*followed);
+            if let Some(schedule) = self.settings.schedules.get(name) {
+                *command = schedule.deflection_at(*alpha_deg);
             }
-            *command += self.input(name, k);
+            *command += self.test_input(name, step);
             for (stick, gears) in &self.law.gearing {
                 *command += gears
                     .get(name)
-                    .map_or(0.0, |gear| gear * self.input(stick, k));
+                    .map_or(0.0, |gear| gear * self.test_input(stick, step));
             }
         }
         self.feedback
-            .add(&moment.state, &instant.air, &mut commands);
+            .apply(&state.body, &outputs.air, &mut commands);
         commands
     }
 
-    /// One control step on.
-    fn next(&self, moment: &Moment, instant: &Instant, k: usize) -> Moment {
-        let settings = &self.simulator.settings;
-        let commands = self.commands(moment, instant, k);
-        let actuators = settings.surfaces.values();
-        let surfaces: Vec<Surface> = actuators
-            .zip(&moment.surfaces)
-            .zip(&commands)
+    /// Integrates one control step.
+    fn advance(&self, state: &AircraftState, outputs: &PlantOutputs, step: usize) -> AircraftState {
+        let surfaces = self.moved_surfaces(state, &self.commands(state, outputs, step));
+        let inputs = self.next_inputs(state, &surfaces, step);
+        let body = self.plant.integrate(
+            &state.body,
+            (&state.inputs, &inputs),
+            self.frozen.as_deref(),
+            (self.step_s, self.settings.parts),
+        );
+        AircraftState {
+            body,
+            inputs,
+            surfaces,
+            schedule_alpha_deg: self.lagged_alphas(state, outputs.air.alpha * DEG),
+        }
+    }
+
+    fn moved_surfaces(&self, state: &AircraftState, commands: &[f64]) -> Vec<SurfaceState> {
+        let actuators = self.settings.surfaces.values();
+        actuators
+            .zip(&state.surfaces)
+            .zip(commands)
             .map(|((actuator, surface), command)| actuator.advance(*surface, *command, self.step_s))
-            .collect();
-        let alpha_deg = instant.air.alpha * DEG;
-        let follow = |(name, before): (&String, &f64)| {
-            let lag_s = settings.schedules.get(name).map_or(0.0, |s| s.lag_s);
-            let keep = if lag_s > 0.0 {
+            .collect()
+    }
+
+    /// First-order lag of the α that enters each surface's schedule.
+    fn lagged_alphas(&self, state: &AircraftState, alpha_deg: f64) -> Vec<f64> {
+        let lagged = |(name, previous): (&String, &f64)| {
+            let lag_s = self.settings.schedules.get(name).map_or(0.0, |s| s.lag_s);
+            let decay = if lag_s > 0.0 {
                 (-self.step_s / lag_s).exp()
             } else {
                 0.0
             };
-            alpha_deg + keep * (before - alpha_deg)
+            alpha_deg + decay * (previous - alpha_deg)
         };
-        let followed = settings
+        self.settings
             .surface_names
             .iter()
-            .zip(&moment.followed)
-            .map(follow)
-            .collect();
-        let engine = &settings.engine;
-        let throttle = self.trim.given.thrust_lbf + self.input(signal::THRUST, k);
-        let altitude_ft = moment.state.position.z;
-        let thrust_lbf =
-            engine.advance(moment.given.thrust_lbf, throttle, altitude_ft, self.step_s);
-        let burnt = engine.fuel_slug_per_lbf_s * moment.given.thrust_lbf * self.step_s;
-        let given = Given {
+            .zip(&state.schedule_alpha_deg)
+            .map(lagged)
+            .collect()
+    }
+
+    /// Inputs of the plant at the end of a control step.
+    fn next_inputs(
+        &self,
+        state: &AircraftState,
+        surfaces: &[SurfaceState],
+        step: usize,
+    ) -> PlantInputs {
+        let engine = &self.settings.engine;
+        let throttle_lbf = self.trim.inputs.thrust_lbf + self.test_input(signal::THRUST, step);
+        let altitude_ft = state.body.position.z;
+        let thrust_lbf = engine.advance(
+            state.inputs.thrust_lbf,
+            throttle_lbf,
+            altitude_ft,
+            self.step_s,
+        );
+        let burnt_slug = engine.fuel_slug_per_lbf_s * state.inputs.thrust_lbf * self.step_s;
+        PlantInputs {
             surfaces: surfaces.iter().map(|s| s.deg).collect(),
             thrust_lbf,
             rpm: 2.0 * engine.rpm(thrust_lbf),
-            gust: self.gust(k + 1),
-            mass_slug: moment.given.mass_slug - burnt,
-        };
-        let state = self.simulator.plant.advance(
-            &moment.state,
-            (&moment.given, &given),
-            self.frozen.as_deref(),
-            (self.step_s, settings.parts),
-        );
-        Moment {
-            state,
-            given,
-            surfaces,
-            followed,
+            gust: self.gust(step + 1),
+            mass_slug: state.inputs.mass_slug - burnt_slug,
         }
     }
 
-    /// Every signal at a control step.
-    fn read(&self, moment: &Moment, instant: &Instant, k: usize) -> Vec<(String, f64)> {
-        let settings = &self.simulator.settings;
-        let time_s = k as f64 * self.step_s;
-        let program = &self.card.program;
-        let read = sensors::read(
-            &self.simulator.plant.aircraft,
-            &moment.state,
-            &moment.given,
-            instant,
-        );
-        let surfaces = settings
+    /// All recorded signals at a control step.
+    fn signals(
+        &self,
+        state: &AircraftState,
+        outputs: &PlantOutputs,
+        step: usize,
+    ) -> Vec<(String, f64)> {
+        let time_s = step as f64 * self.step_s;
+        let readings = sensors::readings(&self.plant.aircraft, &state.body, &state.inputs, outputs);
+        let surfaces = self
+            .settings
             .surface_names
             .iter()
-            .zip(&moment.given.surfaces)
-            .map(|(n, v)| (n.clone(), *v));
-        let controls: std::collections::BTreeSet<&String> = settings
-            .laws
-            .values()
-            .flat_map(|law| law.gearing.keys())
-            .collect();
-        let controls = controls
+            .zip(&state.inputs.surfaces)
+            .map(|(name, deg)| (name.clone(), *deg));
+        let laws = self.settings.laws.values();
+        let sticks: BTreeSet<&String> = laws.flat_map(|law| law.gearing.keys()).collect();
+        let sticks = sticks
             .into_iter()
-            .map(|name| (name.clone(), self.input(name, k)));
-        let flags = program.flags.iter().map(|(name, (from, to))| {
-            (
-                name.clone(),
-                f64::from(u8::from((*from..*to).contains(&time_s))),
-            )
+            .map(|name| (name.clone(), self.test_input(name, step)));
+        let flags = self.card.program.flags.iter().map(|(name, (from, to))| {
+            let is_set = (*from..*to).contains(&time_s);
+            (name.clone(), f64::from(u8::from(is_set)))
         });
-        read.into_iter()
-            .map(|(n, v)| (n.to_owned(), v))
+        readings
+            .into_iter()
+            .map(|(name, value)| (name.to_owned(), value))
             .chain(surfaces)
-            .chain(controls)
+            .chain(sticks)
             .chain(flags)
             .collect()
     }
 
-    fn flown(&self, signals: BTreeMap<String, Vec<f64>>, alphas: &[f64]) -> Flown {
-        let series = |values: Vec<f64>| Series {
+    fn flown(&self, signals: BTreeMap<String, Vec<f64>>, alphas_deg: &[f64]) -> FlownManeuver {
+        let measured = |values: Vec<f64>| Series {
             marks: vec![Mark::Measured; values.len()],
             values,
         };
         let record = Record {
             flight_id: self.card.flight_id.clone(),
             start_s: self.card.start_s,
-            step_s: 1.0 / self.simulator.settings.rate_hz,
-            samples: alphas.len(),
+            step_s: 1.0 / self.settings.rate_hz,
+            samples: alphas_deg.len(),
             signals: signals
                 .into_iter()
-                .map(|(name, values)| (name, series(values)))
+                .map(|(name, values)| (name, measured(values)))
                 .collect(),
         };
-        let maneuver = self.maneuver(&record, alphas);
-        let aerodynamics = &self.simulator.plant.aerodynamics;
-        let values = self
-            .frozen
-            .clone()
-            .unwrap_or_else(|| aerodynamics.values(maneuver.alpha_deg, maneuver.mach));
-        let truth = aerodynamics
-            .derivatives()
-            .iter()
-            .zip(values)
-            .map(|(d, value)| TrueDerivative {
-                derivative: d.name.clone(),
-                unit: d.unit().name(),
-                value,
-            });
-        Flown {
-            truth: truth.collect(),
+        let maneuver = self.maneuver(&record, alphas_deg);
+        FlownManeuver {
+            truth: self.truth(&maneuver),
             record,
             maneuver,
         }
     }
 
-    fn maneuver(&self, record: &Record, alphas: &[f64]) -> Maneuver {
+    /// True derivatives: the frozen values, or the tables at the maneuver's mean α and Mach number.
+    fn truth(&self, maneuver: &Maneuver) -> Vec<TrueDerivative> {
+        let aerodynamics = &self.plant.aerodynamics;
+        let values = self
+            .frozen
+            .clone()
+            .unwrap_or_else(|| aerodynamics.values(maneuver.alpha_deg, maneuver.mach));
+        aerodynamics
+            .derivatives()
+            .iter()
+            .zip(values)
+            .map(|(derivative, value)| TrueDerivative {
+                derivative: derivative.name.clone(),
+                unit: derivative.unit().name(),
+                value,
+            })
+            .collect()
+    }
+
+    fn maneuver(&self, record: &Record, alphas_deg: &[f64]) -> Maneuver {
         let (from_s, to_s) = self.card.program.maneuver_s;
         let first = record.sample_at(record.start_s + from_s);
         let last = record.sample_at(record.start_s + to_s).max(first);
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let of = |name: &str| {
-            mean(
-                record
-                    .values(name)
-                    .and_then(|v| v.get(first..=last))
-                    .unwrap_or_default(),
-            )
+        let mean_of = |name: &str| {
+            let values = record.values(name).and_then(|v| v.get(first..=last));
+            mean(values.unwrap_or_default())
         };
         let start_s = record.time_s(first);
         Maneuver {
@@ -350,13 +378,13 @@ impl<'a> Flight<'a> {
             axis: self.card.axis,
             start_s,
             end_s: record.time_s(last),
-            alpha_deg: mean(alphas.get(first..=last).unwrap_or_default()),
-            mach: of(signal::MACH),
-            qbar_psf: of(signal::QBAR),
-            velocity_ft_s: of(signal::VELOCITY),
-            altitude_ft: of(signal::ALTITUDE),
-            mass_slug: of(signal::MASS),
-            x_cg_ft: of(signal::X_CG),
+            alpha_deg: mean(alphas_deg.get(first..=last).unwrap_or_default()),
+            mach: mean_of(signal::MACH),
+            qbar_psf: mean_of(signal::QBAR),
+            velocity_ft_s: mean_of(signal::VELOCITY),
+            altitude_ft: mean_of(signal::ALTITUDE),
+            mass_slug: mean_of(signal::MASS),
+            x_cg_ft: mean_of(signal::X_CG),
             samples: last - first + 1,
             origin: ManeuverOrigin::Flown,
             recognised: Recognised::default(),

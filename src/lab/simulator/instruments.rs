@@ -1,5 +1,5 @@
-//! Instruments: what a recorder makes of an exact signal: lag, scale, bias, noise white and
-//! coloured, steps of the converter, spikes, dropouts.
+//! Instruments: lag, scale factor, bias, white and coloured noise, quantisation, spikes and dropouts
+//! of a recorded signal.
 //!
 //! y = (1 + s) x(lagged) + b + w + c, rounded to the quantum; c is a first-order Gauss-Markov
 //! process, `c_{k+1}` = e^(−Δt/τ) `c_k` + σ√(1 − e^(−2Δt/τ)) `n_k`.
@@ -8,50 +8,53 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::noise::Noise;
+use super::random::RandomStream;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record};
 
-/// What one signal's instrument does, in the signal's unit. All zero is a perfect instrument.
+/// Errors of one signal's instrument, in the signal's unit. All zero: a perfect instrument.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Instrument {
     /// Standard deviation of white noise.
     pub noise: f64,
-    /// Standard deviation and time constant of coloured noise.
+    /// Standard deviation of coloured noise.
     pub coloured: f64,
+    /// Time constant of coloured noise.
     pub coloured_time_s: f64,
     pub bias: f64,
-    /// Standard deviation from which each flight's further bias is drawn.
+    /// Standard deviation of the further bias drawn for each flight.
     pub bias_spread: f64,
-    /// Relative error of scale: the signal is read 1 + this times.
+    /// Scale factor error: the reading is 1 + `scale` times the signal.
     pub scale: f64,
+    /// Standard deviation of the further scale factor error drawn for each flight.
     pub scale_spread: f64,
     /// Time constant of a first-order lag.
     pub lag_s: f64,
-    /// Step of the converter.
+    /// Quantisation step.
     pub quantum: f64,
-    /// Dropouts and spikes per second.
+    /// Mean number of dropouts per second.
     pub dropouts_per_s: f64,
     pub dropout_s: f64,
+    /// Mean number of spikes per second.
     pub spikes_per_s: f64,
+    /// Size of a spike.
     pub spike: f64,
 }
 
-/// Signal → its instrument; a signal without one is recorded as it is.
+/// Instruments by signal; a signal without an instrument is recorded exactly.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Instruments(pub BTreeMap<String, Instrument>);
 
 impl Instruments {
-    /// The instruments of one flight: biases and scales drawn from their spreads, which are zero
-    /// then.
+    /// Draws the biases and scale factors of one flight; the spreads of the result are zero.
     #[must_use]
     pub fn drawn(&self, seed: u64) -> Instruments {
         let draw = |(signal, i): (&String, &Instrument)| {
-            let mut noise = Noise::new(seed, &format!("instrument of {signal}"));
-            let bias = i.bias + i.bias_spread * noise.normal();
-            let scale = i.scale + i.scale_spread * noise.normal();
+            let mut random = RandomStream::new(seed, &format!("instrument of {signal}"));
+            let bias = i.bias + i.bias_spread * random.normal();
+            let scale = i.scale + i.scale_spread * random.normal();
             (
                 signal.clone(),
                 Instrument {
@@ -66,45 +69,46 @@ impl Instruments {
         Instruments(self.0.iter().map(draw).collect())
     }
 
-    /// The record that these instruments make of an exact one.
+    /// Record of these instruments from the record of perfect ones.
     #[must_use]
-    pub fn read(&self, exact: &Record, seed: u64) -> Record {
+    pub fn record(&self, exact: &Record, seed: u64) -> Record {
         let drawn = self.drawn(seed);
-        let read = |(name, series): (&String, &Series)| {
+        let recorded = |(name, series): (&String, &Series)| {
             let series = match drawn.0.get(name) {
                 Some(instrument) => {
-                    instrument.read(&series.values, exact.step_s, &mut Noise::new(seed, name))
+                    let mut random = RandomStream::new(seed, name);
+                    instrument.record(&series.values, exact.step_s, &mut random)
                 }
                 None => series.clone(),
             };
             (name.clone(), series)
         };
         Record {
-            signals: exact.signals.iter().map(read).collect(),
+            signals: exact.signals.iter().map(recorded).collect(),
             ..exact.clone()
         }
     }
 }
 
 impl Instrument {
-    fn read(&self, exact: &[f64], step_s: f64, noise: &mut Noise) -> Series {
+    fn record(&self, exact: &[f64], step_s: f64, random: &mut RandomStream) -> Series {
         let lag = if self.lag_s > 0.0 {
             (-step_s / self.lag_s).exp()
         } else {
             0.0
         };
-        let keep = if self.coloured_time_s > 0.0 {
+        let decay = if self.coloured_time_s > 0.0 {
             (-step_s / self.coloured_time_s).exp()
         } else {
             0.0
         };
-        let fresh = (1.0 - keep * keep).sqrt();
+        let innovation = (1.0 - decay * decay).sqrt();
         let mut lagged = exact.first().copied().unwrap_or(0.0);
-        let mut colour = noise.normal();
+        let mut colour = random.normal();
         let mut before = lagged;
         let mut values = Vec::with_capacity(exact.len());
         for &x in exact {
-            // The exact answer of a lag to a signal that is linear between samples.
+            // Exact response of a lag to a signal that is linear between samples.
             let ramp = if lag > 0.0 {
                 self.lag_s / step_s * (1.0 - lag)
             } else {
@@ -117,37 +121,42 @@ impl Instrument {
             before = x;
             let value = (1.0 + self.scale) * lagged
                 + self.bias
-                + self.noise * noise.normal()
+                + self.noise * random.normal()
                 + self.coloured * colour;
-            colour = keep * colour + fresh * noise.normal();
+            colour = decay * colour + innovation * random.normal();
             values.push(if self.quantum > 0.0 {
                 (value / self.quantum).round() * self.quantum
             } else {
                 value
             });
         }
-        self.spoil(values, step_s, noise)
+        self.with_spikes_and_dropouts(values, step_s, random)
     }
 
-    /// Adds spikes and dropouts; a sample in a dropout is missing.
-    fn spoil(&self, mut values: Vec<f64>, step_s: f64, noise: &mut Noise) -> Series {
+    /// Adds spikes and dropouts; samples in a dropout are missing.
+    fn with_spikes_and_dropouts(
+        &self,
+        mut values: Vec<f64>,
+        step_s: f64,
+        random: &mut RandomStream,
+    ) -> Series {
         let mut marks = vec![Mark::Measured; values.len()];
-        let mut lost = 0.0;
+        let mut dropout_left_s = 0.0;
         for (value, mark) in values.iter_mut().zip(&mut marks) {
-            if self.spikes_per_s > 0.0 && noise.uniform() < self.spikes_per_s * step_s {
-                *value += if noise.uniform() < 0.5 {
+            if self.spikes_per_s > 0.0 && random.uniform() < self.spikes_per_s * step_s {
+                *value += if random.uniform() < 0.5 {
                     self.spike
                 } else {
                     -self.spike
                 };
             }
-            if self.dropouts_per_s > 0.0 && noise.uniform() < self.dropouts_per_s * step_s {
-                lost = self.dropout_s.max(step_s);
+            if self.dropouts_per_s > 0.0 && random.uniform() < self.dropouts_per_s * step_s {
+                dropout_left_s = self.dropout_s.max(step_s);
             }
-            if lost > 0.5 * step_s {
+            if dropout_left_s > 0.5 * step_s {
                 *value = f64::NAN;
                 *mark = Mark::Missing;
-                lost -= step_s;
+                dropout_left_s -= step_s;
             }
         }
         Series { values, marks }
@@ -159,15 +168,15 @@ mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
-    fn read(instrument: Instrument, exact: &[f64]) -> Series {
-        instrument.read(exact, 0.025, &mut Noise::new(11, "q_deg_s"))
+    fn record(instrument: Instrument, exact: &[f64]) -> Series {
+        instrument.record(exact, 0.025, &mut RandomStream::new(11, "q_deg_s"))
     }
 
     fn mean(values: &[f64]) -> f64 {
         values.iter().sum::<f64>() / values.len() as f64
     }
 
-    /// Covariance of a series with itself at a lag, about its mean.
+    /// Autocovariance of a series at a lag.
     fn covariance(values: &[f64], lag: usize) -> f64 {
         let m = mean(values);
         mean(
@@ -181,7 +190,7 @@ mod tests {
 
     #[test]
     fn white_noise_bias_and_scale_have_their_sizes() {
-        let values = read(
+        let values = record(
             Instrument {
                 noise: 0.2,
                 bias: 0.5,
@@ -203,7 +212,7 @@ mod tests {
             coloured_time_s: 0.25,
             ..Instrument::default()
         };
-        let values = read(instrument, &vec![0.0; 200_000]).values;
+        let values = record(instrument, &vec![0.0; 200_000]).values;
         assert_relative_eq!(covariance(&values, 0), 0.09, max_relative = 0.04);
         assert_relative_eq!(
             covariance(&values, 10) / covariance(&values, 0),
@@ -213,9 +222,9 @@ mod tests {
     }
 
     #[test]
-    fn a_quantum_leaves_its_multiples_and_an_error_under_half_of_it() {
+    fn quantised_values_are_multiples_within_half_a_step() {
         let exact: Vec<f64> = (0..1000).map(|k| 0.0137 * f64::from(k)).collect();
-        let values = read(
+        let values = record(
             Instrument {
                 quantum: 0.1,
                 ..Instrument::default()
@@ -232,7 +241,7 @@ mod tests {
     #[test]
     fn a_lag_follows_a_ramp_by_its_time_constant() {
         let exact: Vec<f64> = (0..400).map(|k| 0.025 * f64::from(k)).collect();
-        let values = read(
+        let values = record(
             Instrument {
                 lag_s: 0.1,
                 ..Instrument::default()
@@ -244,13 +253,13 @@ mod tests {
     }
 
     #[test]
-    fn dropouts_are_missing_and_as_many_as_said() {
+    fn dropouts_have_their_rate_and_are_missing_samples() {
         let instrument = Instrument {
             dropouts_per_s: 0.2,
             dropout_s: 0.1,
             ..Instrument::default()
         };
-        let series = read(instrument, &vec![1.0; 40_000]);
+        let series = record(instrument, &vec![1.0; 40_000]);
         let lost = series.values.iter().filter(|v| v.is_nan()).count();
         // 200 dropouts of 4 samples in 1000 s, a few of them overlapping.
         assert!((650..950).contains(&lost), "{lost}");
@@ -263,6 +272,6 @@ mod tests {
     #[test]
     fn perfect_instruments_change_nothing() {
         let exact: Vec<f64> = (0..50).map(|k| f64::from(k).sin()).collect();
-        assert_eq!(read(Instrument::default(), &exact).values, exact);
+        assert_eq!(record(Instrument::default(), &exact).values, exact);
     }
 }

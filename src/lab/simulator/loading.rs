@@ -1,12 +1,11 @@
-//! Loadings: mass, c.g. and inertias of the aircraft at some fuel states, linear in mass between
-//! them.
+//! Loadings: mass, c.g. and inertias at several fuel states, interpolated linearly in mass.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::aircraft::Position;
 
-/// The mass properties at one fuel state. Inertias about the c.g. in body axes; `ixz` = +∫xz dm.
+/// Mass properties at one fuel state. Inertias about the c.g. in body axes; `ixz` = +∫xz dm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loading {
@@ -22,8 +21,8 @@ pub struct Loading {
 }
 
 impl Loading {
-    /// Between the two loadings next to a mass, and along the line through the last two beyond
-    /// them. All zero without any: the simulator refuses that.
+    /// Interpolates the loadings at a mass; extrapolates along the line through the two nearest.
+    /// All zero for an empty list, which [`super::Settings`] refuses.
     #[must_use]
     pub fn at_mass(loadings: &[Loading], mass_slug: f64) -> Loading {
         let upper = loadings
@@ -58,7 +57,7 @@ impl Loading {
         }
     }
 
-    /// The inertia matrix of an airframe that is symmetric about its xz plane.
+    /// Inertia matrix of an airframe that is symmetric about its xz plane.
     #[must_use]
     pub fn inertia(&self) -> Matrix3<f64> {
         let product = -self.ixz_slug_ft2;
@@ -77,8 +76,7 @@ impl Loading {
 
     #[must_use]
     pub fn inverse_inertia(&self) -> Matrix3<f64> {
-        // A matrix that cannot be inverted is refused with the cards; zeros stop the body instead
-        // of a panic.
+        // `Settings` refuses singular matrices; zeros avoid a panic.
         self.inertia().try_inverse().unwrap_or_else(Matrix3::zeros)
     }
 }

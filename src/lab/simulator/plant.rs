@@ -1,33 +1,35 @@
-//! The plant: aerodynamics, thrust, engines' momentum and gravity on the body at one instant, and
-//! the step between two.
+//! Plant: aerodynamics, thrust, angular momentum of the engines and gravity on the rigid body.
+
+use std::borrow::Cow;
 
 use nalgebra::Vector3;
 
 use super::aerodynamics::Aerodynamics;
 use super::air_data::AirData;
-use super::body::{self, Action, Slope, State};
+use super::body::{self, BodyState, Loads, StateRate};
 use super::loading::Loading;
 use crate::aircraft::Aircraft;
 use crate::earth::gravity_ft_s2;
+use crate::units::DEG;
 
-/// What is given at an instant besides the state.
+/// Inputs of the plant at one instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Given {
-    /// In the order of the simulated surfaces, deg.
+pub struct PlantInputs {
+    /// Deflections in the order of the simulated surfaces, deg.
     pub surfaces: Vec<f64>,
     pub thrust_lbf: f64,
-    /// Sum of the engines' speeds.
+    /// Sum of the engine speeds, 1/min.
     pub rpm: f64,
     /// Velocity of the air over the ground in body axes, ft/s.
     pub gust: Vector3<f64>,
     pub mass_slug: f64,
 }
 
-impl Given {
-    /// Between this (0) and another instant (1).
-    fn towards(&self, end: &Given, part: f64) -> Given {
-        let mix = |a: f64, b: f64| a + part * (b - a);
-        Given {
+impl PlantInputs {
+    /// Interpolates linearly between these inputs (0) and others (1).
+    fn interpolated(&self, end: &PlantInputs, fraction: f64) -> PlantInputs {
+        let mix = |a: f64, b: f64| a + fraction * (b - a);
+        PlantInputs {
             surfaces: self
                 .surfaces
                 .iter()
@@ -36,20 +38,20 @@ impl Given {
                 .collect(),
             thrust_lbf: mix(self.thrust_lbf, end.thrust_lbf),
             rpm: mix(self.rpm, end.rpm),
-            gust: self.gust.lerp(&end.gust, part),
+            gust: self.gust.lerp(&end.gust, fraction),
             mass_slug: mix(self.mass_slug, end.mass_slug),
         }
     }
 }
 
-/// Everything about one instant.
+/// Air data, mass properties, accelerations and state rate at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instant {
+pub struct PlantOutputs {
     pub air: AirData,
     pub loading: Loading,
-    /// Specific force at the c.g. in body axes, ft/s²: all forces but gravity over the mass.
+    /// Specific force at the c.g. in body axes, ft/s²: force without gravity per mass.
     pub specific_force: Vector3<f64>,
-    pub slope: Slope,
+    pub rate: StateRate,
 }
 
 /// The aircraft with its aerodynamics and loadings.
@@ -57,62 +59,65 @@ pub struct Instant {
 pub struct Plant {
     pub aircraft: Aircraft,
     pub aerodynamics: Aerodynamics,
-    /// By ascending mass, at least one.
+    /// At least one, by ascending mass.
     pub loadings: Vec<Loading>,
 }
 
 impl Plant {
-    /// The instant of a state; `frozen` are the derivatives' values, else the tables are read at α
-    /// and Mach.
+    /// Evaluates the plant. `frozen` holds the derivatives constant; `None` reads the tables at the
+    /// present α and Mach number.
     #[must_use]
-    pub fn instant(&self, state: &State, given: &Given, frozen: Option<&[f64]>) -> Instant {
-        let loading = Loading::at_mass(&self.loadings, given.mass_slug);
-        let air = AirData::new(&(state.velocity - given.gust), state.position.z);
-        let read;
-        let values = if let Some(values) = frozen {
-            values
-        } else {
-            read = self
-                .aerodynamics
-                .values(air.alpha * crate::units::DEG, air.mach);
-            &read
-        };
-        let (aerodynamic, moment) =
-            self.aerodynamics
-                .loads(&self.aircraft, values, &air, &state.rates, &given.surfaces);
-        let force = aerodynamic + Vector3::new(given.thrust_lbf, 0.0, 0.0);
+    pub fn evaluate(
+        &self,
+        state: &BodyState,
+        inputs: &PlantInputs,
+        frozen: Option<&[f64]>,
+    ) -> PlantOutputs {
+        let loading = Loading::at_mass(&self.loadings, inputs.mass_slug);
+        let air = AirData::new(&(state.velocity - inputs.gust), state.position.z);
+        let values = frozen.map_or_else(
+            || Cow::Owned(self.aerodynamics.values(air.alpha * DEG, air.mach)),
+            Cow::Borrowed,
+        );
+        let (aerodynamic, moment) = self.aerodynamics.loads(
+            &self.aircraft,
+            &values,
+            &air,
+            &state.rates,
+            &inputs.surfaces,
+        );
+        let force = aerodynamic + Vector3::new(inputs.thrust_lbf, 0.0, 0.0);
         let per_minute = 2.0 * std::f64::consts::PI / 60.0;
-        let action = Action {
+        let loads = Loads {
             force,
             moment,
-            engine_momentum: self.aircraft.engine_inertia_slug_ft2 * given.rpm * per_minute,
+            engine_momentum: self.aircraft.engine_inertia_slug_ft2 * inputs.rpm * per_minute,
             gravity_ft_s2: gravity_ft_s2(self.aircraft.latitude_deg, state.position.z),
         };
-        let slope = body::slope(state, &loading, &action);
-        Instant {
+        PlantOutputs {
             air,
+            rate: body::state_rate(state, &loading, &loads),
             loading,
             specific_force: force / loading.mass_slug,
-            slope,
         }
     }
 
-    /// The state after `step_s`, in `parts` Runge-Kutta steps, with everything given linear in time
+    /// Integrates the state over `step_s` in `parts` Runge-Kutta steps, with inputs linear in time
     /// between `start` and `end`.
     #[must_use]
-    pub fn advance(
+    pub fn integrate(
         &self,
-        state: &State,
-        (start, end): (&Given, &Given),
+        state: &BodyState,
+        (start, end): (&PlantInputs, &PlantInputs),
         frozen: Option<&[f64]>,
         (step_s, parts): (f64, u32),
-    ) -> State {
+    ) -> BodyState {
         let mut state = *state;
-        let parts_f = f64::from(parts);
+        let part_count = f64::from(parts);
         for part in 0..parts {
-            state = body::step(&state, step_s / parts_f, |at, within| {
-                let given = start.towards(end, (f64::from(part) + within) / parts_f);
-                self.instant(at, &given, frozen).slope
+            state = body::runge_kutta_step(&state, step_s / part_count, |state, within| {
+                let inputs = start.interpolated(end, (f64::from(part) + within) / part_count);
+                self.evaluate(state, &inputs, frozen).rate
             });
         }
         state

@@ -1,26 +1,26 @@
-//! Sensors: what perfect instruments at their positions read of an instant, as the signals of a
-//! record.
+//! Sensors: readings of perfect instruments at their positions.
 //!
-//! An accelerometer away from the c.g. feels f + ω̇ × r + ω × (ω × r); a vane the flow at its
-//! place.
+//! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r); a vane measures the local
+//! flow.
 
 use nalgebra::Vector3;
 
-use super::body::State;
-use super::plant::{Given, Instant};
+use super::body::BodyState;
+use super::plant::{PlantInputs, PlantOutputs};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::flight::signal;
 use crate::units::{DEG, G0_FT_S2};
 
-/// The signals of an instant but for surfaces and the pilot's controls.
+/// Signals of the motion, air data, engines and mass properties; surfaces and pilot controls are not
+/// among them.
 #[must_use]
-pub fn read(
+pub fn readings(
     aircraft: &Aircraft,
-    state: &State,
-    given: &Given,
-    instant: &Instant,
+    state: &BodyState,
+    inputs: &PlantInputs,
+    outputs: &PlantOutputs,
 ) -> Vec<(&'static str, f64)> {
-    let (air, loading, sensors) = (&instant.air, &instant.loading, &aircraft.sensors);
+    let (air, loading, sensors) = (&outputs.air, &outputs.loading, &aircraft.sensors);
     let w = state.rates;
     let flow = Flow {
         alpha: air.alpha,
@@ -29,15 +29,15 @@ pub fn read(
         rates: [w.x, w.y, w.z],
     };
     let cg = loading.cg();
-    let felt = |at: Position, axis: usize| {
-        let arm = Vector3::from(at.arm(cg));
-        let turning = instant.slope.rates.cross(&arm) + w.cross(&w.cross(&arm));
-        (instant.specific_force + turning)[axis] / G0_FT_S2
+    let acceleration_g = |position: Position, axis: usize| {
+        let arm = Vector3::from(position.arm(cg));
+        let rotation = outputs.rate.rates.cross(&arm) + w.cross(&w.cross(&arm));
+        (outputs.specific_force + rotation)[axis] / G0_FT_S2
     };
     let thrust = if sensors.thrust_in_ax {
         0.0
     } else {
-        given.thrust_lbf / loading.mass_slug / G0_FT_S2
+        inputs.thrust_lbf / loading.mass_slug / G0_FT_S2
     };
     let angles = state.euler();
     vec![
@@ -58,13 +58,13 @@ pub fn read(
         (signal::THETA, DEG * angles.theta),
         (signal::PHI, DEG * angles.phi),
         (signal::PSI, DEG * angles.psi),
-        (signal::AN, -felt(sensors.an, 2)),
-        (signal::AX, felt(sensors.ax, 0) - thrust),
-        (signal::AY, felt(sensors.ay, 1)),
+        (signal::AN, -acceleration_g(sensors.an, 2)),
+        (signal::AX, acceleration_g(sensors.ax, 0) - thrust),
+        (signal::AY, acceleration_g(sensors.ay, 1)),
         (signal::QBAR, air.qbar_psf),
-        (signal::THRUST, given.thrust_lbf),
-        (signal::RPM_LEFT, 0.5 * given.rpm),
-        (signal::RPM_RIGHT, 0.5 * given.rpm),
+        (signal::THRUST, inputs.thrust_lbf),
+        (signal::RPM_LEFT, 0.5 * inputs.rpm),
+        (signal::RPM_RIGHT, 0.5 * inputs.rpm),
         (signal::MASS, loading.mass_slug),
         (signal::X_CG, loading.x_cg_ft),
         (signal::Y_CG, loading.y_cg_ft),

@@ -1,26 +1,25 @@
-//! Settings: what the simulated aircraft is besides its geometry and derivatives: rates, loadings,
-//! engines, surfaces, laws.
+//! Settings of the simulated aircraft besides geometry and derivatives: rates, loadings, engines,
+//! surfaces, trim, control laws.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::actuators::Actuator;
-use super::control::Law;
 use super::engine::Engine;
+use super::law::ControlLaw;
 use super::loading::Loading;
-use super::trim::TrimSurfaces;
+use crate::error::did_you_mean;
 
-/// The simulated aircraft and the clock of the simulation.
+/// Simulated aircraft and rates of the simulation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Samples per second of the recorder. Default 40.
+    /// Recorded samples per second. Default 40.
     #[serde(default = "default_rate")]
     pub rate_hz: f64,
-    /// Control steps per second, a multiple of the recorder's: surfaces and gusts are linear
-    /// between them. At the recorder's own rate the recorded surfaces are all there is to know of
-    /// their motion. Default 80.
+    /// Control steps per second, a multiple of `rate_hz`; surfaces and gusts are linear between
+    /// control steps. At `rate_hz` itself the record contains the exact surface motion. Default 80.
     #[serde(default = "default_control")]
     pub control_hz: f64,
     /// Integration steps per control step. Default 4.
@@ -29,25 +28,45 @@ pub struct Settings {
     /// By ascending mass.
     pub loadings: Vec<Loading>,
     pub engine: Engine,
-    /// Surface's signal → its actuator.
+    /// Actuators by surface signal.
     pub surfaces: BTreeMap<String, Actuator>,
     pub trim: TrimSurfaces,
-    /// Surface's signal → its schedule.
+    /// Schedules by surface signal.
     #[serde(default)]
     pub schedules: BTreeMap<String, Schedule>,
-    pub laws: BTreeMap<String, Law>,
-    /// The surfaces in the order of simulation.
+    pub laws: BTreeMap<String, ControlLaw>,
+    /// Surface signals in the order of simulation.
     #[serde(skip)]
     pub surface_names: Vec<String>,
 }
 
-/// A surface that follows the angle of attack: linear between the points, constant beyond.
+/// Surfaces used for trim.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrimSurfaces {
+    /// Pitch surfaces by priority: the first that trims within its limits is used; those before it
+    /// stay at their limits.
+    pub pitch: Vec<PitchTrimmer>,
+    pub roll: String,
+    pub yaw: String,
+}
+
+/// A pitch surface with the limits for its use in trim.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PitchTrimmer {
+    pub signal: String,
+    pub lower_deg: f64,
+    pub upper_deg: f64,
+}
+
+/// Deflection scheduled with the angle of attack: linear between the points, constant outside.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
     pub alpha_deg: Vec<f64>,
     pub deflection_deg: Vec<f64>,
-    /// Time constant with which the schedule's α follows the aircraft's. Default 0.2 s.
+    /// Time constant of the α that enters the schedule. Default 0.2 s.
     #[serde(default = "default_follow")]
     pub lag_s: f64,
 }
@@ -66,9 +85,9 @@ fn default_follow() -> f64 {
 }
 
 impl Schedule {
-    /// The deflection at an angle of attack.
+    /// Deflection at an angle of attack.
     #[must_use]
-    pub fn at(&self, alpha_deg: f64) -> f64 {
+    pub fn deflection_at(&self, alpha_deg: f64) -> f64 {
         let points: Vec<(f64, f64)> = self
             .alpha_deg
             .iter()
@@ -89,27 +108,30 @@ impl Schedule {
 }
 
 impl Settings {
-    /// The place of a surface in the order of simulation.
+    /// Index of a surface in the order of simulation.
     ///
     /// # Errors
-    /// A sentence, when it is not simulated.
-    pub fn place(&self, surface: &str) -> Result<usize, String> {
-        let place = self.surface_names.iter().position(|s| s == surface);
-        place.ok_or_else(|| {
-            let near =
-                crate::error::did_you_mean(surface, self.surface_names.iter().map(String::as_str));
+    /// The message for a surface that is not simulated.
+    pub fn surface_index(&self, surface: &str) -> Result<usize, String> {
+        let index = self.surface_names.iter().position(|s| s == surface);
+        index.ok_or_else(|| {
+            let near = did_you_mean(surface, self.surface_names.iter().map(String::as_str));
             format!("`surfaces` has no `{surface}`{near}")
         })
     }
 
-    /// Every surface's scheduled deflection at an angle of attack, zero for one without schedule.
+    /// Scheduled deflections of all surfaces at an angle of attack; 0 for a surface without schedule.
     #[must_use]
-    pub fn scheduled(&self, alpha_deg: f64) -> Vec<f64> {
-        let at = |name: &String| self.schedules.get(name).map_or(0.0, |s| s.at(alpha_deg));
-        self.surface_names.iter().map(at).collect()
+    pub fn scheduled_deflections(&self, alpha_deg: f64) -> Vec<f64> {
+        let scheduled = |name: &String| {
+            self.schedules
+                .get(name)
+                .map_or(0.0, |s| s.deflection_at(alpha_deg))
+        };
+        self.surface_names.iter().map(scheduled).collect()
     }
 
-    /// Control steps per sample.
+    /// Number of control steps per recorded sample.
     #[must_use]
     pub fn steps_per_sample(&self) -> usize {
         #[expect(
@@ -121,8 +143,11 @@ impl Settings {
         steps
     }
 
-    /// What is wrong with the settings, or the names of the surfaces in their order.
-    pub(super) fn checked(mut self) -> Result<Settings, String> {
+    /// Checks the settings and fills `surface_names`.
+    ///
+    /// # Errors
+    /// The message for the first setting that is wrong.
+    pub fn checked(mut self) -> Result<Settings, String> {
         self.surface_names = self.surfaces.keys().cloned().collect();
         let per_sample = self.control_hz / self.rate_hz;
         if !(self.rate_hz > 0.0
@@ -134,23 +159,28 @@ impl Settings {
         if self.parts == 0 {
             return Err("`parts` must be at least 1".into());
         }
-        let sound = |l: &Loading| l.mass_slug > 0.0 && l.inertia().cholesky().is_some();
-        if self.loadings.is_empty() || !self.loadings.iter().all(sound) {
-            return Err("`loadings` needs at least one, with positive mass and inertias that a body can have".into());
+        let is_valid = |l: &Loading| l.mass_slug > 0.0 && l.inertia().cholesky().is_some();
+        if self.loadings.is_empty() || !self.loadings.iter().all(is_valid) {
+            return Err(
+                "`loadings` needs at least one entry with positive mass and a positive definite \
+                 inertia matrix"
+                    .into(),
+            );
         }
         if !self
             .loadings
             .windows(2)
             .all(|w| w[0].mass_slug < w[1].mass_slug)
         {
-            return Err("`loadings` must stand by ascending `mass_slug`".into());
+            return Err("`loadings` must be in order of ascending `mass_slug`".into());
         }
         let schedules = self.schedules.iter();
         for (name, schedule) in schedules {
             let ascending = schedule.alpha_deg.windows(2).all(|w| w[0] < w[1]);
             if schedule.alpha_deg.len() != schedule.deflection_deg.len() || !ascending {
                 return Err(format!(
-                    "schedule of `{name}`: as many deflections as angles, these ascending"
+                    "schedule of `{name}`: `alpha_deg` must ascend and have as many entries as \
+                     `deflection_deg`"
                 ));
             }
         }
@@ -167,7 +197,7 @@ impl Settings {
                 .chain(law.gearing.values().flat_map(BTreeMap::keys))
         });
         for name in trimmers.chain(in_laws).chain(self.schedules.keys()) {
-            self.place(name)?;
+            self.surface_index(name)?;
         }
         Ok(self)
     }

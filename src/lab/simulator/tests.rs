@@ -7,10 +7,11 @@ use approx::assert_abs_diff_eq;
 use nalgebra::{SVector, Vector3};
 
 use super::air_data::AirData;
-use super::body::{Euler, State};
-use super::noise::Noise;
-use super::plant::{Given, Instant};
-use super::{Flown, Instrument, Instruments, Program, sensors};
+use super::body::{BodyState, Euler};
+use super::plant::{PlantInputs, PlantOutputs};
+use super::random::RandomStream;
+use super::trim::{self, Trim, TrimPoint};
+use super::{Card, FlownManeuver, Instrument, Instruments, Program, Simulator, sensors};
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Basis, Estimated};
@@ -19,13 +20,17 @@ use crate::lab::campaign::SimulatedCampaign;
 use crate::tables::Outcome;
 use crate::units::DEG;
 
-fn simulation() -> SimulatedCampaign {
+fn shipped_campaign() -> SimulatedCampaign {
     SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap()
 }
 
-/// The aircraft at a random state with random deflections, some rotation and sideslip.
-fn anywhere(noise: &mut Noise, surfaces: usize) -> (State, Given) {
-    let mut within = |low: f64, high: f64| low + (high - low) * noise.uniform();
+fn trimmed(simulator: &Simulator, card: &Card) -> Trim {
+    trim::trim(&simulator.plant, &simulator.settings, TrimPoint::of(card)).unwrap()
+}
+
+/// Random state and inputs, with rotation and sideslip.
+fn random_instant(random: &mut RandomStream, surfaces: usize) -> (BodyState, PlantInputs) {
+    let mut within = |low: f64, high: f64| low + (high - low) * random.uniform();
     let speed = within(220.0, 600.0);
     let (alpha, beta) = (within(0.05, 1.05), within(-0.2, 0.2));
     let attitude = Euler {
@@ -34,51 +39,50 @@ fn anywhere(noise: &mut Noise, surfaces: usize) -> (State, Given) {
         psi: within(-3.0, 3.0),
     }
     .attitude();
-    let state = State {
+    let state = BodyState {
         velocity: AirData::velocity(speed, alpha, beta),
         rates: Vector3::new(within(-0.9, 0.9), within(-0.5, 0.5), within(-0.5, 0.5)),
         attitude,
         position: Vector3::new(0.0, 0.0, within(18_000.0, 30_000.0)),
     };
-    let given = Given {
+    let inputs = PlantInputs {
         surfaces: (0..surfaces).map(|_| within(-10.0, 10.0)).collect(),
         thrust_lbf: within(2000.0, 14_000.0),
         rpm: within(20_000.0, 26_000.0),
         gust: Vector3::zeros(),
         mass_slug: within(985.0, 1065.0),
     };
-    (state, given)
+    (state, inputs)
 }
 
-/// The instant as the estimator would have measured it without any error.
-fn measured(
-    simulation: &SimulatedCampaign,
-    state: &State,
-    given: &Given,
-    instant: &Instant,
+/// Motion of the estimator from error-free measurements of an instant.
+fn measured_motion(
+    campaign: &SimulatedCampaign,
+    state: &BodyState,
+    inputs: &PlantInputs,
+    outputs: &PlantOutputs,
 ) -> Motion {
-    let (aircraft, loading, angles) =
-        (&simulation.config.aircraft, &instant.loading, state.euler());
+    let (aircraft, loading, angles) = (&campaign.config.aircraft, &outputs.loading, state.euler());
     Motion {
-        alpha: instant.air.alpha,
-        beta: instant.air.beta,
-        velocity: instant.air.velocity_ft_s,
+        alpha: outputs.air.alpha,
+        beta: outputs.air.beta,
+        velocity: outputs.air.velocity_ft_s,
         rates: state.rates.into(),
-        accelerations: instant.slope.rates.into(),
+        accelerations: outputs.rate.rates.into(),
         theta: angles.theta,
         phi: angles.phi,
-        force_x: instant.specific_force.x,
-        force_y: instant.specific_force.y,
-        force_z: instant.specific_force.z,
+        force_x: outputs.specific_force.x,
+        force_y: outputs.specific_force.y,
+        force_z: outputs.specific_force.z,
         gravity: gravity_ft_s2(aircraft.latitude_deg, state.position.z),
-        qbar: instant.air.qbar_psf,
+        qbar: outputs.air.qbar_psf,
         mass: loading.mass_slug,
-        thrust: given.thrust_lbf,
+        thrust: inputs.thrust_lbf,
         ix: loading.ix_slug_ft2,
         iy: loading.iy_slug_ft2,
         iz: loading.iz_slug_ft2,
         ixz: loading.ixz_slug_ft2,
-        engine_momentum: aircraft.engine_inertia_slug_ft2 * given.rpm * 2.0 * std::f64::consts::PI
+        engine_momentum: aircraft.engine_inertia_slug_ft2 * inputs.rpm * 2.0 * std::f64::consts::PI
             / 60.0,
         cg: loading.cg(),
     }
@@ -86,23 +90,24 @@ fn measured(
 
 /// The disagreement of states' rates (rad/s, rad/s²) and of outputs (deg, deg/s, g) at one random
 /// instant.
-fn disagreement(simulation: &SimulatedCampaign, noise: &mut Noise) -> (f64, f64) {
-    let (plant, aircraft) = (&simulation.simulator.plant, &simulation.config.aircraft);
-    let (state, given) = anywhere(noise, simulation.simulator.settings().surface_names.len());
-    let instant = plant.instant(&state, &given, None);
+fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64, f64) {
+    let (plant, aircraft) = (&campaign.simulator.plant, &campaign.config.aircraft);
+    let surfaces = campaign.simulator.settings().surface_names.len();
+    let (state, inputs) = random_instant(random, surfaces);
+    let outputs = plant.evaluate(&state, &inputs, None);
     let values = plant
         .aerodynamics
-        .values(instant.air.alpha * DEG, instant.air.mach);
+        .values(outputs.air.alpha * DEG, outputs.air.mach);
     let (force, moment) = plant.aerodynamics.loads(
         aircraft,
         &values,
-        &instant.air,
+        &outputs.air,
         &state.rates,
-        &given.surfaces,
+        &inputs.surfaces,
     );
-    let area = instant.air.qbar_psf * aircraft.wing_area_ft2;
+    let area = outputs.air.qbar_psf * aircraft.wing_area_ft2;
     let (chord, span) = (area * aircraft.chord_ft, area * aircraft.span_ft);
-    let motion = measured(simulation, &state, &given, &instant);
+    let motion = measured_motion(campaign, &state, &inputs, &outputs);
 
     let known = Longitudinal::known(aircraft, &motion);
     let x = Longitudinal::measured_state(&motion);
@@ -117,12 +122,12 @@ fn disagreement(simulation: &SimulatedCampaign, noise: &mut Noise) -> (f64, f64)
     let lateral_outputs =
         Lateral::outputs(&known, &Lateral::sensed(aircraft, &motion), &x, &c).outputs;
 
-    let (v, v_dot, w_dot) = (state.velocity, instant.slope.velocity, instant.slope.rates);
+    let (v, v_dot, w_dot) = (state.velocity, outputs.rate.velocity, outputs.rate.rates);
     let speed = v.norm();
     let across = v.x.hypot(v.z);
     let alpha_dot = (v.x * v_dot.z - v.z * v_dot.x) / across.powi(2);
     let beta_dot = (v_dot.y * speed - v.y * v.dot(&v_dot) / speed) / (speed * across);
-    let (phi_dot, theta_dot) = state.euler_rates(&instant.slope);
+    let (phi_dot, theta_dot) = state.euler_rates(&outputs.rate);
     let rates = [
         pitch - SVector::from([alpha_dot, w_dot.y, theta_dot]),
         SVector::from([
@@ -132,8 +137,8 @@ fn disagreement(simulation: &SimulatedCampaign, noise: &mut Noise) -> (f64, f64)
         ]),
         SVector::from([lateral[3] - phi_dot, 0.0, 0.0]),
     ];
-    let read = sensors::read(aircraft, &state, &given, &instant);
-    let signal = |name: &str| read.iter().find(|(n, _)| *n == name).unwrap().1;
+    let readings = sensors::readings(aircraft, &state, &inputs, &outputs);
+    let signal = |name: &str| readings.iter().find(|(n, _)| *n == name).unwrap().1;
     let pitch_read = [
         signal::ALPHA_VANE,
         signal::Q,
@@ -163,32 +168,30 @@ fn disagreement(simulation: &SimulatedCampaign, noise: &mut Noise) -> (f64, f64)
 }
 
 #[test]
-fn the_simulator_s_equations_and_the_estimator_s_agree_to_twelve_digits() {
-    // 2e-15 where this was written. No approximation is left between the two: sideslip, rotation
-    // about all axes, engines' momentum, I_xz and the arms of the sensors are all in both.
-    let simulation = simulation();
-    let mut noise = Noise::new(5, "agreement");
+fn the_equations_of_simulator_and_estimator_agree_to_twelve_digits() {
+    // Typically 2e-15: both include sideslip, rotation about all axes, the engines' angular momentum,
+    // I_xz and the sensors' arms without approximation.
+    let campaign = shipped_campaign();
+    let mut random = RandomStream::new(5, "agreement");
     for _ in 0..500 {
-        let (r, o) = disagreement(&simulation, &mut noise);
+        let (r, o) = disagreement(&campaign, &mut random);
         assert!(r < 1e-12 && o < 1e-12, "rates {r:.1e}, outputs {o:.1e}");
     }
 }
 
 #[test]
-fn every_surface_turns_the_aircraft_as_its_sign_says() {
-    let simulation = simulation();
-    let settings = simulation.simulator.settings();
-    let trim = simulation
-        .simulator
-        .trim(&simulation.card("OLAT", 10.0).unwrap())
-        .unwrap();
-    let at =
-        |state: &State, given: &Given| simulation.simulator.plant.instant(state, given, None).slope;
-    let still = at(&trim.state, &trim.given);
+fn every_surface_turns_the_aircraft_in_the_direction_of_its_sign() {
+    let campaign = shipped_campaign();
+    let settings = campaign.simulator.settings();
+    let trim = trimmed(&campaign.simulator, &campaign.card("OLAT", 10.0).unwrap());
+    let rate = |state: &BodyState, inputs: &PlantInputs| {
+        campaign.simulator.plant.evaluate(state, inputs, None).rate
+    };
+    let unperturbed = rate(&trim.state, &trim.inputs);
     let moved = |name: &str| {
-        let mut given = trim.given.clone();
-        given.surfaces[settings.place(name).unwrap()] += 5.0;
-        at(&trim.state, &given).rates - still.rates
+        let mut inputs = trim.inputs.clone();
+        inputs.surfaces[settings.surface_index(name).unwrap()] += 5.0;
+        rate(&trim.state, &inputs).rates - unperturbed.rates
     };
     assert!(
         moved("de_deg").y < 0.0,
@@ -206,62 +209,61 @@ fn every_surface_turns_the_aircraft_as_its_sign_says() {
     );
     assert!(moved("dyv_deg").z > 0.0, "plume right yaws right");
 
-    let wind_from_the_right = State {
+    let wind_from_the_right = BodyState {
         velocity: AirData::velocity(400.0, 10.0 / DEG, 0.1),
         ..trim.state
     };
-    let turned = at(&wind_from_the_right, &trim.given);
+    let turned = rate(&wind_from_the_right, &trim.inputs);
     assert!(
         turned.rates.z > 0.0 && turned.rates.x < 0.0,
         "it weathercocks into the wind and rolls away from it"
     );
-    let faster = at(
+    let faster = rate(
         &trim.state,
-        &Given {
-            thrust_lbf: trim.given.thrust_lbf + 1000.0,
-            ..trim.given.clone()
+        &PlantInputs {
+            thrust_lbf: trim.inputs.thrust_lbf + 1000.0,
+            ..trim.inputs.clone()
         },
     );
     assert!(
-        faster.velocity.x > still.velocity.x,
+        faster.velocity.x > unperturbed.velocity.x,
         "thrust pushes forward"
     );
-    let nose_up = State {
+    let nose_up = BodyState {
         rates: Vector3::new(0.0, 0.1, 0.0),
         ..trim.state
     };
     assert!(
-        at(&nose_up, &trim.given).rates.y < still.rates.y,
+        rate(&nose_up, &trim.inputs).rates.y < unperturbed.rates.y,
         "pitching is damped"
     );
 }
 
 #[test]
-fn a_trimmed_aircraft_stays_where_it_is() {
-    let simulation = simulation();
-    // In a descent (3000 ft in these 22 s at 60°) the air grows a tenth denser, and the thrust with
-    // it.
+fn a_trimmed_aircraft_stays_trimmed() {
+    let campaign = shipped_campaign();
+    // At 60° the aircraft descends 3000 ft in 22 s: density and thrust grow by a tenth.
     for (alpha, drift_deg) in [(5.0, 0.02), (10.0, 0.02), (30.0, 0.3), (60.0, 1.0)] {
-        let mut card = simulation.card("OLAT", alpha).unwrap();
+        let mut card = campaign.card("OLAT", alpha).unwrap();
         card.program.inputs.clear();
-        let trim = simulation.simulator.trim(&card).unwrap();
-        let slope = simulation
+        let trim = trimmed(&campaign.simulator, &card);
+        let rate = campaign
             .simulator
             .plant
-            .instant(&trim.state, &trim.given, None)
-            .slope;
+            .evaluate(&trim.state, &trim.inputs, None)
+            .rate;
         assert!(
-            slope.velocity.norm() < 1e-8 && slope.rates.norm() < 1e-9,
-            "{alpha}: {slope:?}"
+            rate.velocity.norm() < 1e-8 && rate.rates.norm() < 1e-9,
+            "{alpha}: {rate:?}"
         );
-        let flown = simulation.simulator.fly(&card).unwrap();
+        let flown = campaign.simulator.fly(&card).unwrap();
         let theta = flown.record.values(signal::THETA).unwrap();
         let moved = theta
             .iter()
             .map(|t| (t - theta[0]).abs())
             .fold(0.0, f64::max);
         assert!(moved < drift_deg, "at {alpha}° it moves by {moved}°");
-        // An accelerometer at rest feels gravity: an = cos θ cos φ nearly, in g of 32.174 ft/s².
+        // In trim the accelerometer reads gravity: an ≈ cos θ cos φ, in g of 32.174 ft/s².
         let an = flown.record.values(signal::AN).unwrap()[0];
         let phi = flown.record.values(signal::PHI).unwrap()[0];
         assert_abs_diff_eq!(
@@ -274,16 +276,16 @@ fn a_trimmed_aircraft_stays_where_it_is() {
 
 #[test]
 fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
-    let simulation = simulation();
+    let campaign = shipped_campaign();
     for (class, stick, rate) in [
         ("PPSS", "stick_pitch_in", signal::Q),
         ("PYRS", "stick_lat_in", signal::P),
         ("PYRS", "pedal_in", signal::R),
     ] {
-        let mut card = simulation.card(class, 15.0).unwrap();
+        let mut card = campaign.card(class, 15.0).unwrap();
         card.program.inputs.retain(|i| i.signal == stick);
         card.program.inputs[0].start_s = 1.0;
-        let record = simulation.simulator.fly(&card).unwrap().record;
+        let record = campaign.simulator.fly(&card).unwrap().record;
         assert!(
             record.values(rate).unwrap()[record.sample_at(1.4)] > 0.5,
             "{stick}"
@@ -291,8 +293,8 @@ fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
     }
 }
 
-fn estimated(simulation: &SimulatedCampaign, flown: &Flown) -> Estimated {
-    let config = &simulation.config;
+fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
+    let config = &campaign.config;
     let basis = Basis::new(
         &config.aircraft,
         &config.buildup,
@@ -309,15 +311,14 @@ fn estimated(simulation: &SimulatedCampaign, flown: &Flown) -> Estimated {
 
 #[test]
 fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
-    // With surfaces that are linear between the recorder's samples, as the estimator takes them,
-    // all come back to 0.1%. At 80 control steps a second their motion between samples leaves 0.1%
-    // in the median and 1% at worst of these.
+    // The estimator interpolates surfaces linearly between samples. Control steps at the sampling
+    // rate make that exact, and the derivatives return to 0.1%.
     let folder = tempfile::tempdir().unwrap();
     let cards = folder.path().join("cards.yaml");
     let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     assert!(text.contains("control_hz: 80"));
     fs::write(&cards, text.replace("control_hz: 80", "control_hz: 40")).unwrap();
-    let simulation = SimulatedCampaign::load(&cards).unwrap();
+    let campaign = SimulatedCampaign::load(&cards).unwrap();
     for (class, alpha, derivatives) in [
         (
             "SSIMD_LON",
@@ -344,11 +345,11 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
             &["CY_beta", "Cl_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr"],
         ),
     ] {
-        let flown = simulation
+        let flown = campaign
             .simulator
-            .fly(&simulation.card(class, alpha).unwrap())
+            .fly(&campaign.card(class, alpha).unwrap())
             .unwrap();
-        let estimated = estimated(&simulation, &flown);
+        let estimated = estimated(&campaign, &flown);
         assert_eq!(estimated.fit.outcome, Outcome::Converged);
         for name in derivatives {
             let truth = flown
@@ -374,14 +375,14 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
 
 #[test]
 fn instruments_change_a_record_and_not_the_flight() {
-    let simulation = simulation();
-    let mut card = simulation.card("3211", 20.0).unwrap();
+    let campaign = shipped_campaign();
+    let mut card = campaign.card("3211", 20.0).unwrap();
     card.program = Program {
         duration_s: 6.0,
         maneuver_s: (0.0, 5.0),
         ..card.program
     };
-    let flown = simulation.simulator.fly(&card).unwrap();
+    let flown = campaign.simulator.fly(&card).unwrap();
     let instruments = Instruments(
         [(
             signal::Q.to_owned(),
@@ -404,5 +405,5 @@ fn instruments_change_a_record_and_not_the_flight() {
             .all(|(x, y)| (y - x - 0.5).abs() < 1e-12)
     );
     assert_eq!(record.values(signal::P), flown.record.values(signal::P));
-    assert_eq!(flown, simulation.simulator.fly(&card).unwrap());
+    assert_eq!(flown, campaign.simulator.fly(&card).unwrap());
 }

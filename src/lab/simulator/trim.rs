@@ -1,100 +1,115 @@
-//! Trim: the steady straight flight at an angle of attack and height, found by Newton's method.
+//! Trim: steady straight flight at an angle of attack and altitude, by Newton's method.
 //!
-//! No rotation, no sideslip: u̇ = v̇ = ẇ = 0 and ṗ = q̇ = ṙ = 0, for the speed, the thrust, one
-//! surface each in pitch, roll and yaw, and a small bank that carries what side force is left.
-//! Where level flight takes more thrust than there is, thrust is the greatest and the path
-//! descends.
+//! Conditions: u̇ = v̇ = ẇ = 0 and ṗ = q̇ = ṙ = 0 without rotation or sideslip. Unknowns: speed,
+//! thrust, one surface each in pitch, roll and yaw, and a small bank angle that balances the side
+//! force. If level flight needs more than the maximum thrust, thrust is at its maximum and the
+//! flight path angle takes its place among the unknowns.
 
 use nalgebra::{SMatrix, SVector, Vector3};
-use serde::{Deserialize, Serialize};
 
 use super::air_data::AirData;
-use super::body::{Euler, State};
-use super::plant::{Given, Plant};
+use super::body::{BodyState, Euler};
+use super::card::Card;
+use super::plant::{Plant, PlantInputs};
 use super::settings::Settings;
+use crate::earth::air;
+use crate::units::DEG;
 
-/// Which surfaces trim.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrimSurfaces {
-    /// The first that can within its limits; those before it stand at theirs.
-    pub pitch: Vec<Trimmer>,
-    pub roll: String,
-    pub yaw: String,
-}
+/// Starting values of the iteration; the trim does not depend on them.
+const START_GRAVITY_FT_S2: f64 = 32.17;
+const START_THRUST_PER_WEIGHT: f64 = 0.3;
+const START_PATH_ANGLE: f64 = -0.2;
 
-/// A surface with the limits within which it is used for trim.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Trimmer {
-    pub signal: String,
-    pub lower_deg: f64,
-    pub upper_deg: f64,
-}
+/// Limits of the iteration: Newton steps, and halvings of each.
+const NEWTON_STEPS: usize = 100;
+const HALVINGS: i32 = 20;
 
-/// What is to be flown.
+/// Norms of the residual, ft/s²: the iteration ends below the first; the trim is valid below the
+/// second.
+const SOLVED: f64 = 1e-11;
+const ACCEPTED: f64 = 1e-8;
+
+/// Lower limit of the speed during the iteration.
+const LEAST_SPEED_FT_S: f64 = 50.0;
+
+/// Relative step of the central differences: rounding and truncation errors are about equal.
+const DIFFERENCE_STEP: f64 = 1e-4;
+
+/// Flight condition to trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct TrimPoint {
     pub alpha_deg: f64,
     pub altitude_ft: f64,
     pub mass_slug: f64,
     pub heading_deg: f64,
 }
 
-/// Steady flight.
+impl TrimPoint {
+    /// Flight condition at the start of a card.
+    #[must_use]
+    pub fn of(card: &Card) -> TrimPoint {
+        TrimPoint {
+            alpha_deg: card.alpha_deg,
+            altitude_ft: card.altitude_ft,
+            mass_slug: card.mass_slug,
+            heading_deg: card.heading_deg,
+        }
+    }
+}
+
+/// Trimmed flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trim {
-    pub state: State,
-    pub given: Given,
+    pub state: BodyState,
+    pub inputs: PlantInputs,
     pub air: AirData,
-    /// Flight path above the horizon, rad.
-    pub climb: f64,
 }
 
-/// Speed, thrust or path, pitch, roll and yaw surface, bank.
+/// Speed, thrust or flight path angle, pitch, roll and yaw surface, bank angle.
 type Unknowns = SVector<f64, 6>;
 
-/// What the second unknown is: thrust (lbf, for level flight), or the path (rad) at this thrust.
+/// Meaning of the second unknown: thrust, lbf, in level flight; or flight path angle, rad, at a given
+/// thrust, lbf.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Power {
-    Level,
-    Limited(f64),
+enum SecondUnknown {
+    Thrust,
+    PathAngle { thrust_lbf: f64 },
 }
 
-struct Search<'a> {
+struct TrimProblem<'a> {
     plant: &'a Plant,
     settings: &'a Settings,
-    point: Point,
-    /// Surfaces at their schedule, or at zero.
+    point: TrimPoint,
+    /// Scheduled deflections, or zero.
     surfaces: Vec<f64>,
-    /// Places of the three trimming surfaces.
-    places: [usize; 3],
-    power: Power,
+    /// Indices of the pitch, roll and yaw surface.
+    trimmers: [usize; 3],
+    second: SecondUnknown,
 }
 
-/// The trim at a point, or why there is none.
+/// Trims the aircraft at a flight condition.
 ///
 /// # Errors
-/// A sentence: nothing balances the aircraft here, or only a surface beyond its limit.
-pub fn trim(plant: &Plant, settings: &Settings, point: Point) -> Result<Trim, String> {
-    let mut surfaces: Vec<f64> = settings.scheduled(point.alpha_deg);
-    let surfaces_of = &settings.trim;
-    let [roll, yaw] = [&surfaces_of.roll, &surfaces_of.yaw].map(|name| settings.place(name));
-    for trimmer in &surfaces_of.pitch {
-        let pitch = settings.place(&trimmer.signal)?;
-        let places = [pitch, roll.clone()?, yaw.clone()?];
-        let search = Search {
+/// The reason: no balance exists, or it needs a surface beyond its limit.
+pub fn trim(plant: &Plant, settings: &Settings, point: TrimPoint) -> Result<Trim, String> {
+    let mut surfaces: Vec<f64> = settings.scheduled_deflections(point.alpha_deg);
+    let roll = settings.surface_index(&settings.trim.roll);
+    let yaw = settings.surface_index(&settings.trim.yaw);
+    for trimmer in &settings.trim.pitch {
+        let pitch = settings.surface_index(&trimmer.signal)?;
+        let trimmers = [pitch, roll.clone()?, yaw.clone()?];
+        let problem = TrimProblem {
             plant,
             settings,
             point,
             surfaces: surfaces.clone(),
-            places,
-            power: Power::Level,
+            trimmers,
+            second: SecondUnknown::Thrust,
         };
-        let found = search.with_thrust_limit()?;
-        let needed = found.given.surfaces.get(pitch).copied().unwrap_or(0.0);
+        let trim = problem.solve_within_thrust()?;
+        let needed = trim.inputs.surfaces.get(pitch).copied().unwrap_or(0.0);
         if (trimmer.lower_deg..=trimmer.upper_deg).contains(&needed) {
-            return search.within_limits(found);
+            return problem.within_limits(trim);
         }
         if let Some(surface) = surfaces.get_mut(pitch) {
             *surface = needed.clamp(trimmer.lower_deg, trimmer.upper_deg);
@@ -106,13 +121,14 @@ pub fn trim(plant: &Plant, settings: &Settings, point: Point) -> Result<Trim, St
     ))
 }
 
-impl Search<'_> {
-    fn with_thrust_limit(&self) -> Result<Trim, String> {
+impl TrimProblem<'_> {
+    /// Solves for level flight, or for the path angle at maximum thrust.
+    fn solve_within_thrust(&self) -> Result<Trim, String> {
         let limit = self.settings.engine.max_thrust(self.point.altitude_ft);
         match self.solve() {
-            Ok(level) if level.given.thrust_lbf <= limit => Ok(level),
-            _ => Search {
-                power: Power::Limited(limit),
+            Ok(level) if level.inputs.thrust_lbf <= limit => Ok(level),
+            _ => TrimProblem {
+                second: SecondUnknown::PathAngle { thrust_lbf: limit },
                 surfaces: self.surfaces.clone(),
                 ..*self
             }
@@ -120,11 +136,12 @@ impl Search<'_> {
         }
     }
 
-    fn within_limits(&self, found: Trim) -> Result<Trim, String> {
-        for place in self.places {
+    /// Rejects a trim with a surface beyond its limit.
+    fn within_limits(&self, trim: Trim) -> Result<Trim, String> {
+        for index in self.trimmers {
             let (Some(deg), Some(name)) = (
-                found.given.surfaces.get(place),
-                self.settings.surface_names.get(place),
+                trim.inputs.surfaces.get(index),
+                self.settings.surface_names.get(index),
             ) else {
                 continue;
             };
@@ -137,37 +154,39 @@ impl Search<'_> {
                 ));
             }
         }
-        Ok(found)
+        Ok(trim)
     }
 
-    /// The flight that a set of unknowns is.
+    /// Flight described by a set of unknowns.
     fn flight(&self, x: &Unknowns) -> Trim {
-        let alpha = self.point.alpha_deg / crate::units::DEG;
-        let (thrust_lbf, climb) = match self.power {
-            Power::Level => (x[1], 0.0),
-            Power::Limited(limit) => (limit, x[1]),
+        let alpha = self.point.alpha_deg / DEG;
+        let (thrust_lbf, path_angle) = match self.second {
+            SecondUnknown::Thrust => (x[1], 0.0),
+            SecondUnknown::PathAngle { thrust_lbf } => (thrust_lbf, x[1]),
         };
         let phi = x[5];
         // sin γ = cos α sin θ − sin α cos φ cos θ, solved for θ.
         let (forward, down) = (alpha.cos(), alpha.sin() * phi.cos());
-        let theta =
-            down.atan2(forward) + (climb.sin() / forward.hypot(down)).clamp(-1.0, 1.0).asin();
+        let theta = down.atan2(forward)
+            + (path_angle.sin() / forward.hypot(down))
+                .clamp(-1.0, 1.0)
+                .asin();
         let mut surfaces = self.surfaces.clone();
-        for (place, deg) in self.places.into_iter().zip([x[2], x[3], x[4]]) {
-            if let Some(surface) = surfaces.get_mut(place) {
+        for (index, deg) in self.trimmers.into_iter().zip([x[2], x[3], x[4]]) {
+            if let Some(surface) = surfaces.get_mut(index) {
                 *surface = deg;
             }
         }
         let velocity = AirData::velocity(x[0], alpha, 0.0);
-        let psi = self.point.heading_deg / crate::units::DEG;
+        let psi = self.point.heading_deg / DEG;
         Trim {
-            state: State {
+            state: BodyState {
                 velocity,
                 rates: Vector3::zeros(),
                 attitude: Euler { phi, theta, psi }.attitude(),
                 position: Vector3::new(0.0, 0.0, self.point.altitude_ft),
             },
-            given: Given {
+            inputs: PlantInputs {
                 surfaces,
                 thrust_lbf,
                 rpm: 2.0 * self.settings.engine.rpm(thrust_lbf),
@@ -175,81 +194,81 @@ impl Search<'_> {
                 mass_slug: self.point.mass_slug,
             },
             air: AirData::new(&velocity, self.point.altitude_ft),
-            climb,
         }
     }
 
-    /// Accelerations that are to vanish, ft/s² and 0.02 rad/s².
+    /// Residual accelerations, ft/s² and 0.02 rad/s².
     fn residual(&self, x: &Unknowns) -> Unknowns {
         let flight = self.flight(x);
-        // In trim the tables are read where they will be frozen: at the point's α and the speed's
-        // Mach number.
-        let slope = self.plant.instant(&flight.state, &flight.given, None).slope;
-        let (v, w) = (slope.velocity, slope.rates * 50.0);
+        let rate = self
+            .plant
+            .evaluate(&flight.state, &flight.inputs, None)
+            .rate;
+        let (v, w) = (rate.velocity, rate.rates * 50.0);
         Unknowns::from([v.x, v.y, v.z, w.x, w.y, w.z])
     }
 
     fn solve(&self) -> Result<Trim, String> {
-        let gravity = 32.17;
-        let weight = self.point.mass_slug * gravity;
-        let density = crate::earth::air(self.point.altitude_ft).density_slug_ft3;
+        let weight = self.point.mass_slug * START_GRAVITY_FT_S2;
+        let density = air(self.point.altitude_ft).density_slug_ft3;
         let speed = (2.0 * weight / (density * self.plant.aircraft.wing_area_ft2)).sqrt();
-        let second = if self.power == Power::Level {
-            0.3 * weight
+        let second = if self.second == SecondUnknown::Thrust {
+            START_THRUST_PER_WEIGHT * weight
         } else {
-            -0.2
+            START_PATH_ANGLE
         };
         let mut x = Unknowns::from([speed, second, 0.0, 0.0, 0.0, 0.0]);
         let mut residual = self.residual(&x);
-        for _ in 0..100 {
-            if residual.norm() < 1e-11 {
+        for _ in 0..NEWTON_STEPS {
+            if residual.norm() < SOLVED {
                 break;
             }
-            let slopes = self.slopes(&x);
-            let Some(change) = slopes.lu().solve(&-residual) else {
+            let jacobian = self.jacobian(&x);
+            let Some(step) = jacobian.lu().solve(&-residual) else {
                 break;
             };
-            let Some((next, after)) = self.shortened(&x, &change, residual.norm()) else {
+            let Some((next, after)) = self.damped_step(&x, &step, residual.norm()) else {
                 break;
             };
             (x, residual) = (next, after);
         }
-        if residual.norm() < 1e-8 {
+        if residual.norm() < ACCEPTED {
             Ok(self.flight(&x))
         } else {
-            let (alpha, height) = (self.point.alpha_deg, self.point.altitude_ft);
+            let (alpha, altitude_ft) = (self.point.alpha_deg, self.point.altitude_ft);
             Err(format!(
-                "nothing trims α = {alpha}° at {height} ft: {:.1e} ft/s² are left",
+                "nothing trims α = {alpha}° at {altitude_ft} ft: {:.1e} ft/s² are left",
                 residual.norm()
             ))
         }
     }
 
-    /// The first of the halved Newton steps that comes nearer.
-    fn shortened(
+    /// Halves a Newton step until the residual decreases.
+    fn damped_step(
         &self,
         x: &Unknowns,
-        change: &Unknowns,
+        step: &Unknowns,
         before: f64,
     ) -> Option<(Unknowns, Unknowns)> {
-        (0..20).find_map(|halvings| {
-            let next = x + change * 0.5_f64.powi(halvings);
-            let after = (next[0] > 50.0).then(|| self.residual(&next))?;
+        (0..HALVINGS).find_map(|halvings| {
+            let next = x + step * 0.5_f64.powi(halvings);
+            let after = (next[0] > LEAST_SPEED_FT_S).then(|| self.residual(&next))?;
             (after.norm() < before).then_some((next, after))
         })
     }
 
-    fn slopes(&self, x: &Unknowns) -> SMatrix<f64, 6, 6> {
-        let mut slopes = SMatrix::<f64, 6, 6>::zeros();
+    /// Jacobian of the residual by central differences.
+    fn jacobian(&self, x: &Unknowns) -> SMatrix<f64, 6, 6> {
+        let mut jacobian = SMatrix::<f64, 6, 6>::zeros();
         for j in 0..6 {
-            let h = 1e-4 * x[j].abs().max(0.1);
-            let moved = |d: f64| {
+            let h = DIFFERENCE_STEP * x[j].abs().max(0.1);
+            let residual_at = |d: f64| {
                 let mut x = *x;
                 x[j] += d;
                 self.residual(&x)
             };
-            slopes.set_column(j, &((moved(h) - moved(-h)) / (2.0 * h)));
+            jacobian.set_column(j, &((residual_at(h) - residual_at(-h)) / (2.0 * h)));
         }
-        slopes
+        jacobian
     }
 }

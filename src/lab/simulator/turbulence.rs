@@ -1,19 +1,20 @@
-//! Turbulence after Dryden (MIL-F-8785C): gusts along the body axes as white noise through the
-//! filters σ√(2T)/(1 + Ts) for u, T = `L_u`/V, and σ√T (1 + √3 Ts)/(1 + Ts)² for v and w, made in
-//! discrete time without approximation.
+//! Dryden turbulence (MIL-F-8785C): gusts along the body axes.
+//!
+//! White noise through σ√(2T)/(1 + Ts) for u and σ√T (1 + √3 Ts)/(1 + Ts)² for v and w, T = L/V,
+//! discretised exactly.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::noise::Noise;
+use super::random::RandomStream;
 
-/// Intensity and scale of the turbulence.
+/// Intensity and scale length of the turbulence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turbulence {
     /// Standard deviation of the gusts in each axis.
     pub sigma_ft_s: f64,
-    /// The scale length L of all three; 1750 ft above 2000 ft.
+    /// Scale length L of the three axes; 1750 ft above 2000 ft (MIL-F-8785C).
     #[serde(default = "default_length")]
     pub length_ft: f64,
 }
@@ -22,14 +23,14 @@ fn default_length() -> f64 {
     1750.0
 }
 
-/// The second-order filter split into √3/(1+Ts) + (1−√3)/(1+Ts)²: the states of the two.
+/// States of the transverse filter, split into √3/(1+Ts) + (1−√3)/(1+Ts)².
 #[derive(Clone, Copy, Debug, Default)]
-struct Across {
+struct TransverseFilter {
     first: f64,
     second: f64,
 }
 
-/// Gusts in body axes, ft/s, at the times k·`step_s`: `count` of them, from the stationary
+/// Draws `count` gusts in body axes, ft/s, at multiples of `step_s`, from the stationary
 /// distribution.
 #[must_use]
 pub fn gusts(
@@ -39,11 +40,11 @@ pub fn gusts(
     count: usize,
     seed: u64,
 ) -> Vec<Vector3<f64>> {
-    let part = step_s * speed_ft_s / turbulence.length_ft;
+    let step = step_s * speed_ft_s / turbulence.length_ft;
     let sigma = turbulence.sigma_ft_s;
-    let along = first_order(part, count, &mut Noise::new(seed, "gust along"));
-    let side = across(part, count, &mut Noise::new(seed, "gust across"));
-    let down = across(part, count, &mut Noise::new(seed, "gust down"));
+    let along = longitudinal(step, count, &mut RandomStream::new(seed, "gust along"));
+    let side = transverse(step, count, &mut RandomStream::new(seed, "gust across"));
+    let down = transverse(step, count, &mut RandomStream::new(seed, "gust down"));
     along
         .into_iter()
         .zip(side)
@@ -52,52 +53,55 @@ pub fn gusts(
         .collect()
 }
 
-fn first_order(part: f64, count: usize, noise: &mut Noise) -> Vec<f64> {
-    let keep = (-part).exp();
-    let fresh = (1.0 - keep * keep).sqrt();
-    let mut value = noise.normal();
-    let mut next = || {
-        let now = value;
-        value = keep * value + fresh * noise.normal();
-        now
-    };
-    (0..count).map(|_| next()).collect()
+/// Unit gusts of the longitudinal filter; `step` in time constants.
+fn longitudinal(step: f64, count: usize, random: &mut RandomStream) -> Vec<f64> {
+    let decay = (-step).exp();
+    let innovation = (1.0 - decay * decay).sqrt();
+    let mut value = random.normal();
+    let mut gusts = Vec::with_capacity(count);
+    for _ in 0..count {
+        gusts.push(value);
+        value = decay * value + innovation * random.normal();
+    }
+    gusts
 }
 
-/// Covariance of the two states that noise of unit strength leaves after `part` time constants.
-fn covariance(part: f64) -> [f64; 3] {
-    let gone = (-2.0 * part).exp();
+/// Covariance of the two filter states that unit white noise builds up in `step` time constants:
+/// variance, covariance, variance.
+fn covariance(step: f64) -> [f64; 3] {
+    let decay = (-2.0 * step).exp();
     [
-        (1.0 - gone) / 2.0,
-        (1.0 - gone * (1.0 + 2.0 * part)) / 4.0,
-        (1.0 - gone * (1.0 + 2.0 * part + 2.0 * part * part)) / 4.0,
+        (1.0 - decay) / 2.0,
+        (1.0 - decay * (1.0 + 2.0 * step)) / 4.0,
+        (1.0 - decay * (1.0 + 2.0 * step + 2.0 * step * step)) / 4.0,
     ]
 }
 
-/// Two correlated deviates of a covariance (its Cholesky factor times two free ones).
-fn draw([a, b, c]: [f64; 3], noise: &mut Noise) -> Across {
+/// Draws two correlated deviates: the Cholesky factor of the covariance times two independent ones.
+fn draw([a, b, c]: [f64; 3], random: &mut RandomStream) -> TransverseFilter {
     let first = a.sqrt();
-    let (x, y) = (noise.normal(), noise.normal());
-    Across {
+    let (x, y) = (random.normal(), random.normal());
+    TransverseFilter {
         first: first * x,
         second: b / first * x + (c - b * b / a).max(0.0).sqrt() * y,
     }
 }
 
-fn across(part: f64, count: usize, noise: &mut Noise) -> Vec<f64> {
+/// Unit gusts of the transverse filter; `step` in time constants.
+fn transverse(step: f64, count: usize, random: &mut RandomStream) -> Vec<f64> {
     let root = 3.0_f64.sqrt();
-    let keep = (-part).exp();
-    let mut state = draw([0.5, 0.25, 0.25], noise);
-    let mut next = || {
-        let now = root * state.first + (1.0 - root) * state.second;
-        let fresh = draw(covariance(part), noise);
-        state = Across {
-            first: keep * state.first + fresh.first,
-            second: keep * (state.second + part * state.first) + fresh.second,
+    let decay = (-step).exp();
+    let mut state = draw([0.5, 0.25, 0.25], random);
+    let mut gusts = Vec::with_capacity(count);
+    for _ in 0..count {
+        gusts.push(root * state.first + (1.0 - root) * state.second);
+        let innovation = draw(covariance(step), random);
+        state = TransverseFilter {
+            first: decay * state.first + innovation.first,
+            second: decay * (state.second + step * state.first) + innovation.second,
         };
-        now
-    };
-    (0..count).map(|_| next()).collect()
+    }
+    gusts
 }
 
 #[cfg(test)]
@@ -128,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn gusts_have_dryden_s_variance_and_correlation_whatever_the_step() {
+    fn gusts_have_the_variance_and_correlation_of_the_specification_at_any_step() {
         // Correlation over r scale lengths: e^(-r) along, e^(-r)(1 - r/2) across.
         for (step_s, lag) in [(0.05, 10), (0.1, 5)] {
             let [along, side, down] = statistics(step_s, lag);
@@ -145,8 +149,8 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_is_the_same_air() {
-        let air = |seed| {
+    fn the_same_seed_gives_the_same_gusts() {
+        let draw_gusts = |seed| {
             gusts(
                 &Turbulence {
                     sigma_ft_s: 5.0,
@@ -158,7 +162,7 @@ mod tests {
                 seed,
             )
         };
-        assert_eq!(air(1), air(1));
-        assert_ne!(air(1), air(2));
+        assert_eq!(draw_gusts(1), draw_gusts(1));
+        assert_ne!(draw_gusts(1), draw_gusts(2));
     }
 }

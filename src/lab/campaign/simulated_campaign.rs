@@ -1,5 +1,4 @@
-//! Test cards for the simulator: YAML as written, checked against the pipeline whose aircraft flies
-//! them.
+//! A simulated campaign: test cards, checked against the pipeline of the aircraft that flies them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,16 +7,16 @@ use super::cards::Cards;
 use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
-use crate::lab::simulator::{Card, Program, Simulator, Tables};
+use crate::lab::simulator::{Card, DerivativeLookup, Program, Simulator};
 use crate::store::files::TunnelRow;
 
-/// A campaign to be simulated, checked.
+/// Test cards with their pipeline and simulator, checked.
 #[derive(Clone, Debug)]
 pub struct SimulatedCampaign {
     pub cards: Cards,
-    /// The pipeline; its tunnel is the truth here.
+    /// Configuration of the pipeline; its wind tunnel holds the true derivatives.
     pub config: Config,
-    /// The true derivatives as written.
+    /// True derivatives as written.
     pub truth: Vec<TunnelRow>,
     pub simulator: Simulator,
 }
@@ -26,8 +25,7 @@ impl SimulatedCampaign {
     /// Reads and checks a file of cards and its pipeline.
     ///
     /// # Errors
-    /// [`crate::error::Error::Config`] with file, line and what was probably meant, for the first
-    /// thing that is wrong.
+    /// [`crate::error::Error`] with file, line and the probable meaning of the first mistake.
     pub fn load(file: &Path) -> Result<SimulatedCampaign> {
         let source = Source::read(file.to_owned())?;
         let cards: Cards = source.parse()?;
@@ -49,42 +47,44 @@ impl SimulatedCampaign {
             config.tunnel.clone(),
             cards.aircraft.clone(),
         )
-        .map_err(|what| source.error("aircraft", what))?;
-        let simulation = SimulatedCampaign {
+        .map_err(|message| source.error("aircraft", message))?;
+        let campaign = SimulatedCampaign {
             cards,
             config,
             truth,
             simulator,
         };
-        simulation.classes(&source)?;
-        simulation.signals(&source)?;
-        Ok(simulation)
+        campaign.check_programs(&source)?;
+        campaign.check_flights(&source)?;
+        campaign.check_channels(&source)?;
+        campaign.check_instruments(&source)?;
+        Ok(campaign)
     }
 
-    /// The card of one maneuver of a class: its program at an angle of attack, in still air,
-    /// derivatives frozen, for studies. `None` for a class without program.
+    /// Card of one maneuver in still air with frozen derivatives, for studies. `None` for a class
+    /// without program.
     #[must_use]
     pub fn card(&self, class: &str, alpha_deg: f64) -> Option<Card> {
         let axis = self.config.class(class)?.axis;
-        let first = self.cards.flights.values().next()?;
+        let conditions = self.cards.flights.values().next()?;
         Some(Card {
             flight_id: format!("{class}_{alpha_deg:02}"),
             class: class.to_owned(),
             axis,
             alpha_deg,
-            altitude_ft: first.altitude_ft,
-            heading_deg: first.heading_deg,
-            mass_slug: first.mass_slug,
+            altitude_ft: conditions.altitude_ft,
+            heading_deg: conditions.heading_deg,
+            mass_slug: conditions.mass_slug,
             start_s: 0.0,
-            tables: Tables::Frozen,
+            derivatives: DerivativeLookup::Frozen,
             turbulence: None,
             seed: self.cards.seed,
             program: self.cards.programs.get(class)?.clone(),
         })
     }
 
-    /// Every signal that the simulator gives.
-    fn given(&self) -> BTreeSet<&str> {
+    /// Signals of the simulator.
+    fn signals(&self) -> BTreeSet<&str> {
         let settings = self.simulator.settings();
         let flags = self.cards.programs.values().flat_map(|p| p.flags.keys());
         let sticks = settings.laws.values().flat_map(|law| law.gearing.keys());
@@ -98,7 +98,7 @@ impl SimulatedCampaign {
             .collect()
     }
 
-    fn classes(&self, source: &Source) -> Result<()> {
+    fn check_programs(&self, source: &Source) -> Result<()> {
         for (class, program) in &self.cards.programs {
             if self.config.class(class).is_none() {
                 let near = did_you_mean(class, self.config.classes.iter().map(|c| c.name.as_str()));
@@ -108,24 +108,14 @@ impl SimulatedCampaign {
                     format!("unknown class `{class}`{near}"),
                 ));
             }
-            self.program(class, program, source)?;
-        }
-        for (flight, card) in &self.cards.flights {
-            for point in &card.points {
-                if !self.cards.programs.contains_key(&point.class) {
-                    let near =
-                        did_you_mean(&point.class, self.cards.programs.keys().map(String::as_str));
-                    let what = format!("flight {flight}: no program `{}`{near}", point.class);
-                    return Err(source.error_under("flights", &point.class, what));
-                }
-            }
+            self.check_program(class, program, source)?;
         }
         Ok(())
     }
 
-    fn program(&self, class: &str, program: &Program, source: &Source) -> Result<()> {
-        let error = |name: &str, what: String| {
-            Err(source.error_under("programs", name, format!("{class}: {what}")))
+    fn check_program(&self, class: &str, program: &Program, source: &Source) -> Result<()> {
+        let error = |name: &str, message: String| {
+            Err(source.error_under("programs", name, format!("{class}: {message}")))
         };
         let settings = self.simulator.settings();
         let Some(law) = settings.laws.get(&program.law) else {
@@ -136,18 +126,19 @@ impl SimulatedCampaign {
         if !(0.0 <= from_s && from_s < to_s && to_s <= program.duration_s) {
             return error(
                 class,
-                "`maneuver_s` must lie within 0 and `duration_s`, its start first".into(),
+                "`maneuver_s` must be a start and a later end between 0 and `duration_s`".into(),
             );
         }
+        let movable: Vec<&str> = law
+            .gearing
+            .keys()
+            .chain(settings.surfaces.keys())
+            .map(String::as_str)
+            .chain([signal::THRUST])
+            .collect();
         for input in &program.inputs {
-            let known = law
-                .gearing
-                .keys()
-                .chain(settings.surfaces.keys())
-                .map(String::as_str);
-            let mut known = known.chain([signal::THRUST]);
-            if !known.clone().any(|name| name == input.signal) {
-                let near = did_you_mean(&input.signal, known.by_ref());
+            if !movable.contains(&input.signal.as_str()) {
+                let near = did_you_mean(&input.signal, movable.iter().copied());
                 return error(
                     &input.signal,
                     format!("law `{}` moves no `{}`{near}", program.law, input.signal),
@@ -157,22 +148,41 @@ impl SimulatedCampaign {
         Ok(())
     }
 
-    fn signals(&self, source: &Source) -> Result<()> {
-        let given = self.given();
+    fn check_flights(&self, source: &Source) -> Result<()> {
+        for (flight, card) in &self.cards.flights {
+            for point in &card.points {
+                if !self.cards.programs.contains_key(&point.class) {
+                    let near =
+                        did_you_mean(&point.class, self.cards.programs.keys().map(String::as_str));
+                    let message = format!("flight {flight}: no program `{}`{near}", point.class);
+                    return Err(source.error_under("flights", &point.class, message));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_channels(&self, source: &Source) -> Result<()> {
+        let signals = self.signals();
         for (column, channel) in &self.config.channels {
-            if !given.contains(channel.signal.as_str()) {
-                let what = format!(
+            if !signals.contains(channel.signal.as_str()) {
+                let message = format!(
                     "channel `{column}`: the simulator has no signal `{}`",
                     channel.signal
                 );
-                return Err(source.error("pipeline", what));
+                return Err(source.error("pipeline", message));
             }
         }
+        Ok(())
+    }
+
+    fn check_instruments(&self, source: &Source) -> Result<()> {
+        let signals = self.signals();
         for name in self.cards.instruments.0.keys() {
-            if !given.contains(name.as_str()) {
-                let near = did_you_mean(name, given.iter().copied());
-                let what = format!("instruments: there is no signal `{name}`{near}");
-                return Err(source.error_under("instruments", name, what));
+            if !signals.contains(name.as_str()) {
+                let near = did_you_mean(name, signals.iter().copied());
+                let message = format!("instruments: there is no signal `{name}`{near}");
+                return Err(source.error_under("instruments", name, message));
             }
         }
         Ok(())

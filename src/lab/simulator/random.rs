@@ -1,35 +1,35 @@
-//! Random numbers from a seed and a name: the same on every machine and whatever the number of
-//! threads.
+//! Reproducible random numbers: one stream per seed and name, identical on every machine and for any
+//! number of threads.
 //!
-//! A stream is `SplitMix64` (Steele, Lea and Flood 2014); normal deviates are Box and Muller's.
-//! Streams of different names do not touch each other, so a sensor's noise does not depend on which
-//! others there are.
+//! Uniform deviates: `SplitMix64` (Steele, Lea and Flood 2014). Normal deviates: Box and Muller.
+//! Streams of different names are independent, so adding a sensor leaves the noise of the others
+//! unchanged.
 
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
-pub struct Noise {
+pub struct RandomStream {
     state: u64,
 }
 
-/// A seed of its own for a part of what a seed decides.
+/// Derives the seed of a named part of a simulation.
 #[must_use]
-pub fn seed_of(seed: u64, name: &str) -> u64 {
-    Noise::new(seed, name).bits()
+pub fn derived_seed(seed: u64, name: &str) -> u64 {
+    RandomStream::new(seed, name).bits()
 }
 
-impl Noise {
-    /// The stream of a name under a seed.
+impl RandomStream {
+    /// Starts the stream of a name under a seed.
     #[must_use]
-    pub fn new(seed: u64, name: &str) -> Noise {
-        // FNV-1a of the name, so that the streams of a seed start far from each other.
+    pub fn new(seed: u64, name: &str) -> RandomStream {
+        // FNV-1a of the name separates the starting states of a seed's streams.
         let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
         });
-        let mut noise = Noise {
+        let mut stream = RandomStream {
             state: seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ hash,
         };
-        noise.state = noise.bits();
-        noise
+        stream.state = stream.bits();
+        stream
     }
 
     fn bits(&mut self) -> u64 {
@@ -40,13 +40,13 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// A number in (0, 1), all alike.
+    /// Draws a uniform deviate from (0, 1).
     pub fn uniform(&mut self) -> f64 {
         let bits = self.bits() >> 11;
         (bits as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
-    /// A normal deviate of mean 0 and variance 1.
+    /// Draws a normal deviate of mean 0 and variance 1.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn normal_deviates_have_mean_0_variance_1_and_normal_tails() {
-        let mut noise = Noise::new(7, "q_deg_s");
+        let mut noise = RandomStream::new(7, "q_deg_s");
         let n = 200_000;
         let values: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
         let moment = |power: i32| values.iter().map(|v| v.powi(power)).sum::<f64>() / f64::from(n);
@@ -70,9 +70,9 @@ mod tests {
     }
 
     #[test]
-    fn streams_of_other_names_and_seeds_are_unrelated() {
+    fn streams_of_other_names_and_seeds_are_uncorrelated() {
         let draw = |seed, name| {
-            let mut noise = Noise::new(seed, name);
+            let mut noise = RandomStream::new(seed, name);
             (0..20_000).map(|_| noise.normal()).collect::<Vec<f64>>()
         };
         let first = draw(1, "p_deg_s");
