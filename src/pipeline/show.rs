@@ -10,7 +10,7 @@ use crate::error::{Error, Problem, Result, did_you_mean};
 use crate::flight::is_stretch;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
-use crate::report::strip_chart::{self, FlightView, Groups, ManeuverView};
+use crate::report::strip_chart::{self, FlightView, ManeuverView, SignalGroups};
 use crate::store::archive::FlightFiles;
 use crate::store::atomic;
 
@@ -155,7 +155,7 @@ impl Run<'_> {
             .filter(|e| e.flight_id == id)
             .cloned()
             .collect();
-        Ok(strip_chart::flight(&FlightView {
+        Ok(strip_chart::draw_flight(&FlightView {
             aircraft: &self.config.aircraft.name,
             record: &record,
             recorded,
@@ -190,7 +190,7 @@ impl Run<'_> {
         } else {
             self.estimate_maneuver(&record, maneuver).history
         };
-        Ok(strip_chart::maneuver(&ManeuverView {
+        Ok(strip_chart::draw_maneuver(&ManeuverView {
             aircraft: &self.config.aircraft.name,
             record: &record,
             groups: &groups(self.config),
@@ -237,7 +237,7 @@ fn of_flight(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
 
 /// What the configuration says of the signals that it names: surfaces have derivatives, pilot
 /// controls have steps that are counted, flags are up or down in a class.
-fn groups(config: &Config) -> Groups {
+fn groups(config: &Config) -> SignalGroups {
     let surface = |d: &crate::aero::Derivative| match &d.regressor {
         Regressor::Surface(name) | Regressor::Vane(name) => Some(name.clone()),
         _ => None,
@@ -254,7 +254,7 @@ fn groups(config: &Config) -> Groups {
         .iter()
         .flat_map(|c| c.recognition.flags.keys().cloned());
     let flags = unique(std::iter::once(config.segment.excitation_flag.clone()).chain(in_classes));
-    Groups {
+    SignalGroups {
         controls: stepping.collect(),
         flags,
         surfaces,

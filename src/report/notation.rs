@@ -153,6 +153,16 @@ impl Digits {
         }
     }
 
+    /// Form for tick labels that need a number of decimals; scientific beyond six.
+    #[must_use]
+    pub fn of_ticks(decimals: usize) -> Digits {
+        if decimals <= 6 {
+            Digits::Decimals(decimals)
+        } else {
+            Digits::Scientific(1)
+        }
+    }
+
     /// Writes a number in this form; a dash if missing or not finite.
     #[must_use]
     pub fn write(self, value: Option<f64>) -> String {

@@ -97,7 +97,7 @@ pub fn draw(figure: &DerivativeFigure) -> String {
     )
 }
 
-pub(super) fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layout {
+fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layout {
     let layout = Layout::new((x.min, x.max), (y.min, y.max))
         .with_width(WIDTH)
         .with_height(height)
@@ -128,10 +128,7 @@ pub(super) fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Sca
 /// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper
 /// minus.
 fn ticks(scale: Scale) -> TickFormat {
-    let digits = match scale.decimals() {
-        decimals if decimals <= 6 => Digits::Decimals(decimals),
-        _ => Digits::Scientific(1),
-    };
+    let digits = Digits::of_ticks(scale.decimals());
     TickFormat::Custom(Arc::new(move |value| digits.write(Some(value))))
 }
 
@@ -143,7 +140,7 @@ fn zero_line() -> ReferenceLine {
 }
 
 /// A plot without points: the crate draws no axes where there is no plot at all.
-pub(super) fn nothing() -> Plot {
+fn nothing() -> Plot {
     Plot::Scatter(ScatterPlot::new())
 }
 
@@ -254,7 +251,7 @@ fn stroke(scene: &mut Scene, d: String, colour: &str, width: f64, fill: Option<&
     }
 }
 
-pub(super) fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive {
+fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive {
     Primitive::Path(Box::new(PathData {
         d,
         fill: fill.map(Color::from),
@@ -297,7 +294,7 @@ fn own_clips(svg: &str, id: &str) -> String {
 }
 
 /// Cuts decimals that only binary fractions have (more than nine of them) to two.
-pub(super) fn shortened(svg: &str) -> String {
+fn shortened(svg: &str) -> String {
     let mut parts = svg.split('.');
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {

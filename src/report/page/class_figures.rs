@@ -11,7 +11,8 @@ use crate::aero::Axis;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::extent;
-use crate::report::figure::strip_figure::{self, Strip, StripFigure, StripLine};
+use crate::report::figure::strip_figure::{self, StripFigure};
+use crate::report::figure::strips::{Strip, StripLine};
 use crate::report::figure::style::DARK_COLOURS;
 use crate::report::history;
 use crate::report::notation::{angle, fixed, without_unit};
@@ -183,26 +184,17 @@ fn correlated_figure(
             LegendView::new(key(24, &line(colour, dash, width)), without_unit(name))
         })
         .collect();
+    let points: Vec<&[(f64, f64)]> = signals.iter().map(|s| s.1.as_slice()).collect();
+    let scale = history_strips::scale_of(&points, 5.0);
     let lines: Vec<StripLine> = signals
         .into_iter()
         .zip(LINE_STYLES)
         .map(|((_, points), (colour, dash, width))| StripLine {
-            points,
-            colour,
-            width,
             dash,
+            ..StripLine::solid(points, colour, width)
         })
         .collect();
-    let points: Vec<&[(f64, f64)]> = lines.iter().map(|l| l.points.as_slice()).collect();
-    let strip = Strip {
-        name: "change".to_owned(),
-        unit: "over rms".to_owned(),
-        height: CORRELATED_HEIGHT,
-        scale: history_strips::scale_of(&points, 5.0),
-        lines,
-        dots: vec![],
-        class: String::new(),
-    };
+    let strip = Strip::of_lines("change", "over rms", CORRELATED_HEIGHT, scale, lines);
     let drawing = StripFigure {
         id: anchor,
         title: format!("Correlated signals in {}", history.class),
@@ -306,15 +298,15 @@ fn rate_figure(
     for (history, points) in measured {
         let rms = root_mean_square(&points);
         sizes.push(format!("{} {}", history.class, fixed(rms, 1)));
-        strips.push(Strip {
-            name: history.class.clone(),
-            unit: format!("{name}, deg/s"),
-            height: STRIP_HEIGHT,
+        let mut strip = Strip::of_lines(
+            &history.class,
+            &format!("{name}, deg/s"),
+            STRIP_HEIGHT,
             scale,
-            lines: vec![strip_figure::ink(points, 1.1)],
-            dots: vec![],
-            class: markers.token(&history.class),
-        });
+            vec![StripLine::ink(points, 1.1)],
+        );
+        strip.attributes = vec![("data-class", markers.token(&history.class))];
+        strips.push(strip);
     }
     let caption = format!("Root mean square, deg/s: {}.", sizes.join(", "));
     let title = format!("Excitation of {name} by class");

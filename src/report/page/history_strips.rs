@@ -2,7 +2,8 @@
 //! as in the paper's Figures 4 and 12.
 
 use crate::report::figure::scale::{Scale, extent};
-use crate::report::figure::strip_figure::{self, Strip, StripFigure, StripLine};
+use crate::report::figure::strip_figure::{self, StripFigure};
+use crate::report::figure::strips::{Strip, StripLine};
 use crate::report::figure::style::MEASURED_COLOUR;
 use crate::report::history::{is_marked, points, time_scale};
 use crate::report::notation::{angle, without_unit};
@@ -99,32 +100,22 @@ fn output_strips(history: &History, output: &HistoryOutput) -> [Strip; 2] {
     let measured = points(history, &included);
     let computed = points(history, &output.computed);
     let residual = points(history, &residual);
-    let response = Strip {
-        name: without_unit(&output.label).to_owned(),
-        unit: output.unit.clone(),
-        height: OUTPUT_HEIGHT,
-        scale: scale_of(&[&measured, &computed], 3.0),
-        lines: vec![
-            StripLine {
-                points: measured,
-                colour: MEASURED_COLOUR,
-                width: 2.2,
-                dash: "",
-            },
-            strip_figure::ink(computed, 1.0),
-        ],
-        dots: points(history, &excluded),
-        class: String::new(),
-    };
-    let difference = Strip {
-        name: "residual".to_owned(),
-        unit: output.unit.clone(),
-        height: RESIDUAL_HEIGHT,
-        scale: scale_of(&[&residual], 1.6),
-        lines: vec![strip_figure::ink(residual, 0.7)],
-        dots: vec![],
-        class: String::new(),
-    };
+    let scale = scale_of(&[&measured, &computed], 3.0);
+    let residual_scale = scale_of(&[&residual], 1.6);
+    let lines = vec![
+        StripLine::solid(measured, MEASURED_COLOUR, 2.2),
+        StripLine::ink(computed, 1.0),
+    ];
+    let name = without_unit(&output.label);
+    let mut response = Strip::of_lines(name, &output.unit, OUTPUT_HEIGHT, scale, lines);
+    response.dots = points(history, &excluded);
+    let difference = Strip::of_lines(
+        "residual",
+        &output.unit,
+        RESIDUAL_HEIGHT,
+        residual_scale,
+        vec![StripLine::ink(residual, 0.7)],
+    );
     [response, difference]
 }
 
@@ -153,15 +144,13 @@ fn input(history: &History, name: &str, values: &[f64]) -> Option<(f64, Strip)> 
         "-" => "",
         unit => unit,
     };
-    let strip = Strip {
-        name: without_unit(name).to_owned(),
-        unit: unit.to_owned(),
-        height: INPUT_HEIGHT,
-        scale: scale_of(&[&points], 2.4),
-        lines: vec![strip_figure::ink(points, 1.1)],
-        dots: vec![],
-        class: String::new(),
-    };
+    let strip = Strip::of_lines(
+        without_unit(name),
+        unit,
+        INPUT_HEIGHT,
+        scale_of(&[&points], 2.4),
+        vec![StripLine::ink(points, 1.1)],
+    );
     Some((high - low, strip))
 }
 
@@ -180,8 +169,7 @@ mod tests {
         );
         assert_eq!(output.dots.len(), 1, "the excluded sample");
         assert!(
-            residual.lines[0]
-                .points
+            residual.lines[0].pieces[0]
                 .iter()
                 .all(|p| (p.1 - 0.01).abs() < 1e-9)
         );

@@ -1,13 +1,18 @@
-//! Charts: what is drawn, where, and how much of it.
+//! Strip charts of flights and maneuvers: content, places, size of the file.
 
+use std::collections::BTreeMap;
+
+use super::flight::flight_signals;
+use super::signal_strips::scale_with_two_ticks;
 use super::*;
 use crate::aero::Axis;
 use crate::flight::record::Series;
-use crate::maneuver::ManeuverOrigin;
-use crate::tables::Outcome;
+use crate::flight::{Mark, Record};
+use crate::maneuver::{Maneuver, ManeuverOrigin};
+use crate::tables::{EventRow, EventVerdict, FitRow, History, HistoryOutput, Outcome};
 
-fn groups() -> Groups {
-    Groups {
+fn groups() -> SignalGroups {
+    SignalGroups {
         surfaces: vec!["de_deg".into(), "dr_deg".into()],
         controls: vec!["stick_in".into()],
         flags: vec!["on".into()],
@@ -87,7 +92,7 @@ fn fit(outcome: Outcome, reason: &str) -> FitRow {
 fn drawn(record: &Record, maneuvers: &[Maneuver], events: &[EventRow]) -> String {
     let groups = groups();
     let recorded = (record.samples, record.step_s);
-    flight(&FlightView {
+    draw_flight(&FlightView {
         aircraft: "an aircraft",
         record,
         recorded,
@@ -102,7 +107,7 @@ fn drawn(record: &Record, maneuvers: &[Maneuver], events: &[EventRow]) -> String
 fn drawn_maneuver(record: &Record, fit: &FitRow, history: Option<&History>) -> String {
     let maneuver_shown = maneuver_at(20.0);
     let (groups, flight) = (groups(), [maneuver_shown.clone(), maneuver_at(200.0)]);
-    maneuver(&ManeuverView {
+    draw_maneuver(&ManeuverView {
         aircraft: "an aircraft",
         record,
         groups: &groups,
@@ -162,7 +167,7 @@ fn ten_hours_with_two_hundred_maneuvers_are_less_than_a_megabyte() {
 }
 
 #[test]
-fn a_flight_has_a_strip_per_signal_and_says_what_is_not_recorded() {
+fn a_flight_has_a_strip_per_signal_and_lists_signals_not_recorded() {
     let mut record = record(4000);
     record.signals.remove("psi_deg");
     let svg = drawn(&record, &[maneuver_at(20.0)], &[]);
@@ -174,7 +179,7 @@ fn a_flight_has_a_strip_per_signal_and_says_what_is_not_recorded() {
 }
 
 #[test]
-fn marks_are_drawn_where_there_are_some_and_explained() {
+fn flags_are_drawn_and_explained_if_there_are_any() {
     let mut record = record(4000);
     assert!(!drawn(&record, &[], &[]).contains("class=\"mark"));
     let series = record.signals.get_mut("q_deg_s").expect("recorded");
@@ -198,7 +203,7 @@ fn marks_are_drawn_where_there_are_some_and_explained() {
 }
 
 #[test]
-fn the_analyst_s_events_stand_over_what_was_found() {
+fn events_of_the_analyst_are_above_the_maneuvers_found() {
     let row = |given: Option<&str>, found: Option<&str>, verdict: EventVerdict| EventRow {
         flight_id: "f".into(),
         given_class: given.map(str::to_owned),
@@ -253,7 +258,7 @@ fn an_estimated_maneuver_shows_residuals_and_one_that_was_rejected_its_reason() 
 }
 
 #[test]
-fn every_scale_has_two_numbers() {
+fn every_scale_has_two_to_six_ticks() {
     for (low, high) in [
         (-0.009, 0.009),
         (0.0, 0.0),
@@ -262,7 +267,7 @@ fn every_scale_has_two_numbers() {
         (0.0, 1e5),
     ] {
         for steps in [1.6, 2.0, 3.0] {
-            let scale = scale(low, high, steps);
+            let scale = scale_with_two_ticks(low, high, steps);
             let ticks = (scale.max / scale.step + 1e-9).floor()
                 - (scale.min / scale.step - 1e-9).ceil()
                 + 1.0;

@@ -1,0 +1,416 @@
+//! Renderer of strip charts: signals under each other over one time axis.
+//!
+//! A report of five hundred maneuvers has five hundred such drawings. So everything alike in a
+//! column is one path, and lines are written in steps of a tenth.
+
+use std::fmt::Write;
+
+use super::scale::Scale;
+use super::style::{EXCLUDED_COLOUR, FAINT, INK};
+use super::svg_writer::{Anchor, PathStyle, SvgWriter, TextStyle, coordinate, polyline, rectangle};
+use crate::report::notation::Digits;
+
+/// One signal over time.
+#[derive(Clone, Debug)]
+pub struct Strip {
+    pub name: String,
+    pub unit: String,
+    pub height: f64,
+    pub scale: Scale,
+    pub lines: Vec<StripLine>,
+    /// Samples drawn as dots: those excluded from the cost.
+    pub dots: Vec<(f64, f64)>,
+    pub flagged: FlaggedSpans,
+    /// Attributes of the group around lines, dots and flags; no group without any.
+    pub attributes: Vec<(&'static str, String)>,
+}
+
+/// One line of a strip.
+#[derive(Clone, Debug)]
+pub struct StripLine {
+    /// Parts of the line, between which samples are missing.
+    pub pieces: Vec<Vec<(f64, f64)>>,
+    pub colour: &'static str,
+    pub width: f64,
+    /// SVG dash array; empty for a solid line.
+    pub dash: &'static str,
+}
+
+/// Intervals (s) of samples that ingest changed or flagged.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlaggedSpans {
+    pub bridged: Vec<(f64, f64)>,
+    pub despiked: Vec<(f64, f64)>,
+    pub missing: Vec<(f64, f64)>,
+}
+
+impl Strip {
+    /// A strip with lines alone.
+    #[must_use]
+    pub fn of_lines(
+        name: &str,
+        unit: &str,
+        height: f64,
+        scale: Scale,
+        lines: Vec<StripLine>,
+    ) -> Strip {
+        Strip {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            height,
+            scale,
+            lines,
+            dots: vec![],
+            flagged: FlaggedSpans::default(),
+            attributes: vec![],
+        }
+    }
+
+    /// Vertical place of a value, kept inside the strip.
+    fn y(&self, top: f64, value: f64) -> f64 {
+        let share = (value - self.scale.min) / (self.scale.max - self.scale.min);
+        top + (1.0 - share.clamp(0.0, 1.0)) * self.height
+    }
+}
+
+impl StripLine {
+    /// A solid line without gaps.
+    #[must_use]
+    pub fn solid(points: Vec<(f64, f64)>, colour: &'static str, width: f64) -> StripLine {
+        StripLine {
+            pieces: vec![points],
+            colour,
+            width,
+            dash: "",
+        }
+    }
+
+    /// A solid line in the colour of computed responses, residuals and inputs.
+    #[must_use]
+    pub fn ink(points: Vec<(f64, f64)>, width: f64) -> StripLine {
+        StripLine::solid(points, INK, width)
+    }
+}
+
+/// Sizes of text and gaps, in units of the drawing.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Height of text.
+    pub text: f64,
+    /// Width of a letter over its height: an upper estimate.
+    pub letter: f64,
+    /// Width reserved for tick labels.
+    pub tick_labels: f64,
+    /// Half the gap between strips: half a tick label.
+    pub half_gap: f64,
+    /// Height of the time axis with its tick labels and title.
+    pub time_axis: f64,
+}
+
+impl Sizes {
+    /// Sizes for a drawing in a page with others.
+    pub const COMPACT: Sizes = Sizes {
+        text: 11.0,
+        letter: 0.56,
+        tick_labels: 38.0,
+        half_gap: 5.0,
+        time_axis: 32.0,
+    };
+
+    /// Sizes for a drawing that fills a screen.
+    pub const LARGE: Sizes = Sizes {
+        text: 13.0,
+        letter: 0.6,
+        tick_labels: 52.0,
+        half_gap: 7.0,
+        time_axis: 40.0,
+    };
+
+    /// Width of a text.
+    #[must_use]
+    pub fn text_width(&self, text: &str) -> f64 {
+        self.letter * self.text * text.chars().count() as f64
+    }
+
+    /// Width of the longest name or unit of some strips.
+    #[must_use]
+    pub fn names_width(&self, strips: &[Strip]) -> f64 {
+        strips
+            .iter()
+            .flat_map(|strip| [&strip.name, &strip.unit])
+            .map(|text| self.text_width(text))
+            .fold(0.0, f64::max)
+    }
+
+    /// Height of strips with their gaps, without the time axis.
+    #[must_use]
+    pub fn strips_height(&self, strips: &[Strip]) -> f64 {
+        strips
+            .iter()
+            .map(|strip| strip.height + 2.0 * self.half_gap)
+            .sum()
+    }
+}
+
+/// Horizontal layout of strips under each other.
+#[derive(Clone, Copy, Debug)]
+pub struct StripColumn {
+    pub sizes: Sizes,
+    /// Left end of the names.
+    pub names_left: f64,
+    /// Ends of the plot area.
+    pub left: f64,
+    pub right: f64,
+    pub time: Scale,
+}
+
+/// Paths and texts of a column that belong to no strip.
+#[derive(Default)]
+struct Axes {
+    grid: String,
+    frame: String,
+    texts: SvgTexts,
+}
+
+/// Texts to be written over lines and frame.
+type SvgTexts = Vec<((f64, f64), String, TextStyle<'static>)>;
+
+impl StripColumn {
+    /// Horizontal place of a time, kept inside the plot area.
+    #[must_use]
+    pub fn x(&self, time_s: f64) -> f64 {
+        let share = (time_s - self.time.min) / (self.time.max - self.time.min);
+        self.left + share.clamp(0.0, 1.0) * (self.right - self.left)
+    }
+
+    /// Draws strips from a height downwards, with the time axis below the last.
+    pub fn draw(&self, svg: &mut SvgWriter, strips: &[Strip], top: f64) {
+        let mut axes = Axes::default();
+        let mut lines = SvgWriter::default();
+        let mut y = top + self.sizes.half_gap;
+        for strip in strips {
+            self.axes_of_strip(&mut axes, strip, y);
+            self.signals(&mut lines, strip, y);
+            y += strip.height + 2.0 * self.sizes.half_gap;
+        }
+        self.time_axis(&mut axes, y - 2.0 * self.sizes.half_gap);
+        svg.path(&axes.grid, PathStyle::line("#cccccc", 0.5));
+        svg.append(lines);
+        svg.path(&axes.frame, PathStyle::line("#000000", 0.8));
+        for (place, text, style) in axes.texts {
+            svg.text(place, &text, style);
+        }
+    }
+
+    fn time_axis(&self, axes: &mut Axes, bottom: f64) {
+        let middle = TextStyle {
+            anchor: Anchor::Middle,
+            ..TextStyle::default()
+        };
+        for (value, label) in ticks(self.time) {
+            let x = self.x(value);
+            // Writing into a String cannot fail.
+            let _ = write!(axes.frame, "M{} {}v4", coordinate(x), coordinate(bottom));
+            let place = (x, bottom + self.sizes.text + 4.0);
+            axes.texts.push((place, label, middle));
+        }
+        let place = (
+            0.5 * (self.left + self.right),
+            bottom + 2.0 * self.sizes.text + 6.0,
+        );
+        axes.texts.push((place, "time, s".to_owned(), middle));
+    }
+
+    /// Grid, frame, ticks, name and unit of one strip.
+    fn axes_of_strip(&self, axes: &mut Axes, strip: &Strip, top: f64) {
+        let half_digit = 0.36 * self.sizes.text;
+        let width = coordinate(self.right - self.left);
+        let left = coordinate(self.left);
+        for (value, label) in ticks(strip.scale) {
+            let y = strip.y(top, value);
+            let _ = write!(axes.grid, "M{left} {}h{width}", coordinate(y));
+            let _ = write!(axes.frame, "M{left} {}h-3", coordinate(y));
+            let style = TextStyle {
+                anchor: Anchor::End,
+                ..TextStyle::default()
+            };
+            axes.texts
+                .push(((self.left - 5.0, y + half_digit), label, style));
+        }
+        for (value, _) in ticks(self.time) {
+            let [x, y, height] = [self.x(value), top, strip.height].map(coordinate);
+            let _ = write!(axes.grid, "M{x} {y}v{height}");
+        }
+        let size = (self.right - self.left, strip.height);
+        axes.frame.push_str(&rectangle((self.left, top), size));
+        self.name(axes, strip, top + 0.5 * strip.height);
+    }
+
+    /// Name and unit left of a strip, around its middle.
+    fn name(&self, axes: &mut Axes, strip: &Strip, middle: f64) {
+        let name_y = if strip.unit.is_empty() {
+            middle + 0.36 * self.sizes.text
+        } else {
+            middle - 1.5
+        };
+        let name = ((self.names_left, name_y), strip.name.clone());
+        axes.texts.push((name.0, name.1, TextStyle::default()));
+        if !strip.unit.is_empty() {
+            let style = TextStyle {
+                colour: Some(FAINT),
+                ..TextStyle::default()
+            };
+            let place = (self.names_left, middle + self.sizes.text);
+            axes.texts.push((place, strip.unit.clone(), style));
+        }
+    }
+
+    /// Lines, dots and flags of one strip.
+    fn signals(&self, svg: &mut SvgWriter, strip: &Strip, top: f64) {
+        if !strip.attributes.is_empty() {
+            let attributes: Vec<(&str, &str)> = strip
+                .attributes
+                .iter()
+                .map(|(name, value)| (*name, value.as_str()))
+                .collect();
+            svg.open_group(&attributes, "");
+        }
+        for line in &strip.lines {
+            let style = PathStyle {
+                dash: line.dash,
+                ..PathStyle::line(line.colour, line.width)
+            };
+            svg.path(&self.line(line, strip, top), style);
+        }
+        let dots: String = strip
+            .dots
+            .iter()
+            .map(|&(time_s, value)| (self.x(time_s) - 2.0, strip.y(top, value) - 2.0))
+            .map(|(x, y)| format!("M{} {}h4v4h-4z", coordinate(x), coordinate(y)))
+            .collect();
+        svg.path(&dots, PathStyle::filled(EXCLUDED_COLOUR));
+        self.flags(svg, &strip.flagged, (top, top + strip.height));
+        if !strip.attributes.is_empty() {
+            svg.close_group();
+        }
+    }
+
+    fn line(&self, line: &StripLine, strip: &Strip, top: f64) -> String {
+        line.pieces
+            .iter()
+            .map(|piece| {
+                polyline(
+                    piece
+                        .iter()
+                        .map(|&(time_s, value)| (self.x(time_s), strip.y(top, value))),
+                )
+            })
+            .collect()
+    }
+
+    /// Bridged samples at the bottom of the strip, despiked ones at its top, missing ones as hollow
+    /// bars.
+    fn flags(&self, svg: &mut SvgWriter, spans: &FlaggedSpans, (top, bottom): (f64, f64)) {
+        let ends = |(start_s, end_s): &(f64, f64)| (self.x(*start_s), self.x(*end_s));
+        let bridged = spans
+            .bridged
+            .iter()
+            .map(|span| bridged_mark(ends(span), bottom))
+            .collect();
+        let despiked = spans
+            .despiked
+            .iter()
+            .map(|(start_s, end_s)| despiked_mark(self.x(0.5 * (start_s + end_s)), top))
+            .collect();
+        let missing = spans
+            .missing
+            .iter()
+            .map(|span| missing_mark(ends(span), bottom))
+            .collect();
+        flag_group(
+            svg,
+            "mark bridged",
+            bridged,
+            PathStyle::filled(EXCLUDED_COLOUR),
+        );
+        flag_group(
+            svg,
+            "mark despiked",
+            despiked,
+            PathStyle::filled(EXCLUDED_COLOUR),
+        );
+        flag_group(svg, "mark missing", missing, MISSING_STYLE);
+    }
+}
+
+fn flag_group(svg: &mut SvgWriter, class: &str, data: String, style: PathStyle) {
+    if !data.is_empty() {
+        svg.open_group(&[("class", class)], "");
+        svg.path(&data, style);
+        svg.close_group();
+    }
+}
+
+/// Appearance of missing samples.
+pub const MISSING_STYLE: PathStyle<'static> = PathStyle {
+    stroke: Some((EXCLUDED_COLOUR, 0.8)),
+    dash: "",
+    fill: Some("#ffffff"),
+    fill_opacity: None,
+};
+
+/// Narrower marks would not be seen.
+const LEAST_MARK_WIDTH: f64 = 1.6;
+
+/// Path data of the mark of bridged samples.
+#[must_use]
+pub fn bridged_mark((left, right): (f64, f64), bottom: f64) -> String {
+    let width = (right - left).max(LEAST_MARK_WIDTH);
+    rectangle((left, bottom - 8.0), (width, 8.0))
+}
+
+/// Path data of the mark of a replaced spike.
+#[must_use]
+pub fn despiked_mark(x: f64, top: f64) -> String {
+    format!("M{} {}h8l-4 8z", coordinate(x - 4.0), coordinate(top))
+}
+
+/// Path data of the mark of missing samples.
+#[must_use]
+pub fn missing_mark((left, right): (f64, f64), bottom: f64) -> String {
+    let width = (right - left).max(LEAST_MARK_WIDTH);
+    rectangle((left, bottom - 4.0), (width, 4.0))
+}
+
+/// Multiples of the step within a scale, with their labels.
+fn ticks(scale: Scale) -> impl Iterator<Item = (f64, String)> {
+    /// Guards against a step that is tiny beside the range.
+    const MOST: i32 = 50;
+    let digits = Digits::of_ticks(scale.decimals());
+    let first = (scale.min / scale.step - 1e-6).ceil();
+    let last = scale.max / scale.step + 1e-6;
+    let is_finite = first.is_finite() && last.is_finite();
+    (0..MOST)
+        .map(move |i| first + f64::from(i))
+        .take_while(move |n| is_finite && *n <= last)
+        .map(move |n| (n * scale.step, digits.write(Some(n * scale.step))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_the_multiples_of_the_step_inside() {
+        let labels = |min, max, step| {
+            ticks(Scale { min, max, step })
+                .map(|t| t.1)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            labels(-1.0, 1.2, 0.5),
+            ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]
+        );
+        assert!(labels(f64::NAN, 1.0, 0.5).is_empty());
+    }
+}
