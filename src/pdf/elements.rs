@@ -1,41 +1,44 @@
-//! Questions about an element of the page: its classes, its kind, its text.
+//! Kind, classes and text of an element of the page.
 
 use roxmltree::Node;
 
-/// An element's text in one line, without what is small beside it.
-pub fn plain_text(node: Node) -> String {
-    let mut text = String::new();
-    for part in node.descendants().filter(Node::is_text) {
-        let is_kept = part
-            .ancestors()
-            .all(|a| !a.is_element() || !(is_for_screens(a) || a.has_tag_name("small")));
-        if let (Some(part), true) = (part.text(), is_kept) {
-            text.push_str(part);
-        }
-    }
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
+/// Elements of running text.
+const INLINE: [&str; 12] = [
+    "a", "b", "i", "em", "strong", "small", "sub", "span", "br", "code", "title", "desc",
+];
+
+/// Elements that a printed page omits.
+const OMITTED: [&str; 6] = ["script", "style", "head", "button", "input", "label"];
 
 pub fn has_class(node: Node, class: &str) -> bool {
     node.attribute("class")
-        .is_some_and(|c| c.split(' ').any(|c| c == class))
+        .is_some_and(|classes| classes.split(' ').any(|c| c == class))
 }
 
-/// What is of use on a screen alone.
-pub fn is_for_screens(node: Node) -> bool {
-    matches!(
-        node.tag_name().name(),
-        "script" | "style" | "head" | "button" | "input" | "label"
-    ) || node
-        .attribute("class")
-        .is_some_and(|c| c.split(' ').any(|c| c == "screen"))
-}
-
+/// `true` for an element that begins a line of its own.
 pub fn is_block(node: Node) -> bool {
-    let inline = [
-        "a", "b", "i", "em", "strong", "small", "sub", "span", "br", "code", "title", "desc",
-    ];
     let name = node.tag_name().name();
-    let is_key = name == "svg" && (has_class(node, "key") || has_class(node, "strip"));
-    !inline.contains(&name) && !is_key
+    let is_inline_drawing = name == "svg" && has_class(node, "inline");
+    !INLINE.contains(&name) && !is_inline_drawing
+}
+
+/// `true` for an element that is of use on a screen alone.
+pub fn is_screen_only(node: Node) -> bool {
+    OMITTED.contains(&node.tag_name().name()) || has_class(node, "screen")
+}
+
+/// Text of an element in one line, without its `small` parts.
+pub fn plain_text(node: Node) -> String {
+    let is_kept = |text: &Node| {
+        text.ancestors()
+            .filter(Node::is_element)
+            .all(|a| !is_screen_only(a) && !a.has_tag_name("small"))
+    };
+    let parts: String = node
+        .descendants()
+        .filter(Node::is_text)
+        .filter(is_kept)
+        .filter_map(|text| text.text())
+        .collect();
+    parts.split_whitespace().collect::<Vec<_>>().join(" ")
 }

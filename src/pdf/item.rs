@@ -1,25 +1,26 @@
-//! What the pages are filled with: items, one under the other, each with marks at places within it,
-//! y downwards.
+//! Items: what pages are filled with, one under the other.
+//!
+//! An item has marks at places within it, y downwards.
 
 use std::sync::Arc;
 
 use super::fonts::Weight;
 use super::svg::Drawing;
 
-/// One colour of a text or a box.
+/// Red, green and blue.
 pub type Colour = [u8; 3];
 
 pub const INK: Colour = [22, 24, 28];
 pub const SOFT: Colour = [85, 91, 102];
 pub const RULE: Colour = [200, 204, 210];
 
-/// How a text is set.
+/// Appearance of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     pub weight: Weight,
-    /// pt.
+    /// Size, pt.
     pub size: f32,
-    /// How far above the line of the text, pt.
+    /// Height above the base line, pt.
     pub rise: f32,
     pub slanted: bool,
     pub colour: Colour,
@@ -44,7 +45,7 @@ impl Style {
     }
 }
 
-/// Something at a place of an item.
+/// A mark at a place of an item.
 #[derive(Clone, Debug)]
 pub enum Mark {
     /// A text from its base line's left end.
@@ -54,7 +55,7 @@ pub enum Mark {
         style: Style,
         text: String,
     },
-    /// A drawing from its upper left corner, so many times as large as it is.
+    /// A scaled drawing from its upper left corner.
     Drawing {
         x: f32,
         y: f32,
@@ -69,7 +70,7 @@ pub enum Mark {
         height: f32,
         colour: Colour,
     },
-    /// What leads to an anchor when it is pointed at.
+    /// A rectangle that leads to an anchor.
     Link {
         x: f32,
         y: f32,
@@ -77,9 +78,9 @@ pub enum Mark {
         height: f32,
         target: String,
     },
-    /// Where links lead.
+    /// Target of links.
     Anchor { id: String },
-    /// The page of an anchor, after a sign, with its right end here.
+    /// The number of an anchor's page after a sign, ending at a place.
     PageOf {
         x: f32,
         y: f32,
@@ -89,24 +90,27 @@ pub enum Mark {
     },
     /// A heading for the outline: level from 0.
     Heading { level: usize, title: String },
+    /// Place of the table of contents.
+    Contents,
 }
 
-/// What stands together: a line, a row, a figure.
+/// A line, a row or a figure: never torn apart.
 #[derive(Clone, Debug, Default)]
 pub struct Item {
     pub height: f32,
     pub marks: Vec<Mark>,
-    /// Stays with what follows.
+    /// Stays on the page of the next item.
     pub keep: bool,
-    /// Stands again at the top of a page that the item begins.
+    /// Repeated at the top of a page that this item begins.
     pub head: Option<Arc<Item>>,
-    /// Nothing but room, which no page begins with.
+    /// Empty space, which no page begins with.
     pub is_room: bool,
-    /// A new page begins here.
+    /// Begins a page.
     pub breaks: bool,
 }
 
 impl Item {
+    /// Empty space.
     pub fn room(height: f32) -> Item {
         Item {
             height,
@@ -123,7 +127,7 @@ impl Item {
         }
     }
 
-    /// The marks of another item moved by so much.
+    /// Adds the marks of another item, moved.
     pub fn absorb(&mut self, other: &Item, dx: f32, dy: f32) {
         self.marks
             .extend(other.marks.iter().map(|mark| mark.moved(dx, dy)));
@@ -131,6 +135,7 @@ impl Item {
 }
 
 impl Mark {
+    /// The mark moved by a distance.
     pub fn moved(&self, dx: f32, dy: f32) -> Mark {
         let mut mark = self.clone();
         match &mut mark {
@@ -142,8 +147,27 @@ impl Mark {
                 *x += dx;
                 *y += dy;
             }
-            Mark::Anchor { .. } | Mark::Heading { .. } => {}
+            Mark::Anchor { .. } | Mark::Heading { .. } | Mark::Contents => {}
         }
         mark
     }
+}
+
+/// Joins items to one, which is not torn apart.
+pub fn joined(items: &[Item]) -> Item {
+    let mut all = Item::default();
+    for item in items {
+        let y = all.height;
+        all.absorb(item, 0.0, y);
+        all.height += item.height;
+    }
+    all
+}
+
+/// Moves items to the right.
+pub fn indented(mut items: Vec<Item>, indent: f32) -> Vec<Item> {
+    for item in &mut items {
+        item.marks = item.marks.iter().map(|m| m.moved(indent, 0.0)).collect();
+    }
+    items
 }

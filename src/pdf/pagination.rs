@@ -1,4 +1,4 @@
-//! Items on pages: where each begins, what heads it, the table of contents with the pages it tells.
+//! Items on pages, with repeated table heads and the table of contents.
 
 use std::collections::BTreeMap;
 
@@ -12,36 +12,37 @@ pub const MARGIN: f32 = 45.0;
 const TOP: f32 = 45.0;
 const BOTTOM: f32 = 52.0;
 
-/// A mark on a page: y from its top.
+/// Marks of a page, y from its top.
 #[derive(Debug, Default)]
 pub struct Page {
     pub marks: Vec<Mark>,
 }
 
-/// A heading where it came to stand.
+/// A heading with its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
     pub level: usize,
     pub title: String,
+    /// Number of the page, from one.
     pub page: usize,
     pub y: f32,
 }
 
-/// The document on its pages.
+/// The document as pages.
 #[derive(Debug, Default)]
 pub struct Pages {
     pub sheets: Vec<Page>,
     pub headings: Vec<Heading>,
-    /// Page and place of each anchor.
+    /// Number of the page and y of each anchor.
     pub anchors: BTreeMap<String, (usize, f32)>,
 }
 
-/// Level of the mark that the table of contents takes the place of.
-const CONTENTS: usize = 9;
-/// The contents list so many entries at most: then the headings of the first level alone.
+/// With more headings, the contents list chapters only.
 const MOST_ENTRIES: usize = 400;
+/// Higher items need not stay with what follows: they would leave a page almost empty.
+const HIGHEST_KEPT: f32 = 0.8 * (HEIGHT - TOP - BOTTOM);
 
-/// Puts the items on pages.
+/// Divides items into pages.
 pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
     let items = with_contents(items, fonts);
     let mut pages = Pages {
@@ -50,7 +51,7 @@ pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
     };
     let mut y = TOP;
     for (i, item) in items.iter().enumerate() {
-        let is_full = y + item.height + kept(&items, i) > HEIGHT - BOTTOM;
+        let is_full = y + item.height + kept_height(&items, i) > HEIGHT - BOTTOM;
         if y > TOP && (item.breaks || (is_full && !item.is_room)) {
             pages.sheets.push(Page::default());
             y = TOP;
@@ -68,8 +69,8 @@ pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
     pages
 }
 
-/// The height of what an item must stay with: what follows up to the first that is kept no more.
-fn kept(items: &[Item], i: usize) -> f32 {
+/// Height of the following items that an item must stay with.
+fn kept_height(items: &[Item], i: usize) -> f32 {
     let mut height = 0.0;
     let mut last = items.get(i);
     for next in items.get(i + 1..).unwrap_or(&[]) {
@@ -79,15 +80,11 @@ fn kept(items: &[Item], i: usize) -> f32 {
         height += next.height;
         last = Some(next);
     }
-    // What is higher than a page cannot be kept.
-    if height < 0.8 * (HEIGHT - TOP - BOTTOM) {
-        height
-    } else {
-        0.0
-    }
+    if height < HIGHEST_KEPT { height } else { 0.0 }
 }
 
 impl Pages {
+    /// Puts the marks of an item on the last page.
     fn put(&mut self, item: &Item, y: f32) {
         let page = self.sheets.len();
         for mark in &item.marks {
@@ -113,120 +110,131 @@ impl Pages {
     }
 }
 
-/// The items with a line for each heading where the contents belong, and an anchor at each heading
-/// for it.
+/// A heading with the anchor that the table of contents refers to.
+struct Entry {
+    level: usize,
+    title: String,
+    anchor: String,
+}
+
+/// Replaces the mark of the contents by a line for each heading.
 fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
-    let is_place = |item: &Item| {
-        item.marks.iter().any(|m| {
-            matches!(
-                m,
-                Mark::Heading {
-                    level: CONTENTS,
-                    ..
-                }
-            )
-        })
-    };
-    let Some(at) = items.iter().position(is_place) else {
+    let is_place = |item: &Item| item.marks.iter().any(|m| matches!(m, Mark::Contents));
+    let Some(place) = items.iter().position(is_place) else {
         return items;
     };
-    let mut entries = Vec::new();
-    for item in &mut items {
-        let found = item.marks.iter().find_map(|m| match m {
-            Mark::Heading { level, title } if *level < CONTENTS => Some((*level, title.clone())),
-            _ => None,
-        });
-        if let Some((level, title)) = found {
-            let id = format!("contents {}", entries.len());
-            item.marks.push(Mark::Anchor { id: id.clone() });
-            entries.push((level, title, id));
-        }
-    }
-    let few = entries.len() <= MOST_ENTRIES;
+    let entries = anchor_headings(&mut items);
+    let has_sections = entries.len() <= MOST_ENTRIES;
     let lines: Vec<Item> = entries
         .iter()
-        .filter(|e| few || e.0 == 0)
-        .map(|(level, title, id)| line(*level, title, id, fonts))
+        .filter(|entry| has_sections || entry.level == 0)
+        .map(|entry| contents_line(entry, fonts))
         .collect();
-    let mut contents = vec![Item::room(8.0)];
-    let style = Style::of_size(10.5).bold();
-    let title = Mark::Text {
-        x: 0.0,
-        y: 10.5,
-        style,
-        text: "Contents".to_owned(),
-    };
-    contents.push(Item {
+    let title = Item {
         height: 16.0,
-        marks: vec![title],
+        marks: vec![Mark::Text {
+            x: 0.0,
+            y: 10.5,
+            style: Style::of_size(10.5).bold(),
+            text: "Contents".to_owned(),
+        }],
         keep: true,
         ..Item::default()
-    });
+    };
+    let mut contents = vec![Item::room(8.0), title];
     contents.extend(in_columns(&lines));
-    items.splice(at..=at, contents);
+    items.splice(place..=place, contents);
     items
 }
 
-const COLUMN: f32 = 0.5 * (WIDTH - 2.0 * MARGIN - 20.0);
+/// Adds an anchor to each heading and lists them.
+fn anchor_headings(items: &mut [Item]) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for item in items {
+        let heading = item.marks.iter().find_map(|m| match m {
+            Mark::Heading { level, title } => Some((*level, title.clone())),
+            _ => None,
+        });
+        if let Some((level, title)) = heading {
+            let anchor = format!("contents {}", entries.len());
+            item.marks.push(Mark::Anchor { id: anchor.clone() });
+            entries.push(Entry {
+                level,
+                title,
+                anchor,
+            });
+        }
+    }
+    entries
+}
 
-fn line(level: usize, title: &str, id: &str, fonts: &Fonts) -> Item {
-    let style = Style::of_size(if level == 0 { 8.5 } else { 7.5 });
-    let style = if level == 0 { style.bold() } else { style };
-    let x = 9.0 * level as f32;
-    let (mut text, most) = (title.to_owned(), COLUMN - x - 26.0);
+/// Gap between the columns of the contents, pt.
+const GAP: f32 = 20.0;
+const COLUMN: f32 = 0.5 * (WIDTH - 2.0 * MARGIN - GAP);
+/// Width reserved for the page number in a line of the contents, pt.
+const NUMBER_WIDTH: f32 = 26.0;
+
+/// A line of the contents: heading, cut to the column, and page number.
+fn contents_line(entry: &Entry, fonts: &Fonts) -> Item {
+    const HEIGHT: f32 = 11.0;
+    const BASE: f32 = 8.5;
+    let style = match entry.level {
+        0 => Style::of_size(8.5).bold(),
+        _ => Style::of_size(7.5),
+    };
+    let x = 9.0 * entry.level as f32;
+    let (mut text, most) = (entry.title.clone(), COLUMN - x - NUMBER_WIDTH);
     while fonts.width(style.weight, style.size, &text) > most && !text.is_empty() {
         text.pop();
     }
-    let target = id.to_owned();
-    let height = 11.0;
-    let page = Style {
+    let number_style = Style {
         weight: Weight::Regular,
         colour: SOFT,
         ..style
     };
     Item {
-        height,
+        height: HEIGHT,
         marks: vec![
             Mark::Text {
                 x,
-                y: 8.5,
+                y: BASE,
                 style,
                 text,
             },
             Mark::PageOf {
                 x: COLUMN,
-                y: 8.5,
-                style: page,
+                y: BASE,
+                style: number_style,
                 prefix: "",
-                target: target.clone(),
+                target: entry.anchor.clone(),
             },
             Mark::Link {
                 x,
                 y: 0.0,
                 width: COLUMN - x,
-                height,
-                target,
+                height: HEIGHT,
+                target: entry.anchor.clone(),
             },
         ],
         ..Item::default()
     }
 }
 
-/// Lines in two columns, the left one first, so many to a page as it has room for.
+/// Arranges lines in two columns per page, the left one first.
 fn in_columns(lines: &[Item]) -> Vec<Item> {
-    /// What the first page has room for beside the title, and what one has that is all contents.
+    /// Lines of a column below the title of the document, and on a page of contents alone.
     const FIRST: usize = 54;
     const WHOLE: usize = 66;
     let mut rows = Vec::new();
     let mut rest = lines;
     let mut most = FIRST;
     while !rest.is_empty() {
-        let (own, later) = rest.split_at(rest.len().min(2 * most));
-        let (left, right) = own.split_at(own.len().div_ceil(2));
+        let (page, later) = rest.split_at(rest.len().min(2 * most));
+        let (left, right) = page.split_at(page.len().div_ceil(2));
         for (i, item) in left.iter().enumerate() {
             let mut row = item.clone();
             if let Some(beside) = right.get(i) {
-                row.absorb(beside, COLUMN + 20.0, 0.0);
+                row.absorb(beside, COLUMN + GAP, 0.0);
             }
             rows.push(row);
         }

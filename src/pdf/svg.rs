@@ -1,6 +1,6 @@
-//! A drawing: the part of SVG that the report's figures are made of (groups, clips, rectangles,
-//! lines, paths, text), as operators of a PDF page. y points down, as in the SVG; who places the
-//! drawing turns it over.
+//! An SVG drawing as PDF operators.
+//!
+//! y points down, as in the SVG; the page that places the drawing inverts it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -8,18 +8,19 @@ use std::fmt::Write;
 use roxmltree::Node;
 
 use super::fonts::{Fonts, Weight};
+use super::svg_path::{number, path_operators};
 
-/// A drawing ready to be placed.
+/// A drawing as operators.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
     pub width: f32,
     pub height: f32,
     pub operators: String,
-    /// Opacities it uses, in percent; a page names them `A25` and so on.
+    /// Opacities used, percent; a page names them `A25` and so on.
     pub opacities: BTreeSet<u8>,
 }
 
-/// What elements inherit.
+/// Inherited attributes.
 #[derive(Clone, Debug, PartialEq)]
 struct Style {
     fill: Option<[u8; 3]>,
@@ -66,7 +67,7 @@ impl Style {
     }
 }
 
-/// The colour of an attribute; none for `none`, black for what is not understood.
+/// Colour of an attribute; `None` for `none`, black for an unsupported notation.
 fn colour(value: &str) -> Option<[u8; 3]> {
     let hex = |digits: &str| u8::from_str_radix(digits, 16).unwrap_or(0);
     match value.strip_prefix('#') {
@@ -100,24 +101,13 @@ fn percent(value: &str) -> u8 {
         .clamp(0.0, 100.0) as u8
 }
 
-/// The numbers of a list, whatever stands between them.
+/// Numbers of a list, separated by commas or white space.
 fn numbers(text: &str) -> impl Iterator<Item = f32> {
     text.split([' ', ',', '\n', '\t'])
         .filter_map(|n| n.parse().ok())
 }
 
-/// A number as short as a PDF may have it: two decimals at most.
-pub fn number(value: f32) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.is_empty() || text == "-0" || !value.is_finite() {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
-}
-
-/// The drawing of an `svg` element.
+/// Converts an `svg` element.
 pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
     let of = |name: &str| svg.attribute(name).and_then(|v| v.parse::<f32>().ok());
     let view: Vec<f32> = svg
@@ -131,7 +121,7 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         fonts,
         clips: BTreeMap::new(),
         out: String::new(),
-        set: String::new(),
+        graphics_state: String::new(),
         opacities: BTreeSet::new(),
         size: [width, height],
     };
@@ -166,8 +156,8 @@ struct Pen<'a> {
     fonts: &'a Fonts,
     clips: BTreeMap<String, String>,
     out: String,
-    /// The graphics state that was set last, so that it is not set again.
-    set: String,
+    /// Operators of the current graphics state, which are not repeated.
+    graphics_state: String,
     opacities: BTreeSet<u8>,
     size: [f32; 2],
 }
@@ -202,7 +192,7 @@ impl Pen<'_> {
                 );
             }
             "path" => {
-                let outline = path(node.attribute("d").unwrap_or(""));
+                let outline = path_operators(node.attribute("d").unwrap_or(""));
                 self.paint(&outline, style);
             }
             "text" => self.text(node, style, of("x"), of("y")),
@@ -231,10 +221,10 @@ impl Pen<'_> {
         if let Some(clip) = clip {
             let _ = writeln!(self.out, "{clip} W n");
         }
-        self.set.clear();
+        self.graphics_state.clear();
         self.children(node, style);
         self.out.push_str("Q\n");
-        self.set.clear();
+        self.graphics_state.clear();
     }
 
     fn rectangle(&self, node: Node) -> String {
@@ -283,9 +273,9 @@ impl Pen<'_> {
                 style.dash
             );
         }
-        if state != self.set {
+        if state != self.graphics_state {
             self.out.push_str(&state);
-            self.set = state;
+            self.graphics_state = state;
         }
     }
 
@@ -314,127 +304,5 @@ impl Pen<'_> {
             self.out,
             "BT /{font} {size} Tf {place} Tm <{encoded}> Tj ET"
         );
-    }
-}
-
-/// The data of a path as PDF operators. Arcs are half circles, as in the report's marks.
-fn path(d: &str) -> String {
-    let mut trace = Trace::default();
-    let (mut command, mut numbers) = (' ', Vec::new());
-    let mut token = String::new();
-    let flush = |token: &mut String, numbers: &mut Vec<f32>| {
-        numbers.extend(token.parse::<f32>());
-        token.clear();
-    };
-    for c in d.chars().chain(['M']) {
-        match c {
-            'e' | '0'..='9' => token.push(c),
-            '.' if !token.contains('.') => token.push(c),
-            '-' if token.is_empty() || token.ends_with('e') => token.push(c),
-            '.' | '-' => {
-                flush(&mut token, &mut numbers);
-                token.push(c);
-            }
-            c if c.is_ascii_alphabetic() => {
-                flush(&mut token, &mut numbers);
-                trace.run(command, &numbers);
-                numbers.clear();
-                command = c;
-            }
-            _ => flush(&mut token, &mut numbers),
-        }
-    }
-    trace.out
-}
-
-#[derive(Default)]
-struct Trace {
-    out: String,
-    at: [f32; 2],
-    start: [f32; 2],
-}
-
-impl Trace {
-    fn run(&mut self, command: char, numbers: &[f32]) {
-        let from = |at: [f32; 2]| {
-            if command.is_ascii_lowercase() {
-                at
-            } else {
-                [0.0, 0.0]
-            }
-        };
-        match command.to_ascii_lowercase() {
-            'm' | 'l' => {
-                for (i, pair) in numbers.chunks_exact(2).enumerate() {
-                    let base = from(self.at);
-                    self.to(
-                        [base[0] + pair[0], base[1] + pair[1]],
-                        command.eq_ignore_ascii_case(&'m') && i == 0,
-                    );
-                }
-            }
-            'h' => {
-                for x in numbers {
-                    self.to([from(self.at)[0] + x, self.at[1]], false);
-                }
-            }
-            'v' => {
-                for y in numbers {
-                    self.to([self.at[0], from(self.at)[1] + y], false);
-                }
-            }
-            'a' => {
-                for arc in numbers.chunks_exact(7) {
-                    let base = from(self.at);
-                    self.half_circle([base[0] + arc[5], base[1] + arc[6]]);
-                }
-            }
-            'z' => {
-                self.out.push_str(" h");
-                self.at = self.start;
-            }
-            _ => {}
-        }
-    }
-
-    fn to(&mut self, point: [f32; 2], is_move: bool) {
-        let operator = if is_move { 'm' } else { 'l' };
-        if !self.out.is_empty() {
-            self.out.push(' ');
-        }
-        let _ = write!(
-            self.out,
-            "{} {} {operator}",
-            number(point[0]),
-            number(point[1])
-        );
-        self.at = point;
-        if is_move {
-            self.start = point;
-        }
-    }
-
-    /// A half circle, clockwise from left to right as drawn with y down, in two Bézier curves.
-    fn half_circle(&mut self, end: [f32; 2]) {
-        /// Handles of a quarter circle, in radii.
-        const HANDLE: f32 = 0.5523;
-        let [x, y] = self.at;
-        let centre = [0.5 * (x + end[0]), 0.5 * (y + end[1])];
-        // From the centre to the start, and a quarter turn on.
-        let a = [x - centre[0], y - centre[1]];
-        let b = [a[1], -a[0]];
-        for (u, v) in [(a, b), (b, [-a[0], -a[1]])] {
-            let at = |p: f32, q: f32| {
-                [
-                    centre[0] + p * u[0] + q * v[0],
-                    centre[1] + p * u[1] + q * v[1],
-                ]
-            };
-            for point in [at(1.0, HANDLE), at(HANDLE, 1.0), at(0.0, 1.0)] {
-                let _ = write!(self.out, " {} {}", number(point[0]), number(point[1]));
-            }
-            self.out.push_str(" c");
-        }
-        self.at = end;
     }
 }

@@ -4,8 +4,8 @@
 //! nothing. [`crate::pdf`] sets the same page on paper. Rust makes the values, the template
 //! `report.html` their order and appearance.
 //!
-//! In the order of use: [`contents`] (the input), `figure` (SVG), `page` (the sections) and
-//! [`strip_chart`] (the pictures of `harvest show`).
+//! In the order of use: `contents` (the input), `figure` (SVG), `page` (the sections) and
+//! `strip_chart` (the pictures of `harvest show`).
 
 #[cfg(test)]
 mod campaign_fixture;

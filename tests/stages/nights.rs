@@ -295,7 +295,10 @@ fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
     );
     assert!(said.contains("new flight_004_t00124"), "{said}");
     let report = fs::read_to_string(campaign.path("reports/report.html")).unwrap();
-    assert!(report.contains("What changed") && report.contains("new flight flight_004"));
+    assert!(
+        report.contains("Changes since the previous night")
+            && report.contains("new flight flight_004")
+    );
     let alert: Value =
         serde_json::from_slice(&fs::read(campaign.path("reports/alert.json")).unwrap()).unwrap();
     assert_eq!(

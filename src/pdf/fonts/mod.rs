@@ -1,6 +1,5 @@
-//! The two faces of the printed report, regular and bold: a part of Arimo (SIL Open Font License,
-//! `fonts/OFL.txt`) with Latin, Greek and the signs that a report needs. Every PDF carries them, so
-//! it looks the same everywhere.
+//! The two embedded faces, regular and bold: a subset of Arimo (SIL Open Font License,
+//! `fonts/OFL.txt`) with Latin, Greek and mathematical signs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -12,7 +11,7 @@ use ttf_parser::Face;
 const REGULAR: &[u8] = include_bytes!("Arimo-Regular.ttf");
 const BOLD: &[u8] = include_bytes!("Arimo-Bold.ttf");
 
-/// How a text is set.
+/// Weight of a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
     #[default]
@@ -23,7 +22,7 @@ pub enum Weight {
 impl Weight {
     pub const ALL: [Weight; 2] = [Weight::Regular, Weight::Bold];
 
-    /// Its name among a page's resources.
+    /// Name among a page's resources.
     pub fn resource(self) -> &'static str {
         match self {
             Weight::Regular => "R",
@@ -32,9 +31,9 @@ impl Weight {
     }
 }
 
-/// One face: what its characters look like is in the file, how wide they are is here.
+/// One face: its file, and the widths of its characters.
 #[derive(Clone, Debug)]
-struct Cut {
+struct FontFace {
     name: &'static str,
     file: &'static [u8],
     /// Glyph and width in thousandths of the size, by character.
@@ -48,44 +47,46 @@ struct Cut {
 /// Both faces.
 #[derive(Clone, Debug)]
 pub struct Fonts {
-    regular: Cut,
-    bold: Cut,
+    regular: FontFace,
+    bold: FontFace,
 }
 
 impl Fonts {
+    /// Reads the built-in faces.
+    ///
     /// # Errors
-    /// None for the faces that are built in.
+    /// Never for the built-in faces.
     pub fn load() -> Result<Fonts, String> {
         Ok(Fonts {
-            regular: Cut::read("Arimo", REGULAR)?,
-            bold: Cut::read("Arimo-Bold", BOLD)?,
+            regular: FontFace::read("Arimo", REGULAR)?,
+            bold: FontFace::read("Arimo-Bold", BOLD)?,
         })
     }
 
-    fn cut(&self, weight: Weight) -> &Cut {
+    fn face(&self, weight: Weight) -> &FontFace {
         match weight {
             Weight::Regular => &self.regular,
             Weight::Bold => &self.bold,
         }
     }
 
-    /// How wide a text is, in the unit of the size.
+    /// Width of a text, in the unit of the size.
     pub fn width(&self, weight: Weight, size: f32, text: &str) -> f32 {
-        let cut = self.cut(weight);
-        text.chars().map(|c| cut.glyph(c).1).sum::<f32>() * size / 1000.0
+        let face = self.face(weight);
+        text.chars().map(|c| face.glyph(c).1).sum::<f32>() * size / 1000.0
     }
 
-    /// The text as a PDF shows it: the numbers of its glyphs in hexadecimal.
+    /// Numbers of a text's glyphs, hexadecimal.
     pub fn encoded(&self, weight: Weight, text: &str) -> String {
-        let cut = self.cut(weight);
+        let face = self.face(weight);
         text.chars().fold(String::new(), |mut all, c| {
             // Writing into a String cannot fail.
-            let _ = write!(all, "{:04x}", cut.glyph(c).0);
+            let _ = write!(all, "{:04x}", face.glyph(c).0);
             all
         })
     }
 
-    /// Writes a face as the objects that begin with `first`; it takes five.
+    /// Writes a face as five objects from `first` on.
     pub fn write(
         &self,
         pdf: &mut Pdf,
@@ -93,12 +94,12 @@ impl Fonts {
         first: Ref,
         compressed: &dyn Fn(&[u8]) -> Vec<u8>,
     ) {
-        self.cut(weight).write(pdf, first, compressed);
+        self.face(weight).write(pdf, first, compressed);
     }
 }
 
-impl Cut {
-    fn read(name: &'static str, file: &'static [u8]) -> Result<Cut, String> {
+impl FontFace {
+    fn read(name: &'static str, file: &'static [u8]) -> Result<FontFace, String> {
         let face = Face::parse(file, 0).map_err(|e| format!("the font {name}: {e}"))?;
         let unit = 1000.0 / f32::from(face.units_per_em());
         let width = |glyph: u16| {
@@ -123,7 +124,7 @@ impl Cut {
         }
         let b = face.global_bounding_box();
         let scaled = |v: i16| f32::from(v) * unit;
-        Ok(Cut {
+        Ok(FontFace {
             name,
             file,
             glyphs,
@@ -139,7 +140,7 @@ impl Cut {
         })
     }
 
-    /// The glyph of a character; the empty box of the face where it has none.
+    /// Glyph and width of a character; the empty box if the face lacks it.
     fn glyph(&self, c: char) -> (u16, f32) {
         let missing = (0, self.widths.first().copied().unwrap_or(500.0));
         self.glyphs.get(&c).copied().unwrap_or(missing)
@@ -187,8 +188,7 @@ impl Cut {
             .filter(Filter::FlateDecode)
             .pair(Name(b"Length1"), length);
         let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
-        // A hyphen and one that may be left out look alike: what is read is the former, which comes
-        // first.
+        // Hyphen and soft hyphen share a glyph, which stands for the hyphen: it comes first.
         let mut known = BTreeSet::new();
         for (c, (glyph, _)) in &self.glyphs {
             if known.insert(*glyph) {

@@ -25,7 +25,7 @@ impl LegendView {
 #[must_use]
 pub fn key(width: u32, content: &str) -> String {
     format!(
-        r#"<svg class="key" viewBox="0 0 {width} 12" width="{width}" height="12" aria-hidden="true">{content}</svg>"#
+        r#"<svg class="key inline" viewBox="0 0 {width} 12" width="{width}" height="12" aria-hidden="true">{content}</svg>"#
     )
 }
 

@@ -1,10 +1,10 @@
 //! Figures of the report and strip charts, as SVG text.
 //!
-//! In the order of use: [`style`] (colours, font), [`scale`] (limits and ticks of an axis),
-//! [`legend`], [`marker`] (one per maneuver class), [`verdict_bar`], [`derivative_figure`]
-//! (estimates over angle of attack; the only file that uses the plotting crate), [`svg_writer`],
-//! [`strips`] (signals over time, the renderer of all strip charts), [`strip_figure`] (time
-//! histories of the report) and [`annotated_chart`] (strip charts with shaded maneuvers).
+//! In the order of use: `style` (colours, font), `scale` (limits and ticks of an axis),
+//! `legend`, `marker` (one per maneuver class), `verdict_bar`, `derivative_figure`
+//! (estimates over angle of attack; the only file that uses the plotting crate), `svg_writer`,
+//! `strips` (signals over time, the renderer of all strip charts), `strip_figure` (time
+//! histories of the report) and `annotated_chart` (strip charts with shaded maneuvers).
 
 pub mod annotated_chart;
 pub mod derivative_figure;

@@ -35,7 +35,7 @@ pub fn draw(segments: &[Segment], (from_deg, to_deg): (f64, f64), width: u32) ->
     }
     let x = |alpha_deg: f64| ((alpha_deg - from_deg) * scale).clamp(0.0, f64::from(width));
     let mut svg = format!(
-        r#"<svg class="strip" viewBox="0 0 {width} {HEIGHT}" width="{width}" height="{HEIGHT}" aria-hidden="true">"#
+        r#"<svg class="strip inline" viewBox="0 0 {width} {HEIGHT}" width="{width}" height="{HEIGHT}" aria-hidden="true">"#
     );
     for segment in segments {
         let (top, bottom, colour) = style(segment.verdict);

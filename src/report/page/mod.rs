@@ -1,4 +1,4 @@
-//! Sections of the report: from [`Contents`] to the values that the template prints.
+//! Sections of the report: from `Contents` to the values that the template prints.
 //!
 //! The head of `report.html` documents the values.
 
@@ -60,6 +60,7 @@ pub struct Page<'a> {
     predictions: Option<TableView>,
     correlation_triangles: Vec<CorrelationTriangle>,
     identifiability: Vec<TableView>,
+    is_held_by_evidence: bool,
     failures: Vec<TableView>,
     maneuver_pages: Vec<ManeuverPage>,
     provenance: &'a Provenance,
@@ -95,6 +96,7 @@ impl<'a> Page<'a> {
             predictions: prediction_table::table(contents),
             correlation_triangles: correlation_triangle::triangles(contents),
             identifiability: identifiability_tables::tables(contents),
+            is_held_by_evidence: contents.estimates.iter().any(|e| e.held_because.is_some()),
             failures: failures::tables(contents),
             maneuver_pages: maneuver_page::pages(contents, &markers),
             provenance: contents.provenance,

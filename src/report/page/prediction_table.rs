@@ -121,6 +121,6 @@ mod tests {
         ];
         assert_eq!(table.rows, [expected.map(str::to_owned).to_vec()]);
         let page = crate::report::html(&campaign.contents(), None).unwrap();
-        assert!(page.contains("Prediction of data not used") && page.contains("m2 (α 20°)"));
+        assert!(page.contains("Cross-validation") && page.contains("m2 (α 20°)"));
     }
 }

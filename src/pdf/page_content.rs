@@ -1,0 +1,142 @@
+//! A page as PDF operators: its marks and its footer.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use super::fonts::Fonts;
+use super::item::{Colour, Mark, RULE, SOFT, Style};
+use super::pagination::{HEIGHT, MARGIN, Pages, WIDTH};
+use super::svg_path::number;
+
+/// Operators and resources of one page.
+pub struct PageContent<'a> {
+    fonts: &'a Fonts,
+    pub operators: String,
+    /// Opacities used, percent.
+    pub opacities: BTreeSet<u8>,
+    pub links: Vec<Link>,
+}
+
+/// A rectangle that leads to a place of the document; y from the top of the page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    pub x: f32,
+    pub y: f32,
+    pub width: f32,
+    pub height: f32,
+    pub target_page: usize,
+    pub target_y: f32,
+}
+
+impl<'a> PageContent<'a> {
+    /// Sets the page of a number from one.
+    pub fn new(fonts: &'a Fonts, title: &str, pages: &Pages, number: usize) -> PageContent<'a> {
+        let mut content = PageContent {
+            fonts,
+            operators: String::new(),
+            opacities: BTreeSet::from([100]),
+            links: Vec::new(),
+        };
+        let page = number.checked_sub(1).and_then(|i| pages.sheets.get(i));
+        for mark in page.map_or(&[][..], |p| &p.marks) {
+            content.mark(mark, pages);
+        }
+        content.footer(title, number, pages.sheets.len());
+        content
+    }
+
+    fn mark(&mut self, mark: &Mark, pages: &Pages) {
+        match mark {
+            Mark::Text { x, y, style, text } => self.text(*x, *y, *style, text),
+            Mark::Fill {
+                x,
+                y,
+                width,
+                height,
+                colour,
+            } => self.fill([*x, *y, *width, *height], *colour),
+            Mark::Drawing {
+                x,
+                y,
+                scale,
+                drawing,
+            } => {
+                let [x, y] = [*x, HEIGHT - y].map(number);
+                // Four decimals: the scale of a drawing is multiplied by its width.
+                // Writing into a String cannot fail.
+                let _ = writeln!(self.operators, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
+                self.operators.push_str(&drawing.operators);
+                self.operators.push_str("Q\n");
+                self.opacities.extend(&drawing.opacities);
+            }
+            Mark::Link {
+                x,
+                y,
+                width,
+                height,
+                target,
+            } => self.links.extend(pages.anchors.get(target).map(|to| Link {
+                x: *x,
+                y: *y,
+                width: *width,
+                height: *height,
+                target_page: to.0,
+                target_y: to.1,
+            })),
+            Mark::PageOf {
+                x,
+                y,
+                style,
+                prefix,
+                target,
+            } => {
+                if let Some((page, _)) = pages.anchors.get(target) {
+                    self.text_ending_at(*x, *y, *style, &format!("{prefix}{page}"));
+                }
+            }
+            Mark::Anchor { .. } | Mark::Heading { .. } | Mark::Contents => {}
+        }
+    }
+
+    fn text(&mut self, x: f32, y: f32, style: Style, text: &str) {
+        let slant = if style.slanted { "0.2" } else { "0" };
+        let [x, y, size] = [x, HEIGHT - y, style.size].map(number);
+        let encoded = self.fonts.encoded(style.weight, text);
+        let (colour, font) = (rgb(style.colour), style.weight.resource());
+        let _ = writeln!(
+            self.operators,
+            "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET"
+        );
+    }
+
+    fn text_ending_at(&mut self, right: f32, y: f32, style: Style, text: &str) {
+        let width = self.fonts.width(style.weight, style.size, text);
+        self.text(right - width, y, style, text);
+    }
+
+    fn fill(&mut self, [x, y, width, height]: [f32; 4], colour: Colour) {
+        let [x, y, width, height] = [x, HEIGHT - y - height, width, height].map(number);
+        let _ = writeln!(
+            self.operators,
+            "{} rg {x} {y} {width} {height} re f",
+            rgb(colour)
+        );
+    }
+
+    /// A rule, the document's title, the number of the page.
+    fn footer(&mut self, title: &str, number: usize, pages: usize) {
+        let style = Style {
+            colour: SOFT,
+            ..Style::of_size(7.5)
+        };
+        let y = HEIGHT - 28.0;
+        self.fill([MARGIN, y - 11.0, WIDTH - 2.0 * MARGIN, 0.4], RULE);
+        self.text(MARGIN, y, style, title);
+        let page = format!("page {number} of {pages}");
+        self.text_ending_at(WIDTH - MARGIN, y, style, &page);
+    }
+}
+
+fn rgb(colour: Colour) -> String {
+    colour.map(|v| number(f32::from(v) / 255.0)).join(" ")
+}
