@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::schema::table;
+
 /// An error that stops the whole run (exit code 1). What spoils one flight or one maneuver is data:
 /// a [`Problem`].
 #[derive(Debug, thiserror::Error)]
@@ -63,17 +65,20 @@ impl Error {
     }
 }
 
-/// What spoiled one flight, channel or maneuver while the rest of the campaign went on: a row of
-/// the `problems` table.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Problem {
-    /// The stage that found it: `ingest`, `segment`, `estimate`, `trend`.
-    pub stage: String,
-    pub flight_id: String,
-    /// Where in the flight: a file, a channel, a maneuver, a time.
-    pub place: String,
-    /// What is wrong and what to do, one sentence or two.
-    pub reason: String,
+table! {
+    /// Everything that was rejected or could not be made, while the rest of the campaign went on.
+    ///
+    /// With any row in this table `harvest` exits with 2.
+    pub struct Problem in "problems" per "thing that was rejected or could not be made" {
+        /// Stage that found the problem.
+        pub stage: String,
+        /// Flight, or stretch of a flight; empty where it is none.
+        pub flight_id: String,
+        /// File, channel, time, maneuver or derivative.
+        pub place: String,
+        /// Cause and, where known, remedy.
+        pub reason: String,
+    }
 }
 
 /// The name of `known` that `given` was probably meant to be, as a phrase to append to an error.

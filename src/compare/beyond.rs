@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::aero::wind_tunnel::{Beyond, Extrapolation};
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Maneuver;
-use crate::tables::{BeyondRow, ComparisonRow, EstimateRow, Treatment};
+use crate::tables::{ComparisonRow, EstimateRow, ExtrapolationRow, Treatment};
 
 /// One row per maneuver (or α of the comparison), variable and range of tables, with the
 /// derivatives it concerns.
@@ -16,7 +16,7 @@ pub fn beyond(
     maneuvers: &[Maneuver],
     comparison: &[ComparisonRow],
     tunnel: &WindTunnel,
-) -> Vec<BeyondRow> {
+) -> Vec<ExtrapolationRow> {
     let mut rows = Vec::new();
     for maneuver in maneuvers {
         let of_it = estimates
@@ -54,7 +54,7 @@ fn at<'a>(
     condition: &Condition,
     derivatives: impl Iterator<Item = &'a str>,
     tunnel: &WindTunnel,
-) -> Vec<BeyondRow> {
+) -> Vec<ExtrapolationRow> {
     // Tables that end alike share a row; the key is their ends to the bit.
     let mut found: BTreeMap<(String, u64, u64), (Beyond, Vec<&str>)> = BTreeMap::new();
     for name in derivatives {
@@ -75,7 +75,7 @@ fn at<'a>(
         Extrapolation::Clamp => Treatment::Clamped,
         Extrapolation::Refuse => Treatment::Refused,
     };
-    let row = |(beyond, names): (Beyond, Vec<&str>)| BeyondRow {
+    let row = |(beyond, names): (Beyond, Vec<&str>)| ExtrapolationRow {
         maneuver_id: maneuver_id.to_owned(),
         alpha_deg: condition.alpha_deg,
         mach: condition.mach,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Condition, WindTunnel};
-use crate::schema::words;
+use crate::schema::{table, words};
 
 /// One line of the analyst's list of events.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,29 +15,49 @@ pub struct Event {
     pub end_s: f64,
 }
 
-/// One maneuver: its window in the record and its mean flight condition. A row of the `maneuvers`
-/// table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Maneuver {
-    pub maneuver_id: String,
-    pub flight_id: String,
-    pub class: String,
-    pub axis: Axis,
-    /// On the record's own clock.
-    pub start_s: f64,
-    pub end_s: f64,
-    /// Mean angle of attack at the c.g.
-    pub alpha_deg: f64,
-    pub mach: f64,
-    pub qbar_psf: f64,
-    pub velocity_ft_s: f64,
-    pub altitude_ft: f64,
-    pub mass_slug: f64,
-    pub x_cg_ft: f64,
-    pub samples: usize,
-    pub origin: ManeuverOrigin,
-    pub recognised: Recognised,
-    pub quality: Quality,
+table! {
+    /// Maneuvers, with their mean flight condition and quality.
+    ///
+    /// Times are seconds on the record's own clock. The quality measures have limits, which are
+    /// settings: `segment: quality:`. A measure that could not be taken is empty.
+    pub struct Maneuver in "maneuvers" per "maneuver" {
+        /// Flight, and start in whole seconds: `flight_001_t00118`.
+        pub maneuver_id: String,
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Class of the maneuver.
+        pub class: String,
+        /// Set of equations.
+        pub axis: Axis,
+        /// Start: about a second of trimmed flight before the inputs. Maneuvers close together
+        /// share the pause between them (`segment: shared_lead_in:`).
+        pub start_s: f64 ["s"],
+        /// End, after the decay of the response or where the pilot takes over.
+        pub end_s: f64 ["s"],
+        /// Mean angle of attack at the c.g., from the vanes.
+        pub alpha_deg: f64 ["deg"],
+        /// Mean Mach number.
+        pub mach: f64 ["1"],
+        /// Mean dynamic pressure.
+        pub qbar_psf: f64 ["lbf/ft²"],
+        /// Mean true airspeed.
+        pub velocity_ft_s: f64 ["ft/s"],
+        /// Mean altitude.
+        pub altitude_ft: f64 ["ft"],
+        /// Mean mass.
+        pub mass_slug: f64 ["slug"],
+        /// Mean position of the c.g.
+        pub x_cg_ft: f64 ["ft"],
+        /// Number of samples on the record's clock.
+        pub samples: usize ["samples"],
+        /// Origin of the maneuver; the columns from `confidence` to `evidence` are empty for a given
+        /// one.
+        pub origin: ManeuverOrigin,
+        /// Basis of the recognition.
+        pub recognised: Recognised,
+        /// Quality before the estimation.
+        pub quality: Quality,
+    }
 }
 
 impl Maneuver {
@@ -48,19 +68,25 @@ impl Maneuver {
     }
 }
 
-/// What a maneuver was recognised by; nothing of it where the analyst gave the maneuver.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Recognised {
-    pub first_input_s: Option<f64>,
-    pub last_input_s: Option<f64>,
-    /// Signals that moved on their own, with how often they stepped: `de_deg 5`.
-    pub inputs: String,
-    /// Signals that stepped with them, by gearing or feedback.
-    pub followed: String,
-    /// From 0 to 1: how much of what could speak for the class does.
-    pub confidence: Option<f64>,
-    /// What speaks for the class and what against it, in words.
-    pub evidence: String,
+table! {
+    /// Columns of `maneuvers` about the recognition.
+    #[derive(Default)]
+    pub struct Recognised {
+        /// Confidence from 0 to 1, a product: 0.8 for a flag that contradicts (it may be stuck),
+        /// 0.95 for one that is not recorded, 0.9 for vanes without evidence, 0.5 to 1 for the fit
+        /// of the pulses' lengths.
+        pub confidence: Option<f64> ["1"],
+        /// Time of the first step of the inputs.
+        pub first_input_s: Option<f64> ["s"],
+        /// Time of the last step of the inputs.
+        pub last_input_s: Option<f64> ["s"],
+        /// Signals that moved on their own, with their number of steps: `de_deg 5`.
+        pub inputs: String,
+        /// Signals that stepped with them, by gearing or feedback.
+        pub followed: String,
+        /// Evidence in words: flags, vanes, the unit of pulses.
+        pub evidence: String,
+    }
 }
 
 words! {
@@ -93,47 +119,54 @@ impl Default for Acceptance {
     }
 }
 
-/// What a maneuver is worth before it is estimated; a measure that could not be taken does not
-/// exist.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Quality {
-    pub verdict: Acceptance,
-    /// Every limit that it is beyond, in words.
-    pub reason: String,
-    /// Angular rates of its axis in the lead-in over those in the maneuver, both root mean square
-    /// about a straight line.
-    pub lead_in_motion: Option<f64>,
-    /// Root mean square of the angle of attack about its mean, deg.
-    pub alpha_rms_deg: Option<f64>,
-    /// Angular rates of the other axis over those of its own, both root mean square about a
-    /// straight line.
-    pub other_axis: Option<f64>,
-    /// Angular rates of its axis, root mean square, over their noise from sample to sample; the
-    /// best of them.
-    pub signal_to_noise: Option<f64>,
-    /// Share of the time of the inputs in which a surface rests at a stop; the surface that does so
-    /// most.
-    pub saturated_share: Option<f64>,
-    /// Share of the time of the inputs in which a surface moves as fast as its actuator can; the
-    /// surface that does so most.
-    pub rate_limited_share: Option<f64>,
-    /// Share of samples of its outputs and inputs that are not as recorded.
-    pub marked_share: Option<f64>,
+table! {
+    /// Columns of `maneuvers` about the quality.
+    #[derive(Default)]
+    pub struct Quality {
+        /// Verdict on the quality.
+        pub verdict: Acceptance,
+        /// Limits that the maneuver exceeds, in words.
+        pub reason: String,
+        /// Angular rates of its axis before the first input over those in the whole maneuver, root
+        /// mean squares: large where it is not trimmed at the start.
+        pub lead_in_motion: Option<f64> ["1"],
+        /// Root mean square of the angle of attack about its mean.
+        pub alpha_rms_deg: Option<f64> ["deg"],
+        /// Angular rates of the other axis over those of its own, root mean squares about straight
+        /// lines, so that a steady turn does not count.
+        pub other_axis: Option<f64> ["1"],
+        /// Root mean square of the axis's angular rate over its noise from sample to sample; the
+        /// better one of roll and yaw.
+        pub signal_to_noise: Option<f64> ["1"],
+        /// Share of the inputs' time in which a surface rests at its stop; the worst surface. None
+        /// where no actuator is configured.
+        pub saturated_share: Option<f64> ["1"],
+        /// Share of the inputs' time in which a surface moves at its actuator's full rate; the worst
+        /// surface. None where no actuator is configured.
+        pub rate_limited_share: Option<f64> ["1"],
+        /// Share of samples of its outputs and inputs that are bridged, despiked, missing or stuck;
+        /// samples between those of a slow channel do not count.
+        pub marked_share: Option<f64> ["1"],
+    }
 }
 
-/// Excitation that fits no class. A row of the `unknown` table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Unknown {
-    pub flight_id: String,
-    /// First and last input, s on the record's own clock.
-    pub start_s: f64,
-    pub end_s: f64,
-    /// What stepped and how often: `de_deg 5, dpv_deg 1`.
-    pub inputs: String,
-    /// The class that it comes nearest to.
-    pub nearest_class: String,
-    /// What keeps it from being of that class.
-    pub reason: String,
+table! {
+    /// Excitation that fits no class.
+    pub struct Unknown in "unknown" per "excitation that fits no class" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Time of the first step.
+        pub start_s: f64 ["s"],
+        /// Time of the last step.
+        pub end_s: f64 ["s"],
+        /// Signals that stepped, with their number of steps: `de_deg 5, dpv_deg 1`.
+        pub inputs: String,
+        /// Class whose inputs explain the most steps.
+        pub nearest_class: String,
+        /// Difference from that class: too few steps, pulses of other lengths, the pilot's hand. Or
+        /// the classes that fit alike.
+        pub reason: String,
+    }
 }
 
 impl Maneuver {

@@ -1,6 +1,9 @@
-//! Declarations of what the published files contain: the words that a column may hold.
+//! Declarations of the published files: tables with their columns, columns with their words.
 
+mod table;
 mod words;
 
+pub(crate) use table::table;
+pub use table::{Cell, Cells, Column, Declared, Field, Row, Table, one_line};
 pub(crate) use words::words;
 pub use words::{Entry, Words};

@@ -1,24 +1,19 @@
-//! The published tables: rows to a data frame, to Parquet and CSV.
+//! The published tables: columns to a data frame, to Parquet and CSV.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use polars::prelude::{
-    Column, CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter,
+    CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter,
     SerWriter, Series,
 };
+use serde_json::json;
 
 use super::atomic;
-use crate::aero::{Axis, Output};
-use crate::error::{Error, Problem, Result};
-use crate::maneuver::{Maneuver, Unknown};
-use crate::schema::Words;
-use crate::tables::{
-    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow,
-    DisagreementRow, EstimateRow, EventRow, ExportRow, FitRow, InstrumentRow, JointRow,
-    ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow, VerdictRow,
-};
+use crate::error::{Error, Result};
+use crate::schema::{Cells, Column, Row, Table};
+use crate::tables::{ExportRow, FitRow, PredictedRow};
 
 /// Where tables are published, and what their Parquet files say about where they come from.
 #[derive(Clone, Debug, Default)]
@@ -66,203 +61,8 @@ pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
         .collect())
 }
 
-/// A row type with the name of its table and its columns.
-pub trait Table: Sized {
-    const NAME: &'static str;
-    fn columns(rows: &[Self]) -> Vec<Column>;
-}
-
-/// A type of cell: how a column of it is made.
-trait Cell: Sized {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
-    where
-        Self: 'a;
-}
-
-fn column<T: ?Sized, V: AsRef<T>>(name: &str, values: V) -> Column
-where
-    Series: NamedFrom<V, T>,
-{
-    Series::new(name.into(), values).into()
-}
-
-/// Empty is absent: a CSV cannot tell the two apart.
-impl Cell for String {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        let text = cells.map(|text| (!text.is_empty()).then_some(text.as_str()));
-        column::<[Option<&str>], _>(name, text.collect::<Vec<_>>())
-    }
-}
-
-impl Cell for Option<String> {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[Option<&str>], _>(name, cells.map(Option::as_deref).collect::<Vec<_>>())
-    }
-}
-
-impl Cell for f64 {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[Option<f64>], _>(
-            name,
-            cells
-                .map(|v| v.is_finite().then_some(*v))
-                .collect::<Vec<_>>(),
-        )
-    }
-}
-
-impl Cell for Option<f64> {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[Option<f64>], _>(
-            name,
-            cells
-                .map(|v| v.filter(|v| v.is_finite()))
-                .collect::<Vec<_>>(),
-        )
-    }
-}
-
-impl Cell for usize {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        column::<[i64], _>(
-            name,
-            cells
-                .map(|v| i64::try_from(*v).unwrap_or(i64::MAX))
-                .collect::<Vec<_>>(),
-        )
-    }
-}
-
-impl Cell for Option<usize> {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column {
-        let whole = |v: &Self| v.map(|v| i64::try_from(v).unwrap_or(i64::MAX));
-        column::<[Option<i64>], _>(name, cells.map(whole).collect::<Vec<_>>())
-    }
-}
-
-impl<W: Words> Cell for W {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
-    where
-        Self: 'a,
-    {
-        column::<[Option<&str>], _>(
-            name,
-            cells.map(|cell| Some(cell.word())).collect::<Vec<_>>(),
-        )
-    }
-}
-
-impl<W: Words> Cell for Option<W> {
-    fn column<'a>(name: &str, cells: impl Iterator<Item = &'a Self>) -> Column
-    where
-        Self: 'a,
-    {
-        let words = cells.map(|cell| cell.as_ref().map(Words::word));
-        column::<[Option<&str>], _>(name, words.collect::<Vec<_>>())
-    }
-}
-
-/// Says which fields of a row type are the columns of which table.
-macro_rules! table {
-    ($row:ty, $name:literal, $($field:ident)*) => {
-        impl Table for $row {
-            const NAME: &'static str = $name;
-            fn columns(rows: &[Self]) -> Vec<Column> {
-                vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*]
-            }
-        }
-    };
-}
-
-table!(Unknown, "unknown", flight_id start_s end_s inputs nearest_class reason);
-table!(FitRow, "fits", maneuver_id class outcome reason start iterations initial_cost final_cost condition_number left_out
-    largest_condition_index confounded);
-table!(EstimateRow, "estimates", maneuver_id flight_id class alpha_deg mach derivative unit status value bound
-    bound_held bound_calibration bound_corrected wind_tunnel variance_inflation excitation contribution_pct equation_error
-    held_because);
-table!(CorrelationRow, "correlations", maneuver_id class kind first second correlation);
-table!(TrendRow, "trends", derivative unit group alpha_deg value standard_error lower_95 upper_95 prediction_lower_95
-    prediction_upper_95 maneuvers outliers curve order scatter);
-table!(OutlierRow, "outliers", derivative unit group maneuver_id class alpha_deg value bound trend z weight_share);
-table!(ComparisonRow, "comparison", derivative unit group alpha_deg mach flight standard_error wind_tunnel difference
-    uncertainty difference_pct z verdict);
-table!(ManeuverComparisonRow, "maneuver_comparison", maneuver_id class derivative unit alpha_deg mach flight bound
-    wind_tunnel difference uncertainty difference_pct z verdict);
-table!(VerdictRow, "verdicts", against derivative unit group alpha_from_deg alpha_to_deg verdict difference_pct words);
-table!(DisagreementRow, "disagreements", rank against derivative unit alpha_deg flight other difference z size_pct words);
-table!(ChangeRow, "changes", against derivative unit group alpha_deg flight standard_error before before_standard_error
-    difference difference_pct z verdict);
-table!(BeyondRow, "beyond_tunnel", maneuver_id alpha_deg mach variable read_at tabulated_from tabulated_to treatment
-    derivatives);
-table!(ChannelRow, "channels", flight_id channel signal samples rate_hz between bridged despiked missing
-    stuck wraps quantisation noise verdict);
-table!(CheckRow, "checks", flight_id relation signals slope correlation verdict);
-table!(InstrumentRow, "instruments", flight_id channel signal unit bias bias_bound scale scale_bound delay_s delay_bound_s
-    applied verdict);
-table!(EventRow, "events", flight_id given_class given_start_s given_end_s found_class found_start_s found_end_s verdict);
-table!(CoverageRow, "coverage", class alpha_deg residuals weights derivative unit truth realisations converged bias scatter
-    bias_over_scatter scatter_over_bound coverage_68 coverage_95 scatter_over_corrected corrected_coverage_68
-    corrected_coverage_95);
-table!(StartRow, "starts", class alpha_deg start records alone reached);
-table!(Problem, "problems", stage flight_id place reason);
-
-/// What it was recognised by and what it is worth follow the maneuver's own columns.
-impl Table for Maneuver {
-    const NAME: &'static str = "maneuvers";
-    fn columns(rows: &[Self]) -> Vec<Column> {
-        macro_rules! columns {
-            ($($($part:ident).+)*) => { vec![$(Cell::column(last!($($part)+), rows.iter().map(|row| &row.$($part).+))),*] };
-        }
-        macro_rules! last {
-            ($name:ident) => { stringify!($name) };
-            ($first:ident $($rest:ident)+) => { last!($($rest)+) };
-        }
-        columns!(maneuver_id flight_id class axis start_s end_s alpha_deg mach qbar_psf velocity_ft_s altitude_ft mass_slug
-            x_cg_ft samples origin recognised.confidence recognised.first_input_s recognised.last_input_s
-            recognised.inputs recognised.followed recognised.evidence quality.verdict quality.reason
-            quality.lead_in_motion quality.alpha_rms_deg quality.other_axis quality.signal_to_noise
-            quality.saturated_share quality.rate_limited_share quality.marked_share)
-    }
-}
-
-table!(PredictionRow, "predictions", maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias
-    theil_variance theil_covariance r_squared);
-table!(JointRow, "joint", joint_id class joint_alpha_deg joint_mach maneuvers maneuver_id flight_id alpha_deg mach part
-    cost_alone cost_joint);
-
-/// Further columns of `fits`; the outputs of both axes have theirs.
-impl PredictedRow {
-    fn columns(rows: &[&Self]) -> Vec<Column> {
-        macro_rules! columns {
-            ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
-        }
-        let mut columns = columns!(prediction predicted_from predicted_cost theil theil_bias theil_variance
-            theil_covariance);
-        let outputs = || {
-            [Axis::Longitudinal, Axis::Lateral]
-                .into_iter()
-                .flat_map(Axis::outputs)
-        };
-        let mut of = |prefix: &str, values: fn(&Self) -> &BTreeMap<Output, f64>| {
-            for output in outputs() {
-                let cells: Vec<Option<f64>> = rows
-                    .iter()
-                    .map(|row| values(row).get(&output).copied())
-                    .collect();
-                columns.push(Cell::column(
-                    &format!("{prefix}_{}", output.name()),
-                    cells.iter(),
-                ));
-            }
-        };
-        of("theil", |row| &row.theil_of);
-        of("r_squared", |row| &row.r_squared_of);
-        columns
-    }
-}
-
-/// Publishes `fits`: each fit beside the prediction of the same maneuver, those without one at the
-/// end.
+/// Publishes `fits`: each fit beside the prediction of the same maneuver. Fits beyond the end of
+/// `predicted` have none.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -271,24 +71,30 @@ pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) 
     let beside: Vec<&PredictedRow> = (0..fits.len())
         .map(|i| predicted.get(i).unwrap_or(&none))
         .collect();
-    let mut columns = FitRow::columns(fits);
+    let mut columns = FitRow::columns(&fits.iter().collect::<Vec<_>>());
     columns.extend(PredictedRow::columns(&beside));
-    place(shelf, FitRow::NAME, fits.len(), columns)
+    place(shelf, FitRow::NAME, fits.len(), &columns)
 }
 
-/// Publishes the export's rows; the third variable, where the tables have one, is a column of its
-/// name.
+/// Publishes the export's rows. The column `third` has the third variable's name, and is absent
+/// without one.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn publish_export(shelf: &Shelf, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
-    macro_rules! columns {
-        ($($field:ident)*) => { vec![$(Cell::column(stringify!($field), rows.iter().map(|row| &row.$field))),*] };
-    }
-    let mut columns = columns!(derivative alpha_deg mach);
-    columns.extend(third.map(|name| Cell::column(name, rows.iter().map(|row| &row.third))));
-    columns.extend(columns!(value unit uncertainty source is_flight));
-    place(shelf, "flight_updated", rows.len(), columns)
+    let columns = ExportRow::columns(&rows.iter().collect::<Vec<_>>());
+    let named = columns.into_iter().filter_map(|mut column| {
+        if column.name == ExportRow::THIRD {
+            third?.clone_into(&mut column.name);
+        }
+        Some(column)
+    });
+    place(
+        shelf,
+        ExportRow::NAME,
+        rows.len(),
+        &named.collect::<Vec<_>>(),
+    )
 }
 
 /// Publishes rows as `<name>.parquet` and `<name>.csv` on a shelf, each placed whole.
@@ -299,16 +105,16 @@ pub fn publish<T: Table>(shelf: &Shelf, rows: &[T]) -> Result<()> {
     publish_as(shelf, T::NAME, rows)
 }
 
-/// Publishes rows as [`publish`] does, under another name than their type's: a second table of the
-/// same columns.
+/// Publishes rows as [`publish`] does, under another name: a second table of the same columns.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
 pub fn publish_as<T: Table>(shelf: &Shelf, name: &str, rows: &[T]) -> Result<()> {
-    place(shelf, name, rows.len(), T::columns(rows))
+    let columns = T::columns(&rows.iter().collect::<Vec<_>>());
+    place(shelf, name, rows.len(), &columns)
 }
 
-fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result<()> {
+fn place(shelf: &Shelf, name: &str, rows: usize, columns: &[Column]) -> Result<()> {
     let Some(folder) = &shelf.folder else {
         return Ok(());
     };
@@ -316,13 +122,15 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result
         folder.join(format!("{name}.parquet")),
         folder.join(format!("{name}.csv")),
     );
-    let mut frame = DataFrame::new(rows, columns).map_err(|e| Error::store(&parquet, &e))?;
+    let series = columns.iter().map(|column| series(column).into());
+    let mut frame =
+        DataFrame::new(rows, series.collect()).map_err(|e| Error::store(&parquet, &e))?;
+    let mut metadata = shelf.provenance.clone();
+    metadata.push((COLUMNS.to_owned(), explanations(columns)));
     let mut bytes = Vec::new();
-    let metadata = (!shelf.provenance.is_empty())
-        .then(|| KeyValueMetadata::from_static(shelf.provenance.clone()));
     ParquetWriter::new(&mut bytes)
         .with_compression(ParquetCompression::Zstd(None))
-        .with_key_value_metadata(metadata)
+        .with_key_value_metadata(Some(KeyValueMetadata::from_static(metadata)))
         .finish(&mut frame)
         .map_err(|e| Error::store(&parquet, &e))?;
     atomic::place(&parquet, &bytes)?;
@@ -333,10 +141,35 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: Vec<Column>) -> Result
     atomic::place(&csv, &bytes)
 }
 
+fn series(column: &Column) -> Series {
+    let name = column.name.as_str().into();
+    match &column.cells {
+        Cells::Text(cells) => Series::new(name, cells),
+        Cells::Number(cells) => Series::new(name, cells),
+        Cells::Whole(cells) => Series::new(name, cells),
+    }
+}
+
+/// Key of the Parquet metadata for the columns' units and explanations.
+const COLUMNS: &str = "harvest.columns";
+
+/// Name, unit and meaning of each column as JSON; the unit of text is null. The polars writer has
+/// no metadata per field.
+fn explanations(columns: &[Column]) -> String {
+    let explain = |column: &Column| {
+        json!({
+            "name": column.name,
+            "unit": Some(column.unit).filter(|unit| !unit.is_empty()),
+            "meaning": column.explanation(),
+        })
+    };
+    json!(columns.iter().map(explain).collect::<Vec<_>>()).to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::CheckVerdict;
+    use crate::tables::{CheckRow, CheckVerdict};
 
     #[test]
     fn a_table_without_rows_has_its_columns() {
@@ -367,5 +200,17 @@ mod tests {
             csv.lines().nth(1),
             Some("f1,\"theta rate, against q\",theta_deg q_deg_s,,,not excited")
         );
+    }
+
+    #[test]
+    fn parquet_has_the_unit_and_meaning_of_each_column() {
+        let folder = tempfile::tempdir().unwrap();
+        publish::<FitRow>(&Shelf::of(folder.path()), &[]).unwrap();
+        let metadata = provenance(&folder.path().join("fits.parquet")).unwrap();
+        let columns: serde_json::Value = serde_json::from_str(&metadata[COLUMNS]).unwrap();
+        assert_eq!(columns[0]["name"], "maneuver_id");
+        assert_eq!(columns[0]["unit"], serde_json::Value::Null);
+        assert_eq!(columns[5]["unit"], "1");
+        assert_eq!(columns[5]["meaning"], "Number of steps of the iteration.");
     }
 }

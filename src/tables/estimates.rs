@@ -1,0 +1,226 @@
+//! Tables of maneuvers' estimates: fits, derivatives, correlations, joint estimation.
+
+use crate::maneuver::Status;
+use crate::schema::{table, words};
+
+table! {
+    /// Outcome of each maneuver's estimation, and of its prediction from other maneuvers.
+    ///
+    /// Where maneuvers are estimated together (`estimate: joint:`), their rows follow, with
+    /// `maneuver_id` `joint/<class>/<mean α>`.
+    pub struct FitRow in "fits" per "maneuver" {
+        /// Maneuver, or group of maneuvers estimated together.
+        pub maneuver_id: String,
+        /// Class of the maneuver.
+        pub class: String,
+        /// Outcome of the estimation; only converged fits go into trends.
+        pub outcome: Outcome,
+        /// Cause of the outcome: what ended the iteration, which derivatives are undetermined, or
+        /// what was missing. With `hold: evidence` also the undetermined derivatives that have no
+        /// tunnel value to be held at.
+        pub reason: String,
+        /// Starting values of the iteration that led to the outcome: the configured ones, or the
+        /// other ones where these do not converge.
+        pub start: Option<StartingValues>,
+        /// Number of steps of the iteration.
+        pub iterations: usize ["1"],
+        /// Cost J of eq. 1.2 at the start, weights on residuals in deg, deg/s and g.
+        pub initial_cost: Option<f64> ["1"],
+        /// Cost J of eq. 1.2 at the end.
+        pub final_cost: Option<f64> ["1"],
+        /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
+        /// is `unidentifiable`.
+        pub condition_number: Option<f64> ["1"],
+        /// Share of the output samples that the cost leaves out: bridged, despiked or missing.
+        pub left_out: Option<f64> ["1"],
+        /// Square root of the condition number; none where a direction is not determined at all.
+        pub largest_condition_index: Option<f64> ["1"],
+        /// Groups of nearly collinear parameters, worst first, `; ` between groups. A group has a
+        /// condition index of 30 or more and half or more of the variance of two or more
+        /// parameters (Belsley). A constant with its slope, biases and initial states are
+        /// collinear by nature; a group of control derivatives calls for other inputs.
+        pub confounded: Option<String>,
+    }
+}
+
+words! {
+    /// Outcome of an estimation.
+    pub enum Outcome {
+        /// The iteration reached the minimum.
+        Converged = "converged",
+        /// The iteration stopped before the minimum; the reason names the cause.
+        NotConverged = "not_converged",
+        /// The data do not determine some direction of the parameters; the reason names the
+        /// derivatives.
+        Unidentifiable = "unidentifiable",
+        /// The maneuver was not estimated.
+        Rejected = "rejected",
+    }
+}
+
+words! {
+    /// Starting values of the iteration.
+    pub enum StartingValues {
+        /// Derivatives that the measured accelerations imply.
+        EquationError = "equation error",
+        /// The wind tunnel's derivatives.
+        WindTunnel = "wind tunnel",
+        /// Weighted mean of the maneuvers' own estimates, for a joint estimation.
+        SingleEstimates = "single estimates",
+    }
+}
+
+table! {
+    /// Derivatives and biases of each maneuver.
+    ///
+    /// `bound`, `bound_held` and `bound_calibration` are standard deviations (one sigma).
+    /// `bound_corrected` is the half width of a 95 % interval over 1.96.
+    ///
+    /// - `bound` is the Cramér-Rao bound for any weights W: the root of the diagonal of
+    ///   H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹ + G P Gᵀ, with S the sensitivities of the outputs, H = Σ Sᵀ W S,
+    ///   and R̂ the variances of the residuals. It assumes white residuals.
+    /// - `bound_held` is the root of the diagonal of G P Gᵀ: the effect of the uncertainty P of the
+    ///   tunnel's values on the estimates. G = −H⁻¹ Σ Sᵀ W S_h, with S_h the sensitivities to the
+    ///   values that are held, or that act at the tunnel's value though inactive. P is the tunnel
+    ///   table's `uncertainty`, or 20 % (`held_uncertainty_pct`) of the root mean square of the
+    ///   derivative's table. Maneuvers that hold the same value share its error: it does not
+    ///   average out.
+    /// - `bound_corrected` allows for coloured residuals: in place of R̂ stands the autocovariance of
+    ///   an autoregressive process per output. It also counts noise of the measured surfaces and
+    ///   errors of calibration. Student's t accounts for the few seconds from which the
+    ///   autocovariance is estimated. It is never below `bound`, and contains `bound_held`.
+    /// - `bound_calibration` is the effect of the errors that `estimate: calibration:` states: the
+    ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
+    ///   root sum of squares. It does not average out over maneuvers with the same instruments.
+    ///
+    /// No bound contains errors of signals that `calibration` does not name (as shipped: mass, c.g.,
+    /// inertias), or noise of signals other than the five outputs and the surfaces.
+    ///
+    /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
+    /// derivatives only. Trends, comparison and report are made from the single maneuvers alone, so
+    /// that the same data do not count twice.
+    pub struct EstimateRow in "estimates" per "maneuver and derivative or bias of its axis" {
+        /// Maneuver, or group of maneuvers estimated together.
+        pub maneuver_id: String,
+        /// Flight, or stretch of a flight; `joint` for a group.
+        pub flight_id: String,
+        /// Class of the maneuver.
+        pub class: String,
+        /// Mean angle of attack of the maneuver.
+        pub alpha_deg: f64 ["deg"],
+        /// Mean Mach number of the maneuver.
+        pub mach: f64 ["1"],
+        /// Name of the derivative in the model, or of the bias.
+        pub derivative: String,
+        /// Unit of the derivative or bias.
+        pub unit: String,
+        /// Status of the derivative in this maneuver.
+        pub status: Status,
+        /// Estimate, also of a fit that did not converge; the value it was held at; none where
+        /// inactive. In the column `unit`.
+        pub value: Option<f64>,
+        /// Cramér-Rao bound, with the uncertainty of the held values; none unless estimated and
+        /// determined by the data. In the column `unit`.
+        pub bound: Option<f64>,
+        /// Part of both bounds that comes from the held values, in the column `unit`.
+        pub bound_held: Option<f64>,
+        /// Part of `bound_corrected` that comes from errors of calibration, in the column `unit`;
+        /// empty where none are stated.
+        pub bound_calibration: Option<f64>,
+        /// Bound for coloured residuals, noisy surfaces and errors of calibration: the one to use.
+        /// In the column `unit`.
+        pub bound_corrected: Option<f64>,
+        /// Tunnel's value at the maneuver's α and Mach number, in the column `unit`.
+        pub wind_tunnel: Option<f64>,
+        /// H_jj (H⁻¹)_jj: factor by which the other parameters raise the variance. Above 10 it is
+        /// flagged; none where the data do not determine it.
+        pub variance_inflation: Option<f64> ["1"],
+        /// Root mean square of the regressor about its mean; none for constants.
+        pub excitation: Option<f64> ["deg, or rad of p b/2V, q c̄/2V or r b/2V"],
+        /// Root mean square of derivative × regressor about its mean over that of the whole
+        /// coefficient. Parts that cancel make more than 100.
+        pub contribution_pct: Option<f64> ["%"],
+        /// Same derivative by least squares on the measured accelerations, in the column `unit`: a
+        /// check without integration, weights or a bound. Noise in the regressors draws it towards
+        /// zero.
+        pub equation_error: Option<f64>,
+        /// Reason why the maneuver holds it, with `hold: evidence`; empty where the class's table
+        /// decides.
+        pub held_because: Option<String>,
+    }
+}
+
+table! {
+    /// Correlations within each maneuver.
+    ///
+    /// Pairs of regressors are all those that the class estimates or holds. Pairs of estimates are
+    /// those of at least 0.5 (`published_correlation`). The limits are settings: `estimate:
+    /// identifiability:`.
+    pub struct CorrelationRow in "correlations" per "maneuver and pair" {
+        /// Maneuver.
+        pub maneuver_id: String,
+        /// Class of the maneuver.
+        pub class: String,
+        /// Kind of the pair.
+        pub kind: CorrelationKind,
+        /// Signal, `alpha` or `beta`; or derivative, bias or initial state.
+        pub first: String,
+        /// As `first`.
+        pub second: String,
+        /// Correlation coefficient; the report flags it beyond 0.9.
+        pub correlation: f64 ["1"],
+    }
+}
+
+words! {
+    /// Kind of a correlated pair.
+    pub enum CorrelationKind {
+        /// Two regressors, by their histories over the maneuver (Figures 3, 10 and 11).
+        Regressors = "regressors",
+        /// Two estimates, by the inverse of the information matrix.
+        Estimates = "estimates",
+    }
+}
+
+table! {
+    /// Maneuvers that are estimated together, where `estimate: joint:` asks for it.
+    pub struct JointRow in "joint" per "group of maneuvers estimated together, and maneuver" {
+        /// `maneuver_id` of the group's rows in `fits`, `estimates` and `combined`.
+        pub joint_id: String,
+        /// Class of the maneuvers.
+        pub class: String,
+        /// Mean angle of attack of the maneuvers that take part.
+        pub joint_alpha_deg: f64 ["deg"],
+        /// Mean Mach number of the maneuvers that take part.
+        pub joint_mach: f64 ["1"],
+        /// Number of maneuvers that take part.
+        pub maneuvers: usize ["maneuvers"],
+        /// Maneuver.
+        pub maneuver_id: String,
+        /// Flight of the maneuver.
+        pub flight_id: String,
+        /// Mean angle of attack of the maneuver.
+        pub alpha_deg: f64 ["deg"],
+        /// Mean Mach number of the maneuver.
+        pub mach: f64 ["1"],
+        /// Participation of the maneuver.
+        pub part: Participation,
+        /// Cost J of eq. 1.2 with the maneuver's own derivatives.
+        pub cost_alone: Option<f64> ["1"],
+        /// Cost J of eq. 1.2 with the shared derivatives; much larger where the maneuver does not
+        /// share them.
+        pub cost_joint: Option<f64> ["1"],
+    }
+}
+
+words! {
+    /// Participation of a maneuver in a joint estimation.
+    pub enum Participation {
+        /// The maneuver takes part.
+        Joined = "joined",
+    }
+    or text {
+        /// The reason why it was left out: it could not be estimated alone.
+        LeftOut
+    }
+}

@@ -1,0 +1,204 @@
+//! Tables of flights: channels, relations between channels, instruments, events.
+
+use crate::schema::{table, words};
+
+table! {
+    /// Repairs of the channels, and their verdicts.
+    ///
+    /// A flight whose clock restarts or has a long gap is several stretches. Each stretch is a
+    /// flight of its own in all tables: `007`, then `007.2`, `007.3`. The table `problems` has
+    /// their starts and reasons.
+    pub struct ChannelRow in "channels" per "flight and mapped channel" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Column of the archive's file.
+        pub channel: String,
+        /// Signal that the channel is mapped to.
+        pub signal: String,
+        /// Number of samples on the record's clock.
+        pub samples: usize ["samples"],
+        /// Rate at which the channel is recorded; the record's own rate or a slower one.
+        pub rate_hz: Option<f64> ["Hz"],
+        /// Samples interpolated between two samples of a slower channel; no cost counts them.
+        pub between: usize ["samples"],
+        /// Samples bridged by a straight line over short dropouts; of the clock: lost frames.
+        pub bridged: usize ["samples"],
+        /// Single-sample spikes replaced.
+        pub despiked: usize ["samples"],
+        /// Samples of longer gaps, left missing.
+        pub missing: usize ["samples"],
+        /// Samples excluded because the value stood still for longer than its noise allows.
+        pub stuck: usize ["samples"],
+        /// Number of times the value wrapped around; the record has it continuous.
+        pub wraps: usize ["1"],
+        /// Step of the recorder's numbers; empty where they have none.
+        pub quantisation: Option<f64> ["the signal's unit"],
+        /// Standard deviation of the noise from sample to sample; of the clock: jitter of the time
+        /// stamps in s.
+        pub noise: Option<f64> ["the signal's unit"],
+        /// Worst verdict of the relations and instrument checks that name this channel.
+        pub verdict: ChannelVerdict,
+    }
+}
+
+words! {
+    /// Verdict on a channel.
+    pub enum ChannelVerdict {
+        /// A relation between channels confirms it.
+        Ok = "ok",
+        /// No relation can confirm it.
+        NotChecked = "not checked",
+    }
+    or text {
+        /// The fault; after `suspect:` where another channel may be the faulty one.
+        Fault
+    }
+}
+
+impl ChannelVerdict {
+    /// True unless the channel has a fault.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !matches!(self, ChannelVerdict::Fault(_))
+    }
+}
+
+table! {
+    /// Kinematic relations between channels.
+    pub struct CheckRow in "checks" per "flight and relation between channels" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Relation in words: `theta rate against q and r`.
+        pub relation: String,
+        /// Signals of the relation, separated by spaces.
+        pub signals: String,
+        /// Least-squares slope of the measured side on the side predicted from the other signals:
+        /// 1 where units and signs are right.
+        pub slope: Option<f64> ["1"],
+        /// Correlation of the two sides.
+        pub correlation: Option<f64> ["1"],
+        /// Verdict on the relation.
+        pub verdict: CheckVerdict,
+    }
+}
+
+words! {
+    /// Verdict on a kinematic relation between channels.
+    pub enum CheckVerdict {
+        /// The relation holds.
+        Ok = "ok",
+        /// The flight moves too little for a verdict.
+        NotExcited = "not excited",
+        /// The slope is negative.
+        WrongSign = "wrong sign",
+        /// The slope is positive and far from one.
+        WrongScale = "wrong scale",
+        /// The two sides hardly correlate.
+        DoesNotAgree = "does not agree",
+    }
+}
+
+impl CheckVerdict {
+    /// True unless the relation is violated.
+    #[must_use]
+    pub fn passed(self) -> bool {
+        matches!(self, CheckVerdict::Ok | CheckVerdict::NotExcited)
+    }
+}
+
+table! {
+    /// Errors of the instruments from the kinematic equations alone: reading = `scale` × truth(t −
+    /// `delay_s`) + `bias`.
+    ///
+    /// An error that the flight does not determine is empty.
+    pub struct InstrumentRow in "instruments" per "flight and instrument" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Column of the archive's file.
+        pub channel: String,
+        /// Signal that the channel is mapped to.
+        pub signal: String,
+        /// Unit of the bias and its bound.
+        pub unit: String,
+        /// Constant error of the reading, in the column `unit`.
+        pub bias: Option<f64>,
+        /// Standard deviation of the bias, in the column `unit`.
+        pub bias_bound: Option<f64>,
+        /// Scale factor of the reading: 1 where right.
+        pub scale: Option<f64> ["1"],
+        /// Standard deviation of the scale factor.
+        pub scale_bound: Option<f64> ["1"],
+        /// Delay against the other channels; negative: ahead of them.
+        pub delay_s: Option<f64> ["s"],
+        /// Standard deviation of the delay.
+        pub delay_bound_s: Option<f64> ["s"],
+        /// Errors by which the record is corrected, separated by spaces: `bias`, `scale`, `delay`.
+        /// The settings are `ingest: compatibility:`.
+        pub applied: String,
+        /// Verdict on the instrument.
+        pub verdict: InstrumentVerdict,
+    }
+}
+
+words! {
+    /// Verdict on an instrument.
+    pub enum InstrumentVerdict {
+        /// No error beyond its limit.
+        Ok = "ok",
+        /// No error beyond its limit; the flight moves it too little to determine its delay.
+        NoDelay = "ok; its delay is not told",
+        /// The flight moves it too little to determine any error.
+        NotExcited = "not excited",
+    }
+    or text {
+        /// The fault, which has a row in `problems` too.
+        Fault
+    }
+}
+
+impl InstrumentVerdict {
+    /// True unless the instrument has a fault.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !matches!(self, InstrumentVerdict::Fault(_))
+    }
+}
+
+table! {
+    /// The analyst's events against the maneuvers found in the record; without a list of events
+    /// the table has no rows.
+    pub struct EventRow in "events" per "event of the analyst's list, and maneuver that it lacks" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// Class in the list.
+        pub given_class: Option<String>,
+        /// Start in the list.
+        pub given_start_s: Option<f64> ["s"],
+        /// End in the list.
+        pub given_end_s: Option<f64> ["s"],
+        /// Class found in the record.
+        pub found_class: Option<String>,
+        /// Start found in the record.
+        pub found_start_s: Option<f64> ["s"],
+        /// End found in the record.
+        pub found_end_s: Option<f64> ["s"],
+        /// Verdict on the event.
+        pub verdict: EventVerdict,
+    }
+}
+
+words! {
+    /// Verdict on an event of the analyst's list, or on a maneuver that the list lacks.
+    pub enum EventVerdict {
+        /// The class agrees, and both times within 1 s.
+        Agrees = "agrees",
+        /// The maneuver was found as another class.
+        OtherClass = "other class",
+        /// The class agrees; start or end differs by more than 1 s.
+        OtherTimes = "other times",
+        /// No maneuver was found there.
+        NotFound = "not found",
+        /// The list does not have the maneuver.
+        NotGiven = "not given",
+    }
+}

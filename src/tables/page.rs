@@ -1,0 +1,177 @@
+//! The page that explains the tables, made from their declarations: `docs/tables.md`.
+
+use std::fmt::Write;
+
+use super::{
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow,
+    EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, InstrumentRow, JointRow,
+    ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow, VerdictRow,
+};
+use crate::aero::DerivativeUnit;
+use crate::error::Problem;
+use crate::maneuver::{Maneuver, Unknown};
+use crate::schema::{Cells, Column, Entry, Row, Table, Words, one_line};
+
+const HEAD: &str = "\
+<!-- Made from the declarations of the tables by `make docs`: edit those. -->
+
+# Tables
+
+A run writes each table twice into its folder of reports (`reports/harv/` for the pipeline `harv`):
+`<table>.parquet` and `<table>.csv`, with the same rows in the same order, flights by name, maneuvers by
+time. A value that does not exist is a null in Parquet and an empty field in CSV; there are no NaNs.
+Times are seconds on the record's own clock.
+
+A column's unit is in the table below, or row by row in the column `unit`. Each Parquet file has its
+columns' units and meanings as key-value metadata `harvest.columns` (JSON). What the file was made from
+is in `harvest.stage`, `harvest.code`, `harvest.configuration`, `harvest.flights` (fingerprints of the
+files' contents) and `harvest.tables`.
+
+Signs: surfaces trailing edge down positive, rudder trailing edge left, roll surfaces rolling right,
+pitch vane plume down, yaw vane plume right; CN up, CA aft, CY right; Cm nose up, Cl right wing down, Cn
+nose right.
+
+`CN_…` (normal force) and `Cn_…` (yawing moment) differ by case only: do not use the names where case is
+lost.
+";
+
+const COMBINED: &str = "\
+Sums that the tunnel tabulates in one number, such as `CN_ba = CN_0 + CN_alpha α` (eqs. 2.14, 2.15).
+
+The columns are those of `estimates`. `value` is the sum at the maneuver's mean α; the bounds come from
+the full covariance. A sum has a row where both parts were estimated. `CN_0` and `CN_alpha` alone are
+strongly correlated; their sum is well determined.
+";
+
+/// The page as Markdown.
+#[must_use]
+pub fn page() -> String {
+    let mut page = String::from(HEAD);
+    page.push_str("\nUnits of derivatives and biases in the column `unit`:\n\n");
+    words(&mut page, DerivativeUnit::ENTRIES);
+    table::<Maneuver>(&mut page);
+    table::<Unknown>(&mut page);
+    let mut columns = FitRow::columns(&[]);
+    columns.extend(PredictedRow::columns(&[]));
+    section(&mut page, FitRow::NAME, FitRow::PER, FitRow::MEANING);
+    rows(&mut page, &columns);
+    table::<EstimateRow>(&mut page);
+    section(
+        &mut page,
+        "combined",
+        "maneuver and tabulated sum",
+        COMBINED,
+    );
+    table::<PredictionRow>(&mut page);
+    table::<JointRow>(&mut page);
+    table::<CorrelationRow>(&mut page);
+    table::<TrendRow>(&mut page);
+    table::<OutlierRow>(&mut page);
+    table::<ComparisonRow>(&mut page);
+    table::<ManeuverComparisonRow>(&mut page);
+    table::<VerdictRow>(&mut page);
+    table::<DisagreementRow>(&mut page);
+    table::<ChangeRow>(&mut page);
+    table::<ExtrapolationRow>(&mut page);
+    table::<ExportRow>(&mut page);
+    table::<ChannelRow>(&mut page);
+    table::<CheckRow>(&mut page);
+    table::<InstrumentRow>(&mut page);
+    table::<EventRow>(&mut page);
+    table::<Problem>(&mut page);
+    table::<CoverageRow>(&mut page);
+    table::<StartRow>(&mut page);
+    page
+}
+
+fn table<T: Table>(page: &mut String) {
+    section(page, T::NAME, T::PER, T::MEANING);
+    rows(page, &T::columns(&[]));
+}
+
+/// A heading with the table's explanation.
+fn section(page: &mut String, name: &str, per: &str, meaning: &str) {
+    line(page, &format!("\n## {name}: one row per {per}\n"));
+    for text in meaning.lines() {
+        line(page, text.strip_prefix(' ').unwrap_or(text));
+    }
+}
+
+/// The table of the columns, and below it the words that they hold.
+fn rows(page: &mut String, columns: &[Column]) {
+    line(page, "\n| column | unit | meaning |\n|---|---|---|");
+    for column in columns {
+        let unit = match (&column.cells, column.unit) {
+            (Cells::Text(_), _) => "text",
+            (_, "") => "column `unit`",
+            (_, unit) => unit,
+        };
+        line(
+            page,
+            &format!("| `{}` | {unit} | {} |", column.name, column.explanation()),
+        );
+    }
+    for column in columns.iter().filter(|column| !column.words.is_empty()) {
+        line(page, &format!("\n`{}`:\n", column.name));
+        words(page, column.words);
+    }
+}
+
+fn words(page: &mut String, entries: &[Entry]) {
+    for Entry { word, meaning } in entries {
+        line(page, &format!("- `{word}`: {}", one_line(meaning)));
+    }
+}
+
+fn line(page: &mut String, text: &str) {
+    // Writing into a String cannot fail.
+    let _ = writeln!(page, "{text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `make docs` sets the variable, and the test writes the page instead.
+    #[test]
+    fn the_page_of_the_tables_is_the_one_made_from_their_declarations() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tables.md");
+        if std::env::var_os("HARVEST_WRITE_DOCS").is_some() {
+            std::fs::write(path, page()).unwrap();
+        }
+        let committed = std::fs::read_to_string(path).unwrap_or_default();
+        assert!(
+            committed == page(),
+            "docs/tables.md is not up to date: `make docs`"
+        );
+    }
+
+    fn assert_units<T: Table>() {
+        let columns = T::columns(&[]);
+        let has_units = columns.iter().any(|column| column.name == "unit");
+        for column in &columns {
+            let is_text = matches!(column.cells, Cells::Text(_));
+            let name = &column.name;
+            assert!(
+                is_text || has_units || !column.unit.is_empty(),
+                "{}: {name}",
+                T::NAME
+            );
+            assert!(!is_text || column.unit.is_empty(), "{}: {name}", T::NAME);
+        }
+    }
+
+    #[test]
+    fn every_number_has_a_unit_or_a_column_with_its_unit() {
+        assert_units::<Maneuver>();
+        assert_units::<Unknown>();
+        assert_units::<FitRow>();
+        assert_units::<CorrelationRow>();
+        assert_units::<JointRow>();
+        assert_units::<ExtrapolationRow>();
+        assert_units::<ChannelRow>();
+        assert_units::<CheckRow>();
+        assert_units::<EventRow>();
+        assert_units::<StartRow>();
+    }
+}

@@ -1,0 +1,55 @@
+//! Columns of published tables that are read back: an earlier campaign's or another night's.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::comparison::{ComparisonRow, TunnelVerdict};
+use super::trends::TrendRow;
+
+/// Reads a number of a published table: an empty field as NaN.
+fn empty_as_nan<'de, D: Deserializer<'de>>(field: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
+}
+
+/// The columns of published `trends` that campaigns and nights are compared by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PublishedTrend {
+    pub derivative: String,
+    pub unit: String,
+    pub group: String,
+    pub alpha_deg: f64,
+    #[serde(deserialize_with = "empty_as_nan")]
+    pub value: f64,
+    #[serde(deserialize_with = "empty_as_nan")]
+    pub standard_error: f64,
+}
+
+impl From<&TrendRow> for PublishedTrend {
+    fn from(row: &TrendRow) -> PublishedTrend {
+        PublishedTrend {
+            derivative: row.derivative.clone(),
+            unit: row.unit.clone(),
+            group: row.group.clone(),
+            alpha_deg: row.alpha_deg,
+            value: row.value,
+            standard_error: row.standard_error,
+        }
+    }
+}
+
+/// The columns of published `comparison` that nights are compared by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PublishedVerdict {
+    pub derivative: String,
+    pub alpha_deg: f64,
+    pub verdict: TunnelVerdict,
+}
+
+impl From<&ComparisonRow> for PublishedVerdict {
+    fn from(row: &ComparisonRow) -> PublishedVerdict {
+        PublishedVerdict {
+            derivative: row.derivative.clone(),
+            alpha_deg: row.alpha_deg,
+            verdict: row.verdict,
+        }
+    }
+}
