@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store status explain diff verify gc torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
+.PHONY: cluster object-store status explain diff verify gc docs torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -93,6 +93,9 @@ build: ## build the binary (the first time takes minutes)
 
 test: ## run the tests
 	cargo test --locked
+
+docs: ## write docs/tables.md from the declarations of the tables
+	HARVEST_WRITE_DOCS=1 cargo test --locked --lib --quiet -- the_page_of_the_tables
 
 KILLS ?= 200
 FLIPS ?= 200

@@ -1,32 +1,45 @@
-//! What can go wrong, said so that the reader knows where it is and what to do.
+//! Errors, by kind, and problems, which are data.
 
 use std::path::{Path, PathBuf};
 
-use crate::schema::table;
+use crate::schema::{table, words};
 
-/// An error that stops the whole run (exit code 1). What spoils one flight or one maneuver is data:
-/// a [`Problem`].
+/// An error that stops the whole run (exit code 1). A fault of one flight or maneuver is a
+/// [`Problem`].
+///
+/// Each message names the place, the cause and, where known, the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The analyst's configuration is wrong: file, line where known, what, and what was probably
-    /// meant.
+    /// The analyst's configuration is wrong: file, line where known, and what was probably meant.
     #[error("{}{}: {what}", file.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
     Config {
         file: PathBuf,
         line: Option<usize>,
         what: String,
     },
-    /// The archive as a whole cannot be used.
+    /// The archive as a whole, or a place in an object store, cannot be used.
     #[error("{}: {what}", place.display())]
     Archive { place: PathBuf, what: String },
-    /// The disk said no.
+    /// A flight, maneuver, night, table or object that was asked for does not exist.
+    #[error("{}: {what}", place.display())]
+    NotFound { place: PathBuf, what: String },
+    /// Another run holds the lock of the store or of the reports.
+    #[error("{}: {what}", path.display())]
+    Busy { path: PathBuf, what: String },
+    /// The disk or file server returned an error.
     #[error("{}: {what}: {cause}", path.display())]
     Io {
         path: PathBuf,
         what: &'static str,
         cause: std::io::Error,
     },
-    /// An artefact could not be written or read back.
+    /// The object store did not answer, or an object was replaced meanwhile.
+    #[error("{}: {what}", place.display())]
+    Unavailable { place: PathBuf, what: String },
+    /// A file of the store or of a night is not as it was written.
+    #[error("{}: {what}", path.display())]
+    Damaged { path: PathBuf, what: String },
+    /// An artefact or a published file could not be made.
     #[error("{}: {what}", path.display())]
     Store { path: PathBuf, what: String },
 }
@@ -44,6 +57,22 @@ impl Error {
     }
 
     #[must_use]
+    pub fn not_found(place: &Path, what: impl Into<String>) -> Error {
+        Error::NotFound {
+            place: place.to_owned(),
+            what: what.into(),
+        }
+    }
+
+    #[must_use]
+    pub fn damaged(path: &Path, what: &impl ToString) -> Error {
+        Error::Damaged {
+            path: path.to_owned(),
+            what: what.to_string(),
+        }
+    }
+
+    #[must_use]
     pub fn store(path: &Path, what: &impl ToString) -> Error {
         Error::Store {
             path: path.to_owned(),
@@ -51,11 +80,17 @@ impl Error {
         }
     }
 
-    /// Whether the same may go well another time: a disk or a file server that says no, a store in
-    /// use.
+    /// True where the same may succeed another time, without a change by the analyst.
     #[must_use]
-    pub fn is_passing(&self) -> bool {
-        matches!(self, Error::Io { .. } | Error::Store { .. })
+    pub fn is_transient(&self) -> bool {
+        match self {
+            Error::Busy { .. }
+            | Error::Io { .. }
+            | Error::Unavailable { .. }
+            | Error::Damaged { .. }
+            | Error::Store { .. } => true,
+            Error::Config { .. } | Error::Archive { .. } | Error::NotFound { .. } => false,
+        }
     }
 
     /// For `map_err` on a disk operation: `.map_err(Error::io(path, "cannot create the folder"))`.
@@ -71,7 +106,7 @@ table! {
     /// With any row in this table `harvest` exits with 2.
     pub struct Problem in "problems" per "thing that was rejected or could not be made" {
         /// Stage that found the problem.
-        pub stage: String,
+        pub stage: ProblemStage,
         /// Flight, or stretch of a flight; empty where it is none.
         pub flight_id: String,
         /// File, channel, time, maneuver or derivative.
@@ -81,7 +116,26 @@ table! {
     }
 }
 
-/// The name of `known` that `given` was probably meant to be, as a phrase to append to an error.
+words! {
+    /// Stage that found a problem.
+    pub enum ProblemStage {
+        /// Flights to records.
+        Ingest = "ingest",
+        /// Records to maneuvers.
+        Segment = "segment",
+        /// Maneuvers to derivatives.
+        Estimate = "estimate",
+        /// Derivatives to trends.
+        Trend = "trend",
+        /// The report.
+        Report = "report",
+        /// The simulator; not in the table `problems`.
+        Simulate = "simulate",
+    }
+}
+
+/// A phrase to append to an error: the name among `known` nearest to `given`; empty without a near
+/// one.
 #[must_use]
 pub fn did_you_mean<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let near = known

@@ -147,7 +147,11 @@ impl ShareOptions {
     ) -> Option<anyhow::Result<ExitCode>> {
         let (plan, shard) = (self.plan.as_deref()?, self.shard?);
         Some(match work(plan, shard, until, options, patience) {
-            Err(error) if error.downcast_ref::<Error>().is_some_and(Error::is_passing) => {
+            Err(error)
+                if error
+                    .downcast_ref::<Error>()
+                    .is_some_and(Error::is_transient) =>
+            {
                 Ok(again(&error))
             }
             done => done,
@@ -231,7 +235,7 @@ pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
     let bars = Bars::new(options.options.quiet, None);
     let plan = shard::read(&options.plan)?;
     match shard::merge(&config, &plan, options.patience.wait(), &bars) {
-        Err(error) if error.is_passing() => Ok(again(&error.into())),
+        Err(error) if error.is_transient() => Ok(again(&error.into())),
         Err(error) => Err(error.into()),
         Ok(done) => {
             if !options.options.quiet {

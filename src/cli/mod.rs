@@ -386,7 +386,7 @@ fn brought(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Res
 fn said(log: &Log, done: &Done, exit: u8, begun: Instant) {
     let summary = &done.summary;
     for problem in &summary.problems {
-        let (stage, flight) = (problem.stage.as_str(), problem.flight_id.as_str());
+        let (stage, flight) = (problem.stage.name(), problem.flight_id.as_str());
         let (place, reason) = (problem.place.as_str(), problem.reason.as_str());
         log.write(
             "problem",

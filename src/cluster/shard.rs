@@ -59,7 +59,7 @@ pub fn plan(
 ///
 /// # Errors
 /// The plan is of something else; a flight of it cannot be read; the disk says no
-/// ([`Error::is_passing`]).
+/// ([`Error::is_transient`]).
 pub fn work(
     config: &Config,
     plan: &Plan,

@@ -23,7 +23,7 @@ use crate::output_error::consider::{self, Considered};
 use crate::output_error::{
     Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation, mean,
 };
-use crate::tables::{EstimateRow, JointRow, Participation, StartingValues};
+use crate::tables::{EstimateRow, JOINT_FLIGHT, JointRow, Participation, StartingValues};
 
 /// Which maneuvers are estimated together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -395,7 +395,7 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
     let mean = |value: fn(&Maneuver) -> f64| mean_of(maneuvers, value);
     Maneuver {
         maneuver_id: joint_id.to_owned(),
-        flight_id: "joint".to_owned(),
+        flight_id: JOINT_FLIGHT.to_owned(),
         class: maneuvers
             .first()
             .map_or_else(String::new, |m| m.class.clone()),

@@ -1,6 +1,6 @@
 //! Reasons for which ingest refuses a flight, a stretch or a channel.
 
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 
 /// A place in the recording and the reason for which it cannot be used; a [`Problem`] without its
 /// flight.
@@ -23,7 +23,7 @@ impl Refusal {
     #[must_use]
     pub fn into_problem(self, flight_id: &str) -> Problem {
         Problem {
-            stage: "ingest".to_owned(),
+            stage: ProblemStage::Ingest,
             flight_id: flight_id.to_owned(),
             place: self.place,
             reason: self.reason,

@@ -7,7 +7,7 @@ use super::compatibility::Compatibility;
 use super::*;
 use crate::aircraft::Aircraft;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::flight::channel::RawColumn;
 use crate::flight::record::Series;
 use crate::flight::signal::TIME;
@@ -259,8 +259,8 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
     flight.raw.columns.get_mut("theta").unwrap().unit = Some("rad".to_owned());
     let problem = flight.refused();
     assert_eq!(
-        (problem.stage.as_str(), problem.flight_id.as_str()),
-        ("ingest", "007")
+        (problem.stage, problem.flight_id.as_str()),
+        (ProblemStage::Ingest, "007")
     );
     assert_eq!(problem.place, "channel `theta`");
     assert!(

@@ -22,7 +22,7 @@ pub struct Diff {
 /// There is no such night, or its tables cannot be read.
 pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Diff> {
     let nights = Nights::look(&config.reports);
-    let unknown = |what: String| Error::store(&config.reports, &what);
+    let unknown = |what: String| Error::not_found(&config.reports, what);
     let named = |name: &str| -> Result<Night> {
         let night = nights
             .night(name)

@@ -48,10 +48,7 @@ pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<Str
     let what = format!(
         "the store knows no maneuver `{id}`{near}; `harvest status` says whether it is up to date"
     );
-    Err(Error::Archive {
-        place: config.archive.clone().into(),
-        what,
-    })
+    Err(Error::not_found(Path::new(&config.archive), what))
 }
 
 impl Run<'_> {

@@ -97,6 +97,6 @@ fn manifest(nights: &Nights, name: &str) -> Result<Night> {
     nights.night(name).ok_or_else(|| {
         let what = "its manifest night.json cannot be read, so what it needs is unknown: nothing is removed; where the \
                     night is not worth keeping, remove its folder";
-        Error::store(&nights.folder(name), &what)
+        Error::damaged(&nights.folder(name), &what)
     })
 }

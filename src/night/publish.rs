@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::changes::{self, Window};
 use crate::config::Config;
-use crate::error::{Error, Problem, Result};
+use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::lineage::{Changes, Lineage, Stage};
 use crate::maneuver::Maneuver;
 use crate::pipeline::{Campaign, REPORT, Run, inputs};
@@ -52,7 +52,7 @@ impl Done {
 /// Whether something of what was recorded is among the problems.
 #[must_use]
 pub fn rejected(problems: &[Problem]) -> bool {
-    problems.iter().any(|p| p.stage != Stage::Trend.name())
+    problems.iter().any(|p| p.stage != ProblemStage::Trend)
 }
 
 /// The tables of a published night that are compared with tonight's.
@@ -74,7 +74,7 @@ impl Published {
     pub fn read(nights: &Nights, night: &Night) -> Result<Published> {
         let folder = nights.folder(&night.name);
         let mut estimates: Vec<EstimateRow> = files::published(&folder, "estimates")?;
-        estimates.retain(|e| e.flight_id != "joint");
+        estimates.retain(|e| !e.is_joint());
         Ok(Published {
             lineage: night.lineage.clone(),
             maneuvers: files::published(&folder, "maneuvers")?,
@@ -126,15 +126,15 @@ pub fn stated(path: &Path) -> Result<(Stage, Lineage)> {
     ) -> Result<T> {
         let text = pairs
             .get(key)
-            .ok_or_else(|| Error::store(path, &format!("its metadata has no `{key}`")))?;
+            .ok_or_else(|| Error::damaged(path, &format!("its metadata has no `{key}`")))?;
         serde_json::from_str(text)
-            .map_err(|e| Error::store(path, &format!("its metadata `{key}`: {e}")))
+            .map_err(|e| Error::damaged(path, &format!("its metadata `{key}`: {e}")))
     }
     let pairs = table::provenance(path)?;
     let stage = pairs.get(STAGE).map(String::as_str).unwrap_or_default();
     let stage = Stage::ALL.into_iter().find(|s| s.name() == stage);
     let stage =
-        stage.ok_or_else(|| Error::store(path, &format!("its metadata has no `{STAGE}`")))?;
+        stage.ok_or_else(|| Error::damaged(path, &format!("its metadata has no `{STAGE}`")))?;
     let lineage = Lineage {
         code: part(path, &pairs, CODE)?,
         configuration: part(path, &pairs, CONFIGURATION)?,

@@ -57,9 +57,9 @@ pub fn verify(
         None => nights.current(),
     };
     let night = night.ok_or_else(|| {
-        Error::store(
+        Error::not_found(
             &config.reports,
-            &format!(
+            format!(
                 "there is no such night here; there are {}",
                 nights.names().join(", ")
             ),
@@ -74,9 +74,9 @@ pub fn verify(
         .iter()
         .find(|t| !night.files.keys().any(|f| stem(f) == **t || f == *t))
     {
-        return Err(Error::store(
+        return Err(Error::not_found(
             &nights.folder(&night.name),
-            &format!("there is no table `{unknown}`"),
+            format!("there is no table `{unknown}`"),
         ));
     }
     let asked =

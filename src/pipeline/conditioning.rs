@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{Flight, INGEST_VERSION, Ingested, Run, inputs, problem};
-use crate::error::{Error, Problem, Result};
+use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::ingest::{self, ChannelReader, Context, Refusal, Signature, Stretch};
 use crate::store::archive::{self, FlightFiles, Opened};
 use crate::store::atomic::Draft;
@@ -169,7 +169,10 @@ impl Run<'_> {
         let content = match self.inputs.content(id) {
             Ok(content) => content,
             Err(reason) => {
-                return Ok(self.refused(id, problem("ingest", id, &inputs::place(files), reason)));
+                return Ok(self.refused(
+                    id,
+                    problem(ProblemStage::Ingest, id, &inputs::place(files), reason),
+                ));
             }
         };
         if let Some(done) = self.ingested(id, content) {
@@ -183,7 +186,10 @@ impl Run<'_> {
             .iter()
             .find_map(|file| Some((file, object::failed(file)?)))
         {
-            return Ok(self.refused(id, problem("ingest", id, &file.display().to_string(), &why)));
+            return Ok(self.refused(
+                id,
+                problem(ProblemStage::Ingest, id, &file.display().to_string(), &why),
+            ));
         }
         // What was read must be what the fingerprint is of.
         if let Some(changed) = files
@@ -194,7 +200,12 @@ impl Run<'_> {
             let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
             return Ok(self.refused(
                 id,
-                problem("ingest", id, &changed.display().to_string(), reason),
+                problem(
+                    ProblemStage::Ingest,
+                    id,
+                    &changed.display().to_string(),
+                    reason,
+                ),
             ));
         }
         let artefact = self.store.path("ingest", id, &fingerprint, "json");

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::compare::against::Earlier;
 use crate::config::Config;
-use crate::error::{Error, Problem, Result};
+use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::lineage::{Code, Lineage, Stage};
 use crate::report::SourceFile;
 use crate::store::archive::FlightFiles;
@@ -99,7 +99,7 @@ impl Inputs {
                 flight.flight_id
             );
             self.problems.push(problem(
-                "ingest",
+                ProblemStage::Ingest,
                 &flight.flight_id,
                 &rival.display().to_string(),
                 &reason,

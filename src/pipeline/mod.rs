@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::compare::against::Earlier;
 use crate::config::Config;
-use crate::error::{Error, Problem, Result};
+use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::estimate::{Basis, Estimated};
@@ -313,9 +313,12 @@ impl Run<'_> {
         for event in self.config.events.iter().filter(|e| unflown(&e.flight_id)) {
             let place = format!("event {} at {:.1} s", event.class, event.start_s);
             let reason = "the archive has no such flight; the analyst's list names it";
-            campaign
-                .problems
-                .push(problem("segment", &event.flight_id, &place, reason));
+            campaign.problems.push(problem(
+                ProblemStage::Segment,
+                &event.flight_id,
+                &place,
+                reason,
+            ));
         }
         let shelf = self.shelf(Stage::Segment);
         table::publish(&shelf, &campaign.maneuvers)?;
@@ -398,7 +401,7 @@ impl Run<'_> {
             if fit.outcome != Outcome::Converged {
                 let reason = format!("{}: {}", fit.outcome, fit.reason);
                 campaign.problems.push(problem(
-                    "estimate",
+                    ProblemStage::Estimate,
                     &maneuver.flight_id,
                     &maneuver.maneuver_id,
                     &reason,
@@ -560,7 +563,7 @@ impl Run<'_> {
                 let reason = format!("not made: the template's page is no well-formed XML: {why}");
                 campaign
                     .problems
-                    .push(problem("report", "", PRINTED, &reason));
+                    .push(problem(ProblemStage::Report, "", PRINTED, &reason));
             }
         }
         Ok(())
@@ -602,9 +605,9 @@ fn tunnel_and_sources(config: &Config) -> String {
     }
 }
 
-fn problem(stage: &str, flight_id: &str, place: &str, reason: &str) -> Problem {
+fn problem(stage: ProblemStage, flight_id: &str, place: &str, reason: &str) -> Problem {
     Problem {
-        stage: stage.to_owned(),
+        stage,
         flight_id: flight_id.to_owned(),
         place: place.to_owned(),
         reason: reason.to_owned(),

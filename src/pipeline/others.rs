@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::{Campaign, Fingerprint, JOINT_VERSION, PREDICT_VERSION, Run, problem};
-use crate::error::{Error, Result};
+use crate::error::{Error, ProblemStage, Result};
 use crate::estimate::Estimated;
 use crate::estimate::joint::{self, Bin, Joined};
 use crate::estimate::prediction::{self, Predicted};
@@ -20,7 +20,7 @@ use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::store::{Store, table};
-use crate::tables::{EstimateRow, FitRow, JointRow, PredictedRow};
+use crate::tables::{EstimateRow, FitRow, JOINT_FLIGHT, JointRow, PredictedRow};
 
 /// The name of an artefact, which carries its fingerprint; not where it lies.
 fn name(path: &Path) -> String {
@@ -82,9 +82,12 @@ impl Run<'_> {
             .filter(|f| f.outcome != Outcome::Converged)
         {
             let reason = format!("{}: {}", fit.outcome, fit.reason);
-            campaign
-                .problems
-                .push(problem("estimate", "joint", &fit.maneuver_id, &reason));
+            campaign.problems.push(problem(
+                ProblemStage::Estimate,
+                JOINT_FLIGHT,
+                &fit.maneuver_id,
+                &reason,
+            ));
         }
         Ok(())
     }

@@ -104,10 +104,7 @@ fn file_name(id: &str) -> String {
 }
 
 fn unknown(config: &Config, what: String) -> Error {
-    Error::Archive {
-        place: PathBuf::from(&config.archive),
-        what,
-    }
+    Error::not_found(Path::new(&config.archive), what)
 }
 
 fn known_flight(config: &Config, id: &str, files: &[FlightFiles]) -> Result<()> {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{Campaign, Flight, Found, problem};
 use crate::config::Config;
-use crate::error::{Problem, Result};
+use crate::error::{Problem, ProblemStage, Result};
 use crate::flight::is_stretch;
 use crate::maneuver::{Event, Maneuver};
 use crate::segment::{self, Segmented};
@@ -75,7 +75,8 @@ pub(crate) fn same_rows(campaign: &mut Campaign) {
                     "it holds the rows of flight `{}` again; it is left out",
                     other.flight_id
                 );
-                flight.ingested = super::Ingested::refused(problem("ingest", &id, &id, &reason));
+                flight.ingested =
+                    super::Ingested::refused(problem(ProblemStage::Ingest, &id, &id, &reason));
                 break;
             }
             let reason = format!(
@@ -86,7 +87,7 @@ pub(crate) fn same_rows(campaign: &mut Campaign) {
             flight
                 .ingested
                 .problems
-                .push(problem("ingest", &id, &id, &reason));
+                .push(problem(ProblemStage::Ingest, &id, &id, &reason));
             campaign.again.push((id, from_s, to_s));
         }
     }
@@ -110,7 +111,12 @@ pub(crate) fn leave_out_same(campaign: &mut Campaign) {
     };
     for m in maneuvers.iter().filter(|m| is_again(m)) {
         let reason = "an earlier flight holds the same rows; it is left out";
-        problems.push(problem("segment", &m.flight_id, &m.maneuver_id, reason));
+        problems.push(problem(
+            ProblemStage::Segment,
+            &m.flight_id,
+            &m.maneuver_id,
+            reason,
+        ));
     }
     maneuvers.retain(|m| !is_again(m));
 }
@@ -274,7 +280,7 @@ mod tests {
             flight_id: flight_id.to_owned(),
             fingerprint: String::new(),
             record: std::path::PathBuf::new(),
-            ingested: super::super::Ingested::refused(problem("", "", "", "")),
+            ingested: super::super::Ingested::refused(problem(ProblemStage::Ingest, "", "", "")),
         };
         assert!(flight("f").is_of("f") && flight("f.2").is_of("f"));
         assert!(

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Contents, Provenance, SourceFile};
 use crate::aero::Axis;
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::identifiability::Limits;
@@ -160,7 +160,7 @@ pub fn campaign() -> Campaign {
 
 pub fn problem(reason: &str) -> Problem {
     Problem {
-        stage: "ingest".into(),
+        stage: ProblemStage::Ingest,
         flight_id: "7".into(),
         place: "flight_007.parquet".into(),
         reason: reason.into(),

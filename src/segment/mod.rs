@@ -28,7 +28,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use crate::aircraft::Aircraft;
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Unknown};
 use candidates::Scene;
@@ -265,7 +265,7 @@ fn lacking(record: &Record, classes: &[Class], settings: &Settings) -> Vec<Probl
         }
     };
     let problem = |signal: &String| Problem {
-        stage: "segment".into(),
+        stage: ProblemStage::Segment,
         flight_id: record.flight_id.clone(),
         place: signal.clone(),
         reason: reason(signal).into(),
@@ -296,7 +296,7 @@ fn stuck(record: &Record, found: &[recognise::Found]) -> Vec<Problem> {
         );
         let place = flag.clone();
         (against > 1 && values.all(|v| v == always)).then(|| Problem {
-            stage: "segment".into(),
+            stage: ProblemStage::Segment,
             flight_id: record.flight_id.clone(),
             place,
             reason,
@@ -308,7 +308,7 @@ fn stuck(record: &Record, found: &[recognise::Found]) -> Vec<Problem> {
 /// A problem at a time of the record.
 fn problem(record: &Record, at_s: f64, reason: String) -> Problem {
     Problem {
-        stage: "segment".into(),
+        stage: ProblemStage::Segment,
         flight_id: record.flight_id.clone(),
         place: format!("t = {at_s:.1} s"),
         reason,

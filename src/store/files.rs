@@ -20,10 +20,7 @@ use crate::tables::PublishedTrend;
 pub fn text(path: &Path) -> Result<String> {
     if object::is_object(path) {
         let bytes = object::get(path).map_err(|e| e.at(path))?;
-        let bytes = bytes.ok_or_else(|| Error::Archive {
-            place: path.to_owned(),
-            what: "there is no such object".into(),
-        })?;
+        let bytes = bytes.ok_or_else(|| Error::not_found(path, "there is no such object"))?;
         return String::from_utf8(bytes).map_err(|_| Error::config(path, None, "it is no text"));
     }
     std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))

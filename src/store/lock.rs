@@ -32,7 +32,7 @@ impl Lock {
     /// what is locked.
     ///
     /// # Errors
-    /// [`Error::Store`] naming the holder when another has it, [`Error::Io`] when the disk says no.
+    /// [`Error::Busy`] naming the holder when another has it, [`Error::Io`] when the disk says no.
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
         let mut lock = Lock::get(path, what, wait, File::try_lock)?;
         // Only a word for others: a disk that is too full for it stops nobody here.
@@ -82,7 +82,10 @@ impl Lock {
                     std::thread::sleep(AGAIN)
                 }
                 Err(TryLockError::WouldBlock) => {
-                    return Err(Error::store(folder, &busy(&mut file, what)));
+                    return Err(Error::Busy {
+                        path: folder.to_owned(),
+                        what: busy(&mut file, what),
+                    });
                 }
                 Err(TryLockError::Error(e)) if has_none(&e) => break,
                 Err(TryLockError::Error(e)) => return Err(Error::io(path, "cannot lock it")(e)),

@@ -91,7 +91,7 @@ impl Nights {
     /// what a killed run has left: a night that is whole is published, anything half-written goes.
     ///
     /// # Errors
-    /// [`Error::Store`] when another run publishes there, [`Error::Io`] when the disk says no.
+    /// [`Error::Busy`] when another run publishes there, [`Error::Io`] when the disk says no.
     pub fn open(reports: &Path, wait: Duration) -> Result<Nights> {
         let lock = Lock::take(&reports.join(NIGHTS).join("lock"), "reports", wait)?;
         let nights = Nights {

@@ -365,7 +365,7 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
 }
 
 fn not_a_record(path: &Path, what: &dyn std::fmt::Display) -> Error {
-    Error::store(
+    Error::damaged(
         path,
         &format!("not a record; remove it and run again: {what}"),
     )

@@ -94,14 +94,14 @@ impl Shared {
         let mut draft = Draft::of(file)?;
         if !object::fetch(&path, &mut draft.writer()).map_err(|e| e.at(&path))? {
             self.there().remove(name);
-            return Err(Error::store(&path, &"it is gone; run again"));
+            return Err(Error::damaged(&path, &"it is gone; run again"));
         }
         if draft.digest() == *written {
             return draft.place();
         }
         object::remove(&path).map_err(|e| e.at(&path))?;
         self.there().remove(name);
-        Err(Error::store(
+        Err(Error::damaged(
             &path,
             &"its bytes were not those that were written, and it was removed; run again",
         ))

@@ -45,10 +45,10 @@ impl Shelf {
 /// The key-value metadata of a published Parquet file.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Store`] naming the file.
+/// [`Error::Io`] or [`Error::Damaged`] naming the file.
 pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
     let file = std::fs::File::open(path).map_err(Error::io(path, "cannot open the table"))?;
-    let reader = SerializedFileReader::new(file).map_err(|e| Error::store(path, &e))?;
+    let reader = SerializedFileReader::new(file).map_err(|e| Error::damaged(path, &e))?;
     let pairs = reader
         .metadata()
         .file_metadata()

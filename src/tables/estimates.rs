@@ -89,6 +89,7 @@ table! {
     ///   an autoregressive process per output. It also counts noise of the measured surfaces and
     ///   errors of calibration. Student's t accounts for the few seconds from which the
     ///   autocovariance is estimated. It is never below `bound`, and contains `bound_held`.
+    ///   `docs/coverage.md` has the measured coverage of its intervals.
     /// - `bound_calibration` is the effect of the errors that `estimate: calibration:` states: the
     ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
     ///   root sum of squares. It does not average out over maneuvers with the same instruments.
@@ -98,7 +99,7 @@ table! {
     ///
     /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
     /// derivatives only. Trends, comparison and report are made from the single maneuvers alone, so
-    /// that the same data do not count twice.
+    /// that the same data do not count twice; to count maneuvers, leave out `flight_id` `joint`.
     pub struct EstimateRow in "estimates" per "maneuver and derivative or bias of its axis" {
         /// Maneuver, or group of maneuvers estimated together.
         pub maneuver_id: String,
@@ -147,6 +148,17 @@ table! {
         /// Reason why the maneuver holds it, with `hold: evidence`; empty where the class's table
         /// decides.
         pub held_because: Option<String>,
+    }
+}
+
+/// `flight_id` of maneuvers estimated together.
+pub const JOINT_FLIGHT: &str = "joint";
+
+impl EstimateRow {
+    /// True for a row of maneuvers estimated together.
+    #[must_use]
+    pub fn is_joint(&self) -> bool {
+        self.flight_id == JOINT_FLIGHT
     }
 }
 

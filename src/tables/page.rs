@@ -22,7 +22,7 @@ A run writes each table twice into its folder of reports (`reports/harv/` for th
 time. A value that does not exist is a null in Parquet and an empty field in CSV; there are no NaNs.
 Times are seconds on the record's own clock.
 
-A column's unit is in the table below, or row by row in the column `unit`. Each Parquet file has its
+A column's unit is in the table below (`1` for a plain number), or row by row in the column `unit`. Each Parquet file has its
 columns' units and meanings as key-value metadata `harvest.columns` (JSON). What the file was made from
 is in `harvest.stage`, `harvest.code`, `harvest.configuration`, `harvest.flights` (fingerprints of the
 files' contents) and `harvest.tables`.

@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
@@ -422,7 +422,7 @@ fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> 
 
 fn problem(derivative: &str, group: &str, reason: String) -> Problem {
     Problem {
-        stage: "trend".into(),
+        stage: ProblemStage::Trend,
         flight_id: String::new(),
         place: format!("{derivative}, group {group}"),
         reason,

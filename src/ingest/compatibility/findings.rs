@@ -7,7 +7,7 @@ use super::parameters::{
     ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, fault_standard_errors, observable, place, size,
 };
 use super::settings::{Action, Compatibility, OnFault};
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
 use crate::tables::{InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
@@ -144,7 +144,7 @@ impl Findings {
         let faulty = self.0.iter().filter(|f| !f.faults().is_empty());
         faulty
             .map(|f| Problem {
-                stage: "ingest".to_owned(),
+                stage: ProblemStage::Ingest,
                 flight_id: flight_id.to_owned(),
                 place: format!("channel `{}`", f.channel),
                 reason: format!("{}; {}", f.accusation(), f.consequence()),

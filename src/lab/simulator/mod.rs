@@ -27,7 +27,7 @@ mod flight;
 
 use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 
 pub use card::{Card, DerivativeLookup, Program};
 pub use flown::{FlownManeuver, TrueDerivative};
@@ -73,7 +73,7 @@ impl Simulator {
     /// The card cannot be trimmed, its law cannot hold the trim, or the aircraft departs.
     pub fn fly(&self, card: &Card) -> Result<FlownManeuver, Problem> {
         flight::fly(&self.plant, &self.settings, card).map_err(|reason| Problem {
-            stage: "simulate".into(),
+            stage: ProblemStage::Simulate,
             flight_id: card.flight_id.clone(),
             place: format!("{} at α = {}°", card.class, card.alpha_deg),
             reason,

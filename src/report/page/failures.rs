@@ -30,7 +30,7 @@ pub fn tables(contents: &Contents) -> Vec<TableView> {
 fn problems(contents: &Contents) -> TableView {
     let row = |p: &Problem| {
         vec![
-            p.stage.clone(),
+            p.stage.to_string(),
             p.flight_id.clone(),
             p.place.clone(),
             p.reason.clone(),

@@ -22,7 +22,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::file::metadata::PageIndexPolicy;
 use parquet::file::reader::ChunkReader;
 
-use crate::error::{Error, Problem};
+use crate::error::{Error, Problem, ProblemStage};
 use crate::flight::channel::RawColumn;
 use crate::flight::{Channel, RawFlight};
 use crate::ingest::Source;
@@ -90,10 +90,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     }
     if files.is_empty() {
         let what = "no flight records here: looked for files *.parquet in this folder and below it, or matching this glob";
-        return Err(Error::Archive {
-            place: archive.into(),
-            what: what.to_owned(),
-        });
+        return Err(Error::not_found(Path::new(archive), what));
     }
     Ok(flights(files))
 }
@@ -205,7 +202,7 @@ struct OpenColumn {
 /// A file that is no readable Parquet, or a mapped column that is not numbers.
 pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<Opened, Problem> {
     let refused = |path: &Path, reason: String| Problem {
-        stage: "ingest".to_owned(),
+        stage: ProblemStage::Ingest,
         flight_id: files.flight_id.clone(),
         place: path.display().to_string(),
         reason,
@@ -457,7 +454,7 @@ pub fn read(
                 values.extend_from_slice(v)
             });
             read.map_err(|reason| Problem {
-                stage: "ingest".to_owned(),
+                stage: ProblemStage::Ingest,
                 flight_id: files.flight_id.clone(),
                 place: opened.name(file),
                 reason,

@@ -51,8 +51,8 @@ impl Failure {
     #[must_use]
     pub fn at(self, place: &Path) -> Error {
         match self {
-            Failure::Passing(what) => Error::Store {
-                path: place.to_owned(),
+            Failure::Passing(what) => Error::Unavailable {
+                place: place.to_owned(),
                 what,
             },
             Failure::Lasting(what) => Error::Archive {
