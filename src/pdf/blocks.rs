@@ -85,7 +85,7 @@ impl<'a> Blocks<'a> {
         self.pending_anchors
             .extend(node.attribute("id").map(str::to_owned));
         let mut items = Vec::new();
-        if has_class(node, "sheet") {
+        if has_class(node, "new-page") {
             items.push(Item::page_break());
         }
         if node.tag_name().name() == "nav" {

@@ -18,7 +18,7 @@
 //!
 //! | class | effect |
 //! |---|---|
-//! | `sheet` | begins a page |
+//! | `new-page` | begins a page |
 //! | `screen` | is omitted |
 //! | `note` (`p`), `small` (`div`) | small type |
 //! | `pairs` (`div`) | children two by two |
@@ -67,9 +67,9 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         nodes_limit: u32::MAX,
         ..ParsingOptions::default()
     };
-    let document = Document::parse_with_options(html, options).map_err(|e| e.to_string())?;
+    let xml = Document::parse_with_options(html, options).map_err(|e| e.to_string())?;
     let fonts = Fonts::load()?;
-    let root = document.root_element();
+    let root = xml.root_element();
     let title = root
         .descendants()
         .find(|n| n.has_tag_name("title"))
@@ -82,6 +82,6 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         .unwrap_or(root);
     let style = Style::of_size(blocks::TEXT_SIZE);
     let items = Blocks::new(&fonts).children(body, WIDTH - 2.0 * MARGIN, style);
-    let pages = pagination::paginate(items, &fonts);
-    Ok(writer::write(&fonts, title, &pages))
+    let document = pagination::paginate(items, &fonts);
+    Ok(writer::write(&fonts, title, &document))
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::fonts::Fonts;
 use super::item::{Colour, Mark, RULE, SOFT, Style};
-use super::pagination::{HEIGHT, MARGIN, Pages, WIDTH};
+use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
 use super::svg_path::number;
 
 /// Operators and resources of one page.
@@ -30,22 +30,27 @@ pub struct Link {
 
 impl<'a> PageContent<'a> {
     /// Sets the page of a number from one.
-    pub fn new(fonts: &'a Fonts, title: &str, pages: &Pages, number: usize) -> PageContent<'a> {
+    pub fn new(
+        fonts: &'a Fonts,
+        title: &str,
+        document: &PagedDocument,
+        number: usize,
+    ) -> PageContent<'a> {
         let mut content = PageContent {
             fonts,
             operators: String::new(),
             opacities: BTreeSet::from([100]),
             links: Vec::new(),
         };
-        let page = number.checked_sub(1).and_then(|i| pages.sheets.get(i));
+        let page = number.checked_sub(1).and_then(|i| document.pages.get(i));
         for mark in page.map_or(&[][..], |p| &p.marks) {
-            content.mark(mark, pages);
+            content.mark(mark, document);
         }
-        content.footer(title, number, pages.sheets.len());
+        content.footer(title, number, document.pages.len());
         content
     }
 
-    fn mark(&mut self, mark: &Mark, pages: &Pages) {
+    fn mark(&mut self, mark: &Mark, document: &PagedDocument) {
         match mark {
             Mark::Text { x, y, style, text } => self.text(*x, *y, *style, text),
             Mark::Fill {
@@ -75,14 +80,16 @@ impl<'a> PageContent<'a> {
                 width,
                 height,
                 target,
-            } => self.links.extend(pages.anchors.get(target).map(|to| Link {
-                x: *x,
-                y: *y,
-                width: *width,
-                height: *height,
-                target_page: to.0,
-                target_y: to.1,
-            })),
+            } => self
+                .links
+                .extend(document.anchors.get(target).map(|to| Link {
+                    x: *x,
+                    y: *y,
+                    width: *width,
+                    height: *height,
+                    target_page: to.0,
+                    target_y: to.1,
+                })),
             Mark::PageOf {
                 x,
                 y,
@@ -90,7 +97,7 @@ impl<'a> PageContent<'a> {
                 prefix,
                 target,
             } => {
-                if let Some((page, _)) = pages.anchors.get(target) {
+                if let Some((page, _)) = document.anchors.get(target) {
                     self.text_ending_at(*x, *y, *style, &format!("{prefix}{page}"));
                 }
             }

@@ -30,8 +30,8 @@ pub struct Heading {
 
 /// The document as pages.
 #[derive(Debug, Default)]
-pub struct Pages {
-    pub sheets: Vec<Page>,
+pub struct PagedDocument {
+    pub pages: Vec<Page>,
     pub headings: Vec<Heading>,
     /// Number of the page and y of each anchor.
     pub anchors: BTreeMap<String, (usize, f32)>,
@@ -43,30 +43,30 @@ const MOST_ENTRIES: usize = 400;
 const HIGHEST_KEPT: f32 = 0.8 * (HEIGHT - TOP - BOTTOM);
 
 /// Divides items into pages.
-pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> Pages {
+pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> PagedDocument {
     let items = with_contents(items, fonts);
-    let mut pages = Pages {
-        sheets: vec![Page::default()],
-        ..Pages::default()
+    let mut document = PagedDocument {
+        pages: vec![Page::default()],
+        ..PagedDocument::default()
     };
     let mut y = TOP;
     for (i, item) in items.iter().enumerate() {
         let is_full = y + item.height + kept_height(&items, i) > HEIGHT - BOTTOM;
         if y > TOP && (item.breaks || (is_full && !item.is_room)) {
-            pages.sheets.push(Page::default());
+            document.pages.push(Page::default());
             y = TOP;
             if let Some(head) = &item.head {
-                pages.put(head, y);
+                document.put(head, y);
                 y += head.height;
             }
         }
         if item.is_room && y <= TOP {
             continue;
         }
-        pages.put(item, y);
+        document.put(item, y);
         y += item.height;
     }
-    pages
+    document
 }
 
 /// Height of the following items that an item must stay with.
@@ -83,10 +83,10 @@ fn kept_height(items: &[Item], i: usize) -> f32 {
     if height < HIGHEST_KEPT { height } else { 0.0 }
 }
 
-impl Pages {
+impl PagedDocument {
     /// Puts the marks of an item on the last page.
     fn put(&mut self, item: &Item, y: f32) {
-        let page = self.sheets.len();
+        let page = self.pages.len();
         for mark in &item.marks {
             match mark {
                 Mark::Anchor { id } => {
@@ -101,7 +101,7 @@ impl Pages {
                     });
                 }
                 other => {
-                    if let Some(last) = self.sheets.last_mut() {
+                    if let Some(last) = self.pages.last_mut() {
                         last.marks.push(other.moved(MARGIN, y));
                     }
                 }

@@ -117,7 +117,7 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         [_, _, width, height] => [width, height],
         _ => [of("width").unwrap_or(0.0), of("height").unwrap_or(0.0)],
     };
-    let mut pen = Pen {
+    let mut reader = SvgReader {
         fonts,
         clips: BTreeMap::new(),
         out: String::new(),
@@ -130,7 +130,7 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         .filter(|n| n.has_tag_name("clipPath") || n.tag_name().name() == "clipPath")
     {
         if let (Some(id), Some(rect)) = (clip.attribute("id"), clip.first_element_child()) {
-            pen.clips.insert(id.to_owned(), pen.rectangle(rect));
+            reader.clips.insert(id.to_owned(), reader.rectangle(rect));
         }
     }
     let style = Style {
@@ -143,16 +143,16 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         weight: Weight::Regular,
         anchor: 0.0,
     };
-    pen.children(svg, &Style::of(svg, &style));
+    reader.children(svg, &Style::of(svg, &style));
     Drawing {
         width,
         height,
-        operators: pen.out,
-        opacities: pen.opacities,
+        operators: reader.out,
+        opacities: reader.opacities,
     }
 }
 
-struct Pen<'a> {
+struct SvgReader<'a> {
     fonts: &'a Fonts,
     clips: BTreeMap<String, String>,
     out: String,
@@ -162,7 +162,7 @@ struct Pen<'a> {
     size: [f32; 2],
 }
 
-impl Pen<'_> {
+impl SvgReader<'_> {
     fn children(&mut self, node: Node, style: &Style) {
         for child in node.children().filter(Node::is_element) {
             self.element(child, &Style::of(child, style));

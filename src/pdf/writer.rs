@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::fonts::{Fonts, Weight};
 use super::page_content::{Link, PageContent};
-use super::pagination::{HEIGHT, Heading, Pages, WIDTH};
+use super::pagination::{HEIGHT, Heading, PagedDocument, WIDTH};
 
 /// Numbers of the objects.
 const CATALOG: i32 = 1;
@@ -26,16 +26,16 @@ const FIRST_PAGE: i32 = FIRST_FONT + 2 * FONT_OBJECTS;
 const ABOVE_TARGET: f32 = 6.0;
 
 /// Writes the document.
-pub fn write(fonts: &Fonts, title: &str, pages: &Pages) -> Vec<u8> {
+pub fn write(fonts: &Fonts, title: &str, document: &PagedDocument) -> Vec<u8> {
     let mut pdf = Pdf::new();
-    write_catalog(&mut pdf, title, pages.sheets.len());
+    write_catalog(&mut pdf, title, document.pages.len());
     for weight in Weight::ALL {
         fonts.write(&mut pdf, weight, font_ref(weight), &compressed);
     }
-    let contents: Vec<(PageContent, Vec<u8>)> = (1..=pages.sheets.len())
+    let contents: Vec<(PageContent, Vec<u8>)> = (1..=document.pages.len())
         .into_par_iter()
         .map(|number| {
-            let content = PageContent::new(fonts, title, pages, number);
+            let content = PageContent::new(fonts, title, document, number);
             let stream = compressed(content.operators.as_bytes());
             (content, stream)
         })
@@ -43,7 +43,7 @@ pub fn write(fonts: &Fonts, title: &str, pages: &Pages) -> Vec<u8> {
     for (number, (content, stream)) in (1..).zip(&contents) {
         write_page(&mut pdf, number, content, stream);
     }
-    write_outline(&mut pdf, &pages.headings, pages.sheets.len());
+    write_outline(&mut pdf, &document.headings, document.pages.len());
     pdf.finish()
 }
 

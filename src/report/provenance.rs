@@ -1,38 +1,38 @@
-//! Where everything came from, enough to do it again: program, command, data with their
+//! Provenance of the results, enough to reproduce them: program, command, data with their
 //! fingerprints, configuration.
 
 use serde::Serialize;
 
 use super::table_view::TableView;
 
-/// A file that was read, as anyone can check it.
+/// A file that was read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SourceFile {
-    /// Without the folder: where the archive lies is said by the command.
+    /// Name without the folder, which the command has.
     pub name: String,
     pub bytes: u64,
-    /// BLAKE3 of its content, hexadecimal.
+    /// BLAKE3 of the content, hexadecimal.
     pub blake3: String,
 }
 
-/// What decided the results.
+/// Everything that the results depend on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Provenance {
-    /// The program with its version, and the versions of its methods.
+    /// Program and methods with their versions.
     pub program: String,
-    /// What does it again.
+    /// Command that reproduces the results.
     pub command: String,
     pub data: Vec<SourceFile>,
-    /// The configuration's files as they were: name and text.
+    /// Name and text of each configuration file.
     pub configuration: Vec<(String, String)>,
 }
 
 impl Provenance {
-    /// The data as a table.
+    /// Table of the data files.
     #[must_use]
     pub fn table(&self) -> TableView {
         let row = |f: &SourceFile| vec![f.name.clone(), f.bytes.to_string(), f.blake3.clone()];
-        let note = "BLAKE3 of each file's content: the same digits are the same data.";
+        let note = "BLAKE3 of each file's content: equal digits mean equal data.";
         TableView::new(
             "Data",
             note,

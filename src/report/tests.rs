@@ -1,5 +1,4 @@
-//! The page as a whole: complete, well-formed, safe against what stands in the data, and the same
-//! bytes every time.
+//! The page as a whole: complete, well-formed, escaped, and deterministic.
 
 use std::collections::BTreeSet;
 
@@ -11,13 +10,12 @@ fn render(campaign: &Campaign) -> String {
     html(&campaign.contents(), None).expect("a page")
 }
 
-/// Elements that HTML knows as never having content: in HTML these alone may be closed in their own
-/// tag.
+/// Elements without content: in HTML only these may be closed in their own tag.
 const VOID: [&str; 4] = ["meta", "br", "hr", "input"];
-/// What stands in running text: a paragraph can hold nothing else.
+/// Elements of running text: a paragraph can hold nothing else.
 const PHRASING: [&str; 9] = ["a", "b", "i", "small", "sub", "span", "code", "svg", "br"];
 
-/// The page as a strict reader sees it: well-formed, and nested as HTML allows.
+/// Checks that the page is well-formed and nested as HTML allows.
 fn assert_valid(page: &str) {
     let options = roxmltree::ParsingOptions {
         allow_dtd: true,
@@ -52,13 +50,13 @@ fn assert_valid(page: &str) {
             "tr" => only(&["td", "th"]),
             "svg" => {
                 let is_hidden = node.attribute("aria-hidden") == Some("true");
-                let says = |tag| {
+                let has_text = |tag| {
                     node.children()
                         .any(|c| c.has_tag_name(tag) && c.text().is_some_and(|t| !t.is_empty()))
                 };
                 assert!(
-                    is_hidden || (says("title") && says("desc")),
-                    "a drawing says nothing: {}",
+                    is_hidden || (has_text("title") && has_text("desc")),
+                    "a drawing without alternative text: {}",
                     &source[..120]
                 );
             }
@@ -95,7 +93,7 @@ fn the_page_is_valid_and_its_numbers_are_numbers() {
 }
 
 #[test]
-fn ids_are_unique_whatever_their_case_and_links_lead_somewhere() {
+fn ids_are_unique_without_case_and_links_have_targets() {
     let page = render(&campaign());
     let ids: Vec<String> = values(&page, "id")
         .iter()
@@ -105,7 +103,10 @@ fn ids_are_unique_whatever_their_case_and_links_lead_somewhere() {
     assert_eq!(ids.len(), unique.len());
     for link in values(&page, "href") {
         let target = link.strip_prefix('#').expect("a link within the page");
-        assert!(ids.iter().any(|id| id == target), "#{target} leads nowhere");
+        assert!(
+            ids.iter().any(|id| id == target),
+            "#{target} does not exist"
+        );
     }
 }
 
@@ -156,7 +157,7 @@ fn the_page_loads_nothing_and_needs_no_script() {
     );
     assert!(
         page.contains("default-src 'none'"),
-        "a browser is told to load nothing"
+        "the policy forbids to load anything"
     );
     let (before, _) = page.split_once("<script>").expect("the script");
     assert!(
@@ -166,7 +167,7 @@ fn the_page_loads_nothing_and_needs_no_script() {
 }
 
 #[test]
-fn what_stands_in_the_data_cannot_become_markup() {
+fn data_cannot_become_markup() {
     let hostile = "<script>alert('x')</script>&\"";
     let mut campaign = campaign();
     campaign.maneuvers[0].flight_id = hostile.into();
@@ -187,7 +188,7 @@ fn what_stands_in_the_data_cannot_become_markup() {
 }
 
 #[test]
-fn an_empty_campaign_has_a_page_that_says_so() {
+fn an_empty_campaign_has_a_page() {
     let page = render(&Campaign::default());
     assert!(page.contains("No maneuver was found"));
     assert!(page.contains("Nothing to draw"));
@@ -195,7 +196,7 @@ fn an_empty_campaign_has_a_page_that_says_so() {
 }
 
 #[test]
-fn a_campaign_where_everything_failed_has_a_page_that_says_why() {
+fn a_campaign_without_a_sound_fit_has_a_page_with_the_reasons() {
     let mut campaign = campaign();
     campaign.estimates.clear();
     campaign.trends.clear();
@@ -213,7 +214,7 @@ fn a_campaign_where_everything_failed_has_a_page_that_says_why() {
 }
 
 #[test]
-fn numbers_that_are_none_do_not_break_the_page() {
+fn numbers_that_are_not_finite_do_not_break_the_page() {
     let mut campaign = campaign();
     for (i, bad) in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
         .into_iter()
@@ -275,7 +276,7 @@ fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
     let campaign = campaign();
     let page = render(&campaign);
     assert_eq!(
-        page.matches("class=\"maneuver sheet\"").count(),
+        page.matches("class=\"maneuver new-page\"").count(),
         campaign.maneuvers.len()
     );
     assert_eq!(
@@ -285,7 +286,7 @@ fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
 }
 
 #[test]
-fn the_summary_says_what_is_new_what_failed_and_what_disagrees_before_anything_else() {
+fn the_summary_comes_first_with_news_failures_and_disagreements() {
     let page = render(&campaign());
     let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
     assert!(at("<h3>What is new</h3>") < at("<h3>What failed</h3>"));
@@ -294,7 +295,7 @@ fn the_summary_says_what_is_new_what_failed_and_what_disagrees_before_anything_e
 }
 
 #[test]
-fn the_report_ends_with_what_it_takes_to_do_it_again() {
+fn the_report_ends_with_its_provenance() {
     let page = render(&campaign());
     let (_, end) = page.split_once("id=\"provenance\"").expect("the section");
     for words in [
@@ -309,7 +310,7 @@ fn the_report_ends_with_what_it_takes_to_do_it_again() {
 }
 
 #[test]
-fn a_template_of_the_user_replaces_the_built_in_one_and_its_error_names_the_line() {
+fn a_template_of_the_user_replaces_the_built_in_one_and_errors_name_the_line() {
     let campaign = campaign();
     let own = html(
         &campaign.contents(),

@@ -140,7 +140,7 @@ fn a_browser_prints_the_report() {
     );
     assert!(seen.console.is_empty(), "{:?}", seen.console);
     let pages = lopdf::Document::load(&printed).unwrap().get_pages().len();
-    let sheets = demo().report.matches("class=\"maneuver sheet\"").count()
+    let sheets = demo().report.matches("class=\"maneuver new-page\"").count()
         + demo().report.matches("class=\"derivative").count();
     assert!(pages > sheets, "{pages} pages for {sheets} sheets");
 }

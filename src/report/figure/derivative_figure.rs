@@ -22,43 +22,43 @@ use super::scale::Scale;
 use super::style::{FONT, INK, TUNNEL_COLOUR};
 use crate::report::notation::{Digits, escaped};
 
-/// Width of a figure in its own units. On a page (178 mm) a unit is 0.84 pt, so that 14 is over 11
-/// pt.
+/// Width in units of the drawing. On a page 178 mm wide a unit is 0.84 pt: text of 14 units is
+/// over 11 pt.
 const WIDTH: f64 = 600.0;
 const HEIGHT: f64 = 350.0;
-/// Room above and below the frame: half a line of text for the topmost tick label, and ticks and
-/// label of the x axis.
+/// Margins above and below the frame: half a line for the topmost tick label; ticks and label of
+/// the x axis.
 const MARGINS: (f64, f64) = (9.0, 44.0);
 const TEXT: u32 = 14;
 
-/// Beyond so many the tunnel's line has no marks: they would hide it.
-const MOST_TUNNEL_MARKS: usize = 25;
+/// With more points the tunnel's line has no markers, which would hide it.
+const MOST_TUNNEL_MARKERS: usize = 25;
 
-/// A derivative over angle of attack.
+/// Content of the figure.
 #[derive(Clone, Debug)]
 pub struct DerivativeFigure<'a> {
-    /// Unique in the page.
+    /// Id, unique in the page.
     pub id: &'a str,
     pub title: &'a str,
-    /// What those are told who do not see it.
+    /// Alternative text.
     pub description: &'a str,
     pub y_label: String,
     pub alpha: Scale,
     pub scale: Scale,
-    /// α, lower and upper end of the trend's 95 % band.
+    /// Angle of attack (deg), lower and upper end of the trend's 95 % band.
     pub band: Vec<(f64, f64, f64)>,
     pub trend: Vec<(f64, f64)>,
     pub tunnel: Vec<(f64, f64)>,
     pub classes: Vec<ClassEstimates>,
 }
 
-/// The estimates of one class, as they are drawn.
+/// Estimates of one class.
 #[derive(Clone, Debug)]
 pub struct ClassEstimates {
     pub marker: Marker,
-    /// What the class is hidden with.
+    /// Word by which the page hides the class.
     pub token: String,
-    /// α, value and bound of each.
+    /// Angle of attack (deg), value and bound of each.
     pub estimates: Vec<(f64, f64, f64)>,
 }
 
@@ -76,7 +76,7 @@ pub fn draw(figure: &DerivativeFigure) -> String {
     };
     let mut scene = render_multiple(curves(figure), layout());
     let place = ComputedLayout::from_layout(&layout());
-    let pen = Pen {
+    let pen = EstimatePen {
         place: &place,
         scale: figure.scale,
     };
@@ -125,8 +125,7 @@ fn layout(x_label: &str, y_label: &str, height: f64, x: Scale, y: Scale) -> Layo
     }
 }
 
-/// Tick labels like the numbers of the tables: as many decimals as the step has, and a proper
-/// minus.
+/// Tick labels with as many decimals as the step has and a typographic minus.
 fn ticks(scale: Scale) -> TickFormat {
     let digits = Digits::of_ticks(scale.decimals());
     TickFormat::Custom(Arc::new(move |value| digits.write(Some(value))))
@@ -139,14 +138,14 @@ fn zero_line() -> ReferenceLine {
         .with_dasharray("none")
 }
 
-/// A plot without points: the crate draws no axes where there is no plot at all.
-fn nothing() -> Plot {
+/// A plot without points: the crate draws no axes without a plot.
+fn empty_plot() -> Plot {
     Plot::Scatter(ScatterPlot::new())
 }
 
-/// Band, trend and tunnel, from back to front.
+/// Band, tunnel and trend, from back to front.
 fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
-    let mut plots = vec![nothing()];
+    let mut plots = vec![empty_plot()];
     if figure.band.len() > 1 {
         let (alpha, ends): (Vec<f64>, Vec<(f64, f64)>) =
             figure.band.iter().map(|&(a, l, u)| (a, (l, u))).unzip();
@@ -160,7 +159,7 @@ fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
     if !figure.tunnel.is_empty() {
         plots.push(Plot::Line(curve(&figure.tunnel, TUNNEL_COLOUR, 1.6, "6 4")));
     }
-    if !figure.tunnel.is_empty() && figure.tunnel.len() <= MOST_TUNNEL_MARKS {
+    if !figure.tunnel.is_empty() && figure.tunnel.len() <= MOST_TUNNEL_MARKERS {
         let marks = ScatterPlot::new()
             .with_data(figure.tunnel.clone())
             .with_color(TUNNEL_COLOUR);
@@ -186,14 +185,14 @@ fn curve(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> LinePlo
     }
 }
 
-/// Draws into the plot area what the crate does not draw well itself.
-struct Pen<'a> {
+/// Draws estimates into the plot area.
+struct EstimatePen<'a> {
     place: &'a ComputedLayout,
     scale: Scale,
 }
 
-impl Pen<'_> {
-    /// A class's estimates: bars behind marks; an arrowhead at the edge for each that lies outside.
+impl EstimatePen<'_> {
+    /// Draws bars behind markers, and an arrowhead at the edge for an estimate outside.
     fn estimates(&self, scene: &mut Scene, marker: Marker, estimates: &[(f64, f64, f64)]) {
         let (mut bars, mut marks, mut arrows) = (String::new(), String::new(), String::new());
         for &(alpha, value, bound) in estimates {
@@ -210,7 +209,7 @@ impl Pen<'_> {
         stroke(scene, arrows, marker.colour, 1.6, None);
     }
 
-    /// One bound to either side, cut off at the frame; a cap only where the bar ends inside it.
+    /// Draws one bound to either side, cut at the frame, with a cap where the bar ends inside.
     fn bar(&self, path: &mut String, x: f64, value: f64, bound: f64) {
         let (low, high) = (value - bound, value + bound);
         let y = |v: f64| self.place.map_y(v.clamp(self.scale.min, self.scale.max));
@@ -262,8 +261,8 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
     }))
 }
 
-/// Makes a drawing of the crate fit to stand in a page with others: it scales with its column, says
-/// its title to those who do not see it, has ids of its own, and no digits beyond a hundredth.
+/// Adapts a drawing of the crate to a page with others: scaled to its column, with alternative
+/// text, ids of its own and at most two decimals.
 fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);
     let height = svg
@@ -278,7 +277,7 @@ fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     head + &shortened(&own_clips(body, id))
 }
 
-/// The crate numbers its clip paths through the whole process; here they bear the figure's own id.
+/// Names clip paths by the figure's id: the crate numbers them through the whole process.
 fn own_clips(svg: &str, id: &str) -> String {
     const COUNTED: &str = "kuva-clip-";
     let mut parts = svg.split(COUNTED);
@@ -293,7 +292,7 @@ fn own_clips(svg: &str, id: &str) -> String {
     out
 }
 
-/// Cuts decimals that only binary fractions have (more than nine of them) to two.
+/// Cuts more than nine decimals, which come from binary fractions, to two.
 fn shortened(svg: &str) -> String {
     let mut parts = svg.split('.');
     let mut out = parts.next().unwrap_or_default().to_owned();
@@ -349,14 +348,14 @@ mod tests {
     }
 
     #[test]
-    fn the_same_figure_is_the_same_bytes_however_many_were_drawn_before() {
+    fn a_figure_does_not_depend_on_figures_drawn_before() {
         let first = draw(&figure());
         assert_eq!(first, draw(&figure()));
         assert!(first.contains("clip-d3") && !first.contains("kuva"));
     }
 
     #[test]
-    fn estimates_have_marks_and_bars_and_those_outside_an_arrowhead() {
+    fn estimates_have_markers_and_bars_and_outside_the_axes_arrowheads() {
         let svg = draw(&figure());
         let without = draw(&DerivativeFigure {
             classes: vec![],
@@ -369,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_without_curves_has_axes_all_the_same() {
+    fn a_figure_without_curves_has_axes() {
         let (band, trend, tunnel) = (vec![], vec![], vec![]);
         let svg = draw(&DerivativeFigure {
             band,
@@ -384,12 +383,12 @@ mod tests {
     }
 
     #[test]
-    fn a_title_cannot_leave_its_attribute() {
+    fn a_title_is_escaped() {
         assert!(draw(&figure()).contains("CN_alpha &lt;flight&gt;"));
     }
 
     #[test]
-    fn only_digits_of_binary_fractions_are_cut() {
+    fn only_decimals_of_binary_fractions_are_cut() {
         assert_eq!(
             shortened("a 12.340000000000002 0.0025 .5\""),
             "a 12.34 0.0025 .5\""

@@ -1,9 +1,8 @@
-//! The scale of one axis of a figure: round limits and ticks that show what the reader came for,
-//! whatever a few wild values do.
+//! Scale of one axis: round limits and ticks, not stretched by a few outliers.
 
 use crate::report::notation::power_of_ten;
 
-/// Round limits, at half steps at least, with ticks at every multiple of the step between them.
+/// Limits at multiples of half a step, with ticks at the multiples of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     pub min: f64,
@@ -11,20 +10,26 @@ pub struct Scale {
     pub step: f64,
 }
 
-/// About so many steps fill a scale: enough to read a value off, few enough for legible labels.
+/// Approximate number of steps: enough to read a value, few enough for legible labels.
 const STEPS: f64 = 5.0;
 
-/// Estimates further from the middle 80 % than this many times its width do not stretch the axis.
+/// Distance of outliers from the middle 80 % of the estimates, in widths of that interval.
 const FENCE: f64 = 1.0;
+/// Fewer estimates have no quantiles worth the name.
+const LEAST_FOR_FENCE: usize = 5;
+/// Share of the range by which ends of bars and band may extend it.
+const LARGEST_EXTENSION: f64 = 0.35;
+/// Share of the range left free at either end.
+const MARGIN: f64 = 0.03;
 
 impl Scale {
-    /// The round scale that covers an interval; one of some width even where the interval has none.
+    /// Round scale that covers an interval. An interval without width is widened.
     #[must_use]
     pub fn covering(low: f64, high: f64) -> Scale {
         Scale::in_steps(low, high, STEPS)
     }
 
-    /// The same with about so many steps: fewer where the axis is short.
+    /// Round scale that covers an interval in about `steps` steps.
     #[must_use]
     pub fn in_steps(low: f64, high: f64, steps: f64) -> Scale {
         let (low, high) = widened(low, high);
@@ -32,7 +37,7 @@ impl Scale {
         Scale::with_step(low, high, 0.5 * step, step)
     }
 
-    /// The scale from one multiple of `margin` to another that covers an interval.
+    /// Scale between multiples of `margin` that covers an interval.
     #[must_use]
     pub fn with_step(low: f64, high: f64, margin: f64, step: f64) -> Scale {
         let (low, high) = widened(low, high);
@@ -48,7 +53,7 @@ impl Scale {
         (self.min..=self.max).contains(&value)
     }
 
-    /// How many decimals its tick labels need.
+    /// Number of decimals of its tick labels.
     #[must_use]
     pub fn decimals(&self) -> usize {
         // A step of 0.1 may be 0.099999…: its power of ten is that of the rounded number.
@@ -56,20 +61,20 @@ impl Scale {
     }
 }
 
-/// What one figure has to show.
+/// Values that a figure shows.
 #[derive(Clone, Debug, Default)]
 pub struct ValueRange {
-    /// Values that must be seen: the trend and the tunnel.
+    /// Trend and tunnel: always within the axis.
     pub lines: Vec<f64>,
-    /// Estimates and the half-length of their bars.
+    /// Estimates and the half lengths of their bars.
     pub estimates: Vec<(f64, f64)>,
     /// Ends of the trend's band.
     pub band: Vec<f64>,
 }
 
 impl ValueRange {
-    /// The scale for it: all of the lines, the estimates but for the wild ones, and of bars and
-    /// band what does not dwarf them.
+    /// Scale that covers all lines, the estimates without outliers, and those ends of bars and
+    /// band that do not dwarf them.
     #[must_use]
     pub fn scale(&self) -> Scale {
         let values: Vec<f64> = self
@@ -78,36 +83,30 @@ impl ValueRange {
             .map(|e| e.0)
             .filter(|v| v.is_finite())
             .collect();
-        let fence = fence(&values);
-        let near = values
+        let fence = outlier_fence(&values);
+        let inliers = values
             .into_iter()
             .filter(|v| fence.is_none_or(|(low, high)| (low..=high).contains(v)));
-        let core = self
-            .lines
-            .iter()
-            .copied()
-            .filter(|v| v.is_finite())
-            .chain(near);
-        let Some((low, high)) = extent(core) else {
+        let Some((low, high)) = extent(self.lines.iter().copied().chain(inliers)) else {
             return Scale::covering(0.0, 1.0);
         };
-        let room = 0.35 * (high - low);
+        let room = LARGEST_EXTENSION * (high - low);
         let ends = self
             .estimates
             .iter()
-            .flat_map(|(value, bound)| [value - bound, value + bound]);
-        let more = ends
+            .flat_map(|(value, bound)| [value - bound, value + bound])
             .chain(self.band.iter().copied())
             .filter(|v| (low - room..=high + room).contains(v));
-        let (low, high) = extent(more.chain([low, high])).unwrap_or((low, high));
-        let margin = 0.03 * (high - low);
+        let (low, high) = extent(ends.chain([low, high])).unwrap_or((low, high));
+        let margin = MARGIN * (high - low);
         Scale::covering(low - margin, high + margin)
     }
 }
 
-/// The interval outside which an estimate is wild, by the middle 80 % of all of them.
-fn fence(values: &[f64]) -> Option<(f64, f64)> {
-    if values.len() < 5 {
+/// Interval outside which an estimate is an outlier, from the middle 80 % of all estimates; `None`
+/// for fewer than five.
+fn outlier_fence(values: &[f64]) -> Option<(f64, f64)> {
+    if values.len() < LEAST_FOR_FENCE {
         return None;
     }
     let low = quantile(values, 0.1)?;
@@ -116,7 +115,7 @@ fn fence(values: &[f64]) -> Option<(f64, f64)> {
     Some((low - width, high + width))
 }
 
-/// A quantile of the finite values, linear between them.
+/// Quantile of the finite values, interpolated linearly.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -132,7 +131,7 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     Some(below + (above - below) * place.fract())
 }
 
-/// The smallest and the largest of the finite values.
+/// Smallest and largest finite value.
 #[must_use]
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
@@ -144,8 +143,7 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// An interval of some width, however narrow the given one: one value alone gets a tenth of itself
-/// to either side.
+/// Widens an interval without width by a tenth of its value to either side.
 fn widened(low: f64, high: f64) -> (f64, f64) {
     let size = low.abs().max(high.abs());
     if !(low.is_finite() && high.is_finite()) || size > 1e300 {
@@ -159,7 +157,7 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
     }
 }
 
-/// The smallest of 1, 2, 5 and 10 times a power of ten that is at least `step`.
+/// Smallest of 1, 2, 5 and 10 times a power of ten not below `step`.
 fn round_step(step: f64) -> f64 {
     let decade = 10_f64.powi(power_of_ten(step));
     let multiple = [1.0, 2.0, 5.0]
@@ -207,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wild_estimate_does_not_flatten_the_figure() {
+    fn outliers_do_not_flatten_the_figure() {
         let mut range = ValueRange {
             lines: vec![0.04, 0.08],
             ..ValueRange::default()
@@ -220,16 +218,16 @@ mod tests {
             .estimates
             .extend([(9.0, 30.0), (-4.0, 2.0), (f64::NAN, f64::INFINITY)]);
         range.band = vec![-2.0, 5.0, f64::INFINITY];
-        let wild = range.scale();
+        let with_outliers = range.scale();
         assert!(
-            wild.max - wild.min < 2.0 * (calm.max - calm.min),
-            "{wild:?} against {calm:?}"
+            with_outliers.max - with_outliers.min < 2.0 * (calm.max - calm.min),
+            "{with_outliers:?} against {calm:?}"
         );
-        assert!(wild.contains(0.04) && wild.contains(0.08));
+        assert!(with_outliers.contains(0.04) && with_outliers.contains(0.08));
     }
 
     #[test]
-    fn nothing_to_show_and_what_is_not_finite_still_have_a_scale() {
+    fn no_values_and_values_that_are_not_finite_still_have_a_scale() {
         let scale = ValueRange {
             lines: vec![f64::NAN, f64::INFINITY],
             ..ValueRange::default()
