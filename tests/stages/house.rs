@@ -1,112 +1,102 @@
-//! The house: modules use only what stands above them in `src/lib.rs`, what the analyst decides is
-//! nowhere in the code, and disk and terminal have one place each.
+//! Rules of the house: modules use only what stands above them in `src/lib.rs`, files form no
+//! circles, what the analyst decides is nowhere in the code, disk and terminal have one place each,
+//! and comments read as the style has it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+use crate::sources::{Source, Tree, circles, root, source, sources, words};
 use crate::support::files;
 
-/// A source file: its module at the top level, its path, and its lines that are code and no test.
-struct Source {
-    module: String,
-    path: String,
-    code: Vec<(usize, String)>,
+/// Numbered lines of a text.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(at, line)| (at + 1, line))
 }
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// All sources but the crate's roots and files of tests alone.
-fn sources() -> Vec<Source> {
-    let src = root().join("src");
-    let mut found = Vec::new();
-    for file in files(&src) {
-        let path = file
-            .strip_prefix(&src)
-            .unwrap()
-            .to_string_lossy()
-            .replace('\\', "/");
-        let name = file.file_name().unwrap().to_string_lossy();
-        let is_rust = file.extension().is_some_and(|e| e == "rs");
-        if !is_rust
-            || ["tests.rs", "campaign_fixture.rs"].contains(&&*name)
-            || path.contains("/tests/")
-            || ["lib.rs", "main.rs", "build.rs"].contains(&&*path)
-        {
-            continue;
-        }
-        let module = path.split(['/', '.']).next().unwrap().to_owned();
-        found.push(Source {
-            module,
-            code: code(&fs::read_to_string(&file).unwrap()),
-            path,
-        });
-    }
-    found
-}
-
-/// The numbered lines of a file without comments, as far as its module of tests.
-fn code(text: &str) -> Vec<(usize, String)> {
-    let lines: Vec<&str> = text.lines().collect();
-    let tests = lines
-        .windows(2)
-        .position(|w| w[0].trim() == "#[cfg(test)]" && w[1].trim_end().ends_with('{'));
-    let code = lines.iter().take(tests.unwrap_or(lines.len())).enumerate();
-    code.filter(|(_, line)| !line.trim_start().starts_with("//"))
-        .map(|(i, line)| (i + 1, line.split(" // ").next().unwrap().to_owned()))
+/// Files that use each other in a small tree, given by path and text.
+fn uses(files: &[(&str, &str)]) -> BTreeMap<String, BTreeSet<String>> {
+    let sources: Vec<Source> = files
+        .iter()
+        .map(|(path, text)| source((*path).to_owned(), text))
+        .collect();
+    let tree = Tree::of(&sources);
+    tree.uses()
+        .into_iter()
+        .map(|(file, used)| {
+            (
+                file.to_owned(),
+                used.into_iter().map(str::to_owned).collect(),
+            )
+        })
         .collect()
 }
 
-fn is_word(c: char) -> bool {
-    c.is_alphanumeric() || c == '_'
-}
-
-fn words(line: &str) -> impl Iterator<Item = &str> {
-    line.split(|c| !is_word(c)).filter(|w| !w.is_empty())
-}
-
-/// The top-level modules that follow each `crate::` in a text: one name, or the heads of a braced
-/// list.
-fn used(text: &str) -> BTreeSet<String> {
-    let mut modules = BTreeSet::new();
-    for rest in text.split("crate::").skip(1) {
-        match rest.strip_prefix('{') {
-            Some(list) => {
-                let mut depth = 0;
-                let mut head = String::new();
-                for c in list.chars() {
-                    match c {
-                        '}' if depth == 0 => break,
-                        '{' => depth += 1,
-                        '}' => depth -= 1,
-                        ',' if depth == 0 => {
-                            modules.extend(
-                                words(&std::mem::take(&mut head)).next().map(str::to_owned),
-                            );
-                        }
-
-                        _ => head.push(c),
-                    }
-                }
-                modules.extend(words(&head).next().map(str::to_owned));
-            }
-            None => modules.extend(words(rest).next().map(str::to_owned)),
-        }
-    }
-    modules
+#[test]
+fn paths_lead_to_the_file_that_defines_the_item() {
+    let used = uses(&[
+        (
+            "a/mod.rs",
+            "mod leaf;\npub use leaf::Leaf;\npub struct Own;\nuse crate::b::{self, Deep as D};",
+        ),
+        ("a/leaf.rs", "pub struct Leaf; // use super::Own\n"),
+        ("b.rs", "use crate::a::{Leaf, Own};\npub struct Deep;"),
+        (
+            "c.rs",
+            "use crate::a;\nfn f() { a::Own; serde::de::x(); \"crate::b::Deep\"; }",
+        ),
+    ]);
+    let of = |file: &str| used[file].iter().map(String::as_str).collect::<Vec<_>>();
+    assert_eq!(of("a/mod.rs"), ["a/leaf.rs", "b.rs"]);
+    assert!(of("a/leaf.rs").is_empty());
+    assert_eq!(of("b.rs"), ["a/leaf.rs", "a/mod.rs"]);
+    assert_eq!(of("c.rs"), ["a/mod.rs"]);
 }
 
 #[test]
-fn a_list_of_uses_is_read_to_its_heads() {
-    let used = used(
-        "use crate::{compare, estimate::{Basis, Fit},\n trend};\nuse crate::units::Unit; crate::error::io()",
-    );
+fn a_circle_is_found_with_all_its_files() {
+    let used = uses(&[
+        (
+            "a/mod.rs",
+            "mod leaf;\nmod other;\npub struct Shared;\nuse leaf::Leaf;",
+        ),
+        ("a/leaf.rs", "use super::other::f;\npub struct Leaf;"),
+        ("a/other.rs", "fn f() { super::Shared; }"),
+        ("b.rs", "use crate::a::Shared;"),
+    ]);
+    let borrowed = used
+        .iter()
+        .map(|(file, used)| (file.as_str(), used.iter().map(String::as_str).collect()))
+        .collect();
     assert_eq!(
-        used.into_iter().collect::<Vec<_>>(),
-        ["compare", "error", "estimate", "trend", "units"]
+        circles(&borrowed),
+        [BTreeSet::from(["a/leaf.rs", "a/mod.rs", "a/other.rs"])]
     );
+}
+
+#[test]
+fn code_below_a_module_of_tests_is_seen_and_tests_are_not() {
+    let text = "fn a() {}\n#[cfg(test)]\nmod tests {\n    fn b() { '{'; \"}\"; }\n}\nfn c<'a>() { /* d */ }\n";
+    let source = source("x.rs".to_owned(), text);
+    let seen: Vec<&str> = words(&source.bare).collect();
+    assert_eq!(seen, ["fn", "a", "fn", "c", "a"]);
+}
+
+#[test]
+fn files_form_no_circles() {
+    let sources = sources();
+    let tree = Tree::of(&sources);
+    let uses = tree.uses();
+    assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 300);
+    let mut found = String::new();
+    for circle in circles(&uses) {
+        found += &format!("{} files:\n", circle.len());
+        for file in &circle {
+            let others: Vec<&str> = uses[file].intersection(&circle).copied().collect();
+            found += &format!("  {file} uses {}\n", others.join(", "));
+        }
+    }
+    assert!(found.is_empty(), "\n{found}");
 }
 
 #[test]
@@ -118,27 +108,23 @@ fn a_module_uses_only_modules_listed_above_it() {
         .collect();
     assert!(order.len() > 10, "{order:?}");
     let rank = |module: &str| order.iter().position(|m| *m == module);
+    let sources = sources();
+    let tree = Tree::of(&sources);
+    let module = |file: &str| file.split(['/', '.']).next().unwrap().to_owned();
     let mut wrong = Vec::new();
-    for source in sources() {
-        let own =
-            rank(&source.module).unwrap_or_else(|| panic!("lib.rs does not list {}", source.path));
-        let text = source
-            .code
-            .iter()
-            .map(|(_, line)| line.as_str())
-            .collect::<Vec<_>>()
-            .join("\n");
-        for module in used(&text) {
-            if rank(&module).is_none_or(|other| other > own) {
-                wrong.push(format!("{} uses `{module}`", source.path));
+    for (file, used) in tree.uses() {
+        let own = rank(&module(file)).unwrap_or_else(|| panic!("lib.rs does not list {file}"));
+        for other in used {
+            if rank(&module(other)).is_none_or(|other| other > own) {
+                wrong.push(format!("{file} uses {other}"));
             }
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// What `key:` says in a YAML file, on every line that has it.
-fn said(file: &Path, key: &str) -> Vec<String> {
+/// Values of a key in a YAML file.
+fn values(file: &Path, key: &str) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap();
     let value = |line: &str| {
         let (_, rest) = line.split_once(&format!("{key}: "))?;
@@ -154,17 +140,17 @@ fn said(file: &Path, key: &str) -> Vec<String> {
 #[test]
 fn no_name_that_the_analyst_gives_stands_in_the_code() {
     let pipeline = root().join("pipelines/harv");
-    let mut names: BTreeSet<String> = said(&pipeline.join("model.yaml"), "name")
+    let mut names: BTreeSet<String> = values(&pipeline.join("model.yaml"), "name")
         .into_iter()
         .collect();
     assert!(names.len() > 50, "{names:?}");
     for class in files(&pipeline.join("maneuvers")) {
-        names.extend(said(&class, "class"));
+        names.extend(values(&class, "class"));
     }
     names.insert("HARV".to_owned());
     let mut wrong = Vec::new();
     for source in sources() {
-        for (number, line) in &source.code {
+        for (number, line) in lines(&source.code) {
             wrong.extend(
                 words(line)
                     .filter(|w| names.contains(*w))
@@ -175,32 +161,78 @@ fn no_name_that_the_analyst_gives_stands_in_the_code() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-#[test]
-fn only_the_store_touches_the_disk_and_only_the_command_line_prints() {
-    let mut wrong = Vec::new();
-    for source in sources() {
-        for (number, line) in &source.code {
-            let disk = [
-                "std::fs",
-                "fs::",
-                "File::open",
-                "File::create",
-                "tempfile",
-                "std::net",
-            ];
-            let prints = ["println!", "print!", "dbg!", "io::stdout", "io::stderr"];
-            let touches = disk.iter().any(|word| line.contains(word)) && source.module != "store";
-            let speaks = prints.iter().any(|word| line.contains(word)) && source.module != "cli";
-            if touches || speaks {
-                wrong.push(format!("src/{}:{number}: {}", source.path, line.trim()));
+/// Spellings of a use of the file system or the network.
+const OUTSIDE: [&str; 25] = [
+    "std::fs",
+    "fs::",
+    "File::",
+    "OpenOptions",
+    "DirBuilder",
+    "DirEntry",
+    "ReadDir",
+    "read_dir(",
+    ".exists()",
+    ".try_exists()",
+    ".is_file()",
+    ".is_dir()",
+    ".is_symlink()",
+    ".metadata()",
+    ".symlink_metadata()",
+    ".canonicalize()",
+    "canonicalize(",
+    ".read_link()",
+    "current_dir(",
+    "temp_dir(",
+    "tempfile",
+    "std::net",
+    "TcpStream",
+    "std::os::unix",
+    "env::current_exe",
+];
+
+/// Spellings of a use of the terminal.
+const TERMINAL: [&str; 6] = [
+    "println!",
+    "print!",
+    "dbg!",
+    "io::stdout",
+    "io::stderr",
+    "io::stdin",
+];
+
+/// Lines of modules other than `home` that contain one of some spellings as whole words.
+fn elsewhere(home: &str, spellings: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for source in sources().iter().filter(|source| source.module[0] != home) {
+        for (number, line) in lines(&source.bare) {
+            let has = |spelling: &&str| {
+                line.match_indices(*spelling).any(|(at, _)| {
+                    let before = line[..at].chars().next_back().unwrap_or(' ');
+                    spelling.starts_with('.') || !(before.is_alphanumeric() || before == '_')
+                })
+            };
+            if spellings.iter().any(has) {
+                found.push(format!("src/{}:{number}: {}", source.path, line.trim()));
             }
         }
     }
+    found
+}
+
+#[test]
+fn only_the_store_touches_the_disk() {
+    let wrong = elsewhere("store", &OUTSIDE);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
-fn every_file_says_first_what_it_is() {
+fn only_the_command_line_prints() {
+    let wrong = elsewhere("cli", &TERMINAL);
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_file_has_a_header() {
     for file in files(&root().join("src"))
         .into_iter()
         .chain(files(&root().join("tests")))
@@ -210,4 +242,50 @@ fn every_file_says_first_what_it_is() {
             assert!(text.starts_with("//! "), "{}", file.display());
         }
     }
+}
+
+/// First lines of the doc comments of all sources, with their places.
+fn openings() -> Vec<(String, String)> {
+    let mut openings = Vec::new();
+    for folder in ["src", "tests", "benches"] {
+        for file in files(&root().join(folder)) {
+            if file.extension().is_none_or(|e| e != "rs") {
+                continue;
+            }
+            let text = fs::read_to_string(&file).unwrap();
+            let mut before = "";
+            for (number, line) in lines(&text) {
+                let line = line.trim_start();
+                let comment = ["/// ", "//! "]
+                    .iter()
+                    .find_map(|mark| line.strip_prefix(mark));
+                if let Some(comment) = comment.filter(|_| !before.starts_with(&line[..3])) {
+                    let name = file.strip_prefix(root()).unwrap().display();
+                    openings.push((format!("{name}:{number}"), comment.to_owned()));
+                }
+                before = line;
+            }
+        }
+    }
+    openings
+}
+
+#[test]
+fn doc_comments_open_with_a_noun_or_a_verb() {
+    const NOT_SO: [&str; 11] = [
+        "What", "Whether", "Where", "Of", "How", "That", "So", "Those", "Why", "Who", "Which",
+    ];
+    let all = openings();
+    assert!(all.len() > 1000, "{}", all.len());
+    let wrong: Vec<String> = all
+        .iter()
+        .filter(|(_, comment)| words(comment).next().is_some_and(|w| NOT_SO.contains(&w)))
+        .map(|(place, comment)| format!("{place}: {comment}"))
+        .collect();
+    assert!(
+        wrong.len() <= 700,
+        "{} of {}: {wrong:#?}",
+        wrong.len(),
+        all.len()
+    );
 }

@@ -1,6 +1,6 @@
 //! Archive and store in an object store: a real S3-compatible server on this machine's loopback,
-//! named by `HARVEST_S3_SERVER` (`tests/cluster/s3.sh` installs one). Without it these tests say
-//! that they are skipped.
+//! named by `HARVEST_S3_SERVER` (`tests/cluster/s3.sh` installs one). Skipped without it, but in
+//! CI.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::support::{Campaign, Outcome, files, run, yaw_and_roll_steps};
+use crate::support::{Campaign, Outcome, files, run, skip, yaw_and_roll_steps};
 
 const KEY: &str = "tester";
 const SECRET: &str = "a-secret-of-nobody";
@@ -31,12 +31,9 @@ impl Drop for Server {
 
 impl Server {
     /// With a bucket `flights` of two flights and an empty bucket `store`.
-    #[expect(clippy::print_stderr, reason = "a test that did not run says so")]
     fn start(local: &Campaign) -> Option<Server> {
         let Some(program) = std::env::var_os("HARVEST_S3_SERVER") else {
-            eprintln!(
-                "skipped: no S3-compatible server (HARVEST_S3_SERVER; tests/cluster/s3.sh installs one)"
-            );
+            skip("no S3-compatible server (HARVEST_S3_SERVER; tests/cluster/s3.sh installs one)");
             return None;
         };
         let root = tempfile::tempdir().unwrap();
