@@ -8,6 +8,7 @@ pub mod schema;
 pub mod units;
 pub mod numerics;
 pub mod error;
+pub mod settings;
 pub mod earth;
 pub mod flight;
 pub mod aircraft;

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::interpolation::{Interpolation, linear, monotone, place};
+use crate::settings::{settings, single_values};
 
 /// One tabulated value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,19 +42,19 @@ pub struct Condition {
     pub third: Option<f64>,
 }
 
-/// What the analyst decides about reading the tables.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// Between the points. Default `linear`.
-    #[serde(default)]
-    pub interpolation: Interpolation,
-    /// Beyond the ends. Default `clamp`.
-    #[serde(default)]
-    pub extrapolation: Extrapolation,
-    /// The variable of the tables besides α and Mach, where they have one.
-    #[serde(default)]
-    pub third: Option<Third>,
+settings! {
+    /// Reading of the wind-tunnel tables.
+    pub struct Settings {
+        /// Interpolation between the tabulated points: `linear`, or `monotone_cubic` (Fritsch and
+        /// Carlson), which is smooth and does not overshoot. It changes every value read between
+        /// points.
+        pub interpolation: Interpolation = Interpolation::default(),
+        /// Reading beyond the ends of a table: `clamp` takes the value at the end, `refuse` gives no
+        /// value. With `refuse` maneuvers that hold a derivative there are rejected.
+        pub extrapolation: Extrapolation = Extrapolation::default(),
+        /// Variable of the tables besides alpha and Mach number, where they have one.
+        pub third: Option<Third> = None,
+    }
 }
 
 /// What a table says beyond its ends.
@@ -67,16 +68,18 @@ pub enum Extrapolation {
     Refuse,
 }
 
-/// The third variable of the tables.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Third {
-    /// Its column in CSV and Parquet, its variable in DAVE-ML. A mean flight condition of the
-    /// maneuvers (`altitude_ft`, `qbar_psf`, `velocity_ft_s`, `mass_slug`, `x_cg_ft`) is read at
-    /// each maneuver's own.
-    pub name: String,
-    /// Where the tables are read otherwise, in the variable's own unit.
-    pub at: f64,
+single_values!(Interpolation, Extrapolation);
+
+settings! {
+    /// Third variable of the tables.
+    pub struct Third {
+        /// Its column in CSV and Parquet, its variable in DAVE-ML. A mean flight condition of the
+        /// maneuvers (`altitude_ft`, `qbar_psf`, `velocity_ft_s`, `mass_slug`, `x_cg_ft`) is read at
+        /// each maneuver's own value.
+        pub name: String,
+        /// Value at which the tables are read where the maneuver has none, in the variable's unit.
+        pub at: f64,
+    }
 }
 
 /// A reading beyond the ends of a table.

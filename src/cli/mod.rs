@@ -619,6 +619,9 @@ fn check(options: &Options) -> anyhow::Result<ExitCode> {
         None => println!("store      {}", config.store.display()),
     }
     println!("reports    {}", config.reports.display());
+    if let Some(warning) = config.estimate.hold.warning() {
+        println!("note       {warning}");
+    }
     println!("The configuration is right.");
     Ok(ExitCode::SUCCESS)
 }

@@ -14,59 +14,32 @@ pub mod ranges;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
-
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
+use crate::settings::settings;
 use crate::tables::{
     ChangeVerdict, ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow, TunnelVerdict,
 };
 use crate::trend;
 
-/// What the analyst decides about the comparison.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// Derivatives whose tunnel values, where the database holds any, are no measurements to
-    /// compare with.
-    #[serde(default)]
-    pub not_comparable: BTreeSet<String>,
-    /// Flight and tunnel agree when they differ by no more than this many standard errors. Default
-    /// 2.
-    #[serde(default = "default_agreement_z")]
-    pub agreement_z: f64,
-    /// They agree as well when they differ by no more than this share of the tunnel's value, in
-    /// percent, however well the difference is determined. Default 5, about as well as tunnel tests
-    /// repeat each other.
-    #[serde(default = "default_agreement_pct")]
-    pub agreement_pct: f64,
-    /// How many of the worst disagreements the table `disagreements` has at most. Default 20.
-    #[serde(default = "default_worst")]
-    pub worst: usize,
-    /// Folders with the published tables of earlier campaigns or nights, to compare this one with.
-    #[serde(default)]
-    pub against: Vec<PathBuf>,
-}
-
-fn default_agreement_z() -> f64 {
-    2.0
-}
-fn default_agreement_pct() -> f64 {
-    5.0
-}
-fn default_worst() -> usize {
-    20
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings {
-            not_comparable: BTreeSet::new(),
-            agreement_z: default_agreement_z(),
-            agreement_pct: default_agreement_pct(),
-            worst: default_worst(),
-            against: Vec::new(),
-        }
+settings! {
+    /// Settings of the comparison with the wind tunnel and earlier campaigns.
+    pub struct Settings {
+        /// Derivatives whose tunnel values are not comparable with flight. Their rows have the verdict
+        /// `no tunnel value`.
+        pub not_comparable: BTreeSet<String> = BTreeSet::new(),
+        /// Largest difference that counts as agreement, standard errors of the difference. Larger:
+        /// more rows agree, and real differences go unreported.
+        pub agreement_z: f64 = 2.0,
+        /// Largest difference that counts as agreement whatever its standard error, percent of the
+        /// tunnel's value. The default is about the repeatability of tunnel tests. Larger: more rows
+        /// agree.
+        pub agreement_pct: f64 = 5.0,
+        /// Most rows of the table `disagreements`.
+        pub worst: usize = 20,
+        /// Folders with the published tables of earlier campaigns or nights. Each adds its trends to
+        /// the comparison.
+        pub against: Vec<PathBuf> = Vec::new(),
     }
 }
 

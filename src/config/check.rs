@@ -6,10 +6,12 @@ use std::path::Path;
 
 use super::Config;
 use super::source::{Files, Source};
+use super::written::AircraftFile;
 use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Hold;
 use crate::flight::signal;
+use crate::ingest;
 use crate::maneuver::{Class, Event, Status};
 use crate::store;
 use crate::store::files::{self, TunnelRow};
@@ -471,6 +473,11 @@ fn patterns(class: &Class, source: &Source) -> Result<()> {
 /// What segment is told of signals, and its limits.
 fn segment(config: &Config, source: &Source) -> Result<()> {
     let settings = &config.segment;
+    if settings.excitation_flag.is_empty() {
+        let what = "segment: missing field `excitation_flag`: the signal that is up while the on-board excitation \
+                    system moves the surfaces";
+        return Err(source.error("segment", what));
+    }
     let named = settings
         .steps
         .keys()
@@ -517,17 +524,36 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
-fn calibration(config: &Config, source: &Source) -> Result<()> {
-    for (name, left) in &config.estimate.calibration {
-        known_signal(config, source, name, "calibration")?;
-        let sizes = [("bias", left.bias), ("scale_pct", left.scale_pct)];
-        if let Some((what, size)) = sizes
-            .into_iter()
-            .find(|(_, size)| !(size.is_finite() && *size >= 0.0))
+/// Sizes of instrument errors: known signals, no negative sizes.
+pub(super) fn instruments(file: &AircraftFile, source: &Source) -> Result<()> {
+    let recorded = file.channels.values().map(|channel| &channel.signal);
+    let known = recorded.chain(file.constants.keys()).map(String::as_str);
+    let mut examined = ingest::Settings::default().compatibility.ordinary;
+    for (name, instrument) in &file.instruments {
+        let error = |what: String| Err(source.error_under("instruments", name, what));
+        if !known.clone().any(|signal| signal == name) {
+            let near = did_you_mean(name, known.clone());
+            return error(format!(
+                "instruments: no channel gives the signal `{name}`{near}"
+            ));
+        }
+        let uncertainty = instrument.uncertainty;
+        let (ordinary, fault) = (instrument.ordinary.given(), instrument.fault.given());
+        let sizes = [uncertainty.bias, uncertainty.scale_pct].map(Some);
+        let sizes = sizes.iter().chain(&ordinary).chain(&fault).flatten();
+        if let Some(size) = sizes
+            .copied()
+            .find(|size| !(size.is_finite() && *size >= 0.0))
         {
-            let what =
-                format!("calibration of `{name}`: `{what}` is a standard deviation, not {size}");
-            return Err(source.error_under("calibration", name, what));
+            return error(format!(
+                "`{name}`: sizes of errors are not negative, not {size}"
+            ));
+        }
+        let has_sizes = ordinary.iter().chain(&fault).any(Option::is_some);
+        if has_sizes && examined.of_signal(name).is_none() {
+            return error(format!(
+                "`{name}`: no kinematic equation has this signal, so `ordinary` and `fault` have no effect"
+            ));
         }
     }
     Ok(())
@@ -539,7 +565,6 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
     }
-    calibration(config, source)?;
     segment(config, source)?;
     let angles = config
         .estimate

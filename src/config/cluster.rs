@@ -1,40 +1,25 @@
 //! Settings of a batch cluster, `cluster:` in `pipeline.yaml`.
 
-use serde::{Deserialize, Serialize};
+use crate::settings::settings;
 
-/// What a task may use of the cluster, of `cluster:` in `pipeline.yaml`. It decides no result.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ClusterSettings {
-    /// Shards of a plan, each a task of an array. Default 24.
-    pub shards: usize,
-    /// Longest time of a task, as the scheduler writes it. Default one hour.
-    pub time: String,
-    /// Memory of a task, MB. Default 2000.
-    pub memory_mb: usize,
-    /// Processors of a task. Default 1: shards are cheaper to place than threads.
-    pub processors: usize,
-    /// How often a task that asks for it is tried again. Default 3.
-    pub retries: usize,
-    /// Where tasks run; the scheduler's default where none is given.
-    pub partition: Option<String>,
-    /// Who pays; the scheduler's default where none is given.
-    pub account: Option<String>,
-    /// Further lines for the scheduler, as it writes them after its mark: `--constraint=avx2`.
-    pub options: Vec<String>,
-}
-
-impl Default for ClusterSettings {
-    fn default() -> ClusterSettings {
-        ClusterSettings {
-            shards: 24,
-            time: "01:00:00".into(),
-            memory_mb: 2000,
-            processors: 1,
-            retries: 3,
-            partition: None,
-            account: None,
-            options: Vec::new(),
-        }
+settings! {
+    /// Resources of a task on the cluster. They decide no result.
+    pub struct ClusterSettings {
+        /// Shards of a plan, each a task of an array. More: shorter tasks, more of them in the queue.
+        pub shards: usize = 24,
+        /// Longest time of a task, as the scheduler writes it. The scheduler ends a longer task.
+        pub time: String = "01:00:00".into(),
+        /// Memory of a task, MB. The scheduler ends a task that needs more.
+        pub memory_mb: usize = 2000,
+        /// Processors of a task. Shards are cheaper to place than threads.
+        pub processors: usize = 1,
+        /// Further attempts of a task that asks for one.
+        pub retries: usize = 3,
+        /// Partition in which tasks run, in place of the scheduler's default.
+        pub partition: Option<String> = None,
+        /// Account that is charged, in place of the scheduler's default.
+        pub account: Option<String> = None,
+        /// Further lines for the scheduler, as it writes them after its mark: `--constraint=avx2`.
+        pub options: Vec<String> = Vec::new(),
     }
 }

@@ -6,6 +6,8 @@
 
 mod check;
 mod cluster;
+mod instruments;
+mod moved;
 mod places;
 mod source;
 mod written;
@@ -18,7 +20,11 @@ use crate::aircraft::Aircraft;
 use crate::error::Result;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
+use crate::output_error::calibration_errors::Calibration;
 use crate::{compare, estimate, export, ingest, segment, trend};
+
+use instruments::Instrument;
+use written::PipelineFile;
 
 pub(crate) use check::tunnel_rows;
 pub use cluster::ClusterSettings;
@@ -85,8 +91,10 @@ impl Config {
     /// thing that is wrong.
     pub fn load(folder: &Path, overrides: Overrides) -> Result<Config> {
         let files = source::Files::read(folder)?;
-        let pipeline = files.pipeline()?;
+        let mut pipeline = files.pipeline()?;
         let aircraft = files.aircraft()?;
+        check::instruments(&aircraft, &files.aircraft)?;
+        share_keys(&mut pipeline, &aircraft.instruments);
         let buildup = files.model()?;
         let classes = files.classes()?;
         let wind_tunnel = overrides.wind_tunnel.unwrap_or(pipeline.wind_tunnel);
@@ -161,6 +169,34 @@ impl Config {
     }
 }
 
+/// Copies keys that several stages share, and the sizes of instrument errors, to the stages that
+/// read them.
+fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>) {
+    pipeline.ingest.share();
+    let compatibility = &mut pipeline.ingest.compatibility;
+    for (signal, instrument) in errors {
+        if let Some(size) = compatibility.ordinary.of_signal(signal) {
+            instruments::replace(size, instrument.ordinary.given());
+        }
+        if let Some(size) = compatibility.faulty.of_signal(signal) {
+            instruments::replace(size, instrument.fault.given());
+        }
+    }
+    let estimate = &mut pipeline.estimate;
+    estimate.max_marked_share = pipeline.segment.quality.marked_share;
+    estimate.calibration = errors
+        .iter()
+        .filter(|(_, instrument)| instrument.uncertainty != Calibration::default())
+        .map(|(signal, instrument)| (signal.clone(), instrument.uncertainty))
+        .collect();
+    if let Some(joint) = &mut estimate.joint {
+        joint.share_constants = estimate.share_constants;
+    }
+    if let Some(prediction) = &mut estimate.prediction {
+        prediction.share_constants = estimate.share_constants;
+    }
+}
+
 /// The comparison's settings with the earlier campaigns that the command line names, where it names
 /// some.
 fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
@@ -174,5 +210,7 @@ fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Setting
     }
 }
 
+#[cfg(test)]
+mod settings_page;
 #[cfg(test)]
 mod tests;

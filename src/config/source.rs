@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::moved;
 use super::written::{AircraftFile, ClassFile, ModelFile, PipelineFile};
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
@@ -31,6 +32,14 @@ impl Source {
     pub fn read(path: PathBuf) -> Result<Source> {
         let text = files::text(&path)?;
         Ok(Source { path, text })
+    }
+
+    #[cfg(test)]
+    pub fn of(path: &str, text: &str) -> Source {
+        Source {
+            path: path.into(),
+            text: text.to_owned(),
+        }
     }
 
     /// Its name within a pipeline's folder, and its text.
@@ -67,6 +76,17 @@ impl Source {
         let line = self
             .line_of(name, section.unwrap_or(0))
             .or(section.map(|i| i + 1));
+        Error::config(&self.path, line, what)
+    }
+
+    /// An error about a key, given by its path from the outermost section inwards.
+    pub fn error_at(&self, path: &[String], what: impl Into<String>) -> Error {
+        let mut line = None;
+        for name in path {
+            line = self
+                .line_of(name, line.map_or(0, |l: usize| l - 1))
+                .or(line);
+        }
         Error::config(&self.path, line, what)
     }
 
@@ -145,7 +165,8 @@ impl Files {
     }
 
     pub fn pipeline(&self) -> Result<PipelineFile> {
-        self.pipeline.parse()
+        let parsed = self.pipeline.parse();
+        parsed.map_err(|error| moved::refusal(&self.pipeline).unwrap_or(error))
     }
 
     pub fn aircraft(&self) -> Result<AircraftFile> {

@@ -106,15 +106,15 @@ fn an_unknown_key_is_named_with_the_one_that_was_probably_meant() {
 #[test]
 fn an_unknown_key_deep_in_a_file_is_named_with_its_path() {
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "max_marked_share: 0.2", "max_marked: 0.2");
+    let line = copy.spoil("pipeline.yaml", "signal_to_noise: 5", "signal_noise: 5");
     let e = copy.error();
     assert!(
         e.starts_with(&format!(
-            "pipeline.yaml:{line}: estimate: unknown field `max_marked`"
+            "pipeline.yaml:{line}: segment.quality: unknown field `signal_noise`"
         )),
         "{e}"
     );
-    assert!(e.ends_with("did you mean `max_marked_share`?"), "{e}");
+    assert!(e.ends_with("did you mean `signal_to_noise`?"), "{e}");
 }
 
 #[test]
@@ -583,31 +583,94 @@ fn a_trend_group_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
 }
 
 #[test]
-fn calibration_of_an_unknown_signal_or_with_a_negative_size_is_refused() {
+fn errors_of_an_unknown_instrument_or_of_a_negative_size_are_refused() {
     let copy = Copy::new();
     let line = copy.spoil(
-        "pipeline.yaml",
-        "    qbar_psf: { scale_pct: 0.5 }",
-        "    qbar_psi: { scale_pct: 0.5 }",
+        "aircraft.yaml",
+        "  qbar_psf: { uncertainty",
+        "  qbar_psi: { uncertainty",
     );
     assert_eq!(
         copy.error(),
         format!(
-            "pipeline.yaml:{line}: calibration: no channel gives the signal `qbar_psi`; did you mean `qbar_psf`?"
+            "aircraft.yaml:{line}: instruments: no channel gives the signal `qbar_psi`; did you mean `qbar_psf`?"
         )
     );
     let copy = Copy::new();
-    let line = copy.spoil(
-        "pipeline.yaml",
-        "    qbar_psf: { scale_pct: 0.5 }",
-        "    qbar_psf: { scale_pct: -0.5 }",
-    );
+    let line = copy.spoil("aircraft.yaml", "{ scale_pct: 0.5 }", "{ scale_pct: -0.5 }");
     assert_eq!(
         copy.error(),
+        format!("aircraft.yaml:{line}: `qbar_psf`: sizes of errors are not negative, not -0.5")
+    );
+}
+
+/// Error of the shipped pipeline with a section in front of it.
+fn error_with(section: &str, old: &str) -> (usize, String) {
+    let copy = Copy::new();
+    let line = copy.spoil("pipeline.yaml", section, &format!("{section}{old}"));
+    (line, copy.error())
+}
+
+#[test]
+fn an_old_key_is_refused_with_its_new_place_and_line() {
+    let (line, e) = error_with("\ningest:\n", "  checks:\n    jumps_share: 0.3\n");
+    let line = line + 3;
+    assert_eq!(
+        e,
         format!(
-            "pipeline.yaml:{line}: calibration of `qbar_psf`: `scale_pct` is a standard deviation, not -0.5"
+            "pipeline.yaml:{line}: `ingest: checks: jumps_share` is now `ingest: expert: checks: jumps_share`"
         )
     );
+    let (line, e) = error_with("\nestimate:\n", "  max_marked_share: 0.3\n");
+    let line = line + 2;
+    assert_eq!(
+        e,
+        format!(
+            "pipeline.yaml:{line}: `estimate: max_marked_share` is now `segment: quality: marked_share`"
+        )
+    );
+}
+
+#[test]
+fn all_old_keys_are_named_at_once() {
+    let old =
+        "  calibration:\n    an_g: { bias: 0.1, scale_pct: 1 }\n  iteration: { tolerance: 1e-9 }\n";
+    let (line, e) = error_with("\nestimate:\n", old);
+    let first = format!(
+        "pipeline.yaml:{}: `estimate: calibration` is now `instruments: <signal>: uncertainty` of aircraft.yaml",
+        line + 2
+    );
+    let second = format!(
+        "pipeline.yaml:{}: `estimate: iteration: tolerance` is now `estimate: expert: iteration: tolerance`",
+        line + 4
+    );
+    assert_eq!(e, format!("{first}\n{second}"));
+}
+
+#[test]
+fn keys_that_several_stages_share_reach_each_of_them() {
+    let copy = Copy::new();
+    copy.spoil(
+        "pipeline.yaml",
+        "\ningest:\n",
+        "\ningest:\n  expert: { fault_standard_errors: 5 }\n",
+    );
+    copy.spoil(
+        "pipeline.yaml",
+        "    marked_share: 0.2 ",
+        "    marked_share: 0.3 ",
+    );
+    copy.spoil(
+        "pipeline.yaml",
+        "  # joint: { alpha_bin_deg: 2.5 }",
+        "  expert: { share_constants: true }\n  joint: {} #",
+    );
+    let config = copy.load(Overrides::default()).unwrap();
+    assert_eq!(config.ingest.checks.standard_errors, 5.0);
+    assert_eq!(config.ingest.compatibility.fault_standard_errors, 5.0);
+    assert_eq!(config.estimate.max_marked_share, 0.3);
+    assert!(config.estimate.joint.unwrap().share_constants);
+    assert!(config.estimate.prediction.unwrap().share_constants);
 }
 
 #[test]

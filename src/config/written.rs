@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
+use super::cluster::ClusterSettings;
+use super::instruments::Instrument;
 use crate::aero::{
     Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
 };
@@ -12,69 +14,76 @@ use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
+use crate::settings::settings;
 use crate::{compare, estimate, export, ingest, segment, trend};
 
-/// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PipelineFile {
-    pub title: String,
-    pub archive: String,
-    pub wind_tunnel: PathBuf,
-    #[serde(default)]
-    pub store: Option<PathBuf>,
-    /// The folder beside a store in an object store.
-    #[serde(default)]
-    pub store_cache: Option<PathBuf>,
-    #[serde(default)]
-    pub reports: Option<PathBuf>,
-    /// CSV of the analyst's events.
-    #[serde(default)]
-    pub events: Option<PathBuf>,
-    /// How the tunnel's tables are read.
-    #[serde(default)]
-    pub tunnel: wind_tunnel::Settings,
-    #[serde(default)]
-    pub ingest: ingest::Settings,
-    pub segment: segment::Settings,
-    #[serde(default)]
-    pub estimate: estimate::Settings,
-    #[serde(default)]
-    pub trend: trend::Settings,
-    #[serde(default)]
-    pub compare: compare::Settings,
-    #[serde(default)]
-    pub export: export::Settings,
-    #[serde(default)]
-    pub report: ReportSettings,
-    #[serde(default)]
-    pub cluster: super::cluster::ClusterSettings,
+settings! {
+    /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
+    pub struct PipelineFile {
+        /// Title of the report.
+        pub title: String,
+        /// Flight archive: a folder, a glob, a tree partitioned as `flight=…/`, or a place in an
+        /// object store (`s3://bucket/prefix`).
+        pub archive: String,
+        /// Wind-tunnel tables: CSV, Parquet or DAVE-ML.
+        pub wind_tunnel: PathBuf,
+        /// Artefacts: a folder, `data/store/<pipeline>` unless given, or a place in an object store.
+        #[serde(default)]
+        pub store: Option<PathBuf>,
+        /// Folder of this machine that caches a store in an object store.
+        #[serde(default)]
+        pub store_cache: Option<PathBuf>,
+        /// Folder of the tables and the report, `reports/<pipeline>` unless given.
+        #[serde(default)]
+        pub reports: Option<PathBuf>,
+        /// CSV of the analyst's own maneuvers: `flight_id`, `class`, `start_s`, `end_s`. They replace
+        /// what segment finds there.
+        #[serde(default)]
+        pub events: Option<PathBuf>,
+        /// Reading of the wind-tunnel tables.
+        #[serde(default)]
+        pub tunnel: wind_tunnel::Settings,
+        /// Channels into signals, repairs, checks.
+        #[serde(default)]
+        pub ingest: ingest::Settings,
+        /// Maneuvers and their classes.
+        #[serde(default)]
+        pub segment: segment::Settings,
+        /// Derivatives of each maneuver.
+        #[serde(default)]
+        pub estimate: estimate::Settings,
+        /// Trends across angle of attack.
+        #[serde(default)]
+        pub trend: trend::Settings,
+        /// Comparison with the wind tunnel and earlier campaigns.
+        #[serde(default)]
+        pub compare: compare::Settings,
+        /// Derivatives for simulators.
+        #[serde(default)]
+        pub export: export::Settings,
+        /// Report and published nights.
+        #[serde(default)]
+        pub report: ReportSettings,
+        /// Resources on a batch cluster.
+        #[serde(default)]
+        pub cluster: ClusterSettings,
+    }
 }
 
-/// Settings of the report.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ReportSettings {
-    /// The class's maneuver nearest to this angle of attack shows its time histories.
-    pub histories_at_alpha_deg: f64,
-    /// So many maneuvers have a page of their own at most; which ones, `report::maneuvers_with_page` says.
-    /// Default 600.
-    pub maneuver_pages: usize,
-    /// A template of the analyst's own instead of the built-in one.
-    pub template: Option<PathBuf>,
-    /// So many published nights stay; at least one. Default 7: a week to look back over.
-    pub keep_nights: usize,
-}
-
-impl Default for ReportSettings {
-    fn default() -> Self {
-        // The paper's Figures 4 and 12 are at 30 deg.
-        ReportSettings {
-            histories_at_alpha_deg: 30.0,
-            maneuver_pages: 600,
-            template: None,
-            keep_nights: 7,
-        }
+settings! {
+    /// Settings of the report.
+    pub struct ReportSettings {
+        /// Angle of attack of the time histories, deg: each class shows its maneuver nearest to it.
+        /// The paper's Figures 4 and 12 are at 30 deg.
+        pub histories_at_alpha_deg: f64 = 30.0,
+        /// Most maneuvers with a page of their own. Of more, those that changed, failed or represent
+        /// their class come first.
+        pub maneuver_pages: usize = 600,
+        /// HTML template in place of the built-in one.
+        pub template: Option<PathBuf> = None,
+        /// Published nights that `harvest gc` keeps, at least one. Fewer: less disk space, and a
+        /// shorter history to go back to.
+        pub keep_nights: usize = 7,
     }
 }
 
@@ -86,6 +95,8 @@ pub struct AircraftFile {
     pub channels: BTreeMap<String, Channel>,
     #[serde(default)]
     pub constants: BTreeMap<String, f64>,
+    #[serde(default)]
+    pub instruments: BTreeMap<String, Instrument>,
 }
 
 /// `model.yaml`.

@@ -23,32 +23,23 @@ use crate::output_error::consider::{self, Considered};
 use crate::output_error::{
     Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation, mean,
 };
+use crate::settings::settings;
 use crate::tables::{EstimateRow, JOINT_FLIGHT, JointRow, Participation, StartingValues};
 
-/// Which maneuvers are estimated together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
-    /// Widest spread of mean angles of attack among maneuvers that are joined. Default 2.5°: half
-    /// the usual distance of test points, over which a fighter's derivatives change by less than
-    /// they are known.
-    pub alpha_bin_deg: f64,
-    /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`;
-    /// where none are given they are parted at the widest gaps until no group is wider than
-    /// `alpha_bin_deg`.
-    pub centres_deg: Vec<f64>,
-    /// Whether constants are shared too. Default false: a vane's zero error of a few tenths of a
-    /// degree, another one in each flight, would otherwise be charged to the slopes.
-    pub share_constants: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            alpha_bin_deg: 2.5,
-            centres_deg: vec![],
-            share_constants: false,
-        }
+settings! {
+    /// Settings of joint estimation.
+    pub struct Settings {
+        /// Widest spread of the mean angles of attack of joined maneuvers, deg. The default is half
+        /// the usual distance of test points. Larger: smaller bounds, and the change of derivatives
+        /// over the spread becomes an error.
+        pub alpha_bin_deg: f64 = 2.5,
+        /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`.
+        /// Without any, maneuvers are parted at their widest gaps.
+        pub centres_deg: Vec<f64> = Vec::new(),
+    }
+    elsewhere {
+        /// Constants shared by joined maneuvers: `estimate: expert: share_constants`.
+        pub share_constants: bool = false,
     }
 }
 

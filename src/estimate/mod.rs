@@ -27,6 +27,7 @@ use crate::output_error::newton_raphson;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Fit, InitialState, Measurements, Model, Outcome};
 use crate::output_error::{consider, equation_error};
+use crate::settings::{settings, single_values};
 use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, HistoryOutput, StartingValues};
 use crate::units::Unit;
 
@@ -67,6 +68,16 @@ pub enum Hold {
     Evidence,
 }
 
+impl Hold {
+    /// Warning that goes with a choice.
+    #[must_use]
+    pub fn warning(self) -> Option<&'static str> {
+        let warning = "estimate: hold: evidence: intervals cover less than with `table` (89 instead of 94 % in simulation): \
+                       state the tunnel's uncertainty";
+        (self == Hold::Evidence).then_some(warning)
+    }
+}
+
 impl From<Start> for StartingValues {
     fn from(start: Start) -> StartingValues {
         match start {
@@ -76,60 +87,65 @@ impl From<Start> for StartingValues {
     }
 }
 
-/// Choices of the estimation that hold for all classes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
-    pub weights: Weights,
-    pub initial_state: InitialState,
-    pub mass_properties: MassProperties,
-    pub inactive_surfaces: InactiveSurfaces,
-    pub start: Start,
-    pub hold: Hold,
-    /// Standard uncertainty of a held value where the database states none, in percent of the root
-    /// mean square of its derivative's table: a tunnel errs by a share of a derivative's size, also
-    /// where the derivative crosses zero.
-    pub held_uncertainty_pct: f64,
-    /// What calibration leaves unknown of signals; those not named are believed.
-    pub calibration: BTreeMap<String, Calibration>,
-    /// A maneuver with a larger share of faulty samples (bridged, despiked, missing, stuck), over
-    /// its outputs together or in one of its surfaces, is rejected.
-    pub max_marked_share: f64,
-    /// Smallest standard deviation believed of an output when weights are estimated, deg, deg/s, g.
-    pub resolution: BTreeMap<Output, f64>,
-    pub iteration: newton_raphson::Settings,
-    /// Maneuvers of one class and angle of attack estimated together as well; none unless asked
-    /// for. Neither this nor `prediction` changes the estimate of a maneuver alone, so neither is
-    /// among what decides it (fingerprints).
-    #[serde(skip_serializing)]
-    pub joint: Option<joint::Settings>,
-    /// Each maneuver predicted with the derivatives of others.
-    #[serde(skip_serializing)]
-    pub prediction: Option<prediction::Settings>,
-    /// When correlations, inflated variances and groups are worth a word.
-    pub identifiability: identifiability::Limits,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            weights: Weights::default(),
-            initial_state: InitialState::default(),
-            mass_properties: MassProperties::default(),
-            inactive_surfaces: InactiveSurfaces::default(),
-            start: Start::default(),
-            hold: Hold::default(),
-            held_uncertainty_pct: 20.0,
-            calibration: BTreeMap::new(),
-            max_marked_share: 0.2,
-            resolution: BTreeMap::new(),
-            iteration: newton_raphson::Settings::default(),
-            joint: None,
-            prediction: Some(prediction::Settings::default()),
-            identifiability: identifiability::Limits::default(),
-        }
+settings! {
+    /// Settings of the estimation, of all classes.
+    pub struct Settings {
+        /// Weights of the residuals: `table` takes each class's own (Tables 2 and 4), `estimated` the
+        /// inverse of the residuals' variances. `estimated` changes every estimate and its bound.
+        pub weights: Weights = Weights::default(),
+        /// Initial state of a maneuver: `estimated` with the derivatives, or `measured`, the first
+        /// sample, whose noise then enters the estimates.
+        pub initial_state: InitialState = InitialState::default(),
+        /// Mass, centre of gravity and inertias: `recorded` sample by sample, or `mean`, one value
+        /// per maneuver as in the paper.
+        pub mass_properties: MassProperties = MassProperties::default(),
+        /// Small feedback motion of surfaces that a class does not excite: `wind_tunnel` applies the
+        /// tunnel's derivatives to it, `absent` ignores it as in the paper. `absent` charges motion
+        /// in step with a rate to that rate's derivative.
+        pub inactive_surfaces: InactiveSurfaces = InactiveSurfaces::default(),
+        /// Start of the iteration: `equation_error`, or `wind_tunnel` as in the paper. The other
+        /// start is tried where the iteration does not converge.
+        pub start: Start = Start::default(),
+        /// Choice of the derivatives that are held at the tunnel's value: `table` takes each
+        /// class's own (Tables 1 and 3), `evidence` holds what the tunnel determines better than
+        /// the maneuver. The intervals of `evidence` cover less than those of `table`.
+        pub hold: Hold = Hold::default(),
+        /// Standard uncertainty of a held derivative whose table states none, percent of the root
+        /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
+        /// derivatives.
+        pub held_uncertainty_pct: f64 = 20.0,
+        /// Joint estimation of maneuvers of one class and angle of attack, besides each alone. It
+        /// adds rows and changes none; it needs `hold: table`.
+        #[serde(skip_serializing)]
+        pub joint: Option<joint::Settings> = None,
+        /// Prediction of each maneuver with derivatives from the others of its class and angle of
+        /// attack; `null` turns it off. It changes no estimate.
+        #[serde(skip_serializing)]
+        pub prediction: Option<prediction::Settings> = Some(prediction::Settings::default()),
+    }
+    expert {
+        /// Smallest standard deviation of each output with `weights: estimated`, deg, deg/s or g.
+        /// Larger: outputs of coarse resolution weigh less.
+        pub resolution: BTreeMap<Output, f64> = BTreeMap::new(),
+        /// End of the iteration.
+        pub iteration: newton_raphson::Settings = newton_raphson::Settings::default(),
+        /// Constants (`CN_0`) that joined or predicting maneuvers share. `true` charges each flight's
+        /// zero error of vanes and surfaces to the slopes; `false` lets each maneuver keep its own.
+        #[serde(skip_serializing)]
+        pub share_constants: bool = false,
+        /// Limits of the identifiability measures.
+        pub identifiability: identifiability::Limits = identifiability::Limits::default(),
+    }
+    elsewhere {
+        /// Uncertainty that calibration leaves of each signal: `instruments:` of aircraft.yaml.
+        /// Signals without an entry count as exact.
+        pub calibration: BTreeMap<String, Calibration> = BTreeMap::new(),
+        /// Largest share of flagged samples over the outputs together, and in each surface:
+        /// `segment: quality: marked_share`.
+        pub max_marked_share: f64 = 0.2,
     }
 }
+single_values!(Weights, InitialState, MassProperties, InactiveSurfaces, Start, Hold, BTreeMap<Output, f64>);
 
 /// What every maneuver of a campaign is estimated with.
 #[derive(Clone, Debug)]

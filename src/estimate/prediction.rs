@@ -20,26 +20,21 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
+use crate::settings::settings;
 use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow, PredictionStatus};
 use crate::units::Unit;
 
-/// From which others a maneuver is predicted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
-    /// Largest difference of mean angles of attack. Default 2.5°: half the usual distance of test
-    /// points, over which a fighter's derivatives change by less than they are known.
-    pub alpha_distance_deg: f64,
-    /// Whether constants are the others' too. Default false.
-    pub share_constants: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            alpha_distance_deg: 2.5,
-            share_constants: false,
-        }
+settings! {
+    /// Settings of prediction.
+    pub struct Settings {
+        /// Largest difference of mean angles of attack between a maneuver and those that predict it,
+        /// deg. The default is half the usual distance of test points. Larger: more maneuvers are
+        /// predicted, from derivatives further away.
+        pub alpha_distance_deg: f64 = 2.5,
+    }
+    elsewhere {
+        /// Constants taken from the predicting maneuvers: `estimate: expert: share_constants`.
+        pub share_constants: bool = false,
     }
 }
 

@@ -16,40 +16,29 @@ mod xml;
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{
     Buildup, Coefficient, Combined, Condition, Derivative, Regressor, WindTunnel, wind_tunnel,
 };
 use crate::aircraft::Aircraft;
 use crate::maneuver::Maneuver;
+use crate::settings::settings;
 use crate::tables::{EstimateRow, ExportRow, TrendRow};
 use crate::trend;
 
-/// What the analyst decides about the export.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
-    /// Who answers for the model: DAVE-ML demands a name, an organisation and a date, and no clock
-    /// decides what is written.
-    pub author: String,
-    pub organisation: String,
-    /// ISO 8601: 2026-11-21.
-    pub date: String,
-    /// JSBSim's property for a signal of model.yaml, in the signal's unit and sign;
-    /// `harvest/<signal>` where none is given.
-    pub jsbsim_properties: BTreeMap<String, String>,
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings {
-            author: "not stated".into(),
-            organisation: "not stated".into(),
-            date: "not stated".into(),
-            jsbsim_properties: BTreeMap::new(),
-        }
+settings! {
+    /// Settings of the export.
+    pub struct Settings {
+        /// Author of the model in the DAVE-ML file, which requires one.
+        pub author: String = "not stated".into(),
+        /// Organisation of the author.
+        pub organisation: String = "not stated".into(),
+        /// Date of the model in the DAVE-ML file, ISO 8601: `2026-11-21`. No clock sets it, so that
+        /// the same input gives the same bytes.
+        pub date: String = "not stated".into(),
+        /// JSBSim's property for a signal of model.yaml, in the signal's unit and sign. Signals that
+        /// are not named read `harvest/<signal>`.
+        pub jsbsim_properties: BTreeMap<String, String> = BTreeMap::new(),
     }
 }
 

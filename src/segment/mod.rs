@@ -25,128 +25,77 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::{Deserialize, Serialize};
-
 use crate::aircraft::Aircraft;
 use crate::error::{Problem, ProblemStage};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Unknown};
+use crate::settings::settings;
 use candidates::Scene;
 
 pub use events::with_events;
 pub use steps::Step;
 
-/// What the analyst decides about finding maneuvers; all times in s.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// The flag signal that is up while the on-board excitation system moves the surfaces: it is
-    /// drawn, and a record without it is a problem. While it is up, and not stuck, a surface that
-    /// steps soon after the pilot does not answer him.
-    pub excitation_flag: String,
-    /// The pilot's controls. A surface that steps while one of them moves, or right after it has
-    /// stepped, is the pilot's.
-    #[serde(default)]
-    pub pilot_controls: Vec<String>,
-    /// Signal → the smallest change, in the signal's unit, that counts as a step. Well above noise,
-    /// turbulence and feedback, well below the smallest reversal that is commanded.
-    pub steps: BTreeMap<String, f64>,
-    /// Pilot steps begin with a deflection from trim and end with one back to trim, each about half
-    /// a reversal or less: such a step belongs to the maneuver when it is at least this share of
-    /// the smallest step. It is not counted. Default 0.45.
-    #[serde(default = "default_deflection")]
-    pub deflection_share: f64,
-    /// A step is complete within this time: a full reversal at the actuators' rate limit. Default
-    /// 0.15 s.
-    #[serde(default = "default_transit")]
-    pub transit_s: f64,
-    /// Before and after a step the level is averaged over this time. Default 0.125 s.
-    #[serde(default = "default_level")]
-    pub level_s: f64,
-    /// A step is at least this many standard deviations of the signal's own changes, whatever its
-    /// smallest step: in turbulence feedback moves the surfaces. Default 4.
-    #[serde(default = "default_over_noise")]
-    pub steps_over_noise: f64,
-    /// Steps smaller than this share of the signal's largest in the same maneuver are feedback and
-    /// not counted. Default 0.35: a deflection from trim is about half a reversal.
-    #[serde(default = "default_outstanding")]
-    pub outstanding_share: f64,
-    /// A surface is geared to a pilot control that moves by this share of its smallest step.
-    /// Default 0.35.
-    #[serde(default = "default_geared")]
-    pub geared_share: f64,
-    /// It follows within this time, s. Default 0.4: filters and actuators.
-    #[serde(default = "default_gearing")]
-    pub gearing_s: f64,
-    /// Feedback answers a pilot's step within this time, s. Default 1: the response's first
-    /// overshoot.
-    #[serde(default = "default_answer")]
-    pub answer_s: f64,
-    /// Two maneuvers are at least this far apart, s. Default 0.7.
-    #[serde(default = "default_pause")]
-    pub shortest_pause_s: f64,
-    /// How long a pilot may hold a control away from trim within one maneuver: half a slow
-    /// oscillation. Default 4 s.
-    #[serde(default = "default_hold")]
-    pub longest_hold_s: f64,
-    /// How long all controls of one maneuver may rest at trim between two inputs; a longer rest
-    /// ends the maneuver, and what comes after it is recovery, unless the pilot has gone over to
-    /// another control of the same class. Default 2 s.
-    #[serde(default = "default_rest")]
-    pub longest_rest_s: f64,
-    /// Where a maneuver begins before another has decayed: the share of the pause between their
-    /// inputs that is the decay's at least, and of the lead-in that it may use besides. Default
-    /// 0.25: the lead-in counts for more, for the inputs before a decay have told most of their
-    /// derivatives already.
-    #[serde(default = "default_shared")]
-    pub shared_lead_in: f64,
-    /// Excitation of fewer steps than this is no maneuver and not worth a word: a flag that
-    /// flickers, a turn. Default 3, the edges of one doublet.
-    #[serde(default = "default_fewest")]
-    pub fewest_steps: usize,
-    /// When a maneuver is not estimated.
-    #[serde(default)]
-    pub quality: quality::Limits,
-}
-
-fn default_deflection() -> f64 {
-    0.45
-}
-fn default_transit() -> f64 {
-    0.15
-}
-fn default_level() -> f64 {
-    0.125
-}
-fn default_over_noise() -> f64 {
-    4.0
-}
-fn default_outstanding() -> f64 {
-    0.35
-}
-fn default_geared() -> f64 {
-    0.35
-}
-fn default_gearing() -> f64 {
-    0.4
-}
-fn default_answer() -> f64 {
-    1.0
-}
-fn default_pause() -> f64 {
-    0.7
-}
-fn default_hold() -> f64 {
-    4.0
-}
-fn default_rest() -> f64 {
-    2.0
-}
-fn default_shared() -> f64 {
-    0.25
-}
-fn default_fewest() -> usize {
-    3
+settings! {
+    /// Settings of the search for maneuvers; times in s.
+    pub struct Settings {
+        /// Flag signal that is up while the on-board excitation system moves the surfaces. It is
+        /// drawn, and a flight without it is listed in `problems`. A surface that steps while it is
+        /// up is not taken for feedback to the pilot, unless the flag is stuck.
+        pub excitation_flag: String = String::new(),
+        /// Signals of the pilot's controls. A surface that steps with one of them is geared to it,
+        /// one that steps right after it is feedback; neither counts as excitation by the on-board
+        /// system.
+        pub pilot_controls: Vec<String> = Vec::new(),
+        /// Smallest change of each signal that counts as a step, in the signal's unit. Smaller:
+        /// turbulence and feedback are counted as steps. Larger: small doublets are missed. Classes
+        /// count steps of these signals only.
+        pub steps: BTreeMap<String, f64> = BTreeMap::new(),
+        /// Limits beyond which a maneuver is rejected.
+        pub quality: quality::Limits = quality::Limits::default(),
+    }
+    expert {
+        /// Smallest first and last pilot step of a maneuver, as a share of the smallest step. They
+        /// deflect the control from trim and return it, by half a reversal or less. Larger: the
+        /// maneuver's window may cut them off. They are never counted.
+        pub deflection_share: f64 = 0.45,
+        /// Longest duration of a step: a full reversal at the actuators' rate limit. Larger: slower
+        /// motion counts as steps.
+        pub transit_s: f64 = 0.15,
+        /// Time over which the level before and after a step is averaged. Larger: less noise, and
+        /// steps close together merge.
+        pub level_s: f64 = 0.125,
+        /// Smallest step, in standard deviations of the signal's own changes. Larger: fewer steps
+        /// from feedback in turbulence, more missed edges.
+        pub steps_over_noise: f64 = 4.0,
+        /// Share of a signal's largest step in a maneuver below which its steps count as feedback.
+        /// The default lies below a deflection from trim, about half a reversal.
+        pub outstanding_share: f64 = 0.35,
+        /// Smallest motion of a pilot control that gears a surface to it, as a share of the
+        /// control's smallest step. Smaller: more surface steps are attributed to the pilot.
+        pub geared_share: f64 = 0.35,
+        /// Longest delay of a geared surface behind its control: filters and actuators. Larger: more
+        /// surface steps are attributed to the pilot.
+        pub gearing_s: f64 = 0.4,
+        /// Time after a pilot's step in which surface steps count as feedback: the first overshoot
+        /// of the response.
+        pub answer_s: f64 = 1.0,
+        /// Shortest pause between two maneuvers. Larger: maneuvers that follow each other closely
+        /// merge.
+        pub shortest_pause_s: f64 = 0.7,
+        /// Longest time that a pilot holds a control away from trim within one maneuver: half a slow
+        /// oscillation. Smaller: slow maneuvers come apart.
+        pub longest_hold_s: f64 = 4.0,
+        /// Longest rest of all controls at trim within one maneuver. A longer one ends it, and later
+        /// steps are recovery, unless the pilot goes over to another control of the class.
+        pub longest_rest_s: f64 = 2.0,
+        /// Least share of the pause between two maneuvers that the first one's decay keeps, and of
+        /// the lead-in that the second may use. Larger: longer decay, shorter lead-in. The lead-in
+        /// matters more: the inputs before a decay have determined most derivatives.
+        pub shared_lead_in: f64 = 0.25,
+        /// Fewest steps of excitation that is reported when it fits no class. The default is the
+        /// edges of one doublet. Smaller: flickering flags and turns appear in `unknown`.
+        pub fewest_steps: usize = 3,
+    }
 }
 
 impl Settings {

@@ -5,62 +5,50 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use serde::{Deserialize, Serialize};
-
 use crate::aero::Axis;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
+use crate::settings::{elements, settings};
 
-/// Where a surface stops and how fast its actuator is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Actuator {
-    pub lower_deg: f64,
-    pub upper_deg: f64,
-    pub rate_deg_s: f64,
+settings! {
+    /// Stops and rate of a surface's actuator.
+    pub struct Actuator {
+        /// Lower stop, deg.
+        pub lower_deg: f64,
+        /// Upper stop, deg.
+        pub upper_deg: f64,
+        /// Highest rate, deg/s.
+        pub rate_deg_s: f64,
+    }
 }
+elements!(BTreeMap<String, Actuator>: Actuator as "<surface>");
 
-/// The limits beyond which a maneuver is not estimated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Limits {
-    /// Motion in the lead-in over motion in the maneuver. Default 0.5: the response to the inputs
-    /// must be well above what was going on before them, or the initial state speaks louder than
-    /// the derivatives.
-    pub lead_in_motion: f64,
-    /// Root mean square of α about its mean, deg. Default 5, the spacing at which trends are
-    /// published: beyond it a maneuver does not belong to one angle of attack, and derivatives do
-    /// not stay constant.
-    pub alpha_rms_deg: f64,
-    /// Motion of the other axis over motion of the own. Default 1: the other axis's signals enter
-    /// the equations as measured, with their errors, and must not be what moves the aircraft.
-    pub other_axis: f64,
-    /// The least signal to noise. Default 5: what noise hides is not estimated.
-    pub signal_to_noise: f64,
-    /// Share of the inputs' time at a stop. Default 0.5: a surface that rests there excites
-    /// nothing.
-    pub saturated_share: f64,
-    /// Share of the inputs' time at the actuator's rate. Default 0.8: a surface that is always on
-    /// its way follows no command; what it does is measured, so less does no harm.
-    pub rate_limited_share: f64,
-    /// Share of samples that are not as recorded. Default 0.2.
-    pub marked_share: f64,
-    /// Surface → its actuator; a surface without one is taken as free.
-    pub actuators: BTreeMap<String, Actuator>,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits {
-            lead_in_motion: 0.5,
-            alpha_rms_deg: 5.0,
-            other_axis: 1.0,
-            signal_to_noise: 5.0,
-            saturated_share: 0.5,
-            rate_limited_share: 0.8,
-            marked_share: 0.2,
-            actuators: BTreeMap::new(),
-        }
+settings! {
+    /// Limits beyond which a maneuver is not estimated.
+    pub struct Limits {
+        /// Largest motion in the lead-in over motion in the maneuver. Larger: maneuvers with
+        /// residual motion before their inputs pass, whose initial state dominates the derivatives.
+        pub lead_in_motion: f64 = 0.5,
+        /// Largest root mean square of alpha about its mean, deg. The default is the spacing of the
+        /// trends. Larger: maneuvers pass during which the derivatives are not constant.
+        pub alpha_rms_deg: f64 = 5.0,
+        /// Largest motion of the other axis over motion of the own axis. Larger: maneuvers pass that
+        /// the other axis's measured signals, with their errors, move.
+        pub other_axis: f64 = 1.0,
+        /// Smallest signal-to-noise ratio. Smaller: maneuvers pass whose response noise hides.
+        pub signal_to_noise: f64 = 5.0,
+        /// Largest share of the inputs' time that a surface is at a stop, where it excites nothing.
+        pub saturated_share: f64 = 0.5,
+        /// Largest share of the inputs' time that a surface moves at its actuator's rate, where it
+        /// follows no command. Its measured motion enters the equations, so less does no harm.
+        pub rate_limited_share: f64 = 0.8,
+        /// Largest share of flagged samples: bridged, despiked, missing or stuck. Segment applies it
+        /// to all signals of a maneuver, estimate to the outputs together and to each surface.
+        /// Larger: more maneuvers are estimated from repaired samples.
+        pub marked_share: f64 = 0.2,
+        /// Stops and rate of each surface's actuator, by signal. A surface without an entry is never
+        /// saturated or rate-limited.
+        pub actuators: BTreeMap<String, Actuator> = BTreeMap::new(),
     }
 }
 

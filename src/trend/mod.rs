@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
+use crate::settings::{elements, settings, single_values};
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
@@ -25,65 +26,66 @@ use fit::{Point, Trend};
 /// A trend through fewer maneuvers than this has no scatter to speak of and is not drawn.
 const FEWEST_MANEUVERS: usize = 3;
 
-/// What the analyst decides about trends.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// Highest order of the polynomial in α. Default 10: an aircraft that goes through stall bends
-    /// its derivatives at every few degrees between 5° and 60°. The criterion chooses below it.
-    #[serde(default = "default_max_order")]
-    pub max_order: usize,
-    /// What chooses the order. Default `aicc`.
-    #[serde(default)]
-    pub criterion: Criterion,
-    /// The trend is published at the multiples of this that lie inside the range of the data, deg.
-    /// Default 5°.
-    #[serde(default = "default_alpha_step")]
-    pub alpha_step_deg: f64,
-    /// A multiple that lies no further than this beyond the outermost maneuver counts as inside,
-    /// deg: a maneuver flown for 60° has a mean of 59.8°. Default 0.5°.
-    #[serde(default = "default_alpha_reach")]
-    pub alpha_reach_deg: f64,
-    /// Angles of attack at which the trend may bend sharply, deg: with knots it is a spline whose
-    /// order, up to 3, the criterion chooses, or a polynomial up to the third order where that does
-    /// better. Default none: a polynomial, or a spline between the flown angles of attack where
-    /// that does better.
-    #[serde(default)]
-    pub knots_deg: Vec<f64>,
-    /// A maneuver further than this from its trend, in standard deviations, is named in the table
-    /// `outliers`. Default 3. It pulls the trend like one at 1.5, whatever is set here.
-    #[serde(default = "default_outlier_z")]
-    pub outlier_z: f64,
-    /// Whether each class has a trend of its own beside the group's. Default true.
-    #[serde(default = "default_per_class")]
-    pub per_class: bool,
-    /// Which classes speak for which derivatives. The first group that names a derivative, or that
-    /// names none, is the derivative's. Default: one group, `all`, of all classes for all
-    /// derivatives.
-    #[serde(default = "default_groups")]
-    pub groups: Vec<Group>,
-    /// Names that have no trend across α: sensor biases.
-    #[serde(default)]
-    pub leave_out: BTreeSet<String>,
+settings! {
+    /// Settings of the trends across angle of attack.
+    pub struct Settings {
+        /// Criterion that chooses the order of a trend's polynomial or spline: `aicc`, Akaike's
+        /// with the correction for few data, or `bic`, Schwarz's. `bic` chooses lower orders, so
+        /// trends become smoother and their standard errors smaller.
+        pub criterion: Criterion = Criterion::default(),
+        /// Highest order of the polynomial. Lower: smoother trends that may miss the bends of
+        /// derivatives through stall. There are never more coefficients than flown angles of
+        /// attack.
+        pub max_order: usize = 10,
+        /// Spacing of the angles of attack at which trends are published, deg. It changes the rows
+        /// of the tables, not the fitted trends.
+        pub alpha_step_deg: f64 = 5.0,
+        /// Angles of attack at which trends may bend sharply, deg. With knots a trend is a spline of
+        /// up to third order, or a polynomial of up to third order where that fits better. Without,
+        /// it is a polynomial, or a spline between the flown angles of attack.
+        pub knots_deg: Vec<f64> = Vec::new(),
+        /// Distance from its trend beyond which a maneuver is listed in the table `outliers`,
+        /// standard deviations. It changes that table only: the fit limits the influence of any
+        /// maneuver beyond 1.5.
+        pub outlier_z: f64 = 3.0,
+        /// Classes whose maneuvers make the trend of each derivative. The first group that names a
+        /// derivative, or that names none, is used. Other classes then have trends of their own only.
+        pub groups: Vec<Group> = vec![Group {
+            name: "all".into(),
+            ..Group::default()
+        }],
+    }
+    expert {
+        /// Distance beyond the outermost maneuver within which a trend is still published, deg. At 0
+        /// a maneuver flown for 60 deg with a mean of 59.8 deg loses the row at 60 deg.
+        pub alpha_reach_deg: f64 = 0.5,
+        /// Trends of single classes beside the groups' trends. `false` removes their rows.
+        pub per_class: bool = true,
+        /// Names without a trend, for instance sensor biases. The named ones lose their rows.
+        pub leave_out: BTreeSet<String> = BTreeSet::new(),
+    }
 }
 
-/// The classes that speak for some derivatives.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Group {
-    pub name: String,
-    /// Empty: every derivative that no group before this one names.
-    #[serde(default)]
-    pub derivatives: Vec<String>,
-    /// Empty: every class.
-    #[serde(default)]
-    pub classes: Vec<String>,
-    /// The group's own knots, deg, instead of all groups'.
-    #[serde(default)]
-    pub knots_deg: Option<Vec<f64>>,
+settings! {
+    /// Classes that make the trends of some derivatives.
+    pub struct Group {
+        /// Name of the group, as the tables have it.
+        pub name: String,
+        /// Derivatives of the group; without any, all that no group before it names.
+        #[serde(default)]
+        pub derivatives: Vec<String>,
+        /// Classes of the group; without any, all classes.
+        #[serde(default)]
+        pub classes: Vec<String>,
+        /// Knots of the group's trends, deg, in place of `knots_deg` of all trends.
+        #[serde(default)]
+        pub knots_deg: Option<Vec<f64>>,
+    }
 }
+elements!(Vec<Group>: Group as "[]");
+single_values!(Criterion);
 
-/// What chooses the order: both weigh the misfit against the number of coefficients.
+/// Criterion for the order of a trend. Both weigh the misfit against the number of coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
@@ -92,44 +94,6 @@ pub enum Criterion {
     Aicc,
     /// The Bayesian criterion of Schwarz.
     Bic,
-}
-
-fn default_max_order() -> usize {
-    10
-}
-fn default_alpha_step() -> f64 {
-    5.0
-}
-fn default_alpha_reach() -> f64 {
-    0.5
-}
-fn default_outlier_z() -> f64 {
-    3.0
-}
-fn default_per_class() -> bool {
-    true
-}
-fn default_groups() -> Vec<Group> {
-    vec![Group {
-        name: "all".into(),
-        ..Group::default()
-    }]
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings {
-            max_order: default_max_order(),
-            criterion: Criterion::default(),
-            alpha_step_deg: default_alpha_step(),
-            alpha_reach_deg: default_alpha_reach(),
-            knots_deg: Vec::new(),
-            outlier_z: default_outlier_z(),
-            per_class: default_per_class(),
-            groups: default_groups(),
-            leave_out: BTreeSet::new(),
-        }
-    }
 }
 
 impl Settings {

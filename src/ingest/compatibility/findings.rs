@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::joint_fit::{Errors, MODEL_SCALE};
-use super::parameters::{
-    ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, fault_standard_errors, observable, place, size,
-};
+use super::parameters::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, observable, place};
 use super::settings::{Action, Compatibility, OnFault};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
@@ -181,7 +179,7 @@ fn estimate(
     settings: &Compatibility,
 ) -> Option<Estimate> {
     let j = place(instrument, kind);
-    let (value, ordinary) = (errors.values[j], size(&settings.ordinary, instrument, kind));
+    let (value, ordinary) = (errors.values[j], settings.ordinary.of(instrument, kind));
     let model = match kind {
         Kind::Bias => MODEL_BIAS * ordinary,
         Kind::Scale => MODEL_SCALE,
@@ -194,8 +192,9 @@ fn estimate(
         return None;
     }
     let bound = errors.bounds[j].hypot(model);
-    let limit = size(&settings.faulty, instrument, kind);
-    let surely = fault_standard_errors(settings, kind, value) * errors.fault_bounds[j].hypot(model);
+    let limit = settings.faulty.of(instrument, kind);
+    let surely =
+        settings.standard_errors_of_fault(kind, value) * errors.fault_bounds[j].hypot(model);
     let fault = value.abs() > limit && value.abs() > surely;
     let action = match kind {
         Kind::Bias => settings.bias,

@@ -19,9 +19,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::error_sizes::ErrorSizes;
 use super::parameters::{
-    ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, fault_standard_errors,
-    observable, place, size,
+    ALL_KINDS, INPUTS, INSTRUMENTS, KINDS, Kind, OUTPUTS, PARAMETERS, observable, place,
 };
 use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
 use super::settings::Compatibility;
@@ -211,8 +211,8 @@ fn present(windows: &[Window]) -> [bool; PARAMETERS] {
     present
 }
 
-fn size_of(errors: &super::settings::Errors, j: usize) -> f64 {
-    size(errors, j / KINDS, ALL_KINDS[j % KINDS])
+fn size_of(sizes: &ErrorSizes, j: usize) -> f64 {
+    sizes.of(j / KINDS, ALL_KINDS[j % KINDS])
 }
 
 fn total(members: &[Member]) -> DMatrix<f64> {
@@ -473,8 +473,10 @@ impl Problem<'_> {
         let freed =
             |j: &usize| self.present[*j] && prior[*j] > size_of(&self.settings.ordinary, *j);
         let large = |j: &usize| shared[*j].abs() > size_of(&self.settings.faulty, *j);
-        let needed =
-            |j: usize| fault_standard_errors(self.settings, ALL_KINDS[j % KINDS], shared[j]);
+        let needed = |j: usize| {
+            self.settings
+                .standard_errors_of_fault(ALL_KINDS[j % KINDS], shared[j])
+        };
         let unsure = |j: &usize| shared[*j].abs() <= needed(*j) * bounds[*j];
         (0..PARAMETERS)
             .filter(freed)
@@ -518,9 +520,8 @@ impl<'a> Member<'a> {
             .zip(window.start.iter())
             .for_each(|(l, x)| *l = *x);
         // What is believed before residuals are seen.
-        let variances = std::array::from_fn(|o| {
-            size(&problem.settings.ordinary, INPUTS + o, Kind::Bias).powi(2)
-        });
+        let variances =
+            std::array::from_fn(|o| problem.settings.ordinary.of(INPUTS + o, Kind::Bias).powi(2));
         Member::at(window, problem, local, variances, shared)
     }
 
@@ -604,7 +605,7 @@ impl<'a> Member<'a> {
         let range = problem.compared(self.window);
         for o in 0..OUTPUTS {
             let residuals = self.residuals[o].get(range.clone()).unwrap_or_default();
-            let floor = 1e-3 * size(&problem.settings.ordinary, INPUTS + o, Kind::Bias);
+            let floor = 1e-3 * problem.settings.ordinary.of(INPUTS + o, Kind::Bias);
             self.variances[o] = coloured::level(residuals, self.window.step_s).max(floor * floor);
         }
         self.weigh(problem);

@@ -8,6 +8,7 @@
 //! found here.
 
 mod equations;
+mod error_sizes;
 mod findings;
 mod joint_fit;
 mod parameters;
@@ -20,8 +21,9 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use error_sizes::{ErrorSize, ErrorSizes};
 pub use findings::{Estimate, Finding, Findings};
-pub use settings::{Action, Compatibility, Error, Errors, OnFault};
+pub use settings::{Action, Compatibility, OnFault};
 
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, Record, signal};

@@ -1,66 +1,71 @@
-//! What the analyst may decide about data compatibility, with defaults reasoned from the
-//! instruments of a flight test.
+//! Settings of the compatibility check, with defaults from the instruments of flight test.
 
 use serde::{Deserialize, Serialize};
 
-/// How flight-path reconstruction is done and what follows from it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Compatibility {
-    /// Whether instruments are looked at at all.
-    pub reconstruct: bool,
-    /// What becomes of biases, scale errors and delays that the flight tells but that are ordinary.
-    pub bias: Action,
-    pub scale: Action,
-    pub delay: Action,
-    /// What becomes of an instrument with a fault.
-    pub fault: OnFault,
-    /// A correction counts when it is this many times its bound.
-    pub standard_errors: f64,
-    /// A fault is named when it is this many times its bound, besides being beyond what is
-    /// ordinary. A channel that is ahead of the others needs twice as many: instruments and
-    /// recorders delay, and for one to be ahead all others must be late alike.
-    pub fault_standard_errors: f64,
-    /// Length of the windows, s: some periods of the Dutch roll, and short enough that wind stays
-    /// what it is.
-    pub window_s: f64,
-    /// The most windows of a flight; memory and time are proportional to them.
-    pub windows: usize,
-    /// Fewer windows than this decide nothing.
-    pub least_windows: usize,
-    /// The longest delay that is looked for, s.
-    pub longest_delay_s: f64,
-    /// How fast the wind that the aircraft meets may change within a window, ft/s²: a climb of 100
-    /// ft/s through a shear of 2 ft/s in a thousand feet makes 0.2.
-    pub wind_change_ft_s2: f64,
-    /// What a healthy instrument of each kind is off by (standard deviations).
-    pub ordinary: Errors,
-    /// From where it is no longer an instrument's ordinary error but a fault to be named.
-    pub faulty: Errors,
+use super::error_sizes::ErrorSizes;
+use super::parameters::Kind;
+use crate::settings::{settings, single_values};
+
+settings! {
+    /// Settings of flight-path reconstruction and of the corrections that follow.
+    pub struct Compatibility {
+        /// Ordinary biases: `apply` corrects the record by those that count, `report` only publishes
+        /// them. Corrections change every estimate from the channel.
+        pub bias: Action = Action::Apply,
+        /// Ordinary scale errors: `apply` or `report`.
+        pub scale: Action = Action::Apply,
+        /// Ordinary delays: `apply` or `report`.
+        pub delay: Action = Action::Report,
+        /// Instruments with a fault: `apply` names the fault and corrects the channel, `report` names
+        /// it, `refuse` names it and refuses the flight.
+        pub fault: OnFault = OnFault::Apply,
+        /// Size from which an error is corrected, standard errors. Larger: fewer corrections, and
+        /// smaller errors stay in the record.
+        pub standard_errors: f64 = 3.0,
+    }
+    split expert {
+        /// Flight-path reconstruction. `false` leaves all instruments unexamined.
+        pub reconstruct: bool = true,
+        /// Length of the windows, s: some periods of the Dutch roll. Longer: the wind changes within
+        /// a window.
+        pub window_s: f64 = 20.0,
+        /// Most windows of a flight. More: smaller bounds of the errors, and time and memory in
+        /// proportion.
+        pub windows: usize = 20,
+        /// Fewest windows for a result. Larger: short flights stay unexamined.
+        pub least_windows: usize = 3,
+        /// Longest delay of a channel that is searched, s. A larger one is not found.
+        pub longest_delay_s: f64 = 0.3,
+        /// Change of the wind along the flight path within a window, ft/s². A climb of 100 ft/s
+        /// through a shear of 2 ft/s per thousand feet makes 0.2. Larger: wider bounds of errors of
+        /// vanes and airspeed.
+        pub wind_change_ft_s2: f64 = 0.1,
+    }
+    elsewhere {
+        /// Size of an error, in standard errors, from which it is a fault, besides being beyond what
+        /// is ordinary: `ingest: expert: fault_standard_errors`.
+        pub fault_standard_errors: f64 = 4.0,
+        /// Errors of healthy instruments, standard deviations: `instruments:` of aircraft.yaml.
+        pub ordinary: ErrorSizes = ErrorSizes::ordinary(),
+        /// Sizes from which an error is a fault: `instruments:` of aircraft.yaml.
+        pub faulty: ErrorSizes = ErrorSizes::faulty(),
+    }
 }
 
-impl Default for Compatibility {
-    fn default() -> Compatibility {
-        Compatibility {
-            reconstruct: true,
-            bias: Action::Apply,
-            scale: Action::Apply,
-            delay: Action::Report,
-            fault: OnFault::Apply,
-            standard_errors: 3.0,
-            fault_standard_errors: 4.0,
-            window_s: 20.0,
-            windows: 20,
-            least_windows: 3,
-            longest_delay_s: 0.3,
-            wind_change_ft_s2: 0.1,
-            ordinary: Errors::ordinary(),
-            faulty: Errors::faulty(),
+impl Compatibility {
+    /// Standard errors from which an error counts as a fault. A channel ahead of the others needs
+    /// twice as many: instruments and recorders delay, so all others would have to be late alike.
+    pub(super) fn standard_errors_of_fault(&self, kind: Kind, value: f64) -> f64 {
+        let is_ahead = kind == Kind::Delay && value < 0.0;
+        if is_ahead {
+            2.0 * self.fault_standard_errors
+        } else {
+            self.fault_standard_errors
         }
     }
 }
 
-/// What becomes of an ordinary error.
+/// Treatment of an ordinary error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
@@ -70,7 +75,7 @@ pub enum Action {
     Report,
 }
 
-/// What becomes of an instrument with a fault.
+/// Treatment of an instrument with a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OnFault {
@@ -82,58 +87,4 @@ pub enum OnFault {
     Refuse,
 }
 
-/// Bias in the unit of the kind, scale relative.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Error {
-    pub bias: f64,
-    pub scale: f64,
-}
-
-/// Sizes of errors by kind of instrument.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Errors {
-    pub rate_deg_s: Error,
-    pub accelerometer_g: Error,
-    pub vane_deg: Error,
-    pub velocity_ft_s: Error,
-    pub attitude_deg: Error,
-    pub altitude_ft: Error,
-    pub qbar_psf: Error,
-    pub mach: Error,
-    /// Of any channel against the others, s.
-    pub delay_s: f64,
-}
-
-impl Errors {
-    fn ordinary() -> Errors {
-        let error = |bias, scale| Error { bias, scale };
-        Errors {
-            rate_deg_s: error(0.1, 0.005),
-            accelerometer_g: error(0.01, 0.003),
-            vane_deg: error(0.3, 0.02),
-            velocity_ft_s: error(3.0, 0.01),
-            attitude_deg: error(0.2, 0.005),
-            altitude_ft: error(100.0, 0.01),
-            qbar_psf: error(1.0, 0.03),
-            mach: error(0.005, 0.02),
-            delay_s: 0.01,
-        }
-    }
-
-    fn faulty() -> Errors {
-        let error = |bias, scale| Error { bias, scale };
-        Errors {
-            rate_deg_s: error(0.5, 0.05),
-            accelerometer_g: error(0.05, 0.05),
-            vane_deg: error(2.0, 0.1),
-            velocity_ft_s: error(20.0, 0.05),
-            attitude_deg: error(1.0, 0.05),
-            altitude_ft: error(1000.0, 0.05),
-            qbar_psf: error(10.0, 0.15),
-            mach: error(0.05, 0.1),
-            delay_s: 0.03,
-        }
-    }
-}
+single_values!(Action, OnFault);

@@ -503,7 +503,7 @@ fn ordinary(seed: u64) -> [f64; PARAMETERS] {
     let errors = settings().ordinary;
     std::array::from_fn(|j| {
         let (i, kind) = (j / 3, parameters::ALL_KINDS[j % 3]);
-        let drawn = noise.normal() * parameters::size(&errors, i, kind);
+        let drawn = noise.normal() * errors.of(i, kind);
         if kind == Kind::Delay || !observable(i, kind) {
             0.0
         } else {
@@ -605,7 +605,10 @@ fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corre
         ..settings()
     };
     let fitted = joint_fit::fit(&windows(&record), &aircraft(), &sure_of_nothing).unwrap();
-    assert_abs_diff_eq!(fitted.prior[j], sure_of_nothing.ordinary.vane_deg.scale);
+    assert_abs_diff_eq!(
+        fitted.prior[j],
+        sure_of_nothing.ordinary.of(vane, Kind::Scale)
+    );
     assert!(
         joint_fit::fit(&windows(&record), &aircraft(), &settings())
             .unwrap()

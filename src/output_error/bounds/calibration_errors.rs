@@ -8,7 +8,6 @@
 //! v′ − v is known from sensitivities; for other signals it is integrated.
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
@@ -21,15 +20,18 @@ use crate::output_error::kernel::response::Sensitivities;
 use crate::output_error::likelihood::cost;
 use crate::output_error::likelihood::data::Likelihood;
 use crate::output_error::likelihood::outcome::Fit;
+use crate::settings::settings;
 
-/// What calibration leaves unknown of a signal, as standard deviations: reading = (1 + scale) ·
-/// truth + bias.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Calibration {
-    /// In the signal's unit.
-    pub bias: f64,
-    pub scale_pct: f64,
+settings! {
+    /// Uncertainty that calibration leaves of a signal, standard deviations: reading = (1 + scale) ·
+    /// truth + bias.
+    #[derive(Copy)]
+    pub struct Calibration {
+        /// Uncertainty of the bias, in the signal's unit. Larger: wider `bound_corrected`.
+        pub bias: f64 = 0.0,
+        /// Uncertainty of the scale, percent. Larger: wider `bound_corrected`.
+        pub scale_pct: f64 = 0.0,
+    }
 }
 
 /// One error of one signal.

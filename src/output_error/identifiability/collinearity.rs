@@ -11,36 +11,26 @@
 //! A direction of high index that makes more than half of the variance of two or more parameters
 //! names a group that the data hardly tell apart.
 
-use nalgebra::{DMatrix, SymmetricEigen};
-use serde::{Deserialize, Serialize};
-
 use crate::numerics::symmetric::{scale, scaled};
+use crate::settings::settings;
+use nalgebra::{DMatrix, SymmetricEigen};
 
-/// When a correlation, an inflation or a direction is worth a word.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Limits {
-    /// Pairs of estimates that correlate by at least this are published.
-    pub published_correlation: f64,
-    /// Pairs that correlate by more than this are flagged.
-    pub correlation: f64,
-    /// Estimates whose variance is inflated by more than this are flagged.
-    pub variance_inflation: f64,
-    /// A direction of at least this condition index names its group (Belsley: 30 is strong).
-    pub condition_index: f64,
-    /// A parameter belongs to it where the direction makes at least this share of its variance.
-    pub variance_proportion: f64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits {
-            published_correlation: 0.5,
-            correlation: 0.9,
-            variance_inflation: 10.0,
-            condition_index: 30.0,
-            variance_proportion: 0.5,
-        }
+settings! {
+    /// Limits of the identifiability measures.
+    #[derive(Copy)]
+    pub struct Limits {
+        /// Smallest absolute correlation of two estimates that is published. Smaller: more rows in
+        /// `correlations`.
+        pub published_correlation: f64 = 0.5,
+        /// Absolute correlation beyond which a pair of estimates is flagged.
+        pub correlation: f64 = 0.9,
+        /// Variance inflation beyond which an estimate is flagged.
+        pub variance_inflation: f64 = 10.0,
+        /// Condition index from which a direction names its group of parameters. Belsley calls 30
+        /// strong. Smaller: more groups are named.
+        pub condition_index: f64 = 30.0,
+        /// Share of a parameter's variance from which it belongs to a direction's group.
+        pub variance_proportion: f64 = 0.5,
     }
 }
 

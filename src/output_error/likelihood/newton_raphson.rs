@@ -13,27 +13,21 @@ use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::symmetric::{scale, scaled};
 use crate::output_error::kernel::response::Detail;
+use crate::settings::settings;
 
-/// When the iteration stops.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
-    pub max_iterations: usize,
-    /// Converged when a full step would lower J by less than this share of it: at 1e-8 the
-    /// estimates are within a hundredth of their bounds.
-    pub tolerance: f64,
-    /// Beyond this condition number of the information matrix with unit diagonal a direction counts
-    /// as not determined.
-    pub max_condition_number: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            max_iterations: 50,
-            tolerance: 1e-8,
-            max_condition_number: 1e10,
-        }
+settings! {
+    /// End of the iteration.
+    #[derive(Copy)]
+    pub struct Settings {
+        /// Most iterations; a maneuver that needs more does not converge.
+        pub max_iterations: usize = 50,
+        /// Relative decrease of J by a full step below which the iteration has converged. At 1e-8
+        /// estimates are within a hundredth of their bounds. Larger: fewer iterations, estimates
+        /// further from the minimum.
+        pub tolerance: f64 = 1e-8,
+        /// Condition number of the information matrix with unit diagonal beyond which a direction
+        /// counts as not determined. Smaller: more maneuvers are rejected as not identifiable.
+        pub max_condition_number: f64 = 1e10,
     }
 }
 

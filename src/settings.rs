@@ -1,0 +1,500 @@
+//! Declaration of settings: field, default and explanation in one place.
+//!
+//! [`settings!`] makes four things of one declaration: the struct that stages read, its defaults,
+//! its parser and its [`Key`]s, from which `docs/settings.md` is made. A stage declares the keys
+//! that an analyst decides first, then those that stand under `expert:` in the YAML. The stage
+//! reads both as fields of one struct.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// One key of a configuration file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Names from the outermost section inwards; `<name>` is one that the analyst gives.
+    pub path: Vec<&'static str>,
+    /// Default as YAML; `None` for a key that must be given.
+    pub default: Option<String>,
+    /// Meaning, unit and effect of a change.
+    pub explanation: String,
+}
+
+impl Key {
+    /// The path as the pages and messages write it: `ingest: expert: checks: block_s`.
+    #[must_use]
+    pub fn written(&self) -> String {
+        self.path.join(": ")
+    }
+
+    fn below(mut self, outer: &[&'static str]) -> Key {
+        self.path.splice(0..0, outer.iter().copied());
+        self
+    }
+}
+
+/// A value that a configuration file holds: a single value, or a group of keys.
+pub trait Setting {
+    /// Groups have no row of their own in the page of settings.
+    const IS_GROUP: bool = false;
+
+    /// Keys below this value; none for a single value.
+    #[must_use]
+    fn keys() -> Vec<Key> {
+        Vec::new()
+    }
+}
+
+/// Declares types of single values: numbers, words, choices.
+macro_rules! single_values {
+    ($($type:ty),* $(,)?) => { $( impl $crate::settings::Setting for $type {} )* };
+}
+pub(crate) use single_values;
+
+single_values!(bool, f64, usize, String, PathBuf, Vec<f64>, Vec<PathBuf>);
+single_values!(Vec<String>, BTreeSet<String>, BTreeMap<String, f64>);
+single_values!(BTreeMap<String, String>);
+
+impl<T: Setting> Setting for Option<T> {
+    fn keys() -> Vec<Key> {
+        T::keys()
+    }
+}
+
+/// Keys of a field: its own, unless it is a group, and those below it.
+#[must_use]
+pub fn keys_of<T: Setting>(
+    path: &[&'static str],
+    default: Option<String>,
+    documentation: &[&str],
+) -> Vec<Key> {
+    let own = Key {
+        path: path.to_vec(),
+        default,
+        explanation: documentation.join("").trim().to_owned(),
+    };
+    let own = (!T::IS_GROUP).then_some(own);
+    own.into_iter().chain(below(path, T::keys())).collect()
+}
+
+/// Keys with outer names before theirs.
+#[must_use]
+pub fn below(path: &[&'static str], keys: Vec<Key>) -> Vec<Key> {
+    keys.into_iter().map(|key| key.below(path)).collect()
+}
+
+/// Declares maps or lists of groups: `elements!(Vec<Group>: Group as "[]")`.
+macro_rules! elements {
+    ($container:ty: $element:ty as $name:literal) => {
+        impl $crate::settings::Setting for $container {
+            fn keys() -> Vec<$crate::settings::Key> {
+                let keys = <$element as $crate::settings::Setting>::keys();
+                $crate::settings::below(&[$name], keys)
+            }
+        }
+    };
+}
+pub(crate) use elements;
+
+/// A default as YAML, on one line.
+pub fn written_default(default: &impl Serialize) -> Option<String> {
+    let text = serde_json::to_string(default).ok()?;
+    Some(text.strip_suffix(".0").unwrap_or(&text).to_owned())
+}
+
+/// Default of an element's key: `none` for one that may be left out.
+#[must_use]
+pub fn element_default(attribute: &str) -> Option<String> {
+    (attribute == "default").then(|| "none".to_owned())
+}
+
+/// A group whose keys stand in two places of a file: in sight, and under the stage's `expert:`.
+pub trait SplitGroup: Sized {
+    type InSight: DeserializeOwned + Default;
+    type Expert: DeserializeOwned + Default;
+
+    fn join(in_sight: Self::InSight, expert: Self::Expert) -> Self;
+    fn keys_in_sight() -> Vec<Key>;
+    fn keys_of_experts() -> Vec<Key>;
+}
+
+/// Declares a group of settings. The forms:
+///
+/// - fields with defaults: a group in sight, or wholly under somebody's `expert:`;
+/// - the same and `expert { … }`: a stage; `split { … }` lists its groups of the next form;
+/// - the same and `split expert { … }`: a group with keys in both places of its stage;
+/// - fields without defaults: an element of a map or list. A field with `#[serde(default)]` may be
+///   left out.
+///
+/// `elsewhere { … }` has fields that no key of this group sets: the configuration fills them from
+/// another section.
+macro_rules! settings {
+    (
+        $(#[doc = $about:literal])+
+        $(#[derive($derive:ident)])?
+        pub struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $(#[serde($($serde:tt)*)])?
+                pub $field:ident: $type:ty = $default:expr,
+            )*
+        }
+        $(
+            elsewhere {
+                $(
+                    $(#[doc = $other_doc:literal])+
+                    pub $other:ident: $other_type:ty = $other_default:expr,
+                )*
+            }
+        )?
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        $(#[derive($derive)])?
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name {
+            $(
+                $(#[doc = $doc])+
+                $(#[serde($($serde)*)])?
+                pub $field: $type,
+            )*
+            $($(
+                $(#[doc = $other_doc])+
+                #[serde(skip_deserializing)]
+                pub $other: $other_type,
+            )*)?
+        }
+
+        impl Default for $name {
+            fn default() -> $name {
+                $name {
+                    $($field: $default,)*
+                    $($($other: $other_default,)*)?
+                }
+            }
+        }
+
+        impl $crate::settings::Setting for $name {
+            const IS_GROUP: bool = true;
+
+            fn keys() -> Vec<$crate::settings::Key> {
+                let defaults = <$name>::default();
+                [
+                    $($crate::settings::keys_of::<$type>(
+                        &[stringify!($field)],
+                        $crate::settings::written_default(&defaults.$field),
+                        &[$($doc),+],
+                    )),*
+                ]
+                .concat()
+            }
+        }
+    };
+
+    (
+        $(#[doc = $about:literal])+
+        pub struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $(#[serde($($serde:tt)*)])?
+                pub $field:ident: $type:ty = $default:expr,
+            )*
+        }
+        expert {
+            $(
+                $(#[doc = $expert_doc:literal])+
+                $(#[serde($($expert_serde:tt)*)])?
+                pub $expert:ident: $expert_type:ty = $expert_default:expr,
+            )*
+        }
+        $(
+            split {
+                $(
+                    $(#[doc = $split_doc:literal])+
+                    pub $split:ident: $split_type:ty,
+                )*
+            }
+        )?
+        $(
+            elsewhere {
+                $(
+                    $(#[doc = $other_doc:literal])+
+                    pub $other:ident: $other_type:ty = $other_default:expr,
+                )*
+            }
+        )?
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        pub struct $name {
+            $(
+                $(#[doc = $doc])+
+                $(#[serde($($serde)*)])?
+                pub $field: $type,
+            )*
+            $(
+                $(#[doc = $expert_doc])+
+                $(#[serde($($expert_serde)*)])?
+                pub $expert: $expert_type,
+            )*
+            $($(
+                $(#[doc = $split_doc])+
+                pub $split: $split_type,
+            )*)?
+            $($(
+                $(#[doc = $other_doc])+
+                pub $other: $other_type,
+            )*)?
+        }
+
+        impl Default for $name {
+            fn default() -> $name {
+                $name {
+                    $($field: $default,)*
+                    $($expert: $expert_default,)*
+                    $($($split: <$split_type>::default(),)*)?
+                    $($($other: $other_default,)*)?
+                }
+            }
+        }
+
+        const _: () = {
+            use $crate::settings::{Key, Setting, keys_of, written_default};
+            #[derive(serde::Deserialize)]
+            #[serde(deny_unknown_fields, default)]
+            struct Written {
+                $($field: $type,)*
+                $($($split: <$split_type as $crate::settings::SplitGroup>::InSight,)*)?
+                expert: WrittenExpert,
+            }
+
+            #[derive(serde::Deserialize)]
+            #[serde(deny_unknown_fields, default)]
+            struct WrittenExpert {
+                $($expert: $expert_type,)*
+                $($($split: <$split_type as $crate::settings::SplitGroup>::Expert,)*)?
+            }
+
+            impl Default for Written {
+                fn default() -> Written {
+                    Written {
+                        $($field: $default,)*
+                        $($($split: Default::default(),)*)?
+                        expert: WrittenExpert::default(),
+                    }
+                }
+            }
+
+            impl Default for WrittenExpert {
+                fn default() -> WrittenExpert {
+                    WrittenExpert {
+                        $($expert: $expert_default,)*
+                        $($($split: Default::default(),)*)?
+                    }
+                }
+            }
+
+            impl<'de> serde::Deserialize<'de> for $name {
+                fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<$name, D::Error> {
+                    let written = Written::deserialize(from)?;
+                    Ok($name {
+                        $($field: written.$field,)*
+                        $($expert: written.expert.$expert,)*
+                        $($($split: $crate::settings::SplitGroup::join(
+                            written.$split,
+                            written.expert.$split,
+                        ),)*)?
+                        $($($other: $other_default,)*)?
+                    })
+                }
+            }
+
+            impl Setting for $name {
+                const IS_GROUP: bool = true;
+
+                fn keys() -> Vec<Key> {
+                    let defaults = <$name>::default();
+                    [
+                        $(keys_of::<$type>(
+                            &[stringify!($field)],
+                            written_default(&defaults.$field),
+                            &[$($doc),+],
+                        ),)*
+                        $($($crate::settings::below(
+                            &[stringify!($split)],
+                            <$split_type as $crate::settings::SplitGroup>::keys_in_sight(),
+                        ),)*)?
+                        $(keys_of::<$expert_type>(
+                            &["expert", stringify!($expert)],
+                            written_default(&defaults.$expert),
+                            &[$($expert_doc),+],
+                        ),)*
+                        $($($crate::settings::below(
+                            &["expert", stringify!($split)],
+                            <$split_type as $crate::settings::SplitGroup>::keys_of_experts(),
+                        ),)*)?
+                    ]
+                    .concat()
+                }
+            }
+        };
+    };
+
+    (
+        $(#[doc = $about:literal])+
+        pub struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                pub $field:ident: $type:ty = $default:expr,
+            )*
+        }
+        split expert {
+            $(
+                $(#[doc = $expert_doc:literal])+
+                pub $expert:ident: $expert_type:ty = $expert_default:expr,
+            )*
+        }
+        $(
+            elsewhere {
+                $(
+                    $(#[doc = $other_doc:literal])+
+                    pub $other:ident: $other_type:ty = $other_default:expr,
+                )*
+            }
+        )?
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+        pub struct $name {
+            $(
+                $(#[doc = $doc])+
+                pub $field: $type,
+            )*
+            $(
+                $(#[doc = $expert_doc])+
+                pub $expert: $expert_type,
+            )*
+            $($(
+                $(#[doc = $other_doc])+
+                pub $other: $other_type,
+            )*)?
+        }
+
+        impl Default for $name {
+            fn default() -> $name {
+                $name {
+                    $($field: $default,)*
+                    $($expert: $expert_default,)*
+                    $($($other: $other_default,)*)?
+                }
+            }
+        }
+
+        const _: () = {
+            use $crate::settings::{Key, SplitGroup, keys_of, written_default};
+
+            #[derive(serde::Deserialize)]
+            #[serde(deny_unknown_fields, default)]
+            #[derive(Debug)]
+            pub struct InSight {
+                $($field: $type,)*
+            }
+
+            #[derive(serde::Deserialize)]
+            #[serde(deny_unknown_fields, default)]
+            #[derive(Debug)]
+            pub struct Expert {
+                $($expert: $expert_type,)*
+            }
+
+            impl Default for InSight {
+                fn default() -> InSight {
+                    InSight { $($field: $default,)* }
+                }
+            }
+
+            impl Default for Expert {
+                fn default() -> Expert {
+                    Expert { $($expert: $expert_default,)* }
+                }
+            }
+
+            impl SplitGroup for $name {
+                type InSight = InSight;
+                type Expert = Expert;
+
+                fn join(in_sight: InSight, expert: Expert) -> $name {
+                    $name {
+                        $($field: in_sight.$field,)*
+                        $($expert: expert.$expert,)*
+                        $($($other: $other_default,)*)?
+                    }
+                }
+
+                fn keys_in_sight() -> Vec<Key> {
+                    let defaults = <$name>::default();
+                    [
+                        $(keys_of::<$type>(
+                            &[stringify!($field)],
+                            written_default(&defaults.$field),
+                            &[$($doc),+],
+                        )),*
+                    ]
+                    .concat()
+                }
+
+                fn keys_of_experts() -> Vec<Key> {
+                    let defaults = <$name>::default();
+                    [
+                        $(keys_of::<$expert_type>(
+                            &[stringify!($expert)],
+                            written_default(&defaults.$expert),
+                            &[$($expert_doc),+],
+                        )),*
+                    ]
+                    .concat()
+                }
+            }
+        };
+    };
+
+    (
+        $(#[doc = $about:literal])+
+        pub struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $(#[serde($serde:tt)])?
+                pub $field:ident: $type:ty,
+            )*
+        }
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $(
+                $(#[doc = $doc])+
+                $(#[serde($serde)])?
+                pub $field: $type,
+            )*
+        }
+
+        impl $crate::settings::Setting for $name {
+            const IS_GROUP: bool = true;
+
+            fn keys() -> Vec<$crate::settings::Key> {
+                [
+                    $($crate::settings::keys_of::<$type>(
+                        &[stringify!($field)],
+                        $crate::settings::element_default(concat!("" $(, stringify!($serde))?)),
+                        &[$($doc),+],
+                    )),*
+                ]
+                .concat()
+            }
+        }
+    };
+}
+pub(crate) use settings;
