@@ -12,7 +12,7 @@ use harvest::aero::Axis;
 use harvest::config::{Config, Overrides};
 use harvest::dynamics::motion::{MassProperties, Window};
 use harvest::dynamics::{Longitudinal, OUTPUTS};
-use harvest::estimate::{self, Basis};
+use harvest::estimate::{self, Context};
 use harvest::flight::Record;
 use harvest::maneuver::{Class, Maneuver, Status};
 use harvest::output_error::{Case, Measurements, Model};
@@ -187,14 +187,14 @@ fn stages(c: &mut Criterion) {
             )
         });
     });
-    let basis = Basis::new(
+    let context = Context::new(
         &config.aircraft,
         &config.buildup,
         &config.tunnel,
         &config.estimate,
     );
     c.bench_function("estimate one maneuver", |b| {
-        b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &basis));
+        b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &context));
     });
     if let Err(error) = responses(c, &bench) {
         #[expect(clippy::print_stderr, reason = "the benchmark's own output")]

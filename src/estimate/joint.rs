@@ -1,20 +1,23 @@
-//! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives,
-//! while each keeps its biases and initial states.
+//! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives.
+//! Each keeps its biases and initial states.
 //!
-//! Constants (`CN_0`) are biases as well: they take up the zero errors of vanes and surfaces, which
-//! are others in each flight, and the trim. Unless `share_constants` says otherwise each maneuver
-//! keeps its own.
+//! Each also keeps its constants (`CN_0`) unless `share_constants` is set: they take up trim and the
+//! zero errors of vanes and surfaces, which differ between flights.
 //!
-//! Which derivatives are free and what the outputs weigh is decided at the mean angle of attack of
-//! the maneuvers, or they could not share anything. A held derivative acts at the tunnel's value at
-//! each maneuver's own angle of attack and Mach number, as it does when the maneuver is estimated
-//! alone: the tunnel knows how it changes between them, and to hold one value for all would charge
-//! that change to the shared derivatives. The tunnel's error is one and the same for all.
+//! The class's table and weights are those at the mean angle of attack, so that all maneuvers have
+//! the same free derivatives. A held derivative acts at the tunnel's value at each maneuver's own
+//! angle of attack and Mach number: one value for all would charge its change between them to the
+//! shared derivatives. The tunnel's error is common to all maneuvers.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Estimated, Ready, Run, calibration, covariance, values_of};
+use super::calibration_effect::NOT_COUNTED;
+use super::context::Context;
+use super::estimated::{Covariance, Estimated, rejected_fit};
+use super::prepared_case::PreparedCase;
+use super::settings::JointSettings;
+use super::task::{Task, values_by_name};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
@@ -23,39 +26,21 @@ use crate::output_error::consider::{self, Considered};
 use crate::output_error::{
     Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation, mean,
 };
-use crate::settings::settings;
 use crate::tables::{EstimateRow, JOINT_FLIGHT, JointRow, Participation, StartingValues};
 
-settings! {
-    /// Settings of joint estimation.
-    pub struct Settings {
-        /// Widest spread of the mean angles of attack of joined maneuvers, deg. The default is half
-        /// the usual distance of test points. Larger: smaller bounds, and the change of derivatives
-        /// over the spread becomes an error.
-        pub alpha_bin_deg: f64 = 2.5,
-        /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`.
-        /// Without any, maneuvers are parted at their widest gaps.
-        pub centres_deg: Vec<f64> = Vec::new(),
-    }
-    elsewhere {
-        /// Constants shared by joined maneuvers: `estimate: expert: share_constants`.
-        pub share_constants: bool = false,
-    }
-}
-
-/// Maneuvers that are to be estimated together.
+/// A group of maneuvers to be estimated together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// `joint/<class>/<mean α>`: the `maneuver_id` of its rows.
+    /// `maneuver_id` of its rows: `joint/<class>/<mean α>`.
     pub joint_id: String,
     pub class: String,
-    /// Places in the list of maneuvers, in its order; two or more.
+    /// Indices in the list of maneuvers, ascending; two or more.
     pub members: Vec<usize>,
 }
 
-/// Groups maneuvers by class and angle of attack; one that stands alone is in no group.
+/// Groups maneuvers by class and angle of attack; a group has two or more.
 #[must_use]
-pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
+pub fn bins(maneuvers: &[Maneuver], settings: &JointSettings) -> Vec<Bin> {
     let mut classes: Vec<&str> = maneuvers.iter().map(|m| m.class.as_str()).collect();
     classes.sort_unstable();
     classes.dedup();
@@ -67,9 +52,9 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
         of_class.sort_by(|&a, &b| maneuvers[a].alpha_deg.total_cmp(&maneuvers[b].alpha_deg));
         let alpha = |&i: &usize| maneuvers[i].alpha_deg;
         let groups = if settings.centres_deg.is_empty() {
-            parted(&of_class, &alpha, settings.alpha_bin_deg)
+            split_at_gaps(&of_class, &alpha, settings.alpha_bin_deg)
         } else {
-            around(&of_class, &alpha, settings)
+            group_by_centre(&of_class, &alpha, settings)
         };
         for mut members in groups.into_iter().filter(|g| g.len() > 1) {
             let mean = members.iter().map(alpha).sum::<f64>() / members.len() as f64;
@@ -84,9 +69,13 @@ pub fn bins(maneuvers: &[Maneuver], settings: &Settings) -> Vec<Bin> {
     bins
 }
 
-/// Parts maneuvers, sorted by angle of attack, at the widest gap until none of the groups is wider
-/// than `widest_deg`.
-fn parted(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, widest_deg: f64) -> Vec<Vec<usize>> {
+/// Splits maneuvers, sorted by angle of attack, at the widest gap until no group is wider than
+/// `widest_deg`.
+fn split_at_gaps(
+    sorted: &[usize],
+    alpha: &dyn Fn(&usize) -> f64,
+    widest_deg: f64,
+) -> Vec<Vec<usize>> {
     let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
         return vec![];
     };
@@ -99,14 +88,18 @@ fn parted(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, widest_deg: f64) -> V
     };
     let (low, high) = sorted.split_at(at);
     [
-        parted(low, alpha, widest_deg),
-        parted(high, alpha, widest_deg),
+        split_at_gaps(low, alpha, widest_deg),
+        split_at_gaps(high, alpha, widest_deg),
     ]
     .concat()
 }
 
-/// Each maneuver with the nearest centre, if it is near enough.
-fn around(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, settings: &Settings) -> Vec<Vec<usize>> {
+/// Groups maneuvers by the nearest centre within half of `alpha_bin_deg`.
+fn group_by_centre(
+    sorted: &[usize],
+    alpha: &dyn Fn(&usize) -> f64,
+    settings: &JointSettings,
+) -> Vec<Vec<usize>> {
     let centres = &settings.centres_deg;
     let nearest = |i: &usize| {
         let distance = |c: &usize| (alpha(i) - centres[*c]).abs();
@@ -123,85 +116,88 @@ fn around(sorted: &[usize], alpha: &dyn Fn(&usize) -> f64, settings: &Settings) 
     (0..centres.len()).map(of).collect()
 }
 
-/// What joint estimation gives: rows as of a maneuver, and a row for each maneuver that was to be
-/// joined.
+/// Results of a joint estimation: rows as for a maneuver, and a row of `joint` for each member.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joined {
     pub estimated: Estimated,
     pub members: Vec<JointRow>,
 }
 
-/// Estimates maneuvers together; `class` is theirs. Whatever goes wrong is in the outcome; a
-/// maneuver that fails alone is left out and named in the reason.
+/// Estimates maneuvers of one class together.
+///
+/// The outcome has any failure. A maneuver that fails alone is left out, and the reason names it.
 #[must_use]
 pub fn estimate(
     joint_id: &str,
     members: &[(&Record, &Maneuver)],
     class: &Class,
-    basis: &Basis,
+    context: &Context,
 ) -> Joined {
     let all: Vec<&Maneuver> = members.iter().map(|(_, m)| *m).collect();
     let class = class.at(mean_of(&all, |m| m.alpha_deg));
     match class.axis {
-        Axis::Longitudinal => together::<3, Longitudinal>(joint_id, members, &class, basis),
-        Axis::Lateral => together::<4, Lateral>(joint_id, members, &class, basis),
+        Axis::Longitudinal => {
+            estimate_members::<3, Longitudinal>(joint_id, members, &class, context)
+        }
+        Axis::Lateral => estimate_members::<4, Lateral>(joint_id, members, &class, context),
     }
 }
 
-/// A maneuver that takes part, with its own estimation.
-struct Part<'a, const NX: usize, E: Equations<NX>> {
-    run: Run<'a>,
-    ready: Ready<'a, NX, E>,
+/// A maneuver that takes part, with its estimation alone.
+struct Member<'a, const NX: usize, E: Equations<NX>> {
+    task: Task<'a>,
+    prepared: PreparedCase<'a, NX, E>,
     alone: Fit,
 }
 
-fn together<const NX: usize, E: Equations<NX>>(
+fn estimate_members<const NX: usize, E: Equations<NX>>(
     joint_id: &str,
     members: &[(&Record, &Maneuver)],
     class: &Class,
-    basis: &Basis,
+    context: &Context,
 ) -> Joined {
     let (mut parts, mut left_out) = (Vec::new(), Vec::new());
     for &(record, maneuver) in members {
-        match part::<NX, E>(Run {
+        match member::<NX, E>(Task {
             record,
             maneuver,
             class,
-            basis,
+            context,
         }) {
             Ok(part) => parts.push(part),
             Err(reason) => left_out.push((maneuver, reason)),
         }
     }
-    let taking: Vec<&Maneuver> = parts.iter().map(|p| p.run.maneuver).collect();
+    let taking: Vec<&Maneuver> = parts.iter().map(|p| p.task.maneuver).collect();
     let all: Vec<&Maneuver> = members.iter().map(|(_, m)| *m).collect();
-    let whole = condition(joint_id, if taking.is_empty() { &all } else { &taking });
+    let whole = mean_maneuver(joint_id, if taking.is_empty() { &all } else { &taking });
     let Some((record, _)) = members.first() else {
-        return nothing(&whole);
+        return without_members(&whole);
     };
-    let run = Run {
+    let task = Task {
         record,
         maneuver: &whole,
         class,
-        basis,
+        context,
     };
     let fitted = if parts.len() > 1 {
-        fit(&run, &parts)
+        fit(&task, &parts)
     } else {
         Err("fewer than two maneuvers to join".to_owned())
     };
-    let (mut estimated, costs) = fitted.unwrap_or_else(|reason| (run.rejected(reason), vec![]));
+    let (mut estimated, costs) = fitted.unwrap_or_else(|reason| (task.rejected(reason), vec![]));
     for (maneuver, reason) in &left_out {
         estimated.fit.reason = format!(
             "{}; left out: {} ({reason})",
             estimated.fit.reason, maneuver.maneuver_id
         );
     }
-    let row = |maneuver: &Maneuver, part: Participation| row(&whole, parts.len(), maneuver, part);
+    let row =
+        |maneuver: &Maneuver, part: Participation| joint_row(&whole, parts.len(), maneuver, part);
     let joined = parts.iter().enumerate().map(|(i, p)| JointRow {
         cost_alone: p.alone.final_cost,
         cost_joint: costs.get(i).copied(),
-        ..row(p.run.maneuver, Participation::Joined)
+        ..row(p.task.maneuver, Participation::Joined)
     });
     let rows = joined
         .chain(
@@ -216,28 +212,32 @@ fn together<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Makes a maneuver ready and estimates it alone.
-fn part<const NX: usize, E: Equations<NX>>(run: Run) -> Result<Part<NX, E>, String> {
-    let ready = run.ready::<NX, E>(run.model()?)?;
-    let (alone, _) = run.fit(&ready.case)?;
+/// Prepares a maneuver and estimates it alone.
+fn member<const NX: usize, E: Equations<NX>>(task: Task) -> Result<Member<NX, E>, String> {
+    let prepared = task.prepare::<NX, E>(task.class_model()?)?;
+    let (alone, _) = task.fit(&prepared.case)?;
     if alone.outcome == Outcome::NotConverged {
         return Err(format!("alone: {}", alone.reason));
     }
-    Ok(Part { run, ready, alone })
+    Ok(Member {
+        task,
+        prepared,
+        alone,
+    })
 }
 
 /// Output error on the sum of the costs, from the mean of the maneuvers' own estimates.
 fn fit<'a, const NX: usize, E: Equations<NX>>(
-    run: &Run<'a>,
-    parts: &[Part<'a, NX, E>],
+    task: &Task<'a>,
+    parts: &[Member<'a, NX, E>],
 ) -> Result<(Estimated, Vec<f64>), String> {
     let cases = parts
         .iter()
-        .map(|p| (p.run.maneuver.maneuver_id.as_str(), &p.ready.case));
-    let settings = run.basis.settings;
+        .map(|p| (p.task.maneuver.maneuver_id.as_str(), &p.prepared.case));
+    let settings = task.context.settings;
     let share_constants = settings.joint.as_ref().is_some_and(|s| s.share_constants);
-    let joint = Joint::new(cases, |name| !share_constants && run.is_constant(name))?;
-    let (weights, resolution) = (run.weights()?, run.resolution());
+    let joint = Joint::new(cases, |name| !share_constants && task.is_constant(name))?;
+    let (weights, resolution) = (task.weights()?, task.resolution());
     let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
     let from = |shared: &[f64]| {
         let start = joint.assemble(shared, &own);
@@ -250,10 +250,10 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
             &settings.iteration,
         )
     };
-    let mut fit = from(&start(parts, joint.shared()));
+    let mut fit = from(&starting_values(parts, joint.shared()));
     if fit.outcome != Outcome::Converged {
         // From the derivatives of the maneuver that fits best alone.
-        let cost = |p: &&Part<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
+        let cost = |p: &&Member<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
         let best = parts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
         let other = best.map(|p| {
             from(
@@ -273,33 +273,40 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     } else {
         vec![]
     };
-    consider(run, parts, &joint, &mut fit);
-    miscalibrate(parts, &joint, &mut fit);
+    add_held_uncertainty(task, parts, &joint, &mut fit);
+    add_calibration_errors(parts, &joint, &mut fit);
     let names = joint.names().to_vec();
     let (fit, _) = fit.with_response(Response::default());
-    // What each maneuver keeps to itself is no row of what they share.
+    // Parameters that each maneuver keeps to itself have no row.
     let is_shared =
         |row: &EstimateRow| row.status != Status::Estimated || names.contains(&row.derivative);
-    let shared = run.rows(Some((&names, &fit))).into_iter().filter(is_shared);
-    let left_out = parts.iter().map(|p| p.ready.left_out).sum::<f64>() / parts.len().max(1) as f64;
+    let shared = task
+        .estimate_rows(Some((&names, &fit)))
+        .into_iter()
+        .filter(is_shared);
+    let left_out =
+        parts.iter().map(|p| p.prepared.left_out).sum::<f64>() / parts.len().max(1) as f64;
     let estimated = Estimated {
         estimates: shared.collect(),
-        combined: run.combined(&names, &fit),
+        combined: task.combined_rows(&names, &fit),
         correlations: vec![],
-        covariance: covariance(&names, &fit),
+        covariance: Covariance::of_fit(&names, &fit),
         history: None,
-        fit: run.fit_row(&fit, left_out, StartingValues::SingleEstimates),
+        fit: task.fit_row(&fit, left_out, StartingValues::SingleEstimates),
     };
     Ok((estimated, costs))
 }
 
-/// The mean of the maneuvers' own derivatives, weighted by their covariances; plain where these do
-/// not exist.
-fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>], shared: &[usize]) -> Vec<f64> {
+/// Mean of the maneuvers' own derivatives, weighted by their covariances; the plain mean where these
+/// do not exist.
+fn starting_values<const NX: usize, E: Equations<NX>>(
+    parts: &[Member<NX, E>],
+    shared: &[usize],
+) -> Vec<f64> {
     let n = shared.len();
     let values =
-        |p: &Part<NX, E>| DVector::from_iterator(n, shared.iter().map(|&j| p.alone.values[j]));
-    let estimate = |p: &Part<NX, E>| {
+        |p: &Member<NX, E>| DVector::from_iterator(n, shared.iter().map(|&j| p.alone.values[j]));
+    let estimate = |p: &Member<NX, E>| {
         let covariance: &DMatrix<f64> = p.alone.covariance.as_ref()?;
         Some(mean::Estimate {
             places: (0..n).collect(),
@@ -313,15 +320,18 @@ fn start<const NX: usize, E: Equations<NX>>(parts: &[Part<NX, E>], shared: &[usi
     mean.as_slice().to_vec()
 }
 
-/// Adds what the tunnel's errors do to the shared derivatives.
-fn consider<'a, const NX: usize, E: Equations<NX>>(
-    run: &Run<'a>,
-    parts: &[Part<'a, NX, E>],
+/// Adds the effect of the tunnel's errors to the covariances of the shared derivatives.
+fn add_held_uncertainty<'a, const NX: usize, E: Equations<NX>>(
+    task: &Task<'a>,
+    parts: &[Member<'a, NX, E>],
     joint: &Joint<NX, E>,
     fit: &mut Fit<Vec<Response>>,
 ) {
     let Some(first) = parts.first() else { return };
-    let wide: Vec<Case<NX, E>> = parts.iter().map(|p| p.run.wide(&p.ready)).collect();
+    let wide: Vec<Case<NX, E>> = parts
+        .iter()
+        .map(|p| p.task.with_held_free(&p.prepared))
+        .collect();
     let own = |i: usize| {
         joint
             .places(i)
@@ -335,24 +345,25 @@ fn consider<'a, const NX: usize, E: Equations<NX>>(
         .zip(&wide)
         .enumerate()
         .map(|(i, (part, wide))| Considered {
-            case: &part.ready.case,
+            case: &part.prepared.case,
             wide,
-            values: values_of(&part.ready.model, &part.ready.case.names, &own(i)),
+            values: values_by_name(&part.prepared.model, &part.prepared.case.names, &own(i)),
             places: joint.places(i).to_vec(),
         })
         .collect();
     consider::consider_together(
         &considered,
-        &run.held_uncertainties(&first.ready.model),
+        &task.held_uncertainties(&first.prepared.model),
         fit,
     );
 }
 
-/// Adds what errors of calibration do to the shared derivatives. An error of a signal is common to
-/// all its maneuvers: so it is where they are of one flight, and where flights have errors of their
-/// own this is on the safe side.
-fn miscalibrate<const NX: usize, E: Equations<NX>>(
-    parts: &[Part<NX, E>],
+/// Adds the effect of calibration errors to the covariance of the shared derivatives.
+///
+/// An error of a signal is taken as common to all maneuvers. That is so within a flight; between
+/// flights it overestimates the effect.
+fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
+    parts: &[Member<NX, E>],
     joint: &Joint<NX, E>,
     fit: &mut Fit<Vec<Response>>,
 ) {
@@ -363,8 +374,11 @@ fn miscalibrate<const NX: usize, E: Equations<NX>>(
     for (i, part) in parts.iter().enumerate() {
         let places = joint.places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
-        let Ok(shifts) = part.run.gradient_shifts(&part.ready, &own, &fit.weights) else {
-            fit.reason.push_str(calibration::NOT_COUNTED);
+        let Ok(shifts) = part
+            .task
+            .gradient_shifts(&part.prepared, &own, &fit.weights)
+        else {
+            fit.reason.push_str(NOT_COUNTED);
             return;
         };
         together.resize(shifts.len(), DVector::zeros(joint.names().len()));
@@ -381,8 +395,8 @@ fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {
     maneuvers.iter().map(|m| value(m)).sum::<f64>() / maneuvers.len().max(1) as f64
 }
 
-/// The mean flight condition of maneuvers, in the form of one.
-fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
+/// A maneuver with the mean flight condition of several.
+fn mean_maneuver(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
     let mean = |value: fn(&Maneuver) -> f64| mean_of(maneuvers, value);
     Maneuver {
         maneuver_id: joint_id.to_owned(),
@@ -407,15 +421,20 @@ fn condition(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
     }
 }
 
-fn nothing(whole: &Maneuver) -> Joined {
-    let fit = super::rejected(whole, "no maneuver to join".to_owned());
+fn without_members(whole: &Maneuver) -> Joined {
+    let fit = rejected_fit(whole, "no maneuver to join".to_owned());
     Joined {
         estimated: Estimated::without_fit(fit, vec![]),
         members: vec![],
     }
 }
 
-fn row(whole: &Maneuver, maneuvers: usize, member: &Maneuver, part: Participation) -> JointRow {
+fn joint_row(
+    whole: &Maneuver,
+    maneuvers: usize,
+    member: &Maneuver,
+    part: Participation,
+) -> JointRow {
     JointRow {
         joint_id: whole.maneuver_id.clone(),
         class: whole.class.clone(),

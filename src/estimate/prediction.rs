@@ -1,44 +1,32 @@
-//! Validation on data not used: a maneuver is predicted with derivatives estimated from the others
-//! of its class and angle of attack.
+//! Cross-validation: a maneuver is predicted with derivatives estimated from the others of its class
+//! and angle of attack.
 //!
-//! The others' derivatives are averaged with their whole covariances as weights. The predicted
-//! maneuver keeps them fixed; its biases and initial states, which belong to it and to no other,
-//! are fitted by output error with its own weights; so are, unless `share_constants` says
-//! otherwise, its constants (`CN_0`), which take up the zero errors of the flight's vanes and
-//! surfaces. What is left between measured and computed is then the derivatives' doing, and is told
-//! by Theil's coefficient and R².
+//! The others' derivatives are averaged, weighted by their covariances, and fixed. The predicted
+//! maneuver's own biases and initial states are fitted by output error with its own weights. So are,
+//! unless `share_constants` is set, its constants (`CN_0`), which take up the zero errors of the
+//! flight's vanes and surfaces. The remaining difference between measured and computed outputs is
+//! due to the derivatives; Theil's coefficient and R² measure it.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Estimated, Hold, Run};
+use super::context::Context;
+use super::estimated::Estimated;
+use super::settings::Hold;
+use super::settings::PredictionSettings;
+use super::task::Task;
 use crate::aero::{Axis, Derivative, Output};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
-use crate::settings::settings;
 use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow, PredictionStatus};
 use crate::units::Unit;
 
-settings! {
-    /// Settings of prediction.
-    pub struct Settings {
-        /// Largest difference of mean angles of attack between a maneuver and those that predict it,
-        /// deg. The default is half the usual distance of test points. Larger: more maneuvers are
-        /// predicted, from derivatives further away.
-        pub alpha_distance_deg: f64 = 2.5,
-    }
-    elsewhere {
-        /// Constants taken from the predicting maneuvers: `estimate: expert: share_constants`.
-        pub share_constants: bool = false,
-    }
-}
-
-/// A maneuver's prediction: its columns of `fits`, and a row for each output.
+/// Prediction of a maneuver: its columns of `fits`, and a row for each output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Predicted {
     pub summary: PredictedRow,
@@ -46,7 +34,7 @@ pub struct Predicted {
 }
 
 impl Predicted {
-    /// A maneuver that is not predicted, and why.
+    /// A maneuver that is not predicted, with the reason.
     #[must_use]
     pub fn none(reason: impl Into<String>, others: usize) -> Predicted {
         let predicted_from = (others > 0).then_some(others);
@@ -62,13 +50,13 @@ impl Predicted {
     }
 }
 
-/// For each maneuver the others of its class and angle of attack whose fits converged; `None` for
-/// one that did not.
+/// Finds for each maneuver the others of its class and angle of attack whose fits converged; `None`
+/// for a maneuver whose own fit did not.
 #[must_use]
 pub fn others(
     maneuvers: &[Maneuver],
     fits: &[FitRow],
-    settings: &Settings,
+    settings: &PredictionSettings,
 ) -> Vec<Option<Vec<usize>>> {
     let converged: Vec<bool> = fits
         .iter()
@@ -94,37 +82,37 @@ pub fn others(
     maneuvers.iter().enumerate().map(of).collect()
 }
 
-/// Predicts one maneuver from others. Whatever goes wrong is in `prediction`.
+/// Predicts one maneuver from others. The column `prediction` has any failure.
 #[must_use]
 pub fn maneuver(
     record: &Record,
     maneuver: &Maneuver,
     class: &Class,
-    basis: &Basis,
+    context: &Context,
     others: &[&Estimated],
 ) -> Predicted {
-    let run = Run {
+    let task = Task {
         record,
         maneuver,
         class,
-        basis,
+        context,
     };
     let predicted = match class.axis {
-        Axis::Longitudinal => predict::<3, Longitudinal>(&run, others),
-        Axis::Lateral => predict::<4, Lateral>(&run, others),
+        Axis::Longitudinal => predict::<3, Longitudinal>(&task, others),
+        Axis::Lateral => predict::<4, Lateral>(&task, others),
     };
     predicted.unwrap_or_else(|reason| Predicted::none(reason, others.len()))
 }
 
 fn predict<const NX: usize, E: Equations<NX>>(
-    run: &Run,
+    task: &Task,
     others: &[&Estimated],
 ) -> Result<Predicted, String> {
-    let settings = run.basis.settings;
-    // By evidence the others may estimate what a table would hold: all that they know is taken.
+    let settings = task.context.settings;
+    // By evidence the others may estimate a derivative that the class's table holds.
     let model = match settings.hold {
-        Hold::Table => run.model()?,
-        Hold::Evidence => run.model_without_held()?,
+        Hold::Table => task.class_model()?,
+        Hold::Evidence => task.model_without_held()?,
     };
     let share_constants = settings
         .prediction
@@ -134,12 +122,12 @@ fn predict<const NX: usize, E: Equations<NX>>(
         .free
         .iter()
         .map(|d| d.name.as_str())
-        .zip(shared(run, &model.free, others)?)
+        .zip(mean_derivatives(task, &model.free, others)?)
         .collect();
     let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) = model
         .free
         .iter()
-        .partition(|d| !share_constants && run.is_constant(&d.name));
+        .partition(|d| !share_constants && task.is_constant(&d.name));
     let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
     let held = model
         .held
@@ -151,8 +139,8 @@ fn predict<const NX: usize, E: Equations<NX>>(
         held: held.collect(),
         ..model.clone()
     };
-    let ready = run.ready::<NX, E>(fixed)?;
-    let (case, weights) = (&ready.case, run.weights()?);
+    let prepared = task.prepare::<NX, E>(fixed)?;
+    let (case, weights) = (&prepared.case, task.weights()?);
     if case.parameters() == 0 {
         let mut response = case.response();
         let diverged = case.respond(&[], &mut response).is_err();
@@ -161,7 +149,7 @@ fn predict<const NX: usize, E: Equations<NX>>(
             Err("the integration diverges".into())
         } else {
             Ok(rows(
-                run,
+                task,
                 case,
                 &response.outputs,
                 &weights,
@@ -176,13 +164,13 @@ fn predict<const NX: usize, E: Equations<NX>>(
         start,
         weights,
         settings.weights,
-        run.resolution(),
+        task.resolution(),
         &settings.iteration,
     );
     match (fit.outcome, fit.final_cost) {
-        // Biases that cannot be told apart leave the response as it is.
+        // Collinear biases do not change the response.
         (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => Ok(rows(
-            run,
+            task,
             case,
             &fit.response.outputs,
             &fit.weights,
@@ -193,9 +181,13 @@ fn predict<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// The derivatives that are free in the predicted maneuver, as the others have them; the tunnel's
-/// value where none of the others estimates one.
-fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<f64>, String> {
+/// Mean over the others of the derivatives that are free in the predicted maneuver; the tunnel's
+/// value of a derivative that none of them estimates.
+fn mean_derivatives(
+    task: &Task,
+    free: &[&Derivative],
+    others: &[&Estimated],
+) -> Result<Vec<f64>, String> {
     let covered = |d: &&&Derivative| others.iter().any(|o| value(o, &d.name).is_some());
     let wanted: Vec<&str> = free
         .iter()
@@ -213,7 +205,7 @@ fn shared(run: &Run, free: &[&Derivative], others: &[&Estimated]) -> Result<Vec<
     let value = |d: &&Derivative| {
         mean.get(d.name.as_str())
             .copied()
-            .or_else(|| run.tunnel(&d.name))
+            .or_else(|| task.tunnel_value(&d.name))
     };
     free.iter()
         .map(|d| value(d).ok_or_else(|| format!("none of the others estimates {}", d.name)))
@@ -225,7 +217,7 @@ fn value(estimated: &Estimated, name: &str) -> Option<f64> {
     estimated.estimates.iter().find(of_it)?.value
 }
 
-/// One maneuver's estimates of the wanted derivatives, with their part of its covariance.
+/// Estimates of the wanted derivatives by one maneuver, with their part of its covariance.
 fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
     let covariance = estimated.covariance.as_ref()?;
     let (mut places, mut at, mut values) = (Vec::new(), Vec::new(), Vec::new());
@@ -258,7 +250,7 @@ fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
 }
 
 fn rows<const NX: usize, E: Equations<NX>>(
-    run: &Run,
+    task: &Task,
     case: &Case<NX, E>,
     computed: &[[f64; OUTPUTS]],
     weights: &[f64; OUTPUTS],
@@ -281,7 +273,7 @@ fn rows<const NX: usize, E: Equations<NX>>(
         .copied()
         .zip(weights.iter().copied())
         .collect();
-    let named = || run.class.axis.outputs().into_iter().zip(&agreements);
+    let named = || task.class.axis.outputs().into_iter().zip(&agreements);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
         prediction: Some(PredictionStatus::Predicted),
@@ -300,16 +292,16 @@ fn rows<const NX: usize, E: Equations<NX>>(
     };
     Predicted {
         summary,
-        outputs: named().map(|(o, a)| row(run, o, a)).collect(),
+        outputs: named().map(|(o, a)| row(task, o, a)).collect(),
     }
 }
 
-fn row(run: &Run, output: Output, agreement: &Agreement) -> PredictionRow {
+fn row(task: &Task, output: Output, agreement: &Agreement) -> PredictionRow {
     let theil = agreement.theil();
     PredictionRow {
-        maneuver_id: run.maneuver.maneuver_id.clone(),
-        class: run.class.name.clone(),
-        alpha_deg: run.maneuver.alpha_deg,
+        maneuver_id: task.maneuver.maneuver_id.clone(),
+        class: task.class.name.clone(),
+        alpha_deg: task.maneuver.alpha_deg,
         output,
         unit: Unit::of_signal(output.signal()).name.to_owned(),
         samples: agreement.samples,

@@ -27,7 +27,7 @@ use crate::config::Config;
 use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
-use crate::estimate::{Basis, Estimated};
+use crate::estimate::{Context, Estimated};
 use crate::flight::{Correction, Record};
 use crate::ingest::Signature;
 use crate::lineage::{Changes, Lineage, Stage};
@@ -479,14 +479,14 @@ impl Run<'_> {
 
     pub(crate) fn estimate_maneuver(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
         match self.config.class(&maneuver.class) {
-            Some(class) => estimate::maneuver(record, maneuver, class, &self.basis()),
+            Some(class) => estimate::maneuver(record, maneuver, class, &self.context()),
             None => Estimated::unknown_class(maneuver),
         }
     }
 
-    pub(crate) fn basis(&self) -> Basis<'_> {
+    pub(crate) fn context(&self) -> Context<'_> {
         let config = self.config;
-        Basis::new(
+        Context::new(
             &config.aircraft,
             &config.buildup,
             &config.tunnel,

@@ -68,7 +68,7 @@ impl Run<'_> {
             let member = |i: &usize| Some((records.get(i)?, campaign.maneuvers.get(*i)?));
             let members: Vec<(&Record, &Maneuver)> =
                 bin.members.iter().filter_map(member).collect();
-            let joined = joint::estimate(&bin.joint_id, &members, class, &self.basis());
+            let joined = joint::estimate(&bin.joint_id, &members, class, &self.context());
             self.store.save(path, &joined)?;
             Ok(joined)
         };
@@ -166,7 +166,7 @@ impl Run<'_> {
         let class = self.config.class(&maneuvers[i].class);
         match (records.get(&i), class) {
             (Some(record), Some(class)) => {
-                prediction::maneuver(record, &maneuvers[i], class, &self.basis(), from)
+                prediction::maneuver(record, &maneuvers[i], class, &self.context(), from)
             }
             _ => Predicted::none("the configuration has no such class", from.len()),
         }

@@ -1,6 +1,9 @@
 //! Errors of calibration in the rows of a maneuver.
 
 use super::*;
+use crate::flight::Record;
+use crate::maneuver::Maneuver;
+use crate::output_error::calibration_errors::Calibration;
 
 fn calibrated(calibration: &[(&str, Calibration)]) -> Bench {
     let mut bench = bench();
@@ -70,11 +73,11 @@ fn an_error_common_to_maneuvers_does_not_average_out() {
             scale_pct: 2.0,
         },
     )]);
-    bench.settings.joint = Some(joint::Settings::default());
+    bench.settings.joint = Some(JointSettings::default());
     let records = [bench.flown(5, 1.0, 0.0), bench.flown(6, 1.0, 0.0)];
     let maneuvers = [maneuver("a", 20.0), maneuver("b", 20.0)];
     let members: Vec<(&Record, &Maneuver)> = records.iter().zip(&maneuvers).collect();
-    let joined = joint::estimate("joint", &members, &bench.class, &bench.basis());
+    let joined = joint::estimate("joint", &members, &bench.class, &bench.context());
     let row = row(&joined.estimated, "Cm_de");
     assert_relative_eq!(
         row.bound_calibration.unwrap(),

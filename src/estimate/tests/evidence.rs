@@ -6,16 +6,20 @@ use std::collections::BTreeMap;
 use approx::assert_relative_eq;
 
 use super::super::*;
-use crate::aero::Coefficient;
 use crate::aero::wind_tunnel::TunnelPoint;
+use crate::aero::{Axis, Buildup, Coefficient, Derivative, WindTunnel};
+use crate::dynamics::Longitudinal;
+use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::tests::aircraft;
 use crate::flight::record::Series;
-use crate::flight::signal;
+use crate::flight::{Mark, Record, signal};
 use crate::maneuver::class::Recognition;
+use crate::maneuver::{Class, Status};
 use crate::output_error::tests::{
     NOISE, Noise, SAMPLES, derivative, nothing_measured, record, surface, truth,
 };
-use crate::tables::CorrelationKind;
+use crate::output_error::{Case, Model};
+use crate::tables::{CorrelationKind, CorrelationRow, EstimateRow, Outcome};
 
 /// The longitudinal derivatives that are true, and what is flown with them.
 struct Flown {
@@ -123,8 +127,8 @@ impl Flown {
             hold,
             ..Settings::default()
         };
-        let basis = Basis::new(&aircraft, &buildup, tunnel, &settings);
-        super::super::maneuver(&self.record, &maneuver, &class, &basis)
+        let context = Context::new(&aircraft, &buildup, tunnel, &settings);
+        super::super::maneuver(&self.record, &maneuver, &class, &context)
     }
 }
 

@@ -3,17 +3,25 @@
 mod calibration;
 mod evidence;
 
+use std::collections::BTreeMap;
+
 use approx::assert_relative_eq;
 
+use super::estimated::rejected_fit;
 use super::joint::{self, bins};
 use super::prediction::{self, others};
 use super::*;
+use crate::aero::{Axis, Bias, Buildup, Derivative, Output, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::tests::aircraft;
+use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
-use crate::flight::signal;
-use crate::maneuver::{ManeuverOrigin, Recognition};
+use crate::flight::{Mark, Record, signal};
+use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Recognition, Status};
 use crate::output_error::tests::{NOISE, Noise, SAMPLES, TABLE, record, truth};
-use crate::tables::{Participation, PredictionStatus};
+use crate::output_error::{Case, InitialState, Measurements, Model};
+use crate::tables::{EstimateRow, FitRow, Outcome, Participation, PredictionStatus};
 
 /// The aircraft, model, class and settings of the tests.
 struct Bench {
@@ -58,7 +66,7 @@ fn bench() -> Bench {
 }
 
 impl Bench {
-    fn basis(&self) -> Basis<'_> {
+    fn context(&self) -> Context<'_> {
         let Bench {
             aircraft,
             buildup,
@@ -66,7 +74,7 @@ impl Bench {
             settings,
             ..
         } = self;
-        Basis::new(aircraft, buildup, tunnel, settings)
+        Context::new(aircraft, buildup, tunnel, settings)
     }
 
     /// A record whose outputs are the response to the true derivatives times `factor`, with noise
@@ -113,7 +121,7 @@ impl Bench {
     }
 
     fn estimate(&self, record: &Record, maneuver: &Maneuver) -> Estimated {
-        super::maneuver(record, maneuver, &self.class, &self.basis())
+        super::maneuver(record, maneuver, &self.class, &self.context())
     }
 }
 
@@ -155,7 +163,7 @@ fn maneuvers_are_parted_at_the_gaps_between_test_points() {
             .map(|a| maneuver(&format!("m{a}"), *a))
             .collect::<Vec<_>>()
     };
-    let of = |maneuvers: &[Maneuver], settings: &joint::Settings| {
+    let of = |maneuvers: &[Maneuver], settings: &JointSettings| {
         bins(maneuvers, settings)
             .into_iter()
             .map(|b| (b.joint_id, b.members))
@@ -166,11 +174,11 @@ fn maneuvers_are_parted_at_the_gaps_between_test_points() {
         ("joint/steps/10.20".to_owned(), vec![1, 4]),
         ("joint/steps/20.03".to_owned(), vec![0, 2, 5]),
     ];
-    assert_eq!(of(&flown, &joint::Settings::default()), expected);
-    let centres = joint::Settings {
+    assert_eq!(of(&flown, &JointSettings::default()), expected);
+    let centres = JointSettings {
         alpha_bin_deg: 1.0,
         centres_deg: vec![20.0],
-        ..joint::Settings::default()
+        ..JointSettings::default()
     };
     assert_eq!(
         of(&flown, &centres),
@@ -178,7 +186,7 @@ fn maneuvers_are_parted_at_the_gaps_between_test_points() {
     );
     let mut other = flown;
     other[1].class = "other".into();
-    assert_eq!(of(&other, &joint::Settings::default()).len(), 1);
+    assert_eq!(of(&other, &JointSettings::default()).len(), 1);
 }
 
 #[test]
@@ -204,7 +212,12 @@ fn maneuvers_joined_have_smaller_bounds_and_no_biases_and_a_spoiled_one_is_left_
         (&b, &maneuvers[1]),
         (&spoiled, &maneuvers[2]),
     ];
-    let joined = joint::estimate("joint/steps/20.20", &members, &bench.class, &bench.basis());
+    let joined = joint::estimate(
+        "joint/steps/20.20",
+        &members,
+        &bench.class,
+        &bench.context(),
+    );
     let fit = &joined.estimated.fit;
     assert_eq!(fit.outcome, Outcome::Converged, "{}", fit.reason);
     assert!(
@@ -250,7 +263,12 @@ fn with_one_sound_maneuver_there_is_nothing_to_join_and_the_row_says_so() {
     spoiled.signals.remove(signal::AN);
     let maneuvers = [maneuver("a", 20.0), maneuver("c", 20.2)];
     let members = [(&a, &maneuvers[0]), (&spoiled, &maneuvers[1])];
-    let joined = joint::estimate("joint/steps/20.10", &members, &bench.class, &bench.basis());
+    let joined = joint::estimate(
+        "joint/steps/20.10",
+        &members,
+        &bench.class,
+        &bench.context(),
+    );
     assert_eq!(joined.estimated.fit.outcome, Outcome::Rejected);
     assert!(
         joined
@@ -294,7 +312,7 @@ fn predicted(factor: f64) -> prediction::Predicted {
         &record,
         &maneuver("p", 20.0),
         &bench.class,
-        &bench.basis(),
+        &bench.context(),
         &[&near[0], &near[1]],
     )
 }
@@ -351,7 +369,7 @@ fn others_are_those_of_the_class_that_are_near_and_converged() {
     maneuvers[3].class = "other".into();
     let mut fits: Vec<FitRow> = maneuvers
         .iter()
-        .map(|m| rejected(m, String::new()))
+        .map(|m| rejected_fit(m, String::new()))
         .collect();
     for fit in &mut fits[..2] {
         fit.outcome = Outcome::Converged;

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use crate::aero::WindTunnel;
 use crate::error::{Problem, Result};
-use crate::estimate::{self, Basis};
+use crate::estimate::{self, Context};
 use crate::lab::campaign::SimulatedCampaign;
 use crate::lab::simulator::FlownManeuver;
 use crate::lab::simulator::random::derived_seed;
@@ -189,6 +189,6 @@ fn study_maneuver<'a>(
         class: point.class,
         flown: &point.flown,
         instruments: &campaign.cards.instruments,
-        basis: Basis::new(&config.aircraft, &config.buildup, &point.truth, settings),
+        context: Context::new(&config.aircraft, &config.buildup, &point.truth, settings),
     }
 }

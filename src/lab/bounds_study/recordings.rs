@@ -2,7 +2,7 @@
 
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Output, WindTunnel};
-use crate::estimate::{self, Basis, Estimated};
+use crate::estimate::{self, Context, Estimated};
 use crate::lab::simulator::{FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::maneuver::Class;
 use crate::output_error::estimation::Weights;
@@ -38,7 +38,7 @@ pub struct StudyManeuver<'a> {
     pub flown: &'a FlownManeuver,
     /// Instruments with the noise of each signal.
     pub instruments: &'a Instruments,
-    pub basis: Basis<'a>,
+    pub context: Context<'a>,
 }
 
 /// Noise of the recordings and weights of the estimates; the time constant is that of coloured noise.
@@ -74,13 +74,13 @@ impl StudyManeuver<'_> {
         let record = self.flown.recorded(&self.noise_only(scenario), seed);
         let settings = estimate::Settings {
             weights: scenario.weights,
-            ..self.basis.settings.clone()
+            ..self.context.settings.clone()
         };
-        let basis = Basis {
+        let context = Context {
             settings: &settings,
-            ..self.basis
+            ..self.context
         };
-        estimate::maneuver(&record, &self.flown.maneuver, self.class, &basis)
+        estimate::maneuver(&record, &self.flown.maneuver, self.class, &context)
     }
 
     /// Instruments with the noise of a scenario and no other errors.

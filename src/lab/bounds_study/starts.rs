@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::recordings::{Scenario, StudyManeuver, true_tables};
 use crate::aero::{Buildup, WindTunnel};
-use crate::estimate::{self, Basis, Estimated, Start};
+use crate::estimate::{self, Context, Estimated, Start};
 use crate::lab::simulator::TrueDerivative;
 use crate::lab::simulator::random::derived_seed;
 use crate::output_error::Outcome;
@@ -102,7 +102,7 @@ fn reached(
     seed: u64,
 ) -> Vec<Reached> {
     let truth = true_tables(&maneuver.flown.truth);
-    let start = values.tables(&maneuver.flown.truth, maneuver.basis.buildup);
+    let start = values.tables(&maneuver.flown.truth, maneuver.context.buildup);
     (0..realisations)
         .into_par_iter()
         .map(|i| {
@@ -127,15 +127,15 @@ fn estimate_from(
 ) -> Estimated {
     let settings = estimate::Settings {
         start: Start::WindTunnel,
-        ..maneuver.basis.settings.clone()
+        ..maneuver.context.settings.clone()
     };
-    let basis = Basis {
+    let context = Context {
         settings: &settings,
         start,
-        ..maneuver.basis
+        ..maneuver.context
     };
     StudyManeuver {
-        basis,
+        context,
         ..maneuver.clone()
     }
     .estimate(scenario, seed)

@@ -14,7 +14,7 @@ use super::trim::{self, Trim, TrimPoint};
 use super::{Card, FlownManeuver, Instrument, Instruments, Program, Simulator, sensors};
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
-use crate::estimate::{self, Basis, Estimated};
+use crate::estimate::{self, Context, Estimated};
 use crate::flight::signal;
 use crate::lab::campaign::SimulatedCampaign;
 use crate::tables::Outcome;
@@ -295,7 +295,7 @@ fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
 
 fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
     let config = &campaign.config;
-    let basis = Basis::new(
+    let context = Context::new(
         &config.aircraft,
         &config.buildup,
         &config.tunnel,
@@ -305,7 +305,7 @@ fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
         &flown.record,
         &flown.maneuver,
         config.class(&flown.maneuver.class).unwrap(),
-        &basis,
+        &context,
     )
 }
 

@@ -1,9 +1,10 @@
-//! What a maneuver could tell: excitation, correlations, variance inflation, groups that it does
-//! not tell apart, and the same derivatives by equation error. Added to the rows of a fit.
+//! Diagnostics of a fit: excitation, correlations, variance inflation, near-collinear groups, and the
+//! same derivatives by equation error.
 
 use nalgebra::DMatrix;
 
-use super::{Estimated, Run};
+use super::estimated::Estimated;
+use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
@@ -13,18 +14,18 @@ use crate::output_error::identifiability::{Collinearity, collinearity, correlati
 use crate::output_error::{Case, Fit, Model, cost, equation_error};
 use crate::tables::{CorrelationKind, CorrelationRow, EstimateRow};
 
-/// A derivative's regressor as flown.
-struct Flown<'a> {
+/// History of a derivative's regressor.
+struct RegressorHistory<'a> {
     derivative: &'a Derivative,
-    /// Root mean square about the mean, deg or rad of a reduced rate; none for a constant.
+    /// Root mean square about the mean, deg or rad of a reduced rate; `None` for a constant.
     excitation: Option<f64>,
-    /// What the derivative multiplies.
+    /// Factor of the derivative, sample by sample.
     history: Vec<f64>,
 }
 
-impl Run<'_> {
-    /// Adds the measures of a fit to its rows. `model` is what was fitted.
-    pub(super) fn measure<const NX: usize, E: Equations<NX>>(
+impl Task<'_> {
+    /// Adds the diagnostics of a fit of `model` to its rows.
+    pub(super) fn add_diagnostics<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,
         window: &Window,
@@ -32,8 +33,8 @@ impl Run<'_> {
         fit: &Fit,
         estimated: &mut Estimated,
     ) {
-        let flown = self.flown::<NX, E>(case, window, model);
-        estimated.correlations = self.regressors(&flown, window);
+        let flown = self.regressor_histories::<NX, E>(case, window, model);
+        estimated.correlations = self.regressor_correlations(&flown, window);
         self.add_excitation(&flown, &mut estimated.estimates);
         for (name, value) in case.names.iter().zip(equation_error::regression(case)) {
             if let Some(row) = estimated
@@ -48,7 +49,7 @@ impl Run<'_> {
             return;
         }
         let information = cost::sums(&fit.response, &fit.weights).information;
-        let settings = self.basis.settings;
+        let settings = self.context.settings;
         let limits = &settings.identifiability;
         let Some(measured) = collinearity(
             &information,
@@ -68,9 +69,9 @@ impl Run<'_> {
         }
         estimated.fit.largest_condition_index =
             Some(measured.largest_index).filter(|index| index.is_finite());
-        estimated.fit.confounded = in_words(&measured, &case.names);
+        estimated.fit.confounded = groups_in_words(&measured, &case.names);
         if let Some(matrix) = &measured.correlation {
-            estimated.correlations.extend(self.estimates(
+            estimated.correlations.extend(self.estimate_correlations(
                 &case.names,
                 matrix,
                 limits.published_correlation,
@@ -78,13 +79,13 @@ impl Run<'_> {
         }
     }
 
-    /// The regressors of all derivatives that act in the maneuver, free and held.
-    fn flown<'m, const NX: usize, E: Equations<NX>>(
+    /// Regressors of all derivatives that act in the maneuver, free and held.
+    fn regressor_histories<'m, const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,
         window: &Window,
         model: &Model<'m>,
-    ) -> Vec<Flown<'m>> {
+    ) -> Vec<RegressorHistory<'m>> {
         let mut acting: Vec<&'m Derivative> = model
             .free
             .iter()
@@ -93,7 +94,7 @@ impl Run<'_> {
             .collect();
         // In the order of the model, whatever is held: a pair has one name in all maneuvers.
         acting.sort_by_key(|d| {
-            self.basis
+            self.context
                 .buildup
                 .derivatives
                 .iter()
@@ -104,7 +105,12 @@ impl Run<'_> {
             held: vec![],
             ..model.clone()
         };
-        let wide = Case::<NX, E>::new(self.basis.aircraft, window, case.measurements.clone(), &all);
+        let wide = Case::<NX, E>::new(
+            self.context.aircraft,
+            window,
+            case.measurements.clone(),
+            &all,
+        );
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
             let history = wide.regressor_as_flown(j);
@@ -114,7 +120,7 @@ impl Run<'_> {
                 Regressor::Vane(name) => Some(excitation(&samples(window, name))),
                 _ => Some(excitation(&history)),
             };
-            Some(Flown {
+            Some(RegressorHistory {
                 derivative,
                 excitation: moved,
                 history,
@@ -123,13 +129,12 @@ impl Run<'_> {
         flown.collect()
     }
 
-    /// Excitation of every row, and what it contributes at the row's value to its coefficient's
-    /// motion.
-    fn add_excitation(&self, flown: &[Flown], rows: &mut [EstimateRow]) {
+    /// Adds the excitation of each row, and its contribution to the motion of its coefficient.
+    fn add_excitation(&self, flown: &[RegressorHistory], rows: &mut [EstimateRow]) {
         let value = |name: &str, rows: &[EstimateRow]| {
             let row = rows.iter().find(|r| r.derivative == name);
             row.and_then(|r| r.value)
-                .or_else(|| self.tunnel(name))
+                .or_else(|| self.tunnel_value(name))
                 .unwrap_or(0.0)
         };
         for one in flown {
@@ -160,7 +165,11 @@ impl Run<'_> {
 
     /// Correlations among the distinct regressors of the derivatives that the class estimates or
     /// holds.
-    fn regressors(&self, flown: &[Flown], window: &Window) -> Vec<CorrelationRow> {
+    fn regressor_correlations(
+        &self,
+        flown: &[RegressorHistory],
+        window: &Window,
+    ) -> Vec<CorrelationRow> {
         let mut seen: Vec<(String, Vec<f64>)> = Vec::new();
         for one in flown {
             let active = matches!(
@@ -185,12 +194,12 @@ impl Run<'_> {
         let pairs = (0..seen.len()).flat_map(|i| (i + 1..seen.len()).map(move |j| (i, j)));
         let row = |(i, j): (usize, usize)| {
             let both = correlation(&seen[i].1, &seen[j].1)?;
-            Some(self.correlation(CorrelationKind::Regressors, &seen[i].0, &seen[j].0, both))
+            Some(self.correlation_row(CorrelationKind::Regressors, &seen[i].0, &seen[j].0, both))
         };
         pairs.filter_map(row).collect()
     }
 
-    fn estimates(
+    fn estimate_correlations(
         &self,
         names: &[String],
         matrix: &DMatrix<f64>,
@@ -200,7 +209,7 @@ impl Run<'_> {
         pairs
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
             .map(|(i, j)| {
-                self.correlation(
+                self.correlation_row(
                     CorrelationKind::Estimates,
                     &names[i],
                     &names[j],
@@ -210,7 +219,7 @@ impl Run<'_> {
             .collect()
     }
 
-    fn correlation(
+    fn correlation_row(
         &self,
         kind: CorrelationKind,
         first: &str,
@@ -228,13 +237,13 @@ impl Run<'_> {
     }
 }
 
-/// A signal at the samples, without the points between them.
+/// A signal at the samples, without the interpolated points between them.
 fn samples(window: &Window, name: &str) -> Vec<f64> {
     window.signal(name).iter().step_by(2).copied().collect()
 }
 
-/// The groups by name, worst first, each group once.
-fn in_words(measured: &Collinearity, names: &[String]) -> Option<String> {
+/// Near-collinear groups by name, worst first, each group once.
+fn groups_in_words(measured: &Collinearity, names: &[String]) -> Option<String> {
     let mut groups: Vec<String> = Vec::new();
     for group in &measured.groups {
         let members: Vec<&str> = group

@@ -1,0 +1,60 @@
+//! Effect of calibration errors on the bounds.
+
+use nalgebra::DVector;
+
+use super::prepared_case::PreparedCase;
+use super::task::Task;
+use crate::dynamics::{Equations, OUTPUTS};
+use crate::output_error::calibration_errors::{Fitted, Misreading};
+use crate::output_error::{Diverged, Fit, calibration_errors};
+
+/// Added to the reason of a fit whose bounds lack the effect of calibration errors.
+pub(super) const NOT_COUNTED: &str =
+    "; errors of calibration are not in its bounds: with them the integration diverges";
+
+impl<'a> Task<'a> {
+    /// Adds the effect of calibration errors to the corrected covariance of a fit.
+    pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        fit: &mut Fit,
+    ) {
+        if fit.covariance_corrected.is_none() || self.context.settings.calibration.is_empty() {
+            return;
+        }
+        match self.gradient_shifts(prepared, &fit.values, &fit.weights) {
+            Ok(shifts) => calibration_errors::miscalibrated(&prepared.case, &shifts, fit),
+            Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
+        }
+    }
+
+    /// Change of the gradient with one standard deviation of each calibration error, in the order of
+    /// the maneuver's parameters.
+    pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        values: &[f64],
+        weights: &[f64; OUTPUTS],
+    ) -> Result<Vec<DVector<f64>>, Diverged> {
+        let calibration = self.context.settings.calibration.iter();
+        // A signal that the maneuver does not use has no effect.
+        let used = calibration.filter(|(signal, _)| !prepared.window.signal(signal).is_empty());
+        let errors: Vec<Misreading> = used.flat_map(|(signal, c)| c.misreadings(signal)).collect();
+        let aircraft = self.context.aircraft;
+        let PreparedCase {
+            window,
+            model,
+            case,
+            ..
+        } = prepared;
+        Fitted {
+            aircraft,
+            window,
+            model,
+            case,
+            values,
+            weights,
+        }
+        .gradient_shifts(&errors)
+    }
+}

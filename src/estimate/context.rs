@@ -1,0 +1,35 @@
+//! Everything that all maneuvers of a campaign are estimated with.
+
+use super::settings::Settings;
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+
+/// Everything that all maneuvers of a campaign are estimated with.
+#[derive(Clone, Debug)]
+pub struct Context<'a> {
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+    pub tunnel: &'a WindTunnel,
+    /// Table of starting values: the tunnel's, except in studies of the iteration.
+    pub start: &'a WindTunnel,
+    pub settings: &'a Settings,
+}
+
+impl<'a> Context<'a> {
+    /// A context whose table of starting values is the tunnel's.
+    #[must_use]
+    pub fn new(
+        aircraft: &'a Aircraft,
+        buildup: &'a Buildup,
+        tunnel: &'a WindTunnel,
+        settings: &'a Settings,
+    ) -> Context<'a> {
+        Context {
+            aircraft,
+            buildup,
+            tunnel,
+            start: tunnel,
+            settings,
+        }
+    }
+}

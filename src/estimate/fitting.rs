@@ -1,0 +1,58 @@
+//! Output error from two starting values.
+
+use super::settings::Start;
+use super::task::Task;
+use crate::dynamics::Equations;
+use crate::maneuver::Maneuver;
+use crate::output_error::{Case, Fit, Outcome, equation_error, estimation};
+
+impl Task<'_> {
+    /// Estimates from the configured starting values, and from the other ones where the iteration
+    /// does not converge.
+    pub(super) fn fit<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+    ) -> Result<(Fit, Start), String> {
+        if case.parameters() == 0 {
+            return Err("nothing is free to be estimated".to_owned());
+        }
+        let settings = self.context.settings;
+        let Maneuver {
+            alpha_deg, mach, ..
+        } = *self.maneuver;
+        let value = |name: &str| {
+            self.context
+                .start
+                .value(name, alpha_deg, mach)
+                .map_or(0.0, |v| v.value)
+        };
+        let tunnel = case.starting_values(value);
+        let implied = equation_error::start(case, &tunnel);
+        let (first, second, other_start) = match settings.start {
+            Start::EquationError => (implied, tunnel, Start::WindTunnel),
+            Start::WindTunnel => (tunnel, implied, Start::EquationError),
+        };
+        let resolution = self.resolution();
+        let weights = self.weights()?;
+        let from = |start| {
+            estimation::estimate(
+                case,
+                start,
+                weights,
+                settings.weights,
+                resolution,
+                &settings.iteration,
+            )
+        };
+        let fit = from(first);
+        if fit.outcome == Outcome::Converged {
+            return Ok((fit, settings.start));
+        }
+        let other = from(second);
+        Ok(if other.outcome == Outcome::Converged {
+            (other, other_start)
+        } else {
+            (fit, settings.start)
+        })
+    }
+}

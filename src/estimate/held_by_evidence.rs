@@ -1,0 +1,310 @@
+//! `hold: evidence`: each maneuver chooses which of its derivatives are held at the tunnel's values,
+//! in place of Tables 1 and 3.
+//!
+//! Candidates are all derivatives that the class estimates or holds, except constants: those take
+//! up trim and the effect of errors of held values. All candidates are free at first.
+//! [`holding`](crate::output_error::holding) finds those that are better held. The maneuver is
+//! fitted with these held, and the choice is repeated at that solution until it settles. The noise
+//! is that of the least restricted fit that the data determine.
+
+use std::collections::BTreeMap;
+
+use super::task::Task;
+use crate::aero::{Derivative, Regressor};
+use crate::dynamics::Equations;
+use crate::dynamics::motion::Window;
+use crate::maneuver::{Class, Status};
+use crate::output_error::coloured::Noise;
+use crate::output_error::cramer_rao;
+use crate::output_error::holding::{Because, Candidates};
+use crate::output_error::{Case, Fit, Model, Outcome};
+
+/// Derivatives that a maneuver holds, with the reasons in words.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct HeldChoice {
+    pub reasons: BTreeMap<String, String>,
+}
+
+/// Most rounds of fitting and choosing. Each but the last holds or frees a derivative, and none is
+/// freed twice.
+const ROUNDS: usize = 10;
+
+impl HeldChoice {
+    /// The class with the maneuver's choice in place of its table.
+    pub fn applied_to(&self, class: &Class) -> Class {
+        let mut class = class.clone();
+        self.apply(&mut class.statuses);
+        for over in &mut class.overrides {
+            self.apply(&mut over.statuses);
+        }
+        class
+    }
+
+    fn apply(&self, statuses: &mut BTreeMap<String, Status>) {
+        for (name, status) in statuses {
+            let is_held = self.reasons.contains_key(name);
+            match *status {
+                Status::Estimated if is_held => *status = Status::Held,
+                Status::Held if !is_held => *status = Status::Estimated,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The choice of a maneuver's held derivatives.
+struct Choosing<'t, 'a, const NX: usize, E: Equations<NX>> {
+    task: &'t Task<'a>,
+    window: Window,
+    /// Model with every candidate free.
+    all_free: Model<'a>,
+    wide: Case<NX, E>,
+    /// Standard uncertainty of the tunnel's value of each parameter of `wide` that may be held.
+    uncertainty: Vec<Option<f64>>,
+}
+
+impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
+    fn new(task: &'t Task<'a>) -> Result<Self, String> {
+        let (range, all_free) = (task.range(), task.model_without_held()?);
+        let surfaces = all_free
+            .free
+            .iter()
+            .chain(all_free.held.iter().map(|(d, _)| d))
+            .filter_map(|d| d.regressor.surface());
+        let window = Window::cut(
+            task.record,
+            range.clone(),
+            surfaces,
+            task.context.settings.mass_properties,
+        )?;
+        let measurements = task.measurements(&range)?;
+        let wide = Case::new(task.context.aircraft, &window, measurements, &all_free);
+        let uncertainty = wide
+            .names
+            .iter()
+            .map(|name| task.tunnel_uncertainty(name))
+            .collect();
+        Ok(Choosing {
+            task,
+            window,
+            all_free,
+            wide,
+            uncertainty,
+        })
+    }
+
+    /// The maneuver with some parameters of `wide` held.
+    fn with_held(&self, held: &[bool]) -> Case<NX, E> {
+        let names = self.wide.names.iter().zip(held);
+        let held_names: Vec<&String> = names.filter(|(_, held)| **held).map(|(n, _)| n).collect();
+        let is_held = |d: &Derivative| held_names.contains(&&d.name);
+        let at_tunnel_value = |d: &&'a Derivative| Some((*d, self.task.tunnel_value(&d.name)?));
+        let mut model = self.all_free.clone();
+        model.held.extend(
+            model
+                .free
+                .iter()
+                .filter(|d| is_held(d))
+                .filter_map(at_tunnel_value),
+        );
+        model.free.retain(|d| !is_held(d));
+        Case::new(
+            self.task.context.aircraft,
+            &self.window,
+            self.wide.measurements.clone(),
+            &model,
+        )
+    }
+
+    /// Information on all parameters of `wide`, at the values of a fit with some held.
+    fn candidates(&self, narrow: &Case<NX, E>, fit: &Fit, noise: &Noise) -> Option<Candidates> {
+        let values: Vec<f64> = self
+            .wide
+            .names
+            .iter()
+            .map(|name| self.value(name, narrow, fit))
+            .collect();
+        Candidates::gather(
+            &self.wide,
+            &values,
+            noise,
+            &fit.weights,
+            self.uncertainty.clone(),
+            self.max_condition_number(),
+        )
+    }
+
+    /// Estimate of a parameter, or the tunnel's value of one that is held.
+    fn value(&self, name: &String, narrow: &Case<NX, E>, fit: &Fit) -> f64 {
+        let place = narrow.names.iter().position(|n| n == name);
+        place
+            .map(|j| fit.values[j])
+            .or_else(|| self.task.tunnel_value(name))
+            .unwrap_or(0.0)
+    }
+
+    fn max_condition_number(&self) -> f64 {
+        self.task.context.settings.iteration.max_condition_number
+    }
+
+    fn choose(&self) -> Result<HeldChoice, String> {
+        let mut held = vec![false; self.wide.parameters()];
+        let mut released = held.clone();
+        // Of the least restricted fit that the data determine.
+        let mut noise: Option<Noise> = None;
+        let mut candidates = None;
+        let mut last_fitted: Option<Vec<bool>> = None;
+        for round in 0..ROUNDS {
+            let narrow = self.with_held(&held);
+            let (fit, _) = self.task.fit(&narrow)?;
+            if fit.outcome == Outcome::NotConverged {
+                if round > 0 {
+                    // Return to the last choice that could be fitted.
+                    held = last_fitted.unwrap_or(held);
+                    break;
+                }
+                // With everything free there is no fit: begin with the class's table.
+                held = self.held_by_class();
+                continue;
+            }
+            last_fitted = Some(held.clone());
+            noise = noise.or_else(|| cramer_rao::noise(&narrow, &fit, self.max_condition_number()));
+            let Some(found) =
+                self.candidates(&narrow, &fit, noise.as_ref().unwrap_or(&Noise::default()))
+            else {
+                break;
+            };
+            // Without noise from a determined fit, bounds cannot be judged: fit again first.
+            let next = match noise {
+                Some(_) => found.settle(found.determined(held.clone()), &mut released),
+                None => found.determined(held.clone()),
+            };
+            let is_settled = next == held;
+            held = next;
+            candidates = Some(found);
+            if is_settled {
+                break;
+            }
+        }
+        Ok(self.with_reasons(&held, candidates.as_ref()))
+    }
+
+    fn held_by_class(&self) -> Vec<bool> {
+        let names = self.wide.names.iter();
+        names
+            .map(|name| self.task.status(name) == Some(Status::Held))
+            .collect()
+    }
+
+    fn with_reasons(&self, held: &[bool], candidates: Option<&Candidates>) -> HeldChoice {
+        let names = &self.wide.names;
+        let reason = |j: usize| {
+            let because = candidates.and_then(|c| c.because(held, j));
+            (
+                names[j].clone(),
+                self.task.reason_in_words(names, j, because),
+            )
+        };
+        HeldChoice {
+            reasons: (0..held.len()).filter(|&j| held[j]).map(reason).collect(),
+        }
+    }
+}
+
+impl Task<'_> {
+    /// Chooses the derivatives to hold in this maneuver.
+    ///
+    /// # Errors
+    /// The reason why the maneuver is rejected, as in its estimation.
+    pub(super) fn choose_held<const NX: usize, E: Equations<NX>>(
+        &self,
+    ) -> Result<HeldChoice, String> {
+        Choosing::<NX, E>::new(self)?.choose()
+    }
+
+    /// Standard uncertainty of the tunnel's value of a derivative that may be held.
+    ///
+    /// `None` for constants, biases and initial states, for a derivative without a table, and for
+    /// one whose table is all zero and states no uncertainty.
+    fn tunnel_uncertainty(&self, name: &str) -> Option<f64> {
+        let derivative = self.context.buildup.derivative(name)?;
+        if derivative.regressor == Regressor::Constant || self.tunnel_value(name).is_none() {
+            return None;
+        }
+        Some(self.held_uncertainty(derivative)).filter(|u| *u > 0.0)
+    }
+
+    /// Names the undetermined derivatives of a fit that have no tunnel value to be held at; empty
+    /// without any.
+    pub(super) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        fit: &Fit,
+    ) -> String {
+        let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
+        let is_derivative = |name: &&String| {
+            self.context.buildup.derivative(name).is_some() && !self.is_constant(name)
+        };
+        let lacking: Vec<&str> = names
+            .filter(is_derivative)
+            .filter(|name| self.tunnel_uncertainty(name).is_none())
+            .map(String::as_str)
+            .collect();
+        match lacking.as_slice() {
+            [] => String::new(),
+            [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
+            many => format!(
+                "; none of {} has a wind-tunnel value with an uncertainty to be held at",
+                many.join(", ")
+            ),
+        }
+    }
+
+    /// Reason for holding a parameter, in the words of the table `estimates`.
+    fn reason_in_words(
+        &self,
+        names: &[String],
+        parameter: usize,
+        because: Option<Because>,
+    ) -> String {
+        match because {
+            None => "it was held beside others that are free now".to_owned(),
+            Some(Because::NotFelt) => match self.context.buildup.derivative(&names[parameter]) {
+                Some(Derivative {
+                    regressor: Regressor::Surface(s) | Regressor::Vane(s),
+                    ..
+                }) => {
+                    format!("{s} did not move")
+                }
+                _ => "its regressor did not move".to_owned(),
+            },
+            Some(Because::NotToldApart(others)) => {
+                let others: Vec<&str> = others.iter().map(|&j| names[j].as_str()).collect();
+                format!("the data do not tell it apart from {}", others.join(", "))
+            }
+            Some(Because::Bound {
+                bound,
+                uncertainty,
+                partner,
+            }) => {
+                let limit = self.context.settings.identifiability.correlation;
+                let with = partner.filter(|(_, correlation)| correlation.abs() > limit);
+                let with = with.map_or_else(String::new, |(j, correlation)| {
+                    format!("; it would correlate {correlation:.2} with {}", names[j])
+                });
+                let (bound, uncertainty) = (rounded(bound), rounded(uncertainty));
+                format!(
+                    "estimated, its bound would be {bound}; the tunnel's uncertainty is {uncertainty}{with}"
+                )
+            }
+        }
+    }
+}
+
+/// A number with three significant digits.
+fn rounded(value: f64) -> String {
+    let digits = format!("{value:.2e}");
+    digits
+        .parse()
+        .map_or(digits, |number: f64| number.to_string())
+}

@@ -1,0 +1,117 @@
+//! A maneuver laid out for the estimation.
+
+use super::task::Task;
+use crate::aero::Output;
+use crate::dynamics::motion::Window;
+use crate::dynamics::{Equations, OUTPUTS};
+use crate::maneuver::Maneuver;
+use crate::output_error::surface_noise::noisy_surfaces;
+use crate::output_error::{Case, Model};
+
+/// Everything of a maneuver's estimation that does not depend on the parameters.
+pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
+    pub model: Model<'a>,
+    /// Signals of the surfaces that act.
+    pub surfaces: Vec<&'a str>,
+    pub window: Window,
+    pub case: Case<NX, E>,
+    /// Share of the output samples that the cost leaves out.
+    pub left_out: f64,
+}
+
+impl<'a> Task<'a> {
+    /// Cuts the maneuver out of the record and lays it out for a model.
+    pub(super) fn prepare<const NX: usize, E: Equations<NX>>(
+        &self,
+        model: Model<'a>,
+    ) -> Result<PreparedCase<'a, NX, E>, String> {
+        let range = self.range();
+        let derivatives = model
+            .free
+            .iter()
+            .copied()
+            .chain(model.held.iter().map(|(d, _)| *d));
+        let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
+        let settings = self.context.settings;
+        self.check_flagged_share(&surfaces)?;
+        let window = Window::cut(
+            self.record,
+            range.clone(),
+            surfaces.iter().copied(),
+            settings.mass_properties,
+        )?;
+        let measurements = self.measurements(&range)?;
+        let mut case = Case::<NX, E>::new(self.context.aircraft, &window, measurements, &model);
+        let counted: usize = case.used().iter().sum();
+        let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
+        if counted <= case.parameters() {
+            return Err(format!(
+                "{counted} output samples for {} parameters",
+                case.parameters()
+            ));
+        }
+        let mut free = model.free.clone();
+        free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
+        case.noisy_surfaces = noisy_surfaces(self.context.aircraft, &window, &free, &model.held);
+        Ok(PreparedCase {
+            model,
+            surfaces,
+            window,
+            case,
+            left_out,
+        })
+    }
+
+    /// Rejects a maneuver with too large a share of flagged samples.
+    /// Samples between those of a slow channel do not count: the cost leaves them out.
+    fn check_flagged_share(&self, surfaces: &[&str]) -> Result<(), String> {
+        let Maneuver { start_s, end_s, .. } = *self.maneuver;
+        let most = self.context.settings.max_marked_share;
+        let outputs = self.record.marked_share(
+            self.class.axis.outputs().map(Output::signal),
+            start_s,
+            end_s,
+        );
+        if outputs > most {
+            return Err(format!(
+                "{:.0}% of its output samples are marked",
+                100.0 * outputs
+            ));
+        }
+        for surface in surfaces {
+            let share = self.record.marked_share([*surface], start_s, end_s);
+            if share > most {
+                return Err(format!(
+                    "{:.0}% of the samples of `{surface}` are marked",
+                    100.0 * share
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The case with the held derivatives free as well, for the effect of their errors.
+    pub(super) fn with_held_free<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+    ) -> Case<NX, E> {
+        let PreparedCase {
+            model,
+            window,
+            case,
+            ..
+        } = prepared;
+        let held = model.held.iter().map(|(d, _)| *d);
+        let all = Model {
+            free: model.free.iter().copied().chain(held).collect(),
+            held: vec![],
+            ..model.clone()
+        };
+        Case::new(
+            self.context.aircraft,
+            window,
+            case.measurements.clone(),
+            &all,
+        )
+    }
+}

@@ -1,0 +1,187 @@
+//! Rows of the tables from a fit.
+
+use nalgebra::DMatrix;
+
+use super::estimated::{Estimated, rejected_fit};
+use super::task::Task;
+use crate::aero::Combined;
+use crate::dynamics::motion::Window;
+use crate::maneuver::Status;
+use crate::output_error::{Fit, Measurements};
+use crate::tables::{EstimateRow, FitRow, History, HistoryOutput, StartingValues};
+use crate::units::Unit;
+
+/// A derivative or bias of the axis with its status in the class.
+struct Term<'a> {
+    name: &'a str,
+    unit: &'static str,
+    status: Status,
+}
+
+impl<'a> Task<'a> {
+    /// Derivatives and biases of the axis.
+    fn terms(&self) -> Vec<Term<'a>> {
+        let (buildup, axis) = (self.context.buildup, self.class.axis);
+        let derivatives = buildup
+            .derivatives_of(axis)
+            .map(|d| (d.name.as_str(), d.unit().name()));
+        let biases = buildup
+            .biases_of(axis)
+            .map(|b| (b.name.as_str(), b.unit().name()));
+        derivatives
+            .chain(biases)
+            .map(|(name, unit)| Term {
+                name,
+                unit,
+                status: self.status(name).unwrap_or(Status::Inactive),
+            })
+            .collect()
+    }
+
+    /// One row per derivative and bias of the axis.
+    pub(super) fn estimate_rows(&self, fit: Option<(&Vec<String>, &Fit)>) -> Vec<EstimateRow> {
+        let at = |name: &str| fit.and_then(|(names, _)| names.iter().position(|n| n == name));
+        let deviation = |matrix: Option<&DMatrix<f64>>, j: usize| matrix.map(|m| m[(j, j)].sqrt());
+        let mut rows = Vec::new();
+        for term in self.terms() {
+            let mut row = self.estimate_row(term.name, term.unit, term.status);
+            match (term.status, at(term.name), fit) {
+                (Status::Estimated, Some(j), Some((_, fit))) => {
+                    row.value = Some(fit.values[j]);
+                    row.bound = deviation(fit.covariance.as_ref(), j);
+                    row.bound_held = deviation(fit.covariance_held.as_ref(), j);
+                    row.bound_calibration = deviation(fit.covariance_calibration.as_ref(), j);
+                    row.bound_corrected = deviation(fit.covariance_corrected.as_ref(), j);
+                }
+                (Status::Held, ..) => row.value = row.wind_tunnel,
+                _ => {}
+            }
+            rows.push(row);
+        }
+        rows
+    }
+
+    /// Rows of the sums whose parts were both estimated.
+    pub(super) fn combined_rows(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
+        let at = |name: &str| names.iter().position(|n| n == name);
+        let sums = self.context.buildup.combined.iter();
+        sums.filter_map(|c| self.combined_row(c, at(&c.constant)?, at(&c.slope)?, fit))
+            .collect()
+    }
+
+    /// Row of a sum `constant + slope α` of parameters `i` and `j`.
+    fn combined_row(
+        &self,
+        combined: &Combined,
+        i: usize,
+        j: usize,
+        fit: &Fit,
+    ) -> Option<EstimateRow> {
+        let alpha = self.maneuver.alpha_deg;
+        let variance =
+            |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
+        let deviation = |m: &DMatrix<f64>| variance(m).max(0.0).sqrt();
+        let unit = self.context.buildup.unit_of(&combined.name)?.name();
+        Some(EstimateRow {
+            value: Some(fit.values[i] + alpha * fit.values[j]),
+            bound: fit.covariance.as_ref().map(deviation),
+            bound_held: fit.covariance_held.as_ref().map(deviation),
+            bound_calibration: fit.covariance_calibration.as_ref().map(deviation),
+            bound_corrected: fit.covariance_corrected.as_ref().map(deviation),
+            ..self.estimate_row(&combined.name, unit, Status::Estimated)
+        })
+    }
+
+    /// Row without results.
+    fn estimate_row(&self, name: &str, unit: &str, status: Status) -> EstimateRow {
+        EstimateRow {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            flight_id: self.maneuver.flight_id.clone(),
+            class: self.class.name.clone(),
+            alpha_deg: self.maneuver.alpha_deg,
+            mach: self.maneuver.mach,
+            derivative: name.to_owned(),
+            unit: unit.to_owned(),
+            status,
+            value: None,
+            bound: None,
+            bound_held: None,
+            bound_calibration: None,
+            bound_corrected: None,
+            wind_tunnel: self.tunnel_value(name),
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            held_because: None,
+        }
+    }
+
+    /// Row of `fits`.
+    pub(super) fn fit_row(&self, fit: &Fit, left_out: f64, start: StartingValues) -> FitRow {
+        FitRow {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            class: self.class.name.clone(),
+            outcome: fit.outcome,
+            reason: fit.reason.clone(),
+            start: Some(start),
+            iterations: fit.iterations,
+            initial_cost: fit.initial_cost,
+            final_cost: fit.final_cost,
+            condition_number: fit.condition_number,
+            left_out: Some(left_out),
+            largest_condition_index: None,
+            confounded: None,
+        }
+    }
+
+    /// Result of a maneuver that is rejected, with the reason.
+    pub(super) fn rejected(&self, reason: String) -> Estimated {
+        Estimated::without_fit(
+            rejected_fit(self.maneuver, reason),
+            self.estimate_rows(None),
+        )
+    }
+
+    /// Measured and computed outputs, and the motion of the surfaces.
+    pub(super) fn history(
+        &self,
+        measured: &Measurements,
+        fit: &Fit,
+        window: &Window,
+        surfaces: &[&str],
+    ) -> History {
+        let outputs = self
+            .class
+            .axis
+            .outputs()
+            .into_iter()
+            .enumerate()
+            .map(|(o, output)| HistoryOutput {
+                label: output.signal().to_owned(),
+                unit: Unit::of_signal(output.signal()).name.to_owned(),
+                measured: measured.values.iter().map(|z| z[o]).collect(),
+                computed: fit.response.outputs.iter().map(|y| y[o]).collect(),
+                marked: measured.used.iter().map(|used| !used[o]).collect(),
+            });
+        let mut names: Vec<&str> = surfaces.to_vec();
+        names.sort_unstable();
+        names.dedup();
+        let control = |name: &str| {
+            (
+                name.to_owned(),
+                window.signal(name).iter().step_by(2).copied().collect(),
+            )
+        };
+        History {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            class: self.class.name.clone(),
+            alpha_deg: self.maneuver.alpha_deg,
+            time_s: (0..measured.values.len())
+                .map(|k| k as f64 * window.step_s)
+                .collect(),
+            outputs: outputs.collect(),
+            controls: names.into_iter().map(control).collect(),
+        }
+    }
+}

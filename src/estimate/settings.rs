@@ -1,0 +1,159 @@
+//! Settings of the estimation.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::aero::Output;
+use crate::dynamics::motion::MassProperties;
+use crate::output_error::calibration_errors::Calibration;
+use crate::output_error::estimation::Weights;
+use crate::output_error::identifiability;
+use crate::output_error::{InitialState, newton_raphson};
+use crate::settings::{settings, single_values};
+use crate::tables::StartingValues;
+
+/// Effect of an inactive surface that moves a little all the same because feedback stays closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InactiveSurfaces {
+    /// Its motion acts at the wind tunnel's value, where there is one. Without it, feedback motion
+    /// in step with a rate would be charged to that rate's derivative.
+    #[default]
+    WindTunnel,
+    /// None (the paper).
+    Absent,
+}
+
+/// Starting values of the iteration; the other ones are tried where it does not converge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// The derivatives that the measured accelerations imply. From the tunnel's values an airframe
+    /// that is unstable without its feedback diverges within seconds; from these it does not.
+    #[default]
+    EquationError,
+    /// The tunnel's values (the paper).
+    WindTunnel,
+}
+
+/// Choice of the derivatives that are held at the tunnel's values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// By the class (Tables 1 and 3). Joint estimation needs it: the maneuvers must hold the same.
+    #[default]
+    Table,
+    /// By the maneuver: derivatives that the tunnel determines better than the maneuver can.
+    Evidence,
+}
+
+impl Hold {
+    /// Warning that goes with a choice.
+    #[must_use]
+    pub fn warning(self) -> Option<&'static str> {
+        let warning = "estimate: hold: evidence: intervals cover less than with `table` (89 instead of 94 % in simulation): \
+                       state the tunnel's uncertainty";
+        (self == Hold::Evidence).then_some(warning)
+    }
+}
+
+impl From<Start> for StartingValues {
+    fn from(start: Start) -> StartingValues {
+        match start {
+            Start::EquationError => StartingValues::EquationError,
+            Start::WindTunnel => StartingValues::WindTunnel,
+        }
+    }
+}
+
+settings! {
+    /// Settings of the estimation, of all classes.
+    pub struct Settings {
+        /// Weights of the residuals: `table` takes each class's own (Tables 2 and 4), `estimated` the
+        /// inverse of the residuals' variances. `estimated` changes every estimate and its bound.
+        pub weights: Weights = Weights::default(),
+        /// Initial state of a maneuver: `estimated` with the derivatives, or `measured`, the first
+        /// sample, whose noise then enters the estimates.
+        pub initial_state: InitialState = InitialState::default(),
+        /// Mass, centre of gravity and inertias: `recorded` sample by sample, or `mean`, one value
+        /// per maneuver as in the paper.
+        pub mass_properties: MassProperties = MassProperties::default(),
+        /// Small feedback motion of surfaces that a class does not excite: `wind_tunnel` applies the
+        /// tunnel's derivatives to it, `absent` ignores it as in the paper. `absent` charges motion
+        /// in step with a rate to that rate's derivative.
+        pub inactive_surfaces: InactiveSurfaces = InactiveSurfaces::default(),
+        /// Start of the iteration: `equation_error`, or `wind_tunnel` as in the paper. The other
+        /// start is tried where the iteration does not converge.
+        pub start: Start = Start::default(),
+        /// Choice of the derivatives that are held at the tunnel's value: `table` takes each
+        /// class's own (Tables 1 and 3), `evidence` holds what the tunnel determines better than
+        /// the maneuver. The intervals of `evidence` cover less than those of `table`.
+        pub hold: Hold = Hold::default(),
+        /// Standard uncertainty of a held derivative whose table states none, percent of the root
+        /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
+        /// derivatives.
+        pub held_uncertainty_pct: f64 = 20.0,
+        /// Joint estimation of maneuvers of one class and angle of attack, besides each alone. It
+        /// adds rows and changes none; it needs `hold: table`.
+        #[serde(skip_serializing)]
+        pub joint: Option<JointSettings> = None,
+        /// Prediction of each maneuver with derivatives from the others of its class and angle of
+        /// attack; `null` turns it off. It changes no estimate.
+        #[serde(skip_serializing)]
+        pub prediction: Option<PredictionSettings> = Some(PredictionSettings::default()),
+    }
+    expert {
+        /// Smallest standard deviation of each output with `weights: estimated`, deg, deg/s or g.
+        /// Larger: outputs of coarse resolution weigh less.
+        pub resolution: BTreeMap<Output, f64> = BTreeMap::new(),
+        /// End of the iteration.
+        pub iteration: newton_raphson::Settings = newton_raphson::Settings::default(),
+        /// Constants (`CN_0`) that joined or predicting maneuvers share. `true` charges each flight's
+        /// zero error of vanes and surfaces to the slopes; `false` lets each maneuver keep its own.
+        #[serde(skip_serializing)]
+        pub share_constants: bool = false,
+        /// Limits of the identifiability measures.
+        pub identifiability: identifiability::Limits = identifiability::Limits::default(),
+    }
+    elsewhere {
+        /// Uncertainty that calibration leaves of each signal: `instruments:` of aircraft.yaml.
+        /// Signals without an entry count as exact.
+        pub calibration: BTreeMap<String, Calibration> = BTreeMap::new(),
+        /// Largest share of flagged samples over the outputs together, and in each surface:
+        /// `segment: quality: marked_share`.
+        pub max_marked_share: f64 = 0.2,
+    }
+}
+single_values!(Weights, InitialState, MassProperties, InactiveSurfaces, Start, Hold, BTreeMap<Output, f64>);
+
+settings! {
+    /// Settings of joint estimation.
+    pub struct JointSettings {
+        /// Widest spread of the mean angles of attack of joined maneuvers, deg. The default is half
+        /// the usual distance of test points. Larger: smaller bounds, and the change of derivatives
+        /// over the spread becomes an error.
+        pub alpha_bin_deg: f64 = 2.5,
+        /// Angles of attack around which maneuvers are joined, each within half of `alpha_bin_deg`.
+        /// Without any, maneuvers are parted at their widest gaps.
+        pub centres_deg: Vec<f64> = Vec::new(),
+    }
+    elsewhere {
+        /// Constants shared by joined maneuvers: `estimate: expert: share_constants`.
+        pub share_constants: bool = false,
+    }
+}
+
+settings! {
+    /// Settings of prediction.
+    pub struct PredictionSettings {
+        /// Largest difference of mean angles of attack between a maneuver and those that predict it,
+        /// deg. The default is half the usual distance of test points. Larger: more maneuvers are
+        /// predicted, from derivatives further away.
+        pub alpha_distance_deg: f64 = 2.5,
+    }
+    elsewhere {
+        /// Constants taken from the predicting maneuvers: `estimate: expert: share_constants`.
+        pub share_constants: bool = false,
+    }
+}
