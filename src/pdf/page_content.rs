@@ -6,6 +6,7 @@ use std::fmt::Write;
 use super::fonts::Fonts;
 use super::item::{Colour, Mark, RULE, SOFT, Style};
 use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
+use super::svg::Drawing;
 use super::svg_path::number;
 
 /// Operators and resources of one page.
@@ -65,31 +66,18 @@ impl<'a> PageContent<'a> {
                 y,
                 scale,
                 drawing,
-            } => {
-                let [x, y] = [*x, HEIGHT - y].map(number);
-                // Four decimals: the scale of a drawing is multiplied by its width.
-                // Writing into a String cannot fail.
-                let _ = writeln!(self.operators, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
-                self.operators.push_str(&drawing.operators);
-                self.operators.push_str("Q\n");
-                self.opacities.extend(&drawing.opacities);
-            }
+            } => self.drawing(*x, *y, *scale, drawing),
             Mark::Link {
                 x,
                 y,
                 width,
                 height,
                 target,
-            } => self
-                .links
-                .extend(document.anchors.get(target).map(|to| Link {
-                    x: *x,
-                    y: *y,
-                    width: *width,
-                    height: *height,
-                    target_page: to.0,
-                    target_y: to.1,
-                })),
+            } => {
+                if let Some(to) = document.anchors.get(target) {
+                    self.link([*x, *y, *width, *height], *to);
+                }
+            }
             Mark::PageOf {
                 x,
                 y,
@@ -119,6 +107,27 @@ impl<'a> PageContent<'a> {
     fn text_ending_at(&mut self, right: f32, y: f32, style: Style, text: &str) {
         let width = self.fonts.width(style.weight, style.size, text);
         self.text(right - width, y, style, text);
+    }
+
+    fn drawing(&mut self, x: f32, y: f32, scale: f32, drawing: &Drawing) {
+        let [x, y] = [x, HEIGHT - y].map(number);
+        // Four decimals: the scale of a drawing is multiplied by its width.
+        // Writing into a String cannot fail.
+        let _ = writeln!(self.operators, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
+        self.operators.push_str(&drawing.operators);
+        self.operators.push_str("Q\n");
+        self.opacities.extend(&drawing.opacities);
+    }
+
+    fn link(&mut self, [x, y, width, height]: [f32; 4], (page, top): (usize, f32)) {
+        self.links.push(Link {
+            x,
+            y,
+            width,
+            height,
+            target_page: page,
+            target_y: top,
+        });
     }
 
     fn fill(&mut self, [x, y, width, height]: [f32; 4], colour: Colour) {

@@ -139,3 +139,27 @@ impl Outline {
         self.point = end;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relative_and_absolute_commands_give_the_same_outline() {
+        let square = "1 1 m 3 1 l 3 3 l h";
+        assert_eq!(path_operators("M1 1h2v2z"), square);
+        assert_eq!(path_operators("M1,1L3 1 3 3Z"), square);
+        assert_eq!(path_operators("m1 1l2 0l0 2z"), square);
+    }
+
+    #[test]
+    fn numbers_without_separator_are_read() {
+        assert_eq!(path_operators("M.5.5l1-1"), "0.5 0.5 m 1.5 -0.5 l");
+    }
+
+    #[test]
+    fn numbers_are_as_short_as_possible() {
+        let written = [0.0, -0.001, 1.5, 12.345, f32::NAN].map(number);
+        assert_eq!(written, ["0", "0", "1.5", "12.35", "0"]);
+    }
+}

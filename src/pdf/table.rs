@@ -210,3 +210,16 @@ impl TableLayout {
         item
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_share_the_width_that_is_left() {
+        let (least, most) = ([10.0, 20.0], [20.0, 60.0]);
+        assert_eq!(share_width(&least, &most, 100.0), most);
+        assert_eq!(share_width(&least, &most, 55.0), [15.0, 40.0]);
+        assert_eq!(share_width(&least, &most, 15.0), [5.0, 10.0]);
+    }
+}

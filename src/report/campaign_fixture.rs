@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Contents, Provenance, SourceFile};
+use super::contents::Contents;
+use super::provenance::{Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;

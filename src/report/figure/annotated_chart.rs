@@ -386,16 +386,14 @@ mod tests {
         }
     }
 
-    /// The first number after a piece of text.
-    fn after(svg: &str, what: &str, attribute: &str) -> f64 {
-        let rest = &svg[svg
-            .find(what)
-            .unwrap_or_else(|| panic!("{what} is not in {svg}"))..];
-        let rest = &rest[rest.find(attribute).expect(attribute) + attribute.len()..];
-        let end = rest
-            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
-            .expect("an end");
-        rest[..end].parse().expect("a number")
+    /// Numbers of the first path after a piece of text.
+    fn path_after(svg: &str, text: &str) -> Vec<f64> {
+        let (_, rest) = svg.split_once(text).expect(text);
+        let (_, path) = rest.split_once("<path d=\"").expect("a path");
+        let (data, _) = path.split_once('"').expect("an end");
+        data.split(|c: char| c == ' ' || c.is_ascii_alphabetic())
+            .filter_map(|number| number.parse().ok())
+            .collect()
     }
 
     #[test]
@@ -405,13 +403,14 @@ mod tests {
         let left = column(&chart).left;
         let x = |time_s: f64| left + (time_s - 100.0) / 200.0 * 800.0;
         let near = |a: f64, b: f64| assert!((a - b).abs() < 0.1, "{a} for {b}");
-        let window = "data-maneuver=\"f_t00150\"";
-        near(after(&svg, window, "<path d=\"M"), x(150.0));
-        near(after(&svg, window, "h"), x(160.0) - x(150.0));
-        let bridged = "class=\"mark bridged\"";
-        near(after(&svg, bridged, "<path d=\"M"), x(120.0));
-        let despiked = "class=\"mark despiked\"";
-        near(after(&svg, despiked, "<path d=\"M") + 4.0, x(140.0));
+        let window = path_after(&svg, "data-maneuver=\"f_t00150\"");
+        near(window[0], x(150.0));
+        near(window[2], x(160.0) - x(150.0));
+        near(path_after(&svg, "class=\"mark bridged\"")[0], x(120.0));
+        near(
+            path_after(&svg, "class=\"mark despiked\"")[0] + 4.0,
+            x(140.0),
+        );
         let step = coordinate(x(200.0) - x(100.0));
         assert!(svg.contains(&format!("M{} ", coordinate(x(100.0)))));
         assert!(svg.contains(&format!("l{step}-")), "{svg}");

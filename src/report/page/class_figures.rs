@@ -109,8 +109,10 @@ fn figure_of_class(
     }
 }
 
+/// Samples of a signal with their times, s.
+type Points = Vec<(f64, f64)>;
 /// A signal with its name.
-type NamedSignal<'a> = (&'a str, Vec<(f64, f64)>);
+type NamedSignal<'a> = (&'a str, Points);
 
 /// Correlated signals of the representative maneuver of each class that has a flagged pair.
 #[must_use]
@@ -212,7 +214,7 @@ fn correlated_figure(
 
 /// A signal's change from its mean over the root mean square of the change; `None` if the history
 /// lacks the signal or it did not move.
-fn normalised_change(history: &History, name: &str) -> Option<Vec<(f64, f64)>> {
+fn normalised_change(history: &History, name: &str) -> Option<Points> {
     let points = history::points(history, samples(history, name)?);
     let count = points.len() as f64;
     let mean = points.iter().map(|p| p.1).sum::<f64>() / count;
@@ -282,32 +284,16 @@ fn rate_figure(
     markers: &ClassMarkers,
 ) -> ClassFigure {
     let name = without_unit(label);
-    let measured: Vec<(&History, Vec<(f64, f64)>)> = histories
-        .iter()
-        .filter_map(|h| {
-            let output = h.outputs.iter().find(|o| o.label == label)?;
-            Some((*h, history::points(h, &output.measured)))
-        })
-        .collect();
-    let points: Vec<&[(f64, f64)]> = measured.iter().map(|m| m.1.as_slice()).collect();
-    let scale = history_strips::scale_of(&points, 2.4);
+    let measured = measured_rates(label, histories);
     let durations = measured.iter().map(|m| history::time_scale(m.0).max);
     let longest_s = extent(durations).map_or(1.0, |(_, longest)| longest);
-    let mut sizes = Vec::new();
-    let mut strips = Vec::new();
-    for (history, points) in measured {
-        let rms = root_mean_square(&points);
-        sizes.push(format!("{} {}", history.class, fixed(rms, 1)));
-        let mut strip = Strip::of_lines(
-            &history.class,
-            &format!("{name}, deg/s"),
-            STRIP_HEIGHT,
-            scale,
-            vec![StripLine::ink(points, 1.1)],
-        );
-        strip.attributes = vec![("data-class", markers.token(&history.class))];
-        strips.push(strip);
-    }
+    let strips = rate_strips(name, &measured, markers);
+    let sizes: Vec<String> = measured
+        .iter()
+        .map(|(history, points)| {
+            format!("{} {}", history.class, fixed(root_mean_square(points), 1))
+        })
+        .collect();
     let caption = format!("Root mean square, deg/s: {}.", sizes.join(", "));
     let title = format!("Excitation of {name} by class");
     let drawing = StripFigure {
@@ -329,6 +315,37 @@ fn rate_figure(
         legend: vec![],
         caption,
     }
+}
+
+/// A rate as measured in those histories that have it.
+fn measured_rates<'a>(label: &str, histories: &[&'a History]) -> Vec<(&'a History, Points)> {
+    histories
+        .iter()
+        .filter_map(|h| {
+            let output = h.outputs.iter().find(|o| o.label == label)?;
+            Some((*h, history::points(h, &output.measured)))
+        })
+        .collect()
+}
+
+/// A strip per class, all on one scale.
+fn rate_strips(name: &str, measured: &[(&History, Points)], markers: &ClassMarkers) -> Vec<Strip> {
+    let points: Vec<&[(f64, f64)]> = measured.iter().map(|m| m.1.as_slice()).collect();
+    let scale = history_strips::scale_of(&points, 2.4);
+    measured
+        .iter()
+        .map(|(history, points)| {
+            let mut strip = Strip::of_lines(
+                &history.class,
+                &format!("{name}, deg/s"),
+                STRIP_HEIGHT,
+                scale,
+                vec![StripLine::ink(points.clone(), 1.1)],
+            );
+            strip.attributes = vec![("data-class", markers.token(&history.class))];
+            strip
+        })
+        .collect()
 }
 
 fn root_mean_square(points: &[(f64, f64)]) -> f64 {

@@ -115,28 +115,8 @@ fn page(
         .collect();
     legend.extend(trend_key(derivative));
     legend.extend(tunnel_key(derivative));
-    let svg = derivative_figure::draw(&DerivativeFigure {
-        id: &anchor,
-        title: &format!("{} over angle of attack", derivative.name),
-        description: &alternative_text(derivative),
-        y_label: axis_label(derivative.name, &notation::unit(derivative.unit)),
-        alpha,
-        scale,
-        band: confidence_band(derivative),
-        trend: derivative
-            .trend
-            .iter()
-            .map(|t| (t.alpha_deg, t.value))
-            .filter(|(x, y)| x.is_finite() && y.is_finite())
-            .collect(),
-        tunnel: derivative
-            .tunnel
-            .iter()
-            .copied()
-            .filter(|(alpha_deg, _)| alpha.contains(*alpha_deg))
-            .collect(),
-        classes: classes.into_iter().map(|(_, class)| class).collect(),
-    });
+    let classes = classes.into_iter().map(|(_, class)| class).collect();
+    let svg = draw_figure(derivative, &anchor, (alpha, scale), classes);
     let is_compared = derivative.is_compared();
     DerivativePage {
         number,
@@ -153,6 +133,32 @@ fn page(
         comparison: is_compared.then(|| comparison_table(derivative)),
         anchor,
     }
+}
+
+fn draw_figure(
+    derivative: &DerivativeResults,
+    anchor: &str,
+    (alpha, scale): (Scale, Scale),
+    classes: Vec<ClassEstimates>,
+) -> String {
+    let trend = derivative.trend.iter().map(|t| (t.alpha_deg, t.value));
+    let tunnel = derivative.tunnel.iter().copied();
+    derivative_figure::draw(&DerivativeFigure {
+        id: anchor,
+        title: &format!("{} over angle of attack", derivative.name),
+        description: &alternative_text(derivative),
+        y_label: axis_label(derivative.name, &notation::unit(derivative.unit)),
+        alpha,
+        scale,
+        band: confidence_band(derivative),
+        trend: trend
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .collect(),
+        tunnel: tunnel
+            .filter(|(alpha_deg, _)| alpha.contains(*alpha_deg))
+            .collect(),
+        classes,
+    })
 }
 
 /// Estimates by class, in the order of the configuration; other classes come last.
