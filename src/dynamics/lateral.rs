@@ -24,9 +24,9 @@ use crate::units::{DEG, G0_FT_S2};
 #[derive(Clone, Copy, Debug)]
 pub struct Lateral;
 
-/// What the rates know at one instant.
+/// Inputs of the state equations at one instant.
 #[derive(Clone, Debug)]
-pub struct Known {
+pub struct RateInputs {
     /// 1/V.
     per_speed: f64,
     sin_alpha: f64,
@@ -37,7 +37,7 @@ pub struct Known {
     tan_theta: f64,
     /// f_x cos α + f_z sin α, ft/s²: the measured specific force along the wind's projection on the
     /// plane of symmetry.
-    along: f64,
+    along_wind: f64,
     /// q̄S/m, ft/s².
     force: f64,
     gravity: f64,
@@ -49,9 +49,9 @@ pub struct Known {
     gyroscopic: [f64; 2],
 }
 
-/// What the sensors know besides.
+/// Further inputs of the sensor equations.
 #[derive(Clone, Debug)]
-pub struct Sensed {
+pub struct SensorInputs {
     velocity: f64,
     alpha: f64,
     q_dot: f64,
@@ -60,7 +60,7 @@ pub struct Sensed {
     cg: Position,
     vane: Vane,
     model: VaneModel,
-    /// How the rates add to a small angle at the vane, s.
+    /// Slopes of a small angle at the vane along the rates, s.
     vane_by_rates: [f64; 3],
 }
 
@@ -68,15 +68,15 @@ const BETA: usize = 0;
 const P: usize = 1;
 const R: usize = 2;
 const PHI: usize = 3;
-const CY: usize = 0;
-const CL: usize = 1;
-const CN: usize = 2;
+const SIDE_FORCE: usize = 0;
+const ROLLING_MOMENT: usize = 1;
+const YAWING_MOMENT: usize = 2;
 
-impl Known {
+impl RateInputs {
     /// ṗ and ṙ, rad/s².
     #[inline(always)]
     fn angular(&self, p: f64, r: f64, c: &[f64; COEFFICIENTS]) -> [f64; 2] {
-        let ([p_dot, r_dot], [cl, cn]) = (self.coupling, [c[CL], c[CN]]);
+        let ([p_dot, r_dot], [cl, cn]) = (self.coupling, [c[ROLLING_MOMENT], c[YAWING_MOMENT]]);
         [
             p_dot[0] * p
                 + p_dot[1] * r
@@ -93,13 +93,13 @@ impl Known {
 }
 
 impl Equations<4> for Lateral {
-    type Known = Known;
-    type Sensed = Sensed;
+    type RateInputs = RateInputs;
+    type SensorInputs = SensorInputs;
 
     const AXIS: Axis = Axis::Lateral;
     const STATES: [&'static str; 4] = ["beta", "p", "r", "phi"];
 
-    const FOLLOWED: &'static [usize] = &[BETA, P, R];
+    const REGRESSOR_STATES: &'static [usize] = &[BETA, P, R];
     const RATES_BY_STATE: &'static [(usize, usize)] = &[
         (BETA, BETA),
         (BETA, P),
@@ -115,8 +115,13 @@ impl Equations<4> for Lateral {
         (PHI, R),
         (PHI, PHI),
     ];
-    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] =
-        &[(BETA, CY), (P, CL), (P, CN), (R, CL), (R, CN)];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[
+        (BETA, SIDE_FORCE),
+        (P, ROLLING_MOMENT),
+        (P, YAWING_MOMENT),
+        (R, ROLLING_MOMENT),
+        (R, YAWING_MOMENT),
+    ];
     const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
         (0, BETA),
         (0, P),
@@ -128,12 +133,13 @@ impl Equations<4> for Lateral {
         (4, P),
         (4, R),
     ];
-    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(4, CY), (4, CL), (4, CN)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] =
+        &[(4, SIDE_FORCE), (4, ROLLING_MOMENT), (4, YAWING_MOMENT)];
 
     #[inline(always)]
-    fn known(aircraft: &Aircraft, m: &Motion) -> Known {
+    fn rate_inputs(aircraft: &Aircraft, m: &Motion) -> RateInputs {
         let determinant = m.ix * m.iz - m.ixz * m.ixz;
-        // Rows of the inverse inertia matrix: what a rolling and a yawing moment give of ṗ and ṙ.
+        // Rows of the inverse inertia matrix: ṗ and ṙ per rolling and yawing moment.
         let inverse = [
             [m.iz / determinant, m.ixz / determinant],
             [m.ixz / determinant, m.ix / determinant],
@@ -149,7 +155,7 @@ impl Equations<4> for Lateral {
         let times =
             |i: usize, j: usize| inverse[i][0] * turning[0][j] + inverse[i][1] * turning[1][j];
         let [(sin_alpha, cos_alpha), (sin_theta, cos_theta)] = sin_cos([m.alpha, m.theta]);
-        Known {
+        RateInputs {
             per_speed: 1.0 / m.velocity,
             sin_alpha,
             cos_alpha,
@@ -157,7 +163,7 @@ impl Equations<4> for Lateral {
             sin_theta,
             cos_theta,
             tan_theta: sin_theta / cos_theta,
-            along: m.force_x * cos_alpha + m.force_z * sin_alpha,
+            along_wind: m.force_x * cos_alpha + m.force_z * sin_alpha,
             force: m.qbar * aircraft.wing_area_ft2 / m.mass,
             gravity: m.gravity,
             moment: inverse.map(|row| row.map(|v| pressure * v)),
@@ -167,9 +173,9 @@ impl Equations<4> for Lateral {
     }
 
     #[inline(always)]
-    fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
+    fn sensor_inputs(aircraft: &Aircraft, m: &Motion) -> SensorInputs {
         let sensors = &aircraft.sensors;
-        Sensed {
+        SensorInputs {
             velocity: m.velocity,
             alpha: m.alpha,
             q_dot: m.accelerations[1],
@@ -210,7 +216,11 @@ impl Equations<4> for Lateral {
     }
 
     #[inline(always)]
-    fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
+    fn implied_coefficients(
+        aircraft: &Aircraft,
+        m: &Motion,
+        k: &RateInputs,
+    ) -> [f64; COEFFICIENTS] {
         let [p, q, r] = m.rates;
         let [p_dot, _, r_dot] = m.accelerations;
         let pressure = m.qbar * aircraft.wing_area_ft2 * aircraft.span_ft;
@@ -223,13 +233,13 @@ impl Equations<4> for Lateral {
     }
 
     #[inline(always)]
-    fn rates(k: &Known, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
+    fn rates(k: &RateInputs, x: &SVector<f64, 4>, c: &[f64; COEFFICIENTS]) -> Rates<4> {
         let [(sb, cb), (sp, cp)] = sin_cos([x[BETA], x[PHI]]);
         let per_speed = k.per_speed;
         let weight = k.cos_theta * cp * k.sin_alpha - k.sin_theta * k.cos_alpha;
-        // 3.1 sorted by what cos β and sin β multiply.
-        let by_cos = per_speed * (k.force * c[CY] + k.gravity * k.cos_theta * sp);
-        let by_sin = -per_speed * (k.along + k.gravity * weight);
+        // 3.1 sorted by the factors cos β and sin β.
+        let by_cos = per_speed * (k.force * c[SIDE_FORCE] + k.gravity * k.cos_theta * sp);
+        let by_sin = -per_speed * (k.along_wind + k.gravity * weight);
         let beta_dot = sb.mul_add(
             by_sin,
             cb.mul_add(by_cos, x[P] * k.sin_alpha - x[R] * k.cos_alpha),
@@ -254,38 +264,40 @@ impl Equations<4> for Lateral {
         for (row, i) in [(P, 0), (R, 1)] {
             out.by_state[(row, P)] = k.coupling[i][0];
             out.by_state[(row, R)] = k.coupling[i][1];
-            out.by_coefficient[(row, CL)] = k.moment[i][0];
-            out.by_coefficient[(row, CN)] = k.moment[i][1];
+            out.by_coefficient[(row, ROLLING_MOMENT)] = k.moment[i][0];
+            out.by_coefficient[(row, YAWING_MOMENT)] = k.moment[i][1];
         }
         out.by_state[(PHI, P)] = 1.0;
         out.by_state[(PHI, R)] = tan_theta * cp;
         out.by_state[(PHI, PHI)] = tan_theta * (-x[R] * sp + k.q * cp);
-        out.by_coefficient[(BETA, CY)] = per_speed * k.force * cb;
+        out.by_coefficient[(BETA, SIDE_FORCE)] = per_speed * k.force * cb;
         out
     }
 
     #[inline(always)]
     fn outputs(
-        k: &Known,
-        sensed: &Sensed,
+        k: &RateInputs,
+        sensors: &SensorInputs,
         x: &SVector<f64, 4>,
         c: &[f64; COEFFICIENTS],
     ) -> Outputs<4> {
         let rates = [x[P], k.q, x[R]];
         let [p_dot, r_dot] = k.angular(x[P], x[R], c);
-        let vane = match sensed.model {
-            VaneModel::SmallAngle => sensed.vane.beta_small(x[BETA], sensed.vane_by_rates, rates),
+        let vane = match sensors.model {
+            VaneModel::SmallAngle => sensors
+                .vane
+                .beta_small(x[BETA], sensors.vane_by_rates, rates),
             VaneModel::Exact => {
                 let flow = Flow {
-                    alpha: sensed.alpha,
+                    alpha: sensors.alpha,
                     beta: x[BETA],
-                    velocity: sensed.velocity,
+                    velocity: sensors.velocity,
                     rates,
                 };
-                sensed.vane.beta_reading(sensed.model, &flow, sensed.cg)
+                sensors.vane.beta_reading(sensors.model, &flow, sensors.cg)
             }
         };
-        let right = lever(1, sensed.ay, rates, [p_dot, sensed.q_dot, r_dot]);
+        let right = lever(1, sensors.ay, rates, [p_dot, sensors.q_dot, r_dot]);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([
@@ -293,7 +305,7 @@ impl Equations<4> for Lateral {
                 DEG * x[P],
                 DEG * x[R],
                 DEG * x[PHI],
-                g * (k.force * c[CY] + right.value),
+                g * (k.force * c[SIDE_FORCE] + right.value),
             ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::zeros(),
@@ -309,8 +321,8 @@ impl Equations<4> for Lateral {
             out.by_state[(4, state)] =
                 g * (by_rate + by_p_dot * k.coupling[0][j] + by_r_dot * k.coupling[1][j]);
         }
-        out.by_coefficient[(4, CY)] = g * k.force;
-        for (column, j) in [(CL, 0), (CN, 1)] {
+        out.by_coefficient[(4, SIDE_FORCE)] = g * k.force;
+        for (column, j) in [(ROLLING_MOMENT, 0), (YAWING_MOMENT, 1)] {
             out.by_coefficient[(4, column)] =
                 g * (by_p_dot * k.moment[0][j] + by_r_dot * k.moment[1][j]);
         }

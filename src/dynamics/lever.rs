@@ -1,8 +1,7 @@
-//! What an accelerometer away from the c.g. feels besides the specific force at the c.g.: ω̇ × r +
-//! ω × (ω × r).
+//! Acceleration at an arm from the c.g., besides that of the c.g. itself: ω̇ × r + ω × (ω × r).
 //!
-//! Eqs. 2.7, 2.8 and 3.7 are this with the products of two different rates dropped; those reach
-//! 0.005 g at high roll rate, so they are kept.
+//! Eqs. 2.7, 2.8 and 3.7 drop the products of two different rates. These reach 0.005 g at high roll
+//! rate, so they are kept here.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -71,7 +70,7 @@ mod tests {
 
     #[test]
     fn the_lever_has_the_printed_terms_of_2_7_2_8_and_3_7() {
-        // Arms aft, right and above, as in the paper; the printed forms have no products of two
+        // Arms aft, right and above, as in the paper. The printed forms have no products of two
         // different rates.
         let (x, y, z) = (-ARM[0], ARM[1], -ARM[2]);
         let only = |i: usize, w: f64| {

@@ -24,9 +24,9 @@ use crate::units::{DEG, G0_FT_S2};
 #[derive(Clone, Copy, Debug)]
 pub struct Longitudinal;
 
-/// What the rates know at one instant.
+/// Inputs of the state equations at one instant.
 #[derive(Clone, Debug)]
-pub struct Known {
+pub struct RateInputs {
     /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
     slip_cos: f64,
     slip_sin: f64,
@@ -37,14 +37,14 @@ pub struct Known {
     cos_phi: f64,
     /// r sin φ.
     turn: f64,
-    /// Pitch acceleration that is known, rad/s², and q̄Sc̄/I_y.
+    /// Pitch acceleration without the aerodynamic moment, rad/s², and q̄Sc̄/I_y.
     pitch: f64,
     moment: f64,
 }
 
-/// What the sensors know besides.
+/// Further inputs of the sensor equations.
 #[derive(Clone, Debug)]
-pub struct Sensed {
+pub struct SensorInputs {
     velocity: f64,
     beta: f64,
     r: f64,
@@ -55,31 +55,31 @@ pub struct Sensed {
     /// Arms of the accelerometers from the c.g., ft forward, right, down.
     an: [f64; 3],
     ax: [f64; 3],
-    /// q̄S/m, and T/m where the accelerometer feels it, ft/s².
+    /// q̄S/m, and T/m where the accelerometer senses it, ft/s².
     force: f64,
     thrust: f64,
     cg: Position,
     vane: Vane,
     model: VaneModel,
-    /// How the rates add to a small angle at the vane, s.
+    /// Slopes of a small angle at the vane along the rates, s.
     vane_by_rates: [f64; 3],
 }
 
 const ALPHA: usize = 0;
 const Q: usize = 1;
 const THETA: usize = 2;
-const CN: usize = 0;
-const CM: usize = 1;
-const CA: usize = 2;
+const NORMAL_FORCE: usize = 0;
+const PITCHING_MOMENT: usize = 1;
+const AXIAL_FORCE: usize = 2;
 
 impl Equations<3> for Longitudinal {
-    type Known = Known;
-    type Sensed = Sensed;
+    type RateInputs = RateInputs;
+    type SensorInputs = SensorInputs;
 
     const AXIS: Axis = Axis::Longitudinal;
     const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
 
-    const FOLLOWED: &'static [usize] = &[ALPHA, Q];
+    const REGRESSOR_STATES: &'static [usize] = &[ALPHA, Q];
     const RATES_BY_STATE: &'static [(usize, usize)] = &[
         (ALPHA, ALPHA),
         (ALPHA, Q),
@@ -88,7 +88,11 @@ impl Equations<3> for Longitudinal {
         (Q, Q),
         (THETA, Q),
     ];
-    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[(ALPHA, CN), (ALPHA, CA), (Q, CM)];
+    const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = &[
+        (ALPHA, NORMAL_FORCE),
+        (ALPHA, AXIAL_FORCE),
+        (Q, PITCHING_MOMENT),
+    ];
     const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
         (0, ALPHA),
         (0, Q),
@@ -99,20 +103,25 @@ impl Equations<3> for Longitudinal {
         (4, ALPHA),
         (4, Q),
     ];
-    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[(3, CN), (3, CM), (4, CM), (4, CA)];
+    const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[
+        (3, NORMAL_FORCE),
+        (3, PITCHING_MOMENT),
+        (4, PITCHING_MOMENT),
+        (4, AXIAL_FORCE),
+    ];
 
     #[inline(always)]
-    fn known(aircraft: &Aircraft, m: &Motion) -> Known {
+    fn rate_inputs(aircraft: &Aircraft, m: &Motion) -> RateInputs {
         let [p, _, r] = m.rates;
         let [(sin_beta, cos_beta), (sin_phi, cos_phi)] = sin_cos([m.beta, m.phi]);
-        // Divisions are most of what laying out a maneuver costs: one for each denominator, here
-        // and below.
+        // Divisions dominate the preparation of a maneuver: one for each denominator, here and
+        // below.
         let (per_speed, per_mass, per_iy) =
             (1.0 / (m.velocity * cos_beta), 1.0 / m.mass, 1.0 / m.iy);
         let tan_beta = sin_beta * m.velocity * per_speed;
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
-        Known {
+        RateInputs {
             slip_cos: tan_beta * p,
             slip_sin: tan_beta * r,
             force: per_speed * m.qbar * aircraft.wing_area_ft2 * per_mass,
@@ -126,9 +135,9 @@ impl Equations<3> for Longitudinal {
     }
 
     #[inline(always)]
-    fn sensed(aircraft: &Aircraft, m: &Motion) -> Sensed {
+    fn sensor_inputs(aircraft: &Aircraft, m: &Motion) -> SensorInputs {
         let (sensors, per_mass) = (&aircraft.sensors, 1.0 / m.mass);
-        Sensed {
+        SensorInputs {
             velocity: m.velocity,
             beta: m.beta,
             r: m.rates[2],
@@ -176,7 +185,11 @@ impl Equations<3> for Longitudinal {
     }
 
     #[inline(always)]
-    fn coefficients(aircraft: &Aircraft, m: &Motion, k: &Known) -> [f64; COEFFICIENTS] {
+    fn implied_coefficients(
+        aircraft: &Aircraft,
+        m: &Motion,
+        k: &RateInputs,
+    ) -> [f64; COEFFICIENTS] {
         let (per_force, thrust) = (
             m.mass / (m.qbar * aircraft.wing_area_ft2),
             m.thrust * (1.0 / m.mass),
@@ -189,15 +202,21 @@ impl Equations<3> for Longitudinal {
     }
 
     #[inline(always)]
-    fn rates(k: &Known, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
+    fn rates(k: &RateInputs, x: &SVector<f64, 3>, c: &[f64; COEFFICIENTS]) -> Rates<3> {
         let [(sa, ca), (st, ct)] = sin_cos([x[ALPHA], x[THETA]]);
-        // 2.1 sorted by what cos α and sin α multiply, the latter's forces along the body's x axis.
-        let by_cos = ct.mul_add(k.weight * k.cos_phi, (-k.force).mul_add(c[CN], -k.slip_cos));
-        let by_sin = st.mul_add(k.weight, k.force.mul_add(c[CA], -k.thrust - k.slip_sin));
+        // 2.1 sorted by the factors cos α and sin α.
+        let by_cos = ct.mul_add(
+            k.weight * k.cos_phi,
+            (-k.force).mul_add(c[NORMAL_FORCE], -k.slip_cos),
+        );
+        let by_sin = st.mul_add(
+            k.weight,
+            k.force.mul_add(c[AXIAL_FORCE], -k.thrust - k.slip_sin),
+        );
         let alpha_dot = sa.mul_add(by_sin, ca.mul_add(by_cos, x[Q]));
         let by_alpha = ca * by_sin - sa * by_cos;
         let by_theta = k.weight * (ct * sa - st * k.cos_phi * ca);
-        let q_dot = k.moment.mul_add(c[CM], k.pitch);
+        let q_dot = k.moment.mul_add(c[PITCHING_MOMENT], k.pitch);
         let theta_dot = k.cos_phi.mul_add(x[Q], -k.turn);
         Rates {
             rates: SVector::from([alpha_dot, q_dot, theta_dot]),
@@ -220,37 +239,43 @@ impl Equations<3> for Longitudinal {
 
     #[inline(always)]
     fn outputs(
-        k: &Known,
-        sensed: &Sensed,
+        k: &RateInputs,
+        sensors: &SensorInputs,
         x: &SVector<f64, 3>,
         c: &[f64; COEFFICIENTS],
     ) -> Outputs<3> {
-        let rates = [sensed.p, x[Q], sensed.r];
-        let accelerations = [sensed.p_dot, k.pitch + k.moment * c[CM], sensed.r_dot];
-        let vane = match sensed.model {
-            VaneModel::SmallAngle => sensed
-                .vane
-                .alpha_small(x[ALPHA], sensed.vane_by_rates, rates),
+        let rates = [sensors.p, x[Q], sensors.r];
+        let accelerations = [
+            sensors.p_dot,
+            k.pitch + k.moment * c[PITCHING_MOMENT],
+            sensors.r_dot,
+        ];
+        let vane = match sensors.model {
+            VaneModel::SmallAngle => {
+                sensors
+                    .vane
+                    .alpha_small(x[ALPHA], sensors.vane_by_rates, rates)
+            }
             VaneModel::Exact => {
                 let flow = Flow {
                     alpha: x[ALPHA],
-                    beta: sensed.beta,
-                    velocity: sensed.velocity,
+                    beta: sensors.beta,
+                    velocity: sensors.velocity,
                     rates,
                 };
-                sensed.vane.alpha_reading(sensed.model, &flow, sensed.cg)
+                sensors.vane.alpha_reading(sensors.model, &flow, sensors.cg)
             }
         };
-        let down = lever(2, sensed.an, rates, accelerations);
-        let forward = lever(0, sensed.ax, rates, accelerations);
+        let down = lever(2, sensors.an, rates, accelerations);
+        let forward = lever(0, sensors.ax, rates, accelerations);
         let g = 1.0 / G0_FT_S2;
         let mut out = Outputs {
             outputs: SVector::from([
                 DEG * vane.angle,
                 DEG * x[Q],
                 DEG * x[THETA],
-                g * (sensed.force * c[CN] - down.value),
-                g * (sensed.thrust - sensed.force * c[CA] + forward.value),
+                g * (sensors.force * c[NORMAL_FORCE] - down.value),
+                g * (sensors.thrust - sensors.force * c[AXIAL_FORCE] + forward.value),
             ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),
@@ -261,10 +286,10 @@ impl Equations<3> for Longitudinal {
         out.by_state[(2, THETA)] = DEG;
         out.by_state[(3, Q)] = -g * down.by_rates[1];
         out.by_state[(4, Q)] = g * forward.by_rates[1];
-        out.by_coefficient[(3, CN)] = g * sensed.force;
-        out.by_coefficient[(3, CM)] = -g * down.by_accelerations[1] * k.moment;
-        out.by_coefficient[(4, CA)] = -g * sensed.force;
-        out.by_coefficient[(4, CM)] = g * forward.by_accelerations[1] * k.moment;
+        out.by_coefficient[(3, NORMAL_FORCE)] = g * sensors.force;
+        out.by_coefficient[(3, PITCHING_MOMENT)] = -g * down.by_accelerations[1] * k.moment;
+        out.by_coefficient[(4, AXIAL_FORCE)] = -g * sensors.force;
+        out.by_coefficient[(4, PITCHING_MOMENT)] = g * forward.by_accelerations[1] * k.moment;
         out
     }
 }

@@ -1,10 +1,10 @@
-//! The equations of motion (2.1-2.3, 3.1-3.4) and of the sensors (2.7-2.9, 3.7, 3.8) with their
-//! exact slopes, and their integration with sensitivities.
+//! Equations of motion (2.1-2.3, 3.1-3.4) and of the sensors (2.7-2.9, 3.7, 3.8) with their exact
+//! slopes.
 //!
-//! Each axis integrates its own states and takes everything else as measured. What the estimation
-//! needs of an axis is [`Equations`]: the rates of the states and the outputs as functions of the
-//! states x and the axis's three coefficients c, with the slopes along both. How c follows from x
-//! and the derivatives is the build-up's business.
+//! Each axis integrates its own states and takes everything else as measured. The estimation uses
+//! an axis through [`Equations`]: rates of the states and outputs as functions of the states x and
+//! the axis's three coefficients c, with the slopes along both. The build-up of c from x and the
+//! derivatives belongs to the method.
 //!
 //! Units inside: rad, rad/s, ft, slug, lbf, s. Outputs are in the units of the signals: deg, deg/s,
 //! g.
@@ -24,7 +24,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::Aircraft;
 
-/// Number of outputs that are matched in each axis, and of coefficients that act in it.
+/// Number of outputs that are matched on each axis, and of its coefficients.
 pub const OUTPUTS: usize = 5;
 pub const COEFFICIENTS: usize = 3;
 
@@ -45,59 +45,60 @@ pub struct Outputs<const NX: usize> {
     pub by_coefficient: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
 }
 
-/// The equations of one axis with `NX` states.
+/// Equations of one axis with `NX` states.
 pub trait Equations<const NX: usize> {
-    /// What the rates need to know at one instant, prepared for the inner loop.
-    type Known: Clone + std::fmt::Debug + Send + Sync;
-    /// What the outputs need to know besides.
-    type Sensed: Clone + std::fmt::Debug + Send + Sync;
+    /// Inputs of the state equations at one instant, prepared for the inner loop.
+    type RateInputs: Clone + std::fmt::Debug + Send + Sync;
+    /// Further inputs of the sensor equations at one sample.
+    type SensorInputs: Clone + std::fmt::Debug + Send + Sync;
 
     const AXIS: Axis;
-    /// Names of the states with the unit in which they are reported, deg.
+    /// Names of the states; they are reported in deg and deg/s.
     const STATES: [&'static str; NX];
 
-    /// The states that regressors can be proportional to.
-    const FOLLOWED: &'static [usize];
-    /// Where the slopes of the rates along states can be other than zero, also through
-    /// coefficients: (rate, state).
+    /// States that regressors can be proportional to.
+    const REGRESSOR_STATES: &'static [usize];
+    /// Entries (rate, state) of the slopes that can differ from zero, also through coefficients.
     const RATES_BY_STATE: &'static [(usize, usize)];
-    /// Where those along coefficients can be: (rate, coefficient).
+    /// Entries (rate, coefficient) of the slopes that can differ from zero.
     const RATES_BY_COEFFICIENT: &'static [(usize, usize)];
-    /// The same of the outputs: (output, state) and (output, coefficient).
+    /// Entries (output, state) and (output, coefficient) of the slopes that can differ from zero.
     const OUTPUTS_BY_STATE: &'static [(usize, usize)];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)];
 
-    /// Prepares what is known at one instant.
-    fn known(aircraft: &Aircraft, motion: &Motion) -> Self::Known;
+    /// Prepares the inputs of the state equations.
+    fn rate_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::RateInputs;
 
-    /// Prepares what is known besides at one sample.
-    fn sensed(aircraft: &Aircraft, motion: &Motion) -> Self::Sensed;
+    /// Prepares the further inputs of the sensor equations.
+    fn sensor_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::SensorInputs;
 
-    /// The state as measured, from which an integration may start.
+    /// State as measured, from which an integration may start.
     fn measured_state(motion: &Motion) -> SVector<f64, NX>;
 
-    /// The state that a regressor is proportional to, or none when it is not a state of this axis.
+    /// State that a regressor is proportional to; `None` if it is no state of this axis.
     fn state_of(regressor: &Regressor) -> Option<usize>;
 
-    /// That state and the factor of proportion at a velocity, ft/s.
+    /// State that a regressor is proportional to, and the factor of proportion at a velocity, ft/s.
     fn state_regressor(
         aircraft: &Aircraft,
         velocity: f64,
         regressor: &Regressor,
     ) -> Option<(usize, f64)>;
 
-    /// The coefficients that the measured motion implies: its accelerations put into the equations.
-    fn coefficients(
+    /// Coefficients that the measured motion implies: its accelerations inserted into the
+    /// equations.
+    fn implied_coefficients(
         aircraft: &Aircraft,
         motion: &Motion,
-        known: &Self::Known,
+        inputs: &Self::RateInputs,
     ) -> [f64; COEFFICIENTS];
 
-    fn rates(known: &Self::Known, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS]) -> Rates<NX>;
+    fn rates(inputs: &Self::RateInputs, x: &SVector<f64, NX>, c: &[f64; COEFFICIENTS])
+    -> Rates<NX>;
 
     fn outputs(
-        known: &Self::Known,
-        sensed: &Self::Sensed,
+        inputs: &Self::RateInputs,
+        sensors: &Self::SensorInputs,
         x: &SVector<f64, NX>,
         c: &[f64; COEFFICIENTS],
     ) -> Outputs<NX>;

@@ -1,8 +1,7 @@
-//! The measured motion: everything that an axis's equations take as known, at the samples and
-//! halfway between them.
+//! Measured motion: all inputs of an axis's equations, at the samples and halfway between them.
 //!
-//! Signals are linear between samples (design, section 4), so a fourth-order Runge-Kutta step needs
-//! them at its two ends and in its middle: point 2k is sample k, point 2k+1 lies between k and k+1.
+//! Signals are linear between samples. A fourth-order Runge-Kutta step needs them at its ends and
+//! in its middle: point 2k is sample k, point 2k+1 lies between samples k and k+1.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -20,7 +19,7 @@ use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
 use crate::units::{G0_FT_S2, RAD};
 
-/// The motion at one instant, in rad, rad/s, rad/s², ft, ft/s, slug, lbf.
+/// Motion at one instant, in rad, rad/s, rad/s², ft, ft/s, slug, lbf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// At the c.g., from the vanes.
@@ -28,7 +27,7 @@ pub struct Motion {
     pub beta: f64,
     pub velocity: f64,
     pub rates: [f64; 3],
-    /// Slopes of the measured rates.
+    /// Angular accelerations: slopes of the measured rates.
     pub accelerations: [f64; 3],
     pub theta: f64,
     pub phi: f64,
@@ -49,8 +48,8 @@ pub struct Motion {
     pub cg: Position,
 }
 
-/// Whether mass, c.g. and inertias are taken sample by sample or as their means over the maneuver
-/// (the paper's choice).
+/// Mass, c.g. and inertias: sample by sample, or their means over the maneuver (the paper's
+/// choice).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MassProperties {
@@ -70,17 +69,17 @@ const MASS_PROPERTIES: &[&str] = &[
     signal::IXZ,
 ];
 
-/// The signals of a window of a record at samples and half-samples.
+/// Signals of a window of a record at samples and half-samples.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// Shared by windows that differ in few of them.
+    /// Windows that differ in few signals share the others.
     points: BTreeMap<String, Arc<Vec<f64>>>,
     pub step_s: f64,
     pub samples: usize,
 }
 
 impl Window {
-    /// Cuts `range` out of the record, for the named signals besides those the equations need.
+    /// Cuts `range` out of the record: the named signals besides those the equations need.
     ///
     /// # Errors
     /// A sentence that names the signal and time where a value is missing.
@@ -95,7 +94,7 @@ impl Window {
             let values = record.values(name).and_then(|v| v.get(range.clone()));
             let values = values
                 .ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
-            if some_missing(values) {
+            if has_missing(values) {
                 let gap = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
                 let time_s = record.time_s(range.start + gap);
                 return Err(format!(
@@ -106,9 +105,9 @@ impl Window {
             points.insert(
                 name.to_owned(),
                 Arc::new(if mean {
-                    constant(values)
+                    constant_mean(values)
                 } else {
-                    halved(values)
+                    with_half_samples(values)
                 }),
             );
         }
@@ -118,7 +117,7 @@ impl Window {
                 &range,
                 record.step_s,
             );
-            points.insert(slope_name(name), Arc::new(halved(&slope)));
+            points.insert(slope_name(name), Arc::new(with_half_samples(&slope)));
         }
         Ok(Window {
             points,
@@ -138,7 +137,7 @@ impl Window {
         self.samples == 0
     }
 
-    /// A signal's values at the points; all zero for a signal that was not cut out.
+    /// Values of a signal at the points; empty for a signal that was not cut out.
     #[must_use]
     pub fn signal(&self, name: &str) -> &[f64] {
         self.points
@@ -146,8 +145,8 @@ impl Window {
             .map_or(&[], |points| points.as_slice())
     }
 
-    /// The same window as a sensor in error would have recorded it: a signal's values times `1 +
-    /// scale`, plus `bias`.
+    /// Window as a sensor in error would have recorded it: a signal's values times `1 + scale`,
+    /// plus `bias`.
     #[must_use]
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
@@ -166,7 +165,7 @@ impl Window {
         window
     }
 
-    /// The same window with a signal more, which does not change.
+    /// Window with a further, constant signal.
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {
         let mut window = self.clone();
@@ -176,10 +175,13 @@ impl Window {
         window
     }
 
-    /// The motion at every point.
+    /// Measured motion along the window.
     #[must_use]
-    pub fn motion<'a>(&'a self, aircraft: &'a Aircraft) -> Along<'a, impl Fn(f64) -> f64 + use<>> {
-        Along {
+    pub fn motion<'a>(
+        &'a self,
+        aircraft: &'a Aircraft,
+    ) -> MeasuredMotion<'a, impl Fn(f64) -> f64 + use<>> {
+        MeasuredMotion {
             aircraft,
             signals: self.signals(),
             gravity: gravity_at(aircraft.latitude_deg),
@@ -206,34 +208,34 @@ impl Window {
     }
 }
 
-/// The motion along a window.
-pub struct Along<'a, G: Fn(f64) -> f64> {
+/// Measured motion along a window.
+pub struct MeasuredMotion<'a, G: Fn(f64) -> f64> {
     aircraft: &'a Aircraft,
     signals: Signals<'a>,
     gravity: G,
     points: usize,
 }
 
-impl<G: Fn(f64) -> f64> std::fmt::Debug for Along<'_, G> {
+impl<G: Fn(f64) -> f64> std::fmt::Debug for MeasuredMotion<'_, G> {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{} points", self.points)
     }
 }
 
-impl<G: Fn(f64) -> f64> Along<'_, G> {
-    /// At one point.
+impl<G: Fn(f64) -> f64> MeasuredMotion<'_, G> {
+    /// Motion at one point.
     #[inline(always)]
     pub fn at(&self, point: usize) -> Motion {
         self.signals.at(self.aircraft, &self.gravity, point)
     }
 
-    /// At every point in order.
+    /// Motion at every point in order.
     pub fn points(&self) -> impl Iterator<Item = Motion> {
         (0..self.points).map(|point| self.at(point))
     }
 }
 
-/// The signals of a window by what they are for.
+/// Signals of a window, grouped by use.
 struct Signals<'a> {
     flow: [&'a [f64]; 3],
     rates: [&'a [f64]; 3],
@@ -269,7 +271,8 @@ impl Signals<'_> {
         let [ix, iy, iz, ixz] = self.inertia.map(|s| s[i]);
         let [ax, ay, an] = self.forces.map(|s| s[i]);
         let mass = self.mass[i];
-        // An accelerometer that does not feel thrust (the print of 2.8) leaves it to be added.
+        // With an accelerometer that does not sense thrust (the print of 2.8), thrust is added
+        // here.
         let unfelt = if aircraft.sensors.thrust_in_ax {
             0.0
         } else {
@@ -306,8 +309,8 @@ fn slope_name(name: &str) -> String {
     format!("slope of {name}")
 }
 
-/// Asked of all at once: that is faster than looking for the first.
-fn some_missing(values: &[f64]) -> bool {
+/// Returns true if a value is missing. One pass over all values vectorises; a search does not.
+fn has_missing(values: &[f64]) -> bool {
     Arch::new().dispatch(|| {
         values
             .iter()
@@ -315,8 +318,8 @@ fn some_missing(values: &[f64]) -> bool {
     })
 }
 
-/// Samples and the means of neighbours between them.
-fn halved(values: &[f64]) -> Vec<f64> {
+/// Interleaves samples with the means of neighbours.
+fn with_half_samples(values: &[f64]) -> Vec<f64> {
     let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
     Arch::new().dispatch(|| {
         for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
@@ -330,8 +333,8 @@ fn halved(values: &[f64]) -> Vec<f64> {
     points
 }
 
-fn constant(values: &[f64]) -> Vec<f64> {
-    // Several sums side by side, of which none waits for the others.
+fn constant_mean(values: &[f64]) -> Vec<f64> {
+    // Several independent sums hide the latency of one.
     let (whole, rest) = values.as_chunks::<8>();
     let sums = whole
         .iter()
@@ -340,37 +343,36 @@ fn constant(values: &[f64]) -> Vec<f64> {
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }
 
-/// Samples on each side of the local straight line whose slope stands for the derivative: 0.1 s at
-/// 40 Hz, short against the airframe's modes, long enough to hold the gyros' noise under the
-/// accelerometers' when it meets an arm.
+/// Samples on each side of the local straight line whose slope is the derivative: 0.1 s at 40 Hz.
+/// That is short against the airframe's modes, and long enough to keep the gyros' noise, at the
+/// accelerometers' arms, below that of the accelerometers.
 pub const SLOPE_REACH: usize = 4;
 
-/// Slope per second of a signal over a range of the record, by local least squares on up to nine
-/// samples.
+/// Slope per second of a signal over a range of the record, by local least squares on nine samples.
 fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
     const WHOLE: usize = 2 * SLOPE_REACH + 1;
     let at = |k: usize| {
         let first = k.checked_sub(SLOPE_REACH);
-        let Some(near) = first.and_then(|first| values.get(first..first + WHOLE)) else {
-            return slope_near_gap(values, k, step_s);
+        let Some(nine) = first.and_then(|first| values.get(first..first + WHOLE)) else {
+            return slope_at_gap(values, k, step_s);
         };
         let (mut up, mut norm) = (0.0, 0.0);
         for d in 1..=SLOPE_REACH {
             let weight = d as f64;
-            up += weight * (near[SLOPE_REACH + d] - near[SLOPE_REACH - d]);
+            up += weight * (nine[SLOPE_REACH + d] - nine[SLOPE_REACH - d]);
             norm += 2.0 * weight * weight;
         }
         if up.is_finite() {
             up / (norm * step_s)
         } else {
-            slope_near_gap(values, k, step_s)
+            slope_at_gap(values, k, step_s)
         }
     };
     range.clone().map(at).collect()
 }
 
-/// The same where samples are missing or the record ends.
-fn slope_near_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
+/// Slope where samples are missing or the record ends: least squares on the pairs that are there.
+fn slope_at_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
     let reach = SLOPE_REACH.min(k).min(values.len().saturating_sub(k + 1));
     let (mut up, mut norm) = (0.0, 0.0);
     for d in 1..=reach {
@@ -394,8 +396,11 @@ mod tests {
 
     #[test]
     fn points_between_samples_are_the_means() {
-        assert_eq!(halved(&[1.0, 3.0, 2.0]), [1.0, 2.0, 3.0, 2.5, 2.0]);
-        assert!(halved(&[]).is_empty());
+        assert_eq!(
+            with_half_samples(&[1.0, 3.0, 2.0]),
+            [1.0, 2.0, 3.0, 2.5, 2.0]
+        );
+        assert!(with_half_samples(&[]).is_empty());
     }
 
     #[test]

@@ -95,14 +95,14 @@ fn lively() -> Motion {
 const C: [f64; COEFFICIENTS] = [1.4, -0.05, 0.1];
 
 fn slopes_match<const NX: usize, E: Equations<NX>>() {
-    let (known, sensed) = (
-        E::known(&aircraft(), &lively()),
-        E::sensed(&aircraft(), &lively()),
+    let (inputs, sensors) = (
+        E::rate_inputs(&aircraft(), &lively()),
+        E::sensor_inputs(&aircraft(), &lively()),
     );
     let x = E::measured_state(&lively());
     let (rates, outputs) = (
-        E::rates(&known, &x, &C),
-        E::outputs(&known, &sensed, &x, &C),
+        E::rates(&inputs, &x, &C),
+        E::outputs(&inputs, &sensors, &x, &C),
     );
     let h = 1e-6;
     for j in 0..NX {
@@ -110,9 +110,9 @@ fn slopes_match<const NX: usize, E: Equations<NX>>() {
         up[j] += h;
         down[j] -= h;
         let rate =
-            (E::rates(&known, &up, &C).rates - E::rates(&known, &down, &C).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &sensed, &up, &C).outputs
-            - E::outputs(&known, &sensed, &down, &C).outputs)
+            (E::rates(&inputs, &up, &C).rates - E::rates(&inputs, &down, &C).rates) / (2.0 * h);
+        let output = (E::outputs(&inputs, &sensors, &up, &C).outputs
+            - E::outputs(&inputs, &sensors, &down, &C).outputs)
             / (2.0 * h);
         assert_abs_diff_eq!(rates.by_state.column(j).into_owned(), rate, epsilon = 1e-7);
         assert_abs_diff_eq!(
@@ -126,9 +126,9 @@ fn slopes_match<const NX: usize, E: Equations<NX>>() {
         up[j] += h;
         down[j] -= h;
         let rate =
-            (E::rates(&known, &x, &up).rates - E::rates(&known, &x, &down).rates) / (2.0 * h);
-        let output = (E::outputs(&known, &sensed, &x, &up).outputs
-            - E::outputs(&known, &sensed, &x, &down).outputs)
+            (E::rates(&inputs, &x, &up).rates - E::rates(&inputs, &x, &down).rates) / (2.0 * h);
+        let output = (E::outputs(&inputs, &sensors, &x, &up).outputs
+            - E::outputs(&inputs, &sensors, &x, &down).outputs)
             / (2.0 * h);
         assert_abs_diff_eq!(
             rates.by_coefficient.column(j).into_owned(),
@@ -156,14 +156,14 @@ fn lateral_slopes_are_those_of_finite_differences() {
 /// Slopes that are not zero stand where the axis says they can, those through coefficients that
 /// follow every regressor among them.
 fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
-    let (known, sensed) = (
-        E::known(&aircraft(), &lively()),
-        E::sensed(&aircraft(), &lively()),
+    let (inputs, sensors) = (
+        E::rate_inputs(&aircraft(), &lively()),
+        E::sensor_inputs(&aircraft(), &lively()),
     );
     let x = E::measured_state(&lively());
     let (rates, outputs) = (
-        E::rates(&known, &x, &C),
-        E::outputs(&known, &sensed, &x, &C),
+        E::rates(&inputs, &x, &C),
+        E::outputs(&inputs, &sensors, &x, &C),
     );
     let regressors = [
         Regressor::Alpha,
@@ -177,7 +177,7 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
         .filter_map(|r| E::state_regressor(&aircraft(), lively().velocity, r));
     let mut c_by_state = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::zeros();
     for (state, factor) in along {
-        assert!(E::FOLLOWED.contains(&state));
+        assert!(E::REGRESSOR_STATES.contains(&state));
         c_by_state.column_mut(state).fill(factor);
     }
     let nonzero = |rows: usize, columns: usize, at: &dyn Fn(usize, usize) -> f64| {
@@ -213,26 +213,26 @@ fn slopes_that_are_not_zero_stand_where_each_axis_says() {
 }
 
 fn longitudinal(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 3>, SVector<f64, 5>) {
-    let (known, sensed) = (
-        Longitudinal::known(&aircraft(), motion),
-        Longitudinal::sensed(&aircraft(), motion),
+    let (inputs, sensors) = (
+        Longitudinal::rate_inputs(&aircraft(), motion),
+        Longitudinal::sensor_inputs(&aircraft(), motion),
     );
     let x = Longitudinal::measured_state(motion);
     (
-        Longitudinal::rates(&known, &x, &c).rates,
-        Longitudinal::outputs(&known, &sensed, &x, &c).outputs,
+        Longitudinal::rates(&inputs, &x, &c).rates,
+        Longitudinal::outputs(&inputs, &sensors, &x, &c).outputs,
     )
 }
 
 fn lateral(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 4>, SVector<f64, 5>) {
-    let (known, sensed) = (
-        Lateral::known(&aircraft(), motion),
-        Lateral::sensed(&aircraft(), motion),
+    let (inputs, sensors) = (
+        Lateral::rate_inputs(&aircraft(), motion),
+        Lateral::sensor_inputs(&aircraft(), motion),
     );
     let x = Lateral::measured_state(motion);
     (
-        Lateral::rates(&known, &x, &c).rates,
-        Lateral::outputs(&known, &sensed, &x, &c).outputs,
+        Lateral::rates(&inputs, &x, &c).rates,
+        Lateral::outputs(&inputs, &sensors, &x, &c).outputs,
     )
 }
 
@@ -552,7 +552,7 @@ fn produced<const NX: usize, E: Equations<NX>>(
     accelerations: impl Fn(&SVector<f64, NX>) -> [f64; 3],
 ) -> Motion {
     let m = lively();
-    let rates = E::rates(&E::known(&aircraft(), &m), &E::measured_state(&m), &C).rates;
+    let rates = E::rates(&E::rate_inputs(&aircraft(), &m), &E::measured_state(&m), &C).rates;
     let [force_x, force_y, force_z] = forces;
     Motion {
         accelerations: accelerations(&rates),
@@ -564,7 +564,7 @@ fn produced<const NX: usize, E: Equations<NX>>(
 }
 
 fn implied<const NX: usize, E: Equations<NX>>(m: &Motion) -> [f64; COEFFICIENTS] {
-    E::coefficients(&aircraft(), m, &E::known(&aircraft(), m))
+    E::implied_coefficients(&aircraft(), m, &E::rate_inputs(&aircraft(), m))
 }
 
 #[test]

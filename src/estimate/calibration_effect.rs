@@ -23,7 +23,7 @@ impl<'a> Task<'a> {
             return;
         }
         match self.gradient_shifts(prepared, &fit.values, &fit.weights) {
-            Ok(shifts) => calibration_errors::miscalibrated(&prepared.case, &shifts, fit),
+            Ok(shifts) => calibration_errors::add_calibration_errors(&prepared.case, &shifts, fit),
             Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
         }
     }

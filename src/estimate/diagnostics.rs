@@ -113,7 +113,7 @@ impl Task<'_> {
         );
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
-            let history = wide.regressor_as_flown(j);
+            let history = wide.measured_regressor(j);
             let moved = match &derivative.regressor {
                 Regressor::Constant => None,
                 // In deg, not over q̄S.

@@ -14,9 +14,9 @@ use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
 use crate::maneuver::{Class, Status};
-use crate::output_error::coloured::Noise;
+use crate::output_error::coloured::ResidualNoise;
 use crate::output_error::cramer_rao;
-use crate::output_error::holding::{Because, Candidates};
+use crate::output_error::holding::{HoldingCandidates, HoldingReason};
 use crate::output_error::{Case, Fit, Model, Outcome};
 
 /// Derivatives that a maneuver holds, with the reasons in words.
@@ -117,14 +117,19 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
     }
 
     /// Information on all parameters of `wide`, at the values of a fit with some held.
-    fn candidates(&self, narrow: &Case<NX, E>, fit: &Fit, noise: &Noise) -> Option<Candidates> {
+    fn candidates(
+        &self,
+        narrow: &Case<NX, E>,
+        fit: &Fit,
+        noise: &ResidualNoise,
+    ) -> Option<HoldingCandidates> {
         let values: Vec<f64> = self
             .wide
             .names
             .iter()
             .map(|name| self.value(name, narrow, fit))
             .collect();
-        Candidates::gather(
+        HoldingCandidates::gather(
             &self.wide,
             &values,
             noise,
@@ -151,7 +156,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         let mut held = vec![false; self.wide.parameters()];
         let mut released = held.clone();
         // Of the least restricted fit that the data determine.
-        let mut noise: Option<Noise> = None;
+        let mut noise: Option<ResidualNoise> = None;
         let mut candidates = None;
         let mut last_fitted: Option<Vec<bool>> = None;
         for round in 0..ROUNDS {
@@ -168,16 +173,19 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
                 continue;
             }
             last_fitted = Some(held.clone());
-            noise = noise.or_else(|| cramer_rao::noise(&narrow, &fit, self.max_condition_number()));
-            let Some(found) =
-                self.candidates(&narrow, &fit, noise.as_ref().unwrap_or(&Noise::default()))
-            else {
+            noise = noise
+                .or_else(|| cramer_rao::residual_noise(&narrow, &fit, self.max_condition_number()));
+            let Some(found) = self.candidates(
+                &narrow,
+                &fit,
+                noise.as_ref().unwrap_or(&ResidualNoise::default()),
+            ) else {
                 break;
             };
             // Without noise from a determined fit, bounds cannot be judged: fit again first.
             let next = match noise {
-                Some(_) => found.settle(found.determined(held.clone()), &mut released),
-                None => found.determined(held.clone()),
+                Some(_) => found.choose(found.hold_undetermined(held.clone()), &mut released),
+                None => found.hold_undetermined(held.clone()),
             };
             let is_settled = next == held;
             held = next;
@@ -196,10 +204,10 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .collect()
     }
 
-    fn with_reasons(&self, held: &[bool], candidates: Option<&Candidates>) -> HeldChoice {
+    fn with_reasons(&self, held: &[bool], candidates: Option<&HoldingCandidates>) -> HeldChoice {
         let names = &self.wide.names;
         let reason = |j: usize| {
-            let because = candidates.and_then(|c| c.because(held, j));
+            let because = candidates.and_then(|c| c.reason(held, j));
             (
                 names[j].clone(),
                 self.task.reason_in_words(names, j, because),
@@ -265,24 +273,26 @@ impl Task<'_> {
         &self,
         names: &[String],
         parameter: usize,
-        because: Option<Because>,
+        because: Option<HoldingReason>,
     ) -> String {
         match because {
             None => "it was held beside others that are free now".to_owned(),
-            Some(Because::NotFelt) => match self.context.buildup.derivative(&names[parameter]) {
-                Some(Derivative {
-                    regressor: Regressor::Surface(s) | Regressor::Vane(s),
-                    ..
-                }) => {
-                    format!("{s} did not move")
+            Some(HoldingReason::NotExcited) => {
+                match self.context.buildup.derivative(&names[parameter]) {
+                    Some(Derivative {
+                        regressor: Regressor::Surface(s) | Regressor::Vane(s),
+                        ..
+                    }) => {
+                        format!("{s} did not move")
+                    }
+                    _ => "its regressor did not move".to_owned(),
                 }
-                _ => "its regressor did not move".to_owned(),
-            },
-            Some(Because::NotToldApart(others)) => {
+            }
+            Some(HoldingReason::NotSeparable(others)) => {
                 let others: Vec<&str> = others.iter().map(|&j| names[j].as_str()).collect();
                 format!("the data do not tell it apart from {}", others.join(", "))
             }
-            Some(Because::Bound {
+            Some(HoldingReason::Bound {
                 bound,
                 uncertainty,
                 partner,

@@ -388,7 +388,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
             }
         }
     }
-    calibration_errors::miscalibrated(joint, &together, fit);
+    calibration_errors::add_calibration_errors(joint, &together, fit);
 }
 
 fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {

@@ -1,6 +1,7 @@
-//! Rows of numbers padded to whole vectors, and the products of them that the corrected bounds
-//! take. In each of them a number is summed in one order, whatever the width of the processor's
-//! vectors.
+//! Dense matrices whose rows are padded to whole vectors, and the products that the corrected
+//! bounds take.
+//!
+//! Every sum has one order, so the width of the processor's vectors does not change a bit of it.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -10,54 +11,53 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::row_products::Rows;
-use super::simd::{Aligned, VECTOR, load, store};
+use super::row_products::StridedRows;
+use super::simd::{AlignedBuffer, VECTOR, load, store};
 
-/// Rows side by side in a product, and lags: as many sums as hide how long one of them waits for
-/// itself.
+/// Rows and lags that a loop computes side by side: enough independent sums to hide the latency of
+/// one.
 const ROWS_AT_ONCE: usize = 8;
-const SHIFTED_AT_ONCE: usize = 4;
+const LAGGED_ROWS_AT_ONCE: usize = 4;
 const LAGS_AT_ONCE: usize = 7;
-const REACHED: usize = SHIFTED_AT_ONCE + LAGS_AT_ONCE - 1;
-/// The longest lag that can be asked for.
+const ROWS_REACHED: usize = LAGGED_ROWS_AT_ONCE + LAGS_AT_ONCE - 1;
+/// Longest lag of [`AlignedMatrix::lagged_products`].
 pub(crate) const LONGEST_LAG: usize = 2 * LAGS_AT_ONCE - 1;
-/// Rows of zeros behind the last one, so that neither products nor lags end within what they do at
-/// once.
-const BEYOND: usize = LONGEST_LAG + SHIFTED_AT_ONCE;
-const _: () = assert!(BEYOND >= ROWS_AT_ONCE);
+/// Zero rows behind the last one: room for products and lags that are computed several at once.
+const ZERO_ROWS: usize = LONGEST_LAG + LAGGED_ROWS_AT_ONCE;
+const _: () = assert!(ZERO_ROWS >= ROWS_AT_ONCE);
 
-/// Rows of as many columns each.
+/// Matrix in rows, each padded with zeros to whole vectors.
 #[derive(Clone, Debug)]
-pub(crate) struct Padded {
-    values: Aligned,
+pub(crate) struct AlignedMatrix {
+    values: AlignedBuffer,
     rows: usize,
     columns: usize,
 }
 
-/// Columns padded to whole vectors.
+/// Columns rounded up to whole vectors.
 fn width(columns: usize) -> usize {
     columns.max(1).next_multiple_of(VECTOR)
 }
 
-impl Padded {
-    pub fn zeros(rows: usize, columns: usize) -> Padded {
-        Padded {
-            values: Aligned::zeros((rows + BEYOND) * width(columns)),
+impl AlignedMatrix {
+    pub fn zeros(rows: usize, columns: usize) -> AlignedMatrix {
+        AlignedMatrix {
+            values: AlignedBuffer::zeros((rows + ZERO_ROWS) * width(columns)),
             rows,
             columns,
         }
     }
 
-    /// Rows that were padded before.
-    pub fn of_rows(padded: &[f64], columns: usize) -> Padded {
-        let mut rows = Padded::zeros(padded.len() / width(columns), columns);
+    /// Matrix from rows that are padded already.
+    pub fn from_padded_rows(padded: &[f64], columns: usize) -> AlignedMatrix {
+        let mut rows = AlignedMatrix::zeros(padded.len() / width(columns), columns);
         rows.values_mut().copy_from_slice(padded);
         rows
     }
 
-    /// Numbers below each other.
-    pub fn column(values: &[f64]) -> Padded {
-        let mut column = Padded::zeros(values.len(), 1);
+    /// Matrix of one column.
+    pub fn from_column(values: &[f64]) -> AlignedMatrix {
+        let mut column = AlignedMatrix::zeros(values.len(), 1);
         column
             .rows_mut()
             .zip(values)
@@ -65,9 +65,9 @@ impl Padded {
         column
     }
 
-    /// A symmetric matrix.
-    pub fn symmetric(matrix: &DMatrix<f64>) -> Padded {
-        let mut padded = Padded::zeros(matrix.nrows(), matrix.ncols());
+    /// Copy of a symmetric matrix.
+    pub fn from_symmetric(matrix: &DMatrix<f64>) -> AlignedMatrix {
+        let mut padded = AlignedMatrix::zeros(matrix.nrows(), matrix.ncols());
         padded
             .rows_mut()
             .zip(matrix.column_iter())
@@ -79,14 +79,14 @@ impl Padded {
         padded
     }
 
-    /// The same without padding.
-    pub fn matrix(&self) -> DMatrix<f64> {
+    /// Copy without padding.
+    pub fn to_dense(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows, self.columns, |i, j| {
             self.values()[i * self.width() + j]
         })
     }
 
-    /// Numbers from the beginning of a row to that of the next.
+    /// Distance between the beginnings of two rows.
     pub fn width(&self) -> usize {
         width(self.columns)
     }
@@ -113,28 +113,27 @@ impl Padded {
         self.values().chunks_exact(self.width())
     }
 
-    /// Of a square matrix.
+    /// Diagonal of a square matrix.
     pub fn diagonal(&self) -> impl Iterator<Item = f64> + '_ {
         self.rows().enumerate().map(|(i, row)| row[i])
     }
 
-    /// The same followed by rows of zeros.
-    pub fn followed_by(&self, rows: usize) -> Padded {
-        let mut longer = Padded::zeros(self.rows + rows, self.columns);
+    /// Copy with zero rows appended.
+    pub fn with_zero_rows(&self, rows: usize) -> AlignedMatrix {
+        let mut longer = AlignedMatrix::zeros(self.rows + rows, self.columns);
         longer.values_mut()[..self.values().len()].copy_from_slice(self.values());
         longer
     }
 
-    /// Leaves out what follows some rows.
+    /// Removes the rows from a number on.
     pub fn truncate(&mut self, rows: usize) {
         let from = rows.min(self.rows) * self.width();
         self.values_mut()[from..].fill(0.0);
         self.rows = rows.min(self.rows);
     }
 
-    /// Σ of all numbers times those of another; lanes are summed apart, of which none waits for the
-    /// others.
-    pub fn dot(&self, other: &Padded) -> f64 {
+    /// Σ a_ij b_ij over all entries, summed lane by lane.
+    pub fn dot(&self, other: &AlignedMatrix) -> f64 {
         let (a, b) = (
             self.values().as_chunks::<VECTOR>().0,
             other.values().as_chunks::<VECTOR>().0,
@@ -148,8 +147,8 @@ impl Padded {
         sums.iter().sum()
     }
 
-    /// Adds another times a factor.
-    pub fn add(&mut self, other: &Padded, factor: f64) {
+    /// Adds `factor` times another matrix.
+    pub fn add_scaled(&mut self, other: &AlignedMatrix, factor: f64) {
         let (sums, values) = (self.values_mut(), other.values());
         Arch::new().dispatch(|| {
             sums.iter_mut()
@@ -158,21 +157,21 @@ impl Padded {
         });
     }
 
-    pub fn times(mut self, factor: f64) -> Padded {
+    pub fn scaled_by(mut self, factor: f64) -> AlignedMatrix {
         let values = self.values_mut();
         Arch::new().dispatch(|| values.iter_mut().for_each(|v| *v *= factor));
         self
     }
 
-    /// Each row times a matrix.
-    pub fn product(&self, matrix: &Padded) -> Padded {
-        let mut to = Padded::zeros(self.rows, matrix.columns);
+    /// Product with another matrix.
+    pub fn product(&self, matrix: &AlignedMatrix) -> AlignedMatrix {
+        let mut to = AlignedMatrix::zeros(self.rows, matrix.columns);
         to.add_product(self, matrix);
         to
     }
 
-    /// Adds rows times a matrix.
-    pub fn add_product(&mut self, rows: &Padded, matrix: &Padded) {
+    /// Adds the product of two matrices.
+    pub fn add_product(&mut self, rows: &AlignedMatrix, matrix: &AlignedMatrix) {
         Arch::new().dispatch(Product {
             from: rows,
             matrix,
@@ -180,14 +179,13 @@ impl Padded {
         });
     }
 
-    /// Of symmetric matrices the product self · inner · self.
-    pub fn about(&self, inner: &Padded) -> Padded {
+    /// self · inner · self, both symmetric.
+    pub fn sandwich(&self, inner: &AlignedMatrix) -> AlignedMatrix {
         self.product(&inner.product(self))
     }
 
-    /// The inverse of a symmetric matrix, by elimination; none of one that is not positive
-    /// definite.
-    pub fn inverse(mut self) -> Option<Padded> {
+    /// Inverse of a symmetric matrix by Gauss-Jordan elimination; `None` unless positive definite.
+    pub fn inverse(mut self) -> Option<AlignedMatrix> {
         let (width, size) = (self.width(), self.rows);
         let values = self.values_mut();
         let regular = Arch::new().dispatch(|| {
@@ -218,31 +216,33 @@ impl Padded {
         regular.then_some(self)
     }
 
-    /// Σ s sᵀ of the rows.
-    pub fn squares(&self) -> Padded {
-        let mut squares = Padded::zeros(self.columns, self.columns);
-        Arch::new().dispatch(Squares {
+    /// Gram matrix Σ s sᵀ of the rows s.
+    pub fn gram(&self) -> AlignedMatrix {
+        let mut gram = AlignedMatrix::zeros(self.columns, self.columns);
+        Arch::new().dispatch(Gram {
             of: self,
-            to: squares.values.slice_mut(),
+            to: gram.values.slice_mut(),
         });
-        let width = squares.width();
+        let width = gram.width();
         for i in 0..self.columns {
             for j in 0..i {
-                squares.values.slice_mut()[j * width + i] = squares.values.slice()[i * width + j];
+                gram.values.slice_mut()[j * width + i] = gram.values.slice()[i * width + j];
             }
         }
-        squares
+        gram
     }
 
-    /// Σ a_k · b_{k+lag} over rows at lags 0, 1, …
-    pub fn lagged(&self, later: &Padded, lags: usize) -> Vec<f64> {
-        let mut sums = Arch::new().dispatch(Lagged { a: self, b: later }).to_vec();
+    /// Σ_k a_k · b_{k+lag} over rows, at lags 0, 1, …
+    pub fn lagged_products(&self, later: &AlignedMatrix, lags: usize) -> Vec<f64> {
+        let mut sums = Arch::new()
+            .dispatch(LaggedProducts { a: self, b: later })
+            .to_vec();
         sums.truncate(lags);
         sums
     }
 
-    /// Σ a_k b_{k+lag} over rows, column by column.
-    pub fn column_products(&self, later: &Padded, lag: usize) -> Vec<f64> {
+    /// Σ_k a_k b_{k+lag} over rows, column by column.
+    pub fn lagged_products_by_column(&self, later: &AlignedMatrix, lag: usize) -> Vec<f64> {
         let mut sums = vec![0.0; self.width()];
         Arch::new().dispatch(|| {
             for (a, b) in self.rows().zip(later.rows().skip(lag)) {
@@ -254,8 +254,8 @@ impl Padded {
         sums
     }
 
-    /// Each column filtered by a process.
-    pub fn filter(&mut self, coefficients: &[f64]) {
+    /// Filters each column by 1/A forwards in time, A = 1 + Σ a_j z⁻ʲ.
+    pub fn filter_columns(&mut self, coefficients: &[f64]) {
         let width = self.width();
         Arch::new().dispatch(Filter {
             coefficients,
@@ -265,8 +265,8 @@ impl Padded {
         });
     }
 
-    /// The same backwards in time.
-    pub fn filter_back(&mut self, coefficients: &[f64]) {
+    /// Filters each column by 1/A backwards in time.
+    pub fn filter_columns_backwards(&mut self, coefficients: &[f64]) {
         let width = self.width();
         Arch::new().dispatch(Filter {
             coefficients,
@@ -277,33 +277,33 @@ impl Padded {
     }
 }
 
-struct Squares<'a> {
-    of: &'a Padded,
+struct Gram<'a> {
+    of: &'a AlignedMatrix,
     to: &'a mut [f64],
 }
 
-impl WithSimd for Squares<'_> {
+impl WithSimd for Gram<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Padded { rows, columns, .. } = *self.of;
+        let AlignedMatrix { rows, columns, .. } = *self.of;
         let used: Vec<usize> = (0..columns)
             .step_by(VECTOR)
             .map(|first| (columns - first).min(VECTOR))
             .collect();
-        let rows = Rows {
+        let rows = StridedRows {
             values: self.of.values(),
             stride: width(columns),
-            samples: rows,
+            count: rows,
         };
-        rows.add_squares(simd, &used, self.to, width(columns));
+        rows.add_gram(simd, &used, self.to, width(columns));
     }
 }
 
 struct Product<'a> {
-    from: &'a Padded,
-    matrix: &'a Padded,
+    from: &'a AlignedMatrix,
+    matrix: &'a AlignedMatrix,
     to: &'a mut [f64],
 }
 
@@ -338,8 +338,7 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// u = s/A of each column in place, at rest before its first row; backwards in time, at rest after
-/// its last.
+/// Filter u = s/A of each column in place, at rest outside the series.
 struct Filter<'a> {
     coefficients: &'a [f64],
     series: &'a mut [f64],
@@ -369,7 +368,7 @@ impl WithSimd for Filter<'_> {
                     }
                 };
                 let mut now = load::<S>(series, place(k));
-                // What is nearest last: it is what the sum would wait for.
+                // The most recent value last: the sum depends on it.
                 for j in (1..=coefficients.len().min(k)).rev() {
                     let factor = simd.splat_f64s(-coefficients[j - 1]);
                     now = simd.mul_add_f64s(factor, load::<S>(series, place(k - j)), now);
@@ -380,48 +379,47 @@ impl WithSimd for Filter<'_> {
     }
 }
 
-struct Lagged<'a> {
-    a: &'a Padded,
-    b: &'a Padded,
+struct LaggedProducts<'a> {
+    a: &'a AlignedMatrix,
+    b: &'a AlignedMatrix,
 }
 
-impl WithSimd for Lagged<'_> {
+impl WithSimd for LaggedProducts<'_> {
     type Output = [f64; LONGEST_LAG + 1];
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let mut sums = [0.0; LONGEST_LAG + 1];
         for (group, sums) in sums.chunks_exact_mut(LAGS_AT_ONCE).enumerate() {
-            sums.copy_from_slice(&self.from(simd, group * LAGS_AT_ONCE));
+            sums.copy_from_slice(&self.sums_from_lag(simd, group * LAGS_AT_ONCE));
         }
         sums
     }
 }
 
-impl Lagged<'_> {
-    /// Those from one lag on. Lanes are summed eight apart and then in one order, so that the width
-    /// of vectors does not show.
+impl LaggedProducts<'_> {
+    /// Sums at `LAGS_AT_ONCE` lags from one lag on. Eight partial sums are added in a fixed order.
     #[inline(always)]
-    fn from<S: Simd>(&self, simd: S, lag: usize) -> [f64; LAGS_AT_ONCE] {
+    fn sums_from_lag<S: Simd>(&self, simd: S, lag: usize) -> [f64; LAGS_AT_ONCE] {
         let width = self.a.width();
         let (a, b) = (self.a.values.slice(), self.b.values.slice());
         let mut lanes = [[0.0; VECTOR]; LAGS_AT_ONCE];
         for part in (0..VECTOR).step_by(S::F64_LANES) {
             let mut sums = [simd.splat_f64s(0.0); LAGS_AT_ONCE];
             for lane in (part..width).step_by(VECTOR) {
-                for k in (0..self.a.rows).step_by(SHIFTED_AT_ONCE) {
-                    let a = &a[k * width..(k + SHIFTED_AT_ONCE) * width];
-                    let b = &b[(k + lag) * width..(k + lag + REACHED) * width];
-                    let mut now = [simd.splat_f64s(0.0); SHIFTED_AT_ONCE];
-                    for i in 0..SHIFTED_AT_ONCE {
+                for k in (0..self.a.rows).step_by(LAGGED_ROWS_AT_ONCE) {
+                    let a = &a[k * width..(k + LAGGED_ROWS_AT_ONCE) * width];
+                    let b = &b[(k + lag) * width..(k + lag + ROWS_REACHED) * width];
+                    let mut now = [simd.splat_f64s(0.0); LAGGED_ROWS_AT_ONCE];
+                    for i in 0..LAGGED_ROWS_AT_ONCE {
                         now[i] = load::<S>(a, i * width + lane);
                     }
-                    let mut later = [simd.splat_f64s(0.0); REACHED];
-                    for i in 0..REACHED {
+                    let mut later = [simd.splat_f64s(0.0); ROWS_REACHED];
+                    for i in 0..ROWS_REACHED {
                         later[i] = load::<S>(b, i * width + lane);
                     }
                     for n in 0..LAGS_AT_ONCE {
-                        for i in 0..SHIFTED_AT_ONCE {
+                        for i in 0..LAGGED_ROWS_AT_ONCE {
                             sums[n] = simd.mul_add_f64s(now[i], later[i + n], sums[n]);
                         }
                     }
@@ -441,32 +439,36 @@ mod tests {
 
     use super::*;
 
-    fn rows(rows: usize, columns: usize) -> Padded {
-        let mut padded = Padded::zeros(rows, columns);
-        for (k, row) in padded.rows_mut().enumerate() {
+    fn sample_matrix(rows: usize, columns: usize) -> AlignedMatrix {
+        let mut matrix = AlignedMatrix::zeros(rows, columns);
+        for (k, row) in matrix.rows_mut().enumerate() {
             row[..columns]
                 .iter_mut()
                 .enumerate()
                 .for_each(|(j, v)| *v = (1.3 * (k + k * k * j) as f64 + 0.7 * j as f64).sin());
         }
-        padded
+        matrix
     }
 
     #[test]
-    fn products_squares_and_lags_are_those_of_matrices_also_of_odd_sizes() {
-        let (a, b) = (rows(29, 11), rows(29, 11));
-        let (plain, square) = (a.matrix(), rows(11, 11).matrix());
+    fn products_gram_and_lags_match_plain_matrices_of_odd_sizes() {
+        let (a, b) = (sample_matrix(29, 11), sample_matrix(29, 11));
+        let (plain, square) = (a.to_dense(), sample_matrix(11, 11).to_dense());
         assert_relative_eq!(
-            a.product(&rows(11, 11)).matrix(),
+            a.product(&sample_matrix(11, 11)).to_dense(),
             &plain * square,
             epsilon = 1e-12
         );
         assert_relative_eq!(
-            a.squares().matrix(),
+            a.gram().to_dense(),
             plain.transpose() * &plain,
             epsilon = 1e-12
         );
-        for (lag, sum) in a.lagged(&b, LONGEST_LAG + 1).into_iter().enumerate() {
+        for (lag, sum) in a
+            .lagged_products(&b, LONGEST_LAG + 1)
+            .into_iter()
+            .enumerate()
+        {
             let expected: f64 = (lag..29)
                 .map(|k| plain.row(k - lag).dot(&plain.row(k)))
                 .sum();
@@ -474,21 +476,24 @@ mod tests {
         }
     }
 
-    /// What the kernels give with vectors of a width, as bits.
+    /// Bits of all products, computed with vectors of one width.
     fn bits<S: Simd>(simd: S) -> Vec<u64> {
-        let (a, matrix) = (rows(29, 11), rows(11, 11));
-        let (mut product, mut squares, mut series) =
-            (Padded::zeros(29, 11), Padded::zeros(11, 11), rows(29, 11));
+        let (a, matrix) = (sample_matrix(29, 11), sample_matrix(11, 11));
+        let (mut product, mut gram, mut series) = (
+            AlignedMatrix::zeros(29, 11),
+            AlignedMatrix::zeros(11, 11),
+            sample_matrix(29, 11),
+        );
         simd.vectorize(Product {
             from: &a,
             matrix: &matrix,
             to: product.values.slice_mut(),
         });
-        simd.vectorize(Squares {
+        simd.vectorize(Gram {
             of: &a,
-            to: squares.values.slice_mut(),
+            to: gram.values.slice_mut(),
         });
-        let lagged = simd.vectorize(Lagged { a: &a, b: &product });
+        let lagged = simd.vectorize(LaggedProducts { a: &a, b: &product });
         for back in [false, true] {
             simd.vectorize(Filter {
                 coefficients: &[-0.8, 0.3],
@@ -500,14 +505,14 @@ mod tests {
         let all = product
             .values()
             .iter()
-            .chain(squares.values())
+            .chain(gram.values())
             .chain(&lagged)
             .chain(series.values());
         all.map(|v| v.to_bits()).collect()
     }
 
     #[test]
-    fn the_width_of_vectors_does_not_show_in_a_bit() {
+    fn every_vector_width_gives_the_same_bits() {
         let narrow = bits(pulp::Scalar);
         assert!(narrow.iter().all(|bits| f64::from_bits(*bits).is_finite()));
         #[cfg(target_arch = "x86_64")]
@@ -524,17 +529,17 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_is_one_and_there_is_none_of_what_is_not_positive_definite() {
-        let matrix = rows(29, 11).squares();
-        let unit = matrix.matrix() * matrix.clone().inverse().unwrap().matrix();
+    fn only_positive_definite_matrices_have_an_inverse() {
+        let matrix = sample_matrix(29, 11).gram();
+        let unit = matrix.to_dense() * matrix.clone().inverse().unwrap().to_dense();
         assert_relative_eq!(unit, DMatrix::identity(11, 11), epsilon = 1e-9);
         assert!(
-            Padded::symmetric(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]))
+            AlignedMatrix::from_symmetric(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]))
                 .inverse()
                 .is_none()
         );
         assert!(
-            Padded::symmetric(&DMatrix::from_element(2, 2, f64::NAN))
+            AlignedMatrix::from_symmetric(&DMatrix::from_element(2, 2, f64::NAN))
                 .inverse()
                 .is_none()
         );

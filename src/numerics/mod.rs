@@ -1,8 +1,10 @@
-//! Numerical methods that several rooms share.
+//! Numerical methods that several rooms share: vectors of the processor, aligned matrices, the
+//! inverse of a symmetric matrix, one Runge-Kutta step, Student's t.
 
 pub(crate) mod matrix;
 pub(crate) mod row_products;
 pub mod runge_kutta;
 pub(crate) mod simd;
+pub mod student;
 pub mod symmetric;
 pub mod trig;

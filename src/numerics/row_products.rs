@@ -1,4 +1,7 @@
-//! Sums of products over rows of numbers, in vectors of the processor at hand.
+//! Gram matrices Σ s sᵀ and weighted sums Σ v s over rows of numbers.
+//!
+//! The symmetric matrix is updated tile by tile. A tile stays in the processor's registers while
+//! the rows run past, and only tiles that touch the lower triangle are computed.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -12,86 +15,93 @@ use pulp::Simd;
 
 use super::simd::VECTOR;
 
-/// Something that goes on step by step beside other work.
-pub(crate) trait Meanwhile {
-    /// Does one step of it, if any is left.
+/// Work that advances in small steps between the rows of a sum. A chain of dependent operations and
+/// the sums, which wait for nothing, then share the processor.
+pub(crate) trait Interleaved {
+    /// Takes one step, if any is left.
     fn advance(&mut self);
 }
 
-/// Nothing goes on.
-pub(crate) struct Nothing;
+/// No interleaved work.
+pub(crate) struct Idle;
 
-impl Meanwhile for Nothing {
+impl Interleaved for Idle {
     #[inline(always)]
     fn advance(&mut self) {}
 }
 
-/// Samples of a tile between two stages of what goes on meanwhile: about as long as a stage waits.
-const SAMPLES_BETWEEN: usize = 4;
+/// Rows of a tile between two steps of the interleaved work: about the latency of one step.
+const ROWS_BETWEEN: usize = 4;
 
-/// Rows of some samples, `stride` apart.
+/// Rows of numbers, `stride` apart.
 #[derive(Clone, Copy)]
-pub(crate) struct Rows<'a> {
+pub(crate) struct StridedRows<'a> {
     pub values: &'a [f64],
     pub stride: usize,
-    pub samples: usize,
+    pub count: usize,
 }
 
-impl Rows<'_> {
-    /// Adds Σ s sᵀ to the lower triangle of a matrix with rows of `width`. `used` says how many
-    /// lanes of each vector are in use.
+impl StridedRows<'_> {
+    /// Adds Σ s sᵀ to the lower triangle of a matrix with rows of `width`. `used` has the lanes in
+    /// use of each vector.
     #[inline(always)]
-    pub fn add_squares<S: Simd>(self, simd: S, used: &[usize], matrix: &mut [f64], width: usize) {
-        self.add_squares_beside(simd, used, matrix, width, &mut Nothing);
+    pub fn add_gram<S: Simd>(self, simd: S, used: &[usize], matrix: &mut [f64], width: usize) {
+        self.add_gram_interleaved(simd, used, matrix, width, &mut Idle);
     }
 
-    /// The same while something else goes on.
+    /// [`StridedRows::add_gram`] with other work interleaved.
     #[inline(always)]
-    pub fn add_squares_beside<S: Simd>(
+    pub fn add_gram_interleaved<S: Simd>(
         self,
         simd: S,
         used: &[usize],
         matrix: &mut [f64],
         width: usize,
-        meanwhile: &mut impl Meanwhile,
+        interleaved: &mut impl Interleaved,
     ) {
         for vector in 0..used.len() {
             let first = vector * VECTOR;
             match used[vector] {
                 0 => {}
-                1 => self.rows::<S, 1>(simd, first, matrix, width, meanwhile),
-                2 => self.rows::<S, 2>(simd, first, matrix, width, meanwhile),
-                3 => self.rows::<S, 3>(simd, first, matrix, width, meanwhile),
-                4 => self.rows::<S, 4>(simd, first, matrix, width, meanwhile),
-                5 => self.rows::<S, 5>(simd, first, matrix, width, meanwhile),
-                6 => self.rows::<S, 6>(simd, first, matrix, width, meanwhile),
-                7 => self.rows::<S, 7>(simd, first, matrix, width, meanwhile),
-                _ => self.rows::<S, VECTOR>(simd, first, matrix, width, meanwhile),
+                1 => self.add_gram_rows::<S, 1>(simd, first, matrix, width, interleaved),
+                2 => self.add_gram_rows::<S, 2>(simd, first, matrix, width, interleaved),
+                3 => self.add_gram_rows::<S, 3>(simd, first, matrix, width, interleaved),
+                4 => self.add_gram_rows::<S, 4>(simd, first, matrix, width, interleaved),
+                5 => self.add_gram_rows::<S, 5>(simd, first, matrix, width, interleaved),
+                6 => self.add_gram_rows::<S, 6>(simd, first, matrix, width, interleaved),
+                7 => self.add_gram_rows::<S, 7>(simd, first, matrix, width, interleaved),
+                _ => self.add_gram_rows::<S, VECTOR>(simd, first, matrix, width, interleaved),
             }
         }
     }
 
-    /// Adds Σ v s to a row, v being one of the lanes.
+    /// Adds Σ v s to a row; v is lane `v` of s.
     #[inline(always)]
-    pub fn add_moments<S: Simd>(self, simd: S, v: usize, row: &mut [f64]) {
+    pub fn add_weighted_sum<S: Simd>(self, simd: S, v: usize, row: &mut [f64]) {
         let mut lane = 0;
         while lane + 3 * S::F64_LANES <= row.len() {
-            self.moments::<S, 3>(simd, v, lane, row);
+            self.add_weighted_vectors::<S, 3>(simd, v, lane, row);
             lane += 3 * S::F64_LANES;
         }
         while lane < row.len() {
-            self.moments::<S, 1>(simd, v, lane, row);
+            self.add_weighted_vectors::<S, 1>(simd, v, lane, row);
             lane += S::F64_LANES;
         }
     }
 
-    /// The same of `C` vectors.
+    /// Adds Σ v s for `C` vectors from a lane on.
     #[inline(always)]
-    fn moments<S: Simd, const C: usize>(self, simd: S, v: usize, lane: usize, row: &mut [f64]) {
+    fn add_weighted_vectors<S: Simd, const C: usize>(
+        self,
+        simd: S,
+        v: usize,
+        lane: usize,
+        row: &mut [f64],
+    ) {
         let into = S::as_mut_simd_f64s(&mut row[lane..lane + C * S::F64_LANES]).0;
         let mut sums = [simd.splat_f64s(0.0); C];
         sums.copy_from_slice(into);
-        for k in 0..self.samples {
+        for k in 0..self.count {
             let row = &self.values[k * self.stride..];
             let factor = simd.splat_f64s(row[v]);
             let s = S::as_simd_f64s(&row[lane..lane + C * S::F64_LANES]).0;
@@ -102,36 +112,36 @@ impl Rows<'_> {
         into.copy_from_slice(&sums);
     }
 
-    /// `T` rows of the matrix, from its left edge to the diagonal.
+    /// Adds to `T` rows of the matrix, from its left edge to the diagonal.
     #[inline(always)]
-    fn rows<S: Simd, const T: usize>(
+    fn add_gram_rows<S: Simd, const T: usize>(
         self,
         simd: S,
         first: usize,
         matrix: &mut [f64],
         width: usize,
-        meanwhile: &mut impl Meanwhile,
+        interleaved: &mut impl Interleaved,
     ) {
         let mut lane = 0;
         while lane + S::F64_LANES < first + T {
-            self.tile::<S, T, 2>(simd, first, lane, matrix, width, meanwhile);
+            self.add_tile::<S, T, 2>(simd, first, lane, matrix, width, interleaved);
             lane += 2 * S::F64_LANES;
         }
         if lane < first + T {
-            self.tile::<S, T, 1>(simd, first, lane, matrix, width, meanwhile);
+            self.add_tile::<S, T, 1>(simd, first, lane, matrix, width, interleaved);
         }
     }
 
-    /// A tile of `T` rows and `C` vectors.
+    /// Adds to a tile of `T` rows and `C` vectors.
     #[inline(always)]
-    fn tile<S: Simd, const T: usize, const C: usize>(
+    fn add_tile<S: Simd, const T: usize, const C: usize>(
         self,
         simd: S,
         first: usize,
         lane: usize,
         matrix: &mut [f64],
         width: usize,
-        meanwhile: &mut impl Meanwhile,
+        interleaved: &mut impl Interleaved,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
         let matrix =
@@ -140,9 +150,9 @@ impl Rows<'_> {
             let row = S::as_simd_f64s(&matrix[t * width..][..C * S::F64_LANES]).0;
             sums[t].copy_from_slice(row);
         }
-        for k in 0..self.samples {
-            if k % SAMPLES_BETWEEN == 0 {
-                meanwhile.advance();
+        for k in 0..self.count {
+            if k % ROWS_BETWEEN == 0 {
+                interleaved.advance();
             }
             let row = &self.values[k * self.stride..];
             let mut s = [simd.splat_f64s(0.0); C];

@@ -1,37 +1,50 @@
-//! The classical fourth-order Runge-Kutta step, for a state and for its sensitivities alike.
+//! The classical fourth-order Runge-Kutta tableau and its step.
 //!
-//! The sensitivities are those of the discrete integration, not of the continuous equation: each
-//! stage's slope is differentiated where the state's own was taken, so a Gauss-Newton step sees the
-//! exact gradient of what was integrated.
+//! A step serves a state and its sensitivities alike. Sensitivities are those of the discrete
+//! integration: each stage is differentiated at the state where its slope was taken. A Gauss-Newton
+//! step so has the exact gradient of the integrated response.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
 )]
 
-/// Slopes that a step takes.
+/// Stages of a step.
 pub const STAGES: usize = 4;
-/// Which of start (0), middle (1) and end (2) of the step each slope is taken at.
+/// Place of each stage: start (0), middle (1) or end (2) of the step.
 pub const POINT: [usize; STAGES] = [0, 1, 1, 2];
-/// The end of one step of `step_s` from `x`. `slope(stage, x)` is the rate at a stage, and
-/// `along(x, h, slope)` is x + h slope.
+
+/// Time over which each stage's slope leads to the next stage, s.
 #[inline(always)]
-pub fn step<X: Copy>(
-    x: X,
-    step_s: f64,
-    mut slope: impl FnMut(usize, X) -> X,
-    along: impl Fn(X, f64, X) -> X,
-) -> X {
+#[must_use]
+pub fn reaches_s(step_s: f64) -> [f64; STAGES] {
     let half = 0.5 * step_s;
-    let k1 = slope(0, x);
-    let k2 = slope(1, along(x, half, k1));
-    let k3 = slope(2, along(x, half, k2));
-    let k4 = slope(3, along(x, step_s, k3));
+    [half, half, step_s, 0.0]
+}
+
+/// Weight of each stage's slope in the step, s.
+#[inline(always)]
+#[must_use]
+pub fn weights_s(step_s: f64) -> [f64; STAGES] {
     let (sixth, third) = (step_s / 6.0, step_s / 3.0);
-    along(
-        along(along(along(x, sixth, k1), third, k2), third, k3),
-        sixth,
-        k4,
-    )
+    [sixth, third, third, sixth]
+}
+
+/// State after one step of `step_s` from `x`. `slope(stage, x)` returns the rate at a stage, and
+/// `plus(x, slope, h)` returns x + h slope.
+pub fn step<X: Clone>(
+    x: &X,
+    step_s: f64,
+    mut slope: impl FnMut(usize, &X) -> X,
+    plus: impl Fn(&X, &X, f64) -> X,
+) -> X {
+    let (mut at, mut end) = (x.clone(), x.clone());
+    let stages = reaches_s(step_s).into_iter().zip(weights_s(step_s));
+    for (stage, (reach, weight)) in stages.enumerate() {
+        let rate = slope(stage, &at);
+        end = plus(&end, &rate, weight);
+        at = plus(x, &rate, reach);
+    }
+    end
 }
 
 #[cfg(test)]
@@ -39,29 +52,29 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn along(x: f64, h: f64, slope: f64) -> f64 {
+    fn plus(x: &f64, slope: &f64, h: f64) -> f64 {
         x + h * slope
     }
 
-    /// x' = a x² with x(0) = 1: x(t) = 1/(1 − a t); one parameter, a.
+    /// Integrates x' = a x², x(0) = 1, whose solution is 1/(1 − a t), with its sensitivity to a.
     fn integrate(a: f64, steps: u32) -> (f64, f64) {
         let (mut x, mut s, h) = (1.0, 0.0, 1.0 / f64::from(steps));
         for _ in 0..steps {
             let mut at = [0.0; STAGES];
             let next = step(
-                x,
+                &x,
                 h,
                 |stage, x| {
-                    at[stage] = x;
+                    at[stage] = *x;
                     a * x * x
                 },
-                along,
+                plus,
             );
             s = step(
-                s,
+                &s,
                 h,
                 |stage, s| 2.0 * a * at[stage] * s + at[stage] * at[stage],
-                along,
+                plus,
             );
             x = next;
         }
@@ -81,7 +94,7 @@ mod tests {
 
     #[test]
     fn sensitivities_are_those_of_the_discrete_integration() {
-        // With only three steps the discrete slope differs from the continuous 1/(1 − a)² by more
+        // With three steps the discrete sensitivity differs from the continuous 1/(1 − a)² by more
         // than the tolerance.
         let h = 1e-6;
         let numeric = (integrate(0.4 + h, 3).0 - integrate(0.4 - h, 3).0) / (2.0 * h);

@@ -1,4 +1,4 @@
-//! Vectors of the processor at hand: their widest width, memory aligned to them, loads and stores.
+//! Vectors of the processor: their greatest width, memory aligned to them, loads and stores.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the loops that use them"
@@ -6,27 +6,26 @@
 
 use pulp::Simd;
 
-/// A group is padded to a multiple of this many lanes: the widest vector of doubles there is.
+/// Lanes of the widest vector of doubles (512 bit). Rows are padded to a multiple of it.
 pub(crate) const VECTOR: usize = 8;
 
-/// Numbers that begin where a line of the fastest memory does: a vector that lies across two lines
-/// costs twice.
+/// Buffer that begins on a cache line: a vector across two lines costs two loads.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Aligned {
+pub(crate) struct AlignedBuffer {
     buffer: Vec<f64>,
     first: usize,
     length: usize,
 }
 
-impl Aligned {
-    pub fn zeros(length: usize) -> Aligned {
+impl AlignedBuffer {
+    pub fn zeros(length: usize) -> AlignedBuffer {
         const LINE: usize = 64;
         let buffer = vec![0.0; length + LINE / size_of::<f64>()];
         let first = buffer
             .as_ptr()
             .align_offset(LINE)
             .min(LINE / size_of::<f64>());
-        Aligned {
+        AlignedBuffer {
             buffer,
             first,
             length,
@@ -44,13 +43,13 @@ impl Aligned {
     }
 }
 
-/// The vector that begins at a place of a slice.
+/// Loads the vector that begins at a place of a slice.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
     S::as_simd_f64s(&from[at..at + S::F64_LANES]).0[0]
 }
 
-/// Writes a vector to a place of a slice.
+/// Stores a vector at a place of a slice.
 #[inline(always)]
 pub(crate) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
     S::as_mut_simd_f64s(&mut to[at..at + S::F64_LANES]).0[0] = value;

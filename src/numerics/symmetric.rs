@@ -1,10 +1,10 @@
-//! Symmetric matrices at unit diagonal, and their inverse.
+//! Symmetric positive definite matrices: scaling to unit diagonal, and the inverse.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::matrix::Padded;
+use super::matrix::AlignedMatrix;
 
-/// 1/√H_jj, one where the data say nothing of a parameter.
+/// 1/√H_jj of each parameter; one where the diagonal is not positive.
 #[must_use]
 pub fn scale(information: &DMatrix<f64>) -> DVector<f64> {
     information
@@ -12,7 +12,7 @@ pub fn scale(information: &DMatrix<f64>) -> DVector<f64> {
         .map(|h| if h > 0.0 { 1.0 / h.sqrt() } else { 1.0 })
 }
 
-/// H with rows and columns scaled.
+/// D H D with D the diagonal matrix of `scale`.
 #[must_use]
 pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(information.nrows(), information.ncols(), |i, j| {
@@ -20,14 +20,14 @@ pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> 
     })
 }
 
-/// The inverse alone, whatever the condition; none where no direction less would do.
+/// Inverse, computed at unit diagonal without a condition check; `None` unless positive definite.
 #[must_use]
 pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(information);
     Some(scaled(
-        &Padded::symmetric(&scaled(information, &scale))
+        &AlignedMatrix::from_symmetric(&scaled(information, &scale))
             .inverse()?
-            .matrix(),
+            .to_dense(),
         &scale,
     ))
 }

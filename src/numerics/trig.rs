@@ -1,11 +1,9 @@
-//! Sine and cosine of an angle together, from arithmetic alone: the equations of motion wait for
-//! them four times in every step, and a call into the platform's library costs more than the rest
-//! of a stage.
+//! Sine and cosine together from arithmetic alone. The equations of motion need them four times a
+//! step, and a library call costs more than the rest of a stage.
 //!
-//! Within ±π/4 the minimax polynomials of FreeBSD's msun (W. J. Cody and W. Waite's reduction of
-//! the argument otherwise): the error is below one unit in the last place for the angles that an
-//! integration reaches (some 50 rad, beyond which it is stopped). With fused multiplication
-//! throughout, every processor gets the same bits.
+//! Minimax polynomials of FreeBSD's msun within ±π/4, after the argument reduction of Cody and
+//! Waite. The error is below one unit in the last place up to 50 rad, where an integration is
+//! stopped. With fused multiplication throughout, every processor returns the same bits.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -31,10 +29,10 @@ const COSINE: [f64; 6] = [
     2.087_572_321_298_175e-9,
     -1.135_964_755_778_819_5e-11,
 ];
-/// π/2 in two parts, the first exact in products with small whole numbers.
+/// π/2 in two parts; products of the first with small whole numbers are exact.
 const HALF_PI: [f64; 2] = [FRAC_PI_2, 6.123_233_995_736_766e-17];
 
-/// (sin x, cos x) of two angles in rad, which the processor computes side by side.
+/// (sin x, cos x) of two angles in rad, computed side by side.
 #[inline(always)]
 #[must_use]
 pub(crate) fn sin_cos(x: [f64; 2]) -> [(f64, f64); 2] {
@@ -55,7 +53,7 @@ pub(crate) fn sin_cos(x: [f64; 2]) -> [(f64, f64); 2] {
     [turned(first, quarters[0]), turned(second, quarters[1])]
 }
 
-/// Sine and cosine of an angle some quarters of a turn further.
+/// Sine and cosine after adding quarter turns.
 #[inline(always)]
 fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
     match quarters {
@@ -66,8 +64,8 @@ fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
     }
 }
 
-/// Both sines and both cosines are the same polynomial with other numbers, so the processor
-/// computes all four at once.
+/// Sines and cosines of two angles within ±π/4. All four are one polynomial with different
+/// coefficients, so one vector computes them.
 #[inline(always)]
 fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
     let angle = [r[0], r[1], r[0], r[1]];
@@ -95,13 +93,13 @@ fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-/// The numbers of sine and cosine at one power.
+/// Coefficients of sine and cosine at one power.
 #[inline(always)]
 fn at_power(n: usize) -> [f64; 4] {
     [SINE[n], SINE[n], COSINE[n], COSINE[n]]
 }
 
-/// The polynomials of order five, in pairs so that the processor need not wait for each term.
+/// Polynomials of order five, in pairs, so that terms do not wait for each other.
 #[inline(always)]
 fn polynomial(z: [f64; 4], zz: [f64; 4]) -> [f64; 4] {
     let low = fused(at_power(1), z, at_power(0));

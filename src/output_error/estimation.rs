@@ -1,27 +1,27 @@
-//! An estimation: the iteration (1.3), the weights in alternation with it, and the bounds of what it
-//! found.
+//! One estimation: the iteration (1.3), the weights in alternation with it, and the bounds of the
+//! result.
 
+use super::bounds::bounded::Bounded;
 use super::bounds::cramer_rao;
-use super::bounds::data::Bounded;
-use super::likelihood::information::{Identified, identified};
+use super::likelihood::information::Identification;
 use super::likelihood::newton_raphson::{Settings, descend, minimise};
 use super::likelihood::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 
-/// What the weights on the residuals are.
+/// Source of the weights on the residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Weights {
     /// Tables 2 and 4.
     #[default]
     Table,
-    /// The inverse of the residuals' variances, re-estimated in alternation with the parameters
-    /// until both settle.
+    /// Inverse of the residuals' variances, re-estimated in alternation with the parameters until
+    /// both settle.
     Estimated,
 }
 
 impl Weights {
-    /// As the configuration says it.
+    /// Word of the configuration.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -31,16 +31,14 @@ impl Weights {
     }
 }
 
-/// Rounds of re-estimating the weights, and the relative change of all weights at which they have
-/// settled.
+/// Most rounds of re-estimating the weights.
 const WEIGHT_ROUNDS: usize = 20;
+/// Relative change of all weights below which they have settled.
 const WEIGHTS_SETTLED: f64 = 1e-3;
 
-/// Estimates the free parameters of a maneuver, or of several joined, from `start`, with the
-/// table's weights or those they settle to.
+/// Estimates the free parameters of a maneuver, or of several joined, with their bounds.
 ///
-/// `resolution` is the smallest standard deviation of each output that is believed when weights are
-/// estimated.
+/// `resolution` is the least standard deviation of each output from which weights are estimated.
 #[must_use]
 pub fn estimate<D: Bounded>(
     data: &D,
@@ -52,25 +50,29 @@ pub fn estimate<D: Bounded>(
 ) -> Fit<D::Response> {
     let mut fit = minimise(data, start, table, settings);
     if weights == Weights::Estimated {
-        for _ in 0..WEIGHT_ROUNDS {
-            if fit.outcome != Outcome::Converged {
-                break;
-            }
-            let next = residual_weights(data, &fit, resolution);
-            let settled = next
-                .iter()
-                .zip(fit.weights)
-                .all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED);
-            if settled {
-                break;
-            }
-            let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
-            fit = descend(data, fit.values, next, settings, fit.response);
-            fit.iterations += iterations;
-            fit.initial_cost = initial_cost;
-        }
+        fit = settle_weights(data, fit, resolution, settings);
     }
-    judge(data, &mut fit, settings);
+    add_bounds(data, &mut fit, settings);
+    fit
+}
+
+/// Alternates between weights and parameters until both settle or an iteration fails.
+fn settle_weights<D: Bounded>(
+    data: &D,
+    mut fit: Fit<D::Response>,
+    resolution: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit<D::Response> {
+    for _ in 0..WEIGHT_ROUNDS {
+        let next = residual_weights(data, &fit, resolution);
+        if fit.outcome != Outcome::Converged || have_settled(&next, &fit.weights) {
+            break;
+        }
+        let (iterations, initial_cost) = (fit.iterations, fit.initial_cost);
+        fit = descend(data, fit.values, next, settings, fit.response);
+        fit.iterations += iterations;
+        fit.initial_cost = initial_cost;
+    }
     fit
 }
 
@@ -83,32 +85,34 @@ fn residual_weights<D: Bounded>(
     std::array::from_fn(|o| 1.0 / variances[o].max(resolution[o] * resolution[o]))
 }
 
-/// Bounds of a fit, and the verdict on directions that the data do not determine.
-fn judge<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
+fn have_settled(next: &[f64; OUTPUTS], weights: &[f64; OUTPUTS]) -> bool {
+    let mut both = next.iter().zip(weights);
+    both.all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED)
+}
+
+/// Adds the bounds to a fit, or names the parameters that the data do not determine.
+fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
     if fit.final_cost.is_none() {
         return;
     }
-    let at = data.sums(&fit.response, &fit.weights);
-    match identified(&at.information, settings.max_condition_number) {
-        Identified::Determined {
+    let sums = data.sums(&fit.response, &fit.weights);
+    match Identification::of(&sums.information, settings.max_condition_number) {
+        Identification::Determined {
             inverse,
             condition_number,
         } => {
-            fit.condition_number = Some(condition_number);
             let bounds = cramer_rao::bounds(&inverse, data, fit);
-            (fit.covariance, fit.covariance_corrected) =
-                (Some(bounds.covariance), Some(bounds.corrected));
+            fit.condition_number = Some(condition_number);
+            fit.covariance = Some(bounds.covariance);
+            fit.covariance_corrected = Some(bounds.corrected);
         }
-        Identified::Undetermined {
+        Identification::Undetermined {
             condition_number,
             parameters,
         } => {
+            let names = parameters.iter().filter_map(|&j| data.names().get(j));
+            let names: Vec<&str> = names.map(String::as_str).collect();
             fit.condition_number = condition_number;
-            let names: Vec<&str> = parameters
-                .iter()
-                .filter_map(|&j| data.names().get(j))
-                .map(String::as_str)
-                .collect();
             fit.outcome = Outcome::Unidentifiable;
             fit.reason = format!("the data do not tell apart {}", names.join(", "));
             fit.undetermined = parameters;

@@ -19,14 +19,14 @@ pub mod identifiability;
 pub mod kernel;
 pub mod likelihood;
 
-pub use bounds::data::Bounded;
-pub use bounds::{calibration_errors, coloured, consider, cramer_rao, freedom};
+pub use bounds::bounded::Bounded;
+pub use bounds::{calibration_errors, coloured, consider, cramer_rao};
 pub use case::surface_noise;
 pub use case::{Case, InitialState, Measurements, Model};
 pub use identifiability::holding;
 pub use kernel::pass::Diverged;
 pub use kernel::response::{Detail, Response, Sensitivities};
-pub use likelihood::data::Likelihood;
+pub use likelihood::definition::Likelihood;
 pub use likelihood::joint::Joint;
 pub use likelihood::outcome::{Fit, Outcome};
 pub use likelihood::{cost, equation_error, mean, newton_raphson, theil};

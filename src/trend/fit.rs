@@ -32,10 +32,10 @@
 //! than that of one coefficient more (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::basis::Basis;
 use super::{Criterion, Settings};
+use crate::numerics::student;
 
 /// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit
 /// then bears a quarter of wild estimates, and costs 4% of efficiency where there are none.
@@ -293,8 +293,7 @@ impl Fit {
     /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees
     /// of freedom.
     pub(super) fn quantile_95(&self) -> f64 {
-        StudentsT::new(0.0, 1.0, self.degrees_of_freedom as f64)
-            .map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+        student::quantile_95(self.degrees_of_freedom as f64)
     }
 }
 

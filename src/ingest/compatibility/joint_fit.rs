@@ -27,9 +27,10 @@ use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_
 use super::settings::Compatibility;
 use super::window::{Window, factor, margin};
 use crate::aircraft::Aircraft;
-use crate::numerics::row_products::Rows;
-use crate::numerics::simd::{Aligned, VECTOR};
-use crate::output_error::{coloured, freedom};
+use crate::numerics::row_products::StridedRows;
+use crate::numerics::simd::{AlignedBuffer, VECTOR};
+use crate::numerics::student;
+use crate::output_error::coloured;
 
 /// Rounds of re-estimating R and P, and steps within each.
 const ROUNDS: usize = 6;
@@ -81,7 +82,7 @@ struct Sums {
 
 /// Sums of one output with unit weight: of its rows (s, v) Σ of their squares, row by row; the
 /// lower triangle counts.
-struct Raw(Aligned);
+struct Raw(AlignedBuffer);
 
 impl Raw {
     fn information(&self, i: usize, j: usize) -> f64 {
@@ -499,7 +500,7 @@ impl Problem<'_> {
         };
         let left_out: Vec<DVector<f64>> = members.iter().filter_map(without).collect();
         let count = left_out.len() as f64;
-        let longer = freedom::longer(count - 1.0).powi(2);
+        let longer = student::widening_95(count - 1.0).powi(2);
         std::array::from_fn(|j| {
             let mean = left_out.iter().map(|d| d[j]).sum::<f64>() / count.max(1.0);
             longer * left_out.iter().map(|d| (d[j] - mean).powi(2)).sum::<f64>() * (count - 1.0)
@@ -606,7 +607,8 @@ impl<'a> Member<'a> {
         for o in 0..OUTPUTS {
             let residuals = self.residuals[o].get(range.clone()).unwrap_or_default();
             let floor = 1e-3 * problem.settings.ordinary.of(INPUTS + o, Kind::Bias);
-            self.variances[o] = coloured::level(residuals, self.window.step_s).max(floor * floor);
+            let level = coloured::slow_noise_level(residuals, self.window.step_s);
+            self.variances[o] = level.max(floor * floor);
         }
         self.weigh(problem);
     }
@@ -638,7 +640,7 @@ struct Summing<'a> {
     residuals: [Vec<f64>; OUTPUTS],
     raw: Vec<Raw>,
     /// Of each output the rows that are not summed yet, and how many.
-    rows: Aligned,
+    rows: AlignedBuffer,
     filled: [usize; OUTPUTS],
 }
 
@@ -648,9 +650,9 @@ impl<'a> Summing<'a> {
             measured: &window.outputs,
             residuals: std::array::from_fn(|_| vec![f64::NAN; window.samples]),
             raw: (0..OUTPUTS)
-                .map(|_| Raw(Aligned::zeros(WIDE * WIDE)))
+                .map(|_| Raw(AlignedBuffer::zeros(WIDE * WIDE)))
                 .collect(),
-            rows: Aligned::zeros(OUTPUTS * CHUNK * WIDE),
+            rows: AlignedBuffer::zeros(OUTPUTS * CHUNK * WIDE),
             filled: [0; OUTPUTS],
         }
     }
@@ -658,12 +660,12 @@ impl<'a> Summing<'a> {
     #[inline(always)]
     fn sum<S: Simd>(&mut self, simd: S, output: usize) {
         let values = &self.rows.slice()[output * CHUNK * WIDE..];
-        let rows = Rows {
+        let rows = StridedRows {
             values,
             stride: WIDE,
-            samples: self.filled[output],
+            count: self.filled[output],
         };
-        rows.add_squares(
+        rows.add_gram(
             simd,
             &[VECTOR; WIDE / VECTOR],
             self.raw[output].0.slice_mut(),

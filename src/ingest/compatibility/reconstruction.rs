@@ -21,7 +21,7 @@ use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
 use super::window::{Window, factor};
 use crate::aircraft::Aircraft;
 use crate::flight::taps::Taps;
-use crate::numerics::runge_kutta::{POINT, STAGES};
+use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::simd::{load, store};
 
 /// Parameters of a window alone: its first state, and the change of the wind north, east and down,
@@ -163,10 +163,7 @@ impl<K: Sink> Flight<'_, K> {
     #[inline(always)]
     fn advance<S: Simd>(&self, simd: S, k: usize, way: &mut Way) {
         let h = self.window.step_s;
-        let (ahead_s, part_s) = (
-            [0.5 * h, 0.5 * h, h, 0.0],
-            [h / 6.0, h / 3.0, h / 3.0, h / 6.0],
-        );
+        let (ahead_s, part_s) = (reaches_s(h), weights_s(h));
         let Way { x, s, stages, end } = way;
         let (mut at, mut x_end) = (*x, *x);
         *end = *s;

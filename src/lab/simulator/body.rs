@@ -9,6 +9,7 @@
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 
 use super::loading::Loading;
+use crate::numerics::runge_kutta::{self, POINT};
 
 /// State of the body: velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude, body to
 /// earth (north, east, down); position north, east and up, ft.
@@ -144,16 +145,8 @@ pub fn runge_kutta_step(
     step_s: f64,
     rate_at: impl Fn(&BodyState, f64) -> StateRate,
 ) -> BodyState {
-    let k1 = rate_at(state, 0.0);
-    let k2 = rate_at(&state.plus(&k1, step_s / 2.0), 0.5);
-    let k3 = rate_at(&state.plus(&k2, step_s / 2.0), 0.5);
-    let k4 = rate_at(&state.plus(&k3, step_s), 1.0);
-    state
-        .plus(&k1, step_s / 6.0)
-        .plus(&k2, step_s / 3.0)
-        .plus(&k3, step_s / 3.0)
-        .plus(&k4, step_s / 6.0)
-        .normalised()
+    let rate = |stage: usize, at: &BodyState| rate_at(at, 0.5 * POINT[stage] as f64);
+    runge_kutta::step(state, step_s, rate, BodyState::plus).normalised()
 }
 
 #[cfg(test)]

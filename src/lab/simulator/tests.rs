@@ -109,18 +109,23 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
     let (chord, span) = (area * aircraft.chord_ft, area * aircraft.span_ft);
     let motion = measured_motion(campaign, &state, &inputs, &outputs);
 
-    let known = Longitudinal::known(aircraft, &motion);
+    let known = Longitudinal::rate_inputs(aircraft, &motion);
     let x = Longitudinal::measured_state(&motion);
     let c = [-force.z / area, moment.y / chord, -force.x / area];
     let pitch = Longitudinal::rates(&known, &x, &c).rates;
-    let pitch_outputs =
-        Longitudinal::outputs(&known, &Longitudinal::sensed(aircraft, &motion), &x, &c).outputs;
-    let known = Lateral::known(aircraft, &motion);
+    let pitch_outputs = Longitudinal::outputs(
+        &known,
+        &Longitudinal::sensor_inputs(aircraft, &motion),
+        &x,
+        &c,
+    )
+    .outputs;
+    let known = Lateral::rate_inputs(aircraft, &motion);
     let x = Lateral::measured_state(&motion);
     let c = [force.y / area, moment.x / span, moment.z / span];
     let lateral = Lateral::rates(&known, &x, &c).rates;
     let lateral_outputs =
-        Lateral::outputs(&known, &Lateral::sensed(aircraft, &motion), &x, &c).outputs;
+        Lateral::outputs(&known, &Lateral::sensor_inputs(aircraft, &motion), &x, &c).outputs;
 
     let (v, v_dot, w_dot) = (state.velocity, outputs.rate.velocity, outputs.rate.rates);
     let speed = v.norm();

@@ -1,12 +1,13 @@
 //! Noise of one output as an autoregressive process: v_k + Σ a_j v_{k−j} = e_k with white e.
 //!
-//! Found from autocovariances by the recursion of Levinson and Durbin, in the order of least
-//! information criterion (Akaike's, corrected for few samples). White noise is order 0.
+//! The process follows from autocovariances by the recursion of Levinson and Durbin, in the order
+//! of the least information criterion (Akaike's, corrected for few samples). White noise has order
+//! 0.
 
-/// An autoregressive process.
+/// Autoregressive process.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Autoregression {
-    /// a_1, a_2, …
+    /// Coefficients a_1, a_2, …
     pub coefficients: Vec<f64>,
     /// Variance of e.
     pub innovation: f64,
@@ -25,7 +26,7 @@ impl Autoregression {
         self.coefficients.is_empty()
     }
 
-    /// The process that `samples` values with these autocovariances (at lags 0, 1, …) speak for.
+    /// Process of best order for autocovariances (at lags 0, 1, …) of `samples` values.
     pub fn fitted(autocovariances: &[f64], samples: f64) -> Autoregression {
         let variance = autocovariances.first().copied().unwrap_or(0.0).max(0.0);
         let mut process = Autoregression::white(variance);
@@ -41,8 +42,8 @@ impl Autoregression {
         best
     }
 
-    /// Becomes the process of the next order, unless no further autocovariance is given or no
-    /// process can have it.
+    /// Extends the process by one order. Returns false, unchanged, where no further autocovariance
+    /// is given or no process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
         let Some((next, past)) = autocovariances
@@ -75,16 +76,16 @@ impl Autoregression {
             + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0)
     }
 
-    /// Spectral density at frequency zero: the variance of the sum of many values, per value.
+    /// Spectral density at frequency zero: variance of a sum of many values, per value.
     pub fn long_run_variance(&self) -> f64 {
         let gain = 1.0 + self.coefficients.iter().sum::<f64>();
         self.innovation / (gain * gain)
     }
 
-    /// Samples until the answer to one impulse has died away, at most `longest`.
+    /// Samples until the impulse response has decayed, at most `longest`.
     pub fn memory(&self, longest: usize) -> usize {
         const DEAD: f64 = 1e-3;
-        /// Where nothing is left from which it could rise again.
+        /// Response so small that it cannot grow again.
         const GONE: f64 = 1e-9;
         let order = self.coefficients.len();
         let (mut answer, mut last) = (vec![1.0], 0);
@@ -116,7 +117,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::numerics::matrix::Padded;
+    use crate::numerics::matrix::AlignedMatrix;
 
     /// Autocovariances of v_k = c v_{k−1} + e_k with unit variance.
     fn first_order(c: f64, lags: i32) -> Vec<f64> {
@@ -181,15 +182,15 @@ mod tests {
             innovation: 0.36,
         };
         let (samples, impulse) = (100, 40);
-        let mut series = Padded::zeros(samples, 1);
+        let mut series = AlignedMatrix::zeros(samples, 1);
         series
             .rows_mut()
             .skip(impulse)
             .take(1)
             .for_each(|row| row[0] = 1.0);
-        let mut series = series.followed_by(process.memory(samples));
-        series.filter(&process.coefficients);
-        series.filter_back(&process.coefficients);
+        let mut series = series.with_zero_rows(process.memory(samples));
+        series.filter_columns(&process.coefficients);
+        series.filter_columns_backwards(&process.coefficients);
         for (k, row) in series.rows().take(samples).enumerate() {
             let covariance = 0.8_f64.powi(i32::try_from(k.abs_diff(impulse)).unwrap());
             assert_relative_eq!(process.innovation * row[0], covariance, epsilon = 1e-4);

@@ -1,11 +1,11 @@
-//! What errors of calibration do to the estimates. The equations take every recorded signal for
-//! true but for noise: a bias or a scale error of one moves a maneuver's estimates as a whole, and
-//! hardly shows in the residuals.
+//! Effect of calibration errors on the estimates. The equations take recorded signals as exact but
+//! for noise. A bias or scale error moves a maneuver's estimates as a whole and hardly shows in the
+//! residuals.
 //!
-//! The estimates solve Σ Sᵀ W v = 0. In error by one standard deviation, a signal leaves other
-//! residuals v′ at the same parameters, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first
-//! order in the error. A surface in error is the same as its derivatives in error, so for surfaces
-//! v′ − v is known from sensitivities; for other signals it is integrated.
+//! The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the residuals at
+//! the same parameters to v′, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first order in the
+//! error. A surface in error is equivalent to its derivatives in error, so v′ − v follows from
+//! sensitivities. For other signals it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,7 +18,7 @@ use crate::output_error::case::{Case, InitialState, Model};
 use crate::output_error::kernel::pass::Diverged;
 use crate::output_error::kernel::response::Sensitivities;
 use crate::output_error::likelihood::cost;
-use crate::output_error::likelihood::data::Likelihood;
+use crate::output_error::likelihood::definition::Likelihood;
 use crate::output_error::likelihood::outcome::Fit;
 use crate::settings::settings;
 
@@ -44,7 +44,7 @@ pub struct Misreading<'a> {
 }
 
 impl Calibration {
-    /// Its errors, one standard deviation each, of which each is independent of the other.
+    /// Independent errors of one standard deviation each.
     pub fn misreadings<'a>(&self, signal: &'a str) -> impl Iterator<Item = Misreading<'a>> {
         let scale = Misreading {
             signal,
@@ -62,7 +62,7 @@ impl Calibration {
     }
 }
 
-/// A maneuver as it was fitted.
+/// Maneuver with its fit.
 #[derive(Debug)]
 pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
@@ -74,50 +74,51 @@ pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
-    /// What each error does to the gradient Σ Sᵀ W v, in the order of the case's parameters.
+    /// Changes of the gradient Σ Sᵀ W v by each error, in the order of the case's parameters.
     ///
     /// # Errors
-    /// [`Diverged`] when an error makes the integration leave the bounds of sense.
+    /// [`Diverged`] when the integration with an error leaves its bounds.
     pub fn gradient_shifts(&self, errors: &[Misreading]) -> Result<Vec<DVector<f64>>, Diverged> {
         let held = self.all_held();
-        let right = self.computed(self.window, &held)?;
+        let exact = self.computed(self.window, &held)?;
         let sensitivities = self.case.sensitivities(self.values)?;
-        let acts = |error: &Misreading| {
-            held.iter()
-                .any(|(d, _)| d.regressor.surface() == Some(error.signal))
-        };
-        let surfaces = if errors.iter().any(acts) {
-            Some(Surfaces::of(self, &held)?)
-        } else {
-            None
-        };
-        let shift = |error: &Misreading| match surfaces.as_ref().filter(|_| acts(error)) {
-            Some(surfaces) => Ok(surfaces.gradient_shift(error)),
-            None => self.gradient_shift(error, &held, &right, &sensitivities),
-        };
-        errors.iter().map(shift).collect()
+        let mut surfaces = None;
+        let mut shifts = Vec::with_capacity(errors.len());
+        for error in errors {
+            let is_surface = |(d, _): &(&Derivative, f64)| is_along(d, error.signal);
+            shifts.push(if held.iter().any(is_surface) {
+                if surfaces.is_none() {
+                    surfaces = Some(SurfaceErrors::new(self, &held)?);
+                }
+                let shift = surfaces.as_ref().map(|s| s.gradient_shift(error));
+                shift.unwrap_or_else(|| DVector::zeros(self.values.len()))
+            } else {
+                self.gradient_shift(error, &held, &exact, &sensitivities)?
+            });
+        }
+        Ok(shifts)
     }
 
     fn gradient_shift(
         &self,
         error: &Misreading,
         held: &[(&Derivative, f64)],
-        right: &[[f64; OUTPUTS]],
+        exact: &[[f64; OUTPUTS]],
         sensitivities: &Sensitivities,
     ) -> Result<DVector<f64>, Diverged> {
         let misread = self.window.misread(error.signal, error.scale, error.bias);
         let computed = self.computed(&misread, held)?;
-        let read = E::AXIS.outputs().map(|o| o.signal() == error.signal);
+        let misread_outputs = E::AXIS.outputs().map(|o| o.signal() == error.signal);
         let measurements = &self.case.measurements;
         let mut lanes = vec![0.0; sensitivities.width];
-        for (k, (now, before)) in computed.iter().zip(right).enumerate() {
+        for (k, (misread, exact)) in computed.iter().zip(exact).enumerate() {
             for o in (0..OUTPUTS).filter(|&o| measurements.used[k][o]) {
-                let measured = if read[o] {
+                let measured = if misread_outputs[o] {
                     error.scale * measurements.values[k][o] + error.bias
                 } else {
                     0.0
                 };
-                let factor = self.weights[o] * (measured - (now[o] - before[o]));
+                let factor = self.weights[o] * (measured - (misread[o] - exact[o]));
                 for (sum, s) in lanes.iter_mut().zip(sensitivities.row(k, o)) {
                     *sum += factor * s;
                 }
@@ -129,20 +130,16 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         ))
     }
 
-    /// Every derivative at the value of the fit.
+    /// Every derivative, held at its value in the fit.
     fn all_held(&self) -> Vec<(&Derivative, f64)> {
-        let value = |d: &&Derivative| {
-            self.case
-                .names
-                .iter()
-                .position(|n| *n == d.name)
-                .map(|j| self.values[j])
-        };
-        let free = self.model.free.iter().filter_map(|d| Some((*d, value(d)?)));
+        let free = self.model.free.iter().filter_map(|d| {
+            let j = place(&self.case.names, &d.name)?;
+            Some((*d, self.values[j]))
+        });
         free.chain(self.model.held.iter().copied()).collect()
     }
 
-    /// The outputs of a window at the values of the fit, without the biases.
+    /// Outputs of a window at the values of the fit, without the biases.
     fn computed(
         &self,
         window: &Window,
@@ -169,59 +166,36 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
     }
 }
 
-/// A signal that is one throughout.
+/// Name of a signal that is one throughout.
 const ONE: &str = "one";
 
-/// What errors of surfaces do, of all of them from one pass: a surface enters through its
-/// derivatives alone, so its scale error changes the outputs as errors of its derivatives would,
-/// and its bias as errors of the coefficients' constants.
-struct Surfaces<'a> {
-    /// The derivatives along surfaces with their values.
-    acting: Vec<(&'a Derivative, f64)>,
-    /// Parameters of the case, which come first here.
-    parameters: Vec<usize>,
+/// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone: its
+/// scale error changes the outputs as errors of its derivatives, and its bias as errors of the
+/// coefficients' constants.
+struct SurfaceErrors<'a> {
+    /// Derivatives along surfaces, with their values.
+    derivatives: Vec<(&'a Derivative, f64)>,
+    /// Places of the case's parameters among those of this pass.
+    places: Vec<usize>,
     names: Vec<String>,
-    /// Σ Sᵀ W S of the case's parameters, these derivatives and the constants.
+    /// Σ Sᵀ W S of all parameters of this pass.
     information: DMatrix<f64>,
 }
 
-impl<'a> Surfaces<'a> {
-    fn of<const NX: usize, E: Equations<NX>>(
+impl<'a> SurfaceErrors<'a> {
+    /// Runs the pass with the derivatives along surfaces and constant deflections free as well.
+    fn new<const NX: usize, E: Equations<NX>>(
         fitted: &Fitted<NX, E>,
         held: &[(&'a Derivative, f64)],
-    ) -> Result<Surfaces<'a>, Diverged> {
-        let Fitted {
-            window,
-            model,
-            case,
-            values,
-            weights,
-            ..
-        } = fitted;
+    ) -> Result<SurfaceErrors<'a>, Diverged> {
+        let Fitted { model, case, .. } = fitted;
         let is_free = |d: &Derivative| model.free.iter().any(|f| f.name == d.name);
-        let (acting, rest): (Vec<_>, Vec<_>) = held
+        let (derivatives, rest): (Vec<_>, Vec<_>) = held
             .iter()
             .partition(|(d, _)| d.regressor.surface().is_some());
-        let constants: Vec<Derivative> = E::AXIS
-            .coefficients()
-            .into_iter()
-            .flat_map(|coefficient| {
-                [
-                    Regressor::Surface(ONE.to_owned()),
-                    Regressor::Vane(ONE.to_owned()),
-                ]
-                .map(|regressor| {
-                    let name = constant(coefficient, &regressor);
-                    Derivative {
-                        name,
-                        coefficient,
-                        regressor,
-                    }
-                })
-            })
-            .collect();
+        let constants = constant_deflections::<NX, E>();
         let mut free = model.free.clone();
-        free.extend(acting.iter().map(|(d, _)| *d).filter(|d| !is_free(d)));
+        free.extend(derivatives.iter().map(|(d, _)| *d).filter(|d| !is_free(d)));
         free.extend(&constants);
         let wide = Model {
             free,
@@ -229,59 +203,83 @@ impl<'a> Surfaces<'a> {
             biases: model.biases.clone(),
             initial_state: case.initial_state,
         };
-        let window = window.with_constant(ONE, 1.0);
-        let mut wide =
-            Case::<NX, E>::new(fitted.aircraft, &window, case.measurements.clone(), &wide);
+        let window = fitted.window.with_constant(ONE, 1.0);
+        let measurements = case.measurements.clone();
+        let mut wide = Case::<NX, E>::new(fitted.aircraft, &window, measurements, &wide);
         wide.start = case.start;
-        let place = |name: &String| case.names.iter().position(|n| n == name);
-        let value = |name: &String| match place(name) {
-            Some(j) => values[j],
-            None => acting
-                .iter()
-                .find(|(d, _)| d.name == *name)
-                .map_or(0.0, |(_, value)| *value),
-        };
-        let start: Vec<f64> = wide.names.iter().map(value).collect();
+        let values = wide
+            .names
+            .iter()
+            .map(|name| match place(&case.names, name) {
+                Some(j) => fitted.values[j],
+                None => derivatives
+                    .iter()
+                    .find(|(d, _)| d.name == *name)
+                    .map_or(0.0, |(_, value)| *value),
+            });
+        let values: Vec<f64> = values.collect();
         let mut response = wide.response();
-        wide.respond(&start, &mut response)?;
-        let at = |name: &String| wide.names.iter().position(|n| n == name).unwrap_or(0);
-        let parameters = case.names.iter().map(at).collect();
-        let information = cost::sums(&response, weights).information;
-        Ok(Surfaces {
-            acting,
-            parameters,
+        wide.respond(&values, &mut response)?;
+        let places = case.names.iter();
+        Ok(SurfaceErrors {
+            derivatives,
+            places: places
+                .map(|name| place(&wide.names, name).unwrap_or(0))
+                .collect(),
+            information: cost::sums(&response, fitted.weights).information,
             names: wide.names,
-            information,
         })
     }
 
     fn gradient_shift(&self, error: &Misreading) -> DVector<f64> {
-        let mut shift = DVector::zeros(self.parameters.len());
-        let mut add = |name: &str, change: f64| {
-            if let Some(column) = self.names.iter().position(|n| n == name) {
-                for (shift, &row) in shift.iter_mut().zip(&self.parameters) {
-                    *shift -= change * self.information[(row, column)];
-                }
-            }
-        };
-        for (derivative, value) in self
-            .acting
-            .iter()
-            .filter(|(d, _)| d.regressor.surface() == Some(error.signal))
-        {
-            add(&derivative.name, error.scale * value);
-            add(
-                &constant(derivative.coefficient, &derivative.regressor),
-                error.bias * value,
-            );
+        let mut shift = DVector::zeros(self.places.len());
+        let own = self.derivatives.iter();
+        for (derivative, value) in own.filter(|(d, _)| is_along(d, error.signal)) {
+            let constant = constant_name(derivative.coefficient, &derivative.regressor);
+            self.subtract_column(&derivative.name, error.scale * value, &mut shift);
+            self.subtract_column(&constant, error.bias * value, &mut shift);
         }
         shift
     }
+
+    /// Subtracts a change of one parameter times its column of the information matrix.
+    fn subtract_column(&self, name: &str, change: f64, shift: &mut DVector<f64>) {
+        if let Some(column) = place(&self.names, name) {
+            for (shift, &row) in shift.iter_mut().zip(&self.places) {
+                *shift -= change * self.information[(row, column)];
+            }
+        }
+    }
 }
 
-/// The name of what a constant deflection of a surface, or force of a vane, changes of a
-/// coefficient.
-fn constant(coefficient: Coefficient, regressor: &Regressor) -> String {
+/// Derivatives of every coefficient along a constant deflection, and along a vane's constant force.
+fn constant_deflections<const NX: usize, E: Equations<NX>>() -> Vec<Derivative> {
+    let mut constants = Vec::new();
+    for coefficient in E::AXIS.coefficients() {
+        for regressor in [
+            Regressor::Surface(ONE.to_owned()),
+            Regressor::Vane(ONE.to_owned()),
+        ] {
+            constants.push(Derivative {
+                name: constant_name(coefficient, &regressor),
+                coefficient,
+                regressor,
+            });
+        }
+    }
+    constants
+}
+
+fn is_along(derivative: &Derivative, surface: &str) -> bool {
+    derivative.regressor.surface() == Some(surface)
+}
+
+fn place(names: &[String], name: &str) -> Option<usize> {
+    names.iter().position(|n| n == name)
+}
+
+/// Name of the effect of a constant deflection of a surface, or force of a vane, on a coefficient.
+fn constant_name(coefficient: Coefficient, regressor: &Regressor) -> String {
     let vane = matches!(regressor, Regressor::Vane(_));
     format!(
         "{coefficient:?} of a constant {}",
@@ -289,9 +287,9 @@ fn constant(coefficient: Coefficient, regressor: &Regressor) -> String {
     )
 }
 
-/// Adds to a fit's corrected covariance what errors common to all its data do to the estimates: of
-/// each, the change of the gradient with one standard deviation of it ([`super::calibration`]).
-pub fn miscalibrated<D: Likelihood>(
+/// Adds the effect of errors common to all data to a fit's corrected covariance. Each error is
+/// given by its change of the gradient at one standard deviation ([`Fitted::gradient_shifts`]).
+pub fn add_calibration_errors<D: Likelihood>(
     data: &D,
     gradient_shifts: &[DVector<f64>],
     fit: &mut Fit<D::Response>,

@@ -1,95 +1,64 @@
-//! Scatter of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R
-//! W S] H⁻¹ with R the autocovariance of the noise, in a form that stays positive and counts the
-//! degrees of freedom.
+//! Covariance of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R
+//! W S] H⁻¹ with R the autocovariance of the noise. Every variance is a sum of squares and has its
+//! degrees of freedom ([`degrees_of_freedom`](super::degrees_of_freedom)).
 //!
-//! Residuals are not the noise: the parameters have followed it, most where it is slow. With C = S
-//! H⁻¹ W, the change of the estimates with each value, the residuals are (I − S Cᵀ) times the noise
-//! and their covariance is (I − S Cᵀ) R (I − C Sᵀ), so what the parameters took, R C Sᵀ + S Cᵀ R −
-//! S K Sᵀ with K = Cᵀ R C their own covariance, is added back, round after round until R settles. R
-//! of each output is that of an autoregressive process, by which the changes are filtered: every
-//! variance is a sum of squares.
+//! Residuals are not the noise: the parameters absorb part of it, most where it is slow. With
+//! C = S H⁻¹ W the change of the estimates with each value, the residuals are (I − S Cᵀ) times the
+//! noise, and their covariance is (I − S Cᵀ) R (I − C Sᵀ). The absorbed part is
+//! R C Sᵀ + S Cᵀ R − S K Sᵀ, with K = Cᵀ R C the parameters' covariance. It is added back in rounds
+//! until R settles. R of each output belongs to an autoregressive process, by which the changes are
+//! filtered.
 //!
-//! Most outputs are white to the process, and then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
-//! number. White noise that has settled is left alone while that of other outputs goes on.
-//!
-//! Variances from a noise that is itself estimated are known with few degrees of freedom
-//! ([`freedom`]).
-//!
-//! Noise is seen through blocks of samples: what moves slower than a block is the autoregressive
-//! process, with few coefficients even where it is far slower; what moves faster is white within
-//! the blocks. Parameters act slower than a block, so the process decides, and a slow component
-//! counts that is small beside the sensors' white noise.
+//! Most outputs are white to the process. Then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
+//! number. White noise that has settled stays while that of other outputs goes on.
+
+use std::ops::Range;
 
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
-use super::freedom;
-use super::freedom::{Known, Part};
-use crate::numerics::matrix::{LONGEST_LAG, Padded};
-use crate::output_error::case::blocks::{Block, samples_of_block};
+use super::block_series::BlockSeries;
+use super::degrees_of_freedom::{ColouredPart, VarianceEstimates};
+use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::student;
+use crate::output_error::case::blocks::BlockSums;
 
-/// Longest memory of a process, blocks.
-const ORDER: usize = 12;
-const _: () = assert!(ORDER <= LONGEST_LAG);
-/// A process has at most one coefficient per so many blocks.
-const BLOCKS_PER_COEFFICIENT: usize = 10;
+/// Most rounds of adding the absorbed part back.
 const ROUNDS: usize = 30;
-/// An output's noise is settled when its long-run variance changes by no more than this share.
+/// Relative change of an output's long-run variance below which its noise has settled.
 const SETTLED: f64 = 0.01;
-/// White noise that has settled is left alone while the parameters follow it alike, to this share
-/// of its variance.
-const STILL: f64 = 1e-3;
-/// Where the parameters leave at least this share of white noise, its strength follows from the
-/// residuals' at once.
-const LITTLE: f64 = 0.95;
+/// Change of the absorbed part, as a share of the variance, below which settled white noise stays. A
+/// bound is known to some hundredths only.
+const UNCHANGED: f64 = 1e-3;
+/// Share of white noise that the parameters must leave for its strength to follow from the residuals
+/// in one round.
+const MOSTLY_LEFT: f64 = 0.95;
 
-/// One output of one maneuver, seen through blocks of samples.
-#[derive(Clone, Debug)]
-pub struct Series {
-    /// Of a sample.
-    weight: f64,
-    /// Samples of a block.
-    block: f64,
-    /// Means of the blocks' residuals.
-    residuals: Padded,
-    /// Variance of the samples about their block's mean, and the degrees of freedom with which it
-    /// is known.
-    fast: f64,
-    fast_freedom: f64,
-    /// Of each block how many samples count, and the sums of their sensitivities.
-    pub(crate) counts: Vec<f64>,
-    pub(crate) sensitivities: Padded,
-    /// Σ s sᵀ of these sums, and of the samples' sensitivities about their block's mean.
-    between: Padded,
-    within: Padded,
-}
-
-/// The noise of each output.
+/// Noise of each output.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Noise(Vec<OutputNoise>);
+pub struct ResidualNoise(Vec<OutputNoise>);
 
 #[derive(Clone, Debug, PartialEq)]
 struct OutputNoise {
-    /// Of the blocks' means.
+    /// Process of the blocks' means.
     slow: Autoregression,
     /// Variance of the samples about their block's mean.
-    fast: f64,
+    fast_variance: f64,
 }
 
-/// The scatter of the parameters.
+/// Covariance of the parameters with the degrees of freedom of each variance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimated {
+pub struct CovarianceEstimate {
     pub covariance: DMatrix<f64>,
-    /// Degrees of freedom with which each variance is known.
-    pub freedom: Vec<f64>,
+    pub degrees_of_freedom: Vec<f64>,
 }
 
-impl Estimated {
-    /// The covariance whose roots times 1.96 are intervals of 95 %: Student's, not normal ones.
+impl CovarianceEstimate {
+    /// Covariance widened by Student's t, so that ±1.96 standard errors are an interval of 95 %.
     #[must_use]
-    pub fn of_student(mut self) -> DMatrix<f64> {
-        for (j, freedom) in self.freedom.iter().enumerate() {
-            let factor = freedom::longer(*freedom);
+    pub fn widened(mut self) -> DMatrix<f64> {
+        for (j, degrees_of_freedom) in self.degrees_of_freedom.iter().enumerate() {
+            let factor = student::widening_95(*degrees_of_freedom);
             self.covariance.row_mut(j).scale_mut(factor);
             self.covariance.column_mut(j).scale_mut(factor);
         }
@@ -97,230 +66,88 @@ impl Estimated {
     }
 }
 
-/// Covariance of the parameters, given H⁻¹, where each output has independent noise.
+/// Covariance of the parameters from H⁻¹ and the outputs' residuals, whose noise is independent.
 #[must_use]
-pub(crate) fn covariance(inverse: &Padded, outputs: &[Series]) -> Estimated {
-    let outputs = settled(inverse, outputs);
-    let mut known = Known::nothing(inverse.columns());
+pub(super) fn covariance(inverse: &AlignedMatrix, outputs: &[BlockSeries]) -> CovarianceEstimate {
+    let outputs = settle_noise(inverse, outputs);
+    let mut estimates = VarianceEstimates::zero(inverse.columns());
     for output in &outputs {
-        output.know(&mut known);
+        output.add_variances(&mut estimates);
     }
-    Estimated {
-        covariance: scatter(&outputs, inverse.columns()).matrix(),
-        freedom: known.freedom(),
+    CovarianceEstimate {
+        covariance: total_covariance(&outputs, inverse.columns()).to_dense(),
+        degrees_of_freedom: estimates.degrees_of_freedom(),
     }
 }
 
-/// The noise that residuals of a fit speak for, given H⁻¹.
+/// Estimates the noise from a fit's residuals and H⁻¹.
 #[must_use]
-pub fn noise(inverse: &DMatrix<f64>, outputs: &[Series]) -> Noise {
-    let inverse = Padded::symmetric(inverse);
-    let settled = settled(&inverse, outputs).into_iter();
-    Noise(
-        settled
-            .map(|o| OutputNoise {
-                slow: o.slow,
-                fast: o.output.fast,
-            })
-            .collect(),
-    )
+pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> ResidualNoise {
+    let inverse = AlignedMatrix::from_symmetric(inverse);
+    let settled = settle_noise(&inverse, outputs).into_iter();
+    let noise = settled.map(|output| OutputNoise {
+        slow: output.slow,
+        fast_variance: output.series.fast_variance,
+    });
+    ResidualNoise(noise.collect())
 }
 
-/// The variance of white noise that is as strong as the slowest part of these values, NaN where one
-/// does not count, and never weaker than the values are.
+/// Variance of white noise as strong as the slowest part of these values, and at least that of the
+/// values. NaN marks values that do not count.
 #[must_use]
-pub fn level(values: &[f64], step_s: f64) -> f64 {
-    let counted = |values: &[f64]| {
-        let finite = || values.iter().filter(|v| v.is_finite());
-        (
-            Block {
-                count: finite().count() as f64,
-                residual: finite().sum(),
-            },
-            finite().map(|v| v * v).sum::<f64>(),
-        )
-    };
-    let (all, square) = counted(values);
-    let series = Series::new(
-        step_s,
-        1.0,
-        values.len(),
-        square,
-        &DMatrix::zeros(1, 1),
-        |samples, _| counted(&values[samples]).0,
-    );
+pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
+    let counted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let square = counted.iter().map(|v| v * v).sum::<f64>();
+    let sums_of = |samples: Range<usize>, _: &mut [f64]| finite_sums(&values[samples]);
+    let no_parameter = DMatrix::zeros(1, 1);
+    let series = BlockSeries::new(step_s, 1.0, values.len(), square, &no_parameter, sums_of);
     let pairs = series.pairs();
-    let slow =
-        Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]).long_run_variance();
-    (slow * series.block).max(square / all.count.max(1.0))
+    let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]);
+    let level = slow.long_run_variance() * series.block_length;
+    level.max(square / (counted.len() as f64).max(1.0))
 }
 
-/// Σ Sᵀ W R W S: what noise does to the gradient.
+/// Sums of the values that are finite.
+fn finite_sums(values: &[f64]) -> BlockSums {
+    let finite = || values.iter().filter(|v| v.is_finite());
+    BlockSums {
+        count: finite().count() as f64,
+        residual: finite().sum(),
+    }
+}
+
+/// Covariance Σ Sᵀ W R W S of the gradient under a noise.
 #[must_use]
-pub fn gradient_covariance(outputs: &[Series], noise: &Noise) -> DMatrix<f64> {
+pub fn gradient_covariance(outputs: &[BlockSeries], noise: &ResidualNoise) -> DMatrix<f64> {
     let parameters = outputs.first().map_or(0, |o| o.between.columns());
-    let mut scatter = Padded::zeros(parameters, parameters);
+    let mut covariance = AlignedMatrix::zeros(parameters, parameters);
     for (output, noise) in outputs.iter().zip(&noise.0) {
-        scatter.add(&output.within, output.weight.powi(2) * noise.fast);
-        let factor = output.weight.powi(2) * noise.slow.innovation;
+        let square = output.weight.powi(2);
+        covariance.add_scaled(&output.within, square * noise.fast_variance);
+        let factor = square * noise.slow.innovation;
         if noise.slow.is_white() {
-            scatter.add(&output.between, factor);
+            covariance.add_scaled(&output.between, factor);
         } else {
-            scatter.add(
-                &output
-                    .filtered(&output.sensitivities, &noise.slow)
-                    .squares(),
-                factor,
-            );
+            let filtered = output.filtered(&output.sensitivities, &noise.slow);
+            covariance.add_scaled(&filtered.gram(), factor);
         }
     }
-    scatter.matrix()
+    covariance.to_dense()
 }
 
-impl Series {
-    /// Sees one output's `samples` through blocks: of each `block_of` writes the sensitivities of
-    /// some samples that count, added up, to a row. `square` and `squares` are Σ v² and Σ s sᵀ of
-    /// all samples that count.
-    #[must_use]
-    pub fn new(
-        step_s: f64,
-        weight: f64,
-        samples: usize,
-        square: f64,
-        squares: &DMatrix<f64>,
-        mut block_of: impl FnMut(std::ops::Range<usize>, &mut [f64]) -> Block,
-    ) -> Series {
-        let (length, parameters) = (samples_of_block(step_s), squares.nrows());
-        let (blocks, block) = (samples.div_ceil(length), length as f64);
-        let mut sensitivities = Padded::zeros(blocks, parameters);
-        let (mut counts, mut residuals) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
-        let (mut square, mut freedom) = (square, 0.0);
-        // Of blocks that do not count whole, what their mean's square is larger by.
-        let mut more = Vec::new();
-        for (k, row) in sensitivities.rows_mut().enumerate() {
-            let Block { count, residual } =
-                block_of(k * length..samples.min((k + 1) * length), row);
-            let mean = residual / count.max(1.0);
-            counts.push(count);
-            residuals.push(mean);
-            square -= residual * mean;
-            freedom += (count - 1.0).max(0.0);
-            if count > 0.0 && count < block {
-                let factor = (1.0 / count - 1.0 / block).sqrt();
-                more.extend(row.iter().map(|s| factor * s));
-            }
-        }
-        let between = sensitivities.squares();
-        let mut within = Padded::symmetric(squares);
-        within.add(&between, -1.0 / block);
-        if !more.is_empty() {
-            within.add(&Padded::of_rows(&more, parameters).squares(), -1.0);
-        }
-        let fast_freedom = f64::max(freedom, 1.0);
-        let fast = square.max(0.0) / fast_freedom;
-        let residuals = Padded::column(&residuals);
-        Series {
-            weight,
-            block,
-            residuals,
-            fast,
-            fast_freedom,
-            counts,
-            sensitivities,
-            between,
-            within,
-        }
-    }
-
-    /// The same with other parameters: `places` says where each stands among them.
-    #[must_use]
-    pub fn widened(&self, places: &[usize], parameters: usize) -> Series {
-        let place = |own: &[f64], wide: &mut [f64]| {
-            places
-                .iter()
-                .zip(own)
-                .for_each(|(&place, s)| wide[place] = *s)
-        };
-        let mut sensitivities = Padded::zeros(self.blocks(), parameters);
-        self.sensitivities
-            .rows()
-            .zip(sensitivities.rows_mut())
-            .for_each(|(own, wide)| place(own, wide));
-        let square = |own: &Padded| {
-            let mut wide = Padded::zeros(parameters, parameters);
-            for (own, &row) in own.rows().zip(places) {
-                wide.rows_mut()
-                    .skip(row)
-                    .take(1)
-                    .for_each(|wide| place(own, wide));
-            }
-            wide
-        };
-        let (between, within) = (square(&self.between), square(&self.within));
-        Series {
-            sensitivities,
-            between,
-            within,
-            ..self.clone()
-        }
-    }
-
-    fn blocks(&self) -> usize {
-        self.counts.len()
-    }
-
-    fn lags(&self) -> usize {
-        1 + ORDER.min(self.blocks() / BLOCKS_PER_COEFFICIENT)
-    }
-
-    /// Pairs of blocks that count, at lags 0, 1, …, at least one.
-    fn pairs(&self) -> Vec<f64> {
-        let used: Vec<f64> = self.counts.iter().map(|count| count.min(1.0)).collect();
-        let used = Padded::column(&used);
-        used.lagged(&used, self.lags())
-            .iter()
-            .map(|pairs| pairs.max(1.0))
-            .collect()
-    }
-
-    fn autocovariances(&self, pairs: &[f64]) -> Vec<f64> {
-        let sums = self.residuals.lagged(&self.residuals, self.lags());
-        sums.iter()
-            .zip(pairs)
-            .map(|(sum, pairs)| sum / pairs)
-            .collect()
-    }
-
-    /// Rows of the blocks filtered by a process, until that has died away.
-    fn filtered(&self, rows: &Padded, process: &Autoregression) -> Padded {
-        let mut filtered = rows.followed_by(process.memory(self.blocks()));
-        filtered.filter(&process.coefficients);
-        filtered
-    }
-
-    /// R times rows of which these are the filtered ones, of noise with unit innovation.
-    fn spread(&self, mut filtered: Padded, process: &Autoregression) -> Padded {
-        filtered.filter_back(&process.coefficients);
-        filtered.truncate(self.blocks());
-        let unused = filtered
-            .rows_mut()
-            .zip(&self.counts)
-            .filter(|(_, count)| **count <= 0.0);
-        unused.for_each(|(row, _)| row.fill(0.0));
-        filtered
-    }
-}
-
-/// The outputs with the noise that is left when what the parameters took is added back.
-fn settled<'a>(inverse: &'a Padded, outputs: &'a [Series]) -> Vec<Settling<'a>> {
+/// Estimates the noise of all outputs: adds back what the parameters absorb until all have settled.
+fn settle_noise<'a>(
+    inverse: &'a AlignedMatrix,
+    outputs: &'a [BlockSeries],
+) -> Vec<NoiseIteration<'a>> {
     let mut outputs: Vec<_> = outputs
         .iter()
-        .map(|output| Settling::new(inverse, output))
+        .map(|output| NoiseIteration::new(inverse, output))
         .collect();
     for _ in 0..ROUNDS {
-        let scatter = scatter(&outputs, inverse.columns());
+        let covariance = total_covariance(&outputs, inverse.columns());
         for output in &mut outputs {
-            output.settle(&scatter);
+            output.iterate(&covariance);
         }
         if outputs.iter().all(|o| o.settled) {
             break;
@@ -329,161 +156,152 @@ fn settled<'a>(inverse: &'a Padded, outputs: &'a [Series]) -> Vec<Settling<'a>> 
     outputs
 }
 
-/// The parameters' covariance by all outputs' noise.
-fn scatter(outputs: &[Settling], parameters: usize) -> Padded {
-    let mut sum = Padded::zeros(parameters, parameters);
+/// Covariance of the parameters from the noise of all outputs.
+fn total_covariance(outputs: &[NoiseIteration], parameters: usize) -> AlignedMatrix {
+    let mut sum = AlignedMatrix::zeros(parameters, parameters);
     for output in outputs {
-        sum.add(&output.by_fast, 1.0);
-        sum.add(&output.by_slow, 1.0);
+        sum.add_scaled(&output.by_fast, 1.0);
+        sum.add_scaled(&output.by_slow, 1.0);
     }
     sum
 }
 
-/// One output while its noise settles, and what that does to the parameters.
-struct Settling<'a> {
-    output: &'a Series,
-    inverse: &'a Padded,
-    /// Pairs of blocks and the residuals' autocovariances at lags 0, 1, …
+/// Iteration for the noise of one output, and its effect on the parameters.
+struct NoiseIteration<'a> {
+    series: &'a BlockSeries,
+    inverse: &'a AlignedMatrix,
+    /// Pairs of blocks at lags 0, 1, …
     pairs: Vec<f64>,
+    /// Autocovariances of the residuals at lags 0, 1, …
     observed: Vec<f64>,
-    /// The noise of the blocks' means, and its variance.
+    /// Noise of the blocks' means.
     slow: Autoregression,
+    /// Variance of the blocks' means.
     variance: f64,
-    /// Parts of the parameters' covariance: by the noise within blocks, by that of their means, and
-    /// by the latter were it white with unit variance.
-    by_fast: Padded,
-    by_slow: Padded,
-    by_white: Padded,
-    /// The change of the parameters with each block's mean, and R times it for unit innovation;
-    /// none as long as the noise is white.
-    changes: Option<Padded>,
-    spread: Option<Padded>,
-    /// Variance of what the parameters made of the noise, S K Sᵀ, when that was last added back.
-    followed: f64,
+    /// Covariance of the parameters from the noise within blocks.
+    by_fast: AlignedMatrix,
+    /// Covariance of the parameters from the noise of the blocks' means.
+    by_slow: AlignedMatrix,
+    /// `by_slow` if the blocks' means were white with unit variance.
+    by_white: AlignedMatrix,
+    /// C: change of the parameters with each block's mean; `None` until the noise is coloured.
+    changes: Option<AlignedMatrix>,
+    /// R C at unit innovation; `None` for white noise.
+    spread: Option<AlignedMatrix>,
+    /// Variance of S K Sᵀ when the absorbed part was last added back.
+    absorbed_variance: f64,
     settled: bool,
 }
 
-impl<'a> Settling<'a> {
-    fn new(inverse: &'a Padded, output: &'a Series) -> Settling<'a> {
-        let square = output.weight.powi(2);
-        let by_white = inverse.about(&output.between).times(square);
-        let pairs = output.pairs();
-        let observed = output.autocovariances(&pairs);
-        let mut settling = Settling {
-            output,
+impl<'a> NoiseIteration<'a> {
+    fn new(inverse: &'a AlignedMatrix, series: &'a BlockSeries) -> NoiseIteration<'a> {
+        let square = series.weight.powi(2);
+        let by_white = inverse.sandwich(&series.between).scaled_by(square);
+        let by_fast = inverse.sandwich(&series.within);
+        let pairs = series.pairs();
+        let observed = series.autocovariances(&pairs);
+        let mut iteration = NoiseIteration {
+            series,
             inverse,
             pairs,
             slow: Autoregression::white(0.0),
             variance: 0.0,
-            by_fast: inverse.about(&output.within).times(square * output.fast),
+            by_fast: by_fast.scaled_by(square * series.fast_variance),
             by_slow: by_white.clone(),
             by_white,
             changes: None,
             spread: None,
-            followed: 0.0,
+            absorbed_variance: 0.0,
             settled: false,
             observed: vec![],
         };
-        settling.take(&observed);
-        settling.observed = observed;
-        settling
+        iteration.set_noise(&observed);
+        iteration.observed = observed;
+        iteration
     }
 
-    /// Takes the process with these autocovariances for its noise.
-    fn take(&mut self, autocovariances: &[f64]) {
-        let (output, inverse) = (self.output, self.inverse);
+    /// Sets the noise to the process with these autocovariances.
+    fn set_noise(&mut self, autocovariances: &[f64]) {
+        let (series, inverse) = (self.series, self.inverse);
         let slow = Autoregression::fitted(autocovariances, self.pairs[0]);
         if slow.is_white() {
-            self.by_slow = self.by_white.clone().times(slow.innovation);
+            self.by_slow = self.by_white.clone().scaled_by(slow.innovation);
         } else {
-            let new = || output.sensitivities.product(inverse).times(output.weight);
-            let filtered = output.filtered(self.changes.get_or_insert_with(new), &slow);
-            self.by_slow = filtered.squares().times(slow.innovation);
-            self.spread = Some(output.spread(filtered, &slow));
+            let changes = self.changes.get_or_insert_with(|| {
+                series
+                    .sensitivities
+                    .product(inverse)
+                    .scaled_by(series.weight)
+            });
+            let filtered = series.filtered(changes, &slow);
+            self.by_slow = filtered.gram().scaled_by(slow.innovation);
+            self.spread = Some(series.times_autocovariance(filtered, &slow));
         }
         self.slow = slow;
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Adds back what the parameters, of this covariance, took. White noise is at once made as
-    /// strong as leaves residuals as strong as they are; then only what others do to the parameters
-    /// can change it.
-    fn settle(&mut self, scatter: &Padded) {
-        let (pairs, block) = (self.pairs[0], self.output.block);
-        let followed = scatter.dot(&self.output.between) / (block * block * pairs);
-        let still = (followed - self.followed).abs() <= STILL * self.variance;
-        if self.settled && still && self.slow.is_white() {
+    /// Adds back the part that the parameters, of this covariance, absorb. White noise is set at once
+    /// to the strength that leaves the observed residuals; then only other outputs can change it.
+    fn iterate(&mut self, covariance: &AlignedMatrix) {
+        let (pairs, length) = (self.pairs[0], self.series.block_length);
+        let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);
+        let change = (absorbed_variance - self.absorbed_variance).abs();
+        if self.settled && change <= UNCHANGED * self.variance && self.slow.is_white() {
             return;
         }
-        self.followed = followed;
-        let taken = self.taken(scatter);
-        let left = self.variance - taken[0] / pairs;
-        let stronger = if self.slow.is_white() && left > LITTLE * self.variance {
+        self.absorbed_variance = absorbed_variance;
+        let absorbed = self.absorbed(covariance);
+        let left = self.variance - absorbed[0] / pairs;
+        let stronger = if self.slow.is_white() && left > MOSTLY_LEFT * self.variance {
             self.observed[0] / left
         } else {
             1.0
         };
-        let shares = taken
-            .iter()
-            .zip(&self.pairs)
-            .map(|(taken, pairs)| stronger * taken / pairs);
-        let whole: Vec<f64> = self
-            .observed
-            .iter()
-            .zip(shares)
-            .map(|(observed, share)| observed + share)
+        let both = absorbed.iter().zip(&self.pairs).zip(&self.observed);
+        let whole: Vec<f64> = both
+            .map(|((absorbed, pairs), observed)| observed + stronger * absorbed / pairs)
             .collect();
         let expected = stronger * self.slow.long_run_variance();
-        self.take(&whole);
+        self.set_noise(&whole);
         let found = self.slow.long_run_variance();
         self.settled = (expected - found).abs() <= SETTLED * found;
     }
 
-    /// R C Sᵀ + S Cᵀ R − S K Sᵀ summed along its diagonals.
-    fn taken(&mut self, scatter: &Padded) -> Vec<f64> {
-        let (sums, block, lags) = (
-            &self.output.sensitivities,
-            self.output.block,
-            self.output.lags(),
-        );
-        let factor = self.slow.innovation / block;
-        let mut inner = scatter.clone().times(-0.5 / (block * block));
+    /// Sums of R C Sᵀ + S Cᵀ R − S K Sᵀ along its diagonals.
+    fn absorbed(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
+        let (series, lags) = (self.series, self.series.lags());
+        let (sums, length) = (&series.sensitivities, series.block_length);
+        let factor = self.slow.innovation / length;
+        let mut inner = covariance.clone().scaled_by(-0.5 / (length * length));
         if let Some(mut half) = self.spread.take() {
-            half.add_product(sums, &inner.times(1.0 / factor));
-            let both = half
-                .lagged(sums, lags)
-                .into_iter()
-                .zip(sums.lagged(&half, lags));
+            half.add_product(sums, &inner.scaled_by(1.0 / factor));
+            let before = half.lagged_products(sums, lags);
+            let after = sums.lagged_products(&half, lags);
+            let both = before.iter().zip(after);
             both.map(|(before, after)| factor * (before + after))
                 .collect()
         } else {
-            inner.add(self.inverse, factor * self.output.weight);
-            sums.product(&inner)
-                .lagged(sums, lags)
-                .iter()
-                .map(|half| 2.0 * half)
-                .collect()
+            inner.add_scaled(self.inverse, factor * series.weight);
+            let half = sums.product(&inner).lagged_products(sums, lags);
+            half.iter().map(|half| 2.0 * half).collect()
         }
     }
 
-    /// Adds what the noise gives the parameters, and how well that is known.
-    fn know(&self, known: &mut Known) {
-        known.add(self.by_fast.diagonal(), self.output.fast_freedom);
-        // What the parameters took of the blocks.
-        let taken = self.output.weight / self.output.block * self.inverse.dot(&self.output.between);
-        let freedom = self.pairs[0] - taken;
+    /// Adds the variances of the parameters from this output.
+    fn add_variances(&self, estimates: &mut VarianceEstimates) {
+        let series = self.series;
+        estimates.add(self.by_fast.diagonal(), series.fast_degrees_of_freedom);
+        let absorbed_blocks =
+            series.weight / series.block_length * self.inverse.dot(&series.between);
+        let degrees_of_freedom = self.pairs[0] - absorbed_blocks;
         match &self.changes {
-            Some(changes) if !self.slow.is_white() => {
-                let filtered = self.output.filtered(changes, &self.slow);
-                Part {
-                    noise: &self.slow,
-                    filtered,
-                    freedom,
-                    known,
-                }
-                .add();
-            }
-            _ => known.add(self.by_slow.diagonal(), freedom),
+            Some(changes) if !self.slow.is_white() => estimates.add_coloured(&ColouredPart {
+                noise: &self.slow,
+                filtered: series.filtered(changes, &self.slow),
+                degrees_of_freedom,
+            }),
+            _ => estimates.add(self.by_slow.diagonal(), degrees_of_freedom),
         }
     }
 }
@@ -495,21 +313,21 @@ mod tests {
     use super::*;
     use crate::output_error::tests::Noise;
 
-    /// An output whose sensitivity is one wherever it counts.
-    fn of_a_sum(weight: f64, residuals: &[f64], used: &[bool]) -> Series {
+    /// Series of an output whose sensitivity is one wherever it counts.
+    fn unit_series(weight: f64, residuals: &[f64], used: &[bool]) -> BlockSeries {
         let count = |used: &[bool]| used.iter().filter(|used| **used).count() as f64;
         let (square, squares) = (
             residuals.iter().map(|v| v * v).sum(),
             DMatrix::from_element(1, 1, count(used)),
         );
-        Series::new(
+        BlockSeries::new(
             0.1,
             weight,
             residuals.len(),
             square,
             &squares,
             |samples, row| {
-                let block = Block {
+                let block = BlockSums {
                     count: count(&used[samples.clone()]),
                     residual: residuals[samples].iter().sum(),
                 };
@@ -519,9 +337,8 @@ mod tests {
         )
     }
 
-    /// The variance stated for the mean of values, given their residuals from it; H = w N and H⁻¹ =
-    /// 1/H.
-    fn of_the_mean(values: &[f64], used: &[bool]) -> Estimated {
+    /// Covariance of the mean of values from their residuals; H = w N.
+    fn estimate_mean(values: &[f64], used: &[bool]) -> CovarianceEstimate {
         let weight = 3.0;
         let count = used.iter().filter(|used| **used).count() as f64;
         let of = |used: bool, value: f64| if used { value } else { 0.0 };
@@ -536,44 +353,42 @@ mod tests {
             .zip(used)
             .map(|(v, used)| of(*used, v - mean))
             .collect();
-        let series = of_a_sum(weight, &residuals, used);
+        let series = unit_series(weight, &residuals, used);
         covariance(
-            &Padded::symmetric(&DMatrix::from_element(1, 1, 1.0 / (weight * count))),
+            &AlignedMatrix::from_symmetric(&DMatrix::from_element(1, 1, 1.0 / (weight * count))),
             &[series],
         )
     }
 
     #[test]
     fn the_variance_of_a_mean_of_white_values_has_n_minus_one_degrees_of_freedom() {
-        // Fewer than BLOCKS_PER_COEFFICIENT blocks: white noise is all that is considered. The
-        // blocks' means speak alone.
+        // With fewer than BLOCKS_PER_COEFFICIENT blocks only white noise is considered.
         let means = [1.0, 3.0, 2.0, 5.0, 4.0, 1.0, 0.0, 2.0, 3.0];
         let values: Vec<f64> = means.iter().flat_map(|m| [m + 0.5, m - 0.5]).collect();
         let mean = means.iter().sum::<f64>() / 9.0;
         let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
-        // Nine blocks, so that a degree of freedom not counted would be 11%.
-        let said = of_the_mean(&values, &[true; 18]);
+        // One of nine degrees of freedom more would be 11 %.
+        let estimate = estimate_mean(&values, &[true; 18]);
         assert_relative_eq!(
-            said.covariance[(0, 0)],
+            estimate.covariance[(0, 0)],
             square / 8.0 / 9.0,
             max_relative = 0.02
         );
-        // The interval is Student's with as many.
-        assert_relative_eq!(said.freedom[0], 8.0, max_relative = 1e-9);
-        let longer = said.clone().of_student()[(0, 0)] / said.covariance[(0, 0)];
+        assert_relative_eq!(estimate.degrees_of_freedom[0], 8.0, max_relative = 1e-9);
+        let longer = estimate.clone().widened()[(0, 0)] / estimate.covariance[(0, 0)];
         assert_relative_eq!(longer.sqrt(), 2.306 / 1.960, max_relative = 1e-3);
     }
 
     #[test]
-    fn white_noise_does_to_the_gradient_what_it_does_to_the_blocks() {
+    fn the_gradient_covariance_of_white_noise_is_that_of_the_blocks() {
         let (count, weight) = (40, 3.0);
         let residuals: Vec<f64> = (0..count)
             .map(|k| if k % 4 < 2 { 1.0 } else { -1.0 })
             .collect();
-        let series = of_a_sum(weight, &residuals, &vec![true; residuals.len()]);
-        let noise = super::Noise(vec![OutputNoise {
+        let series = unit_series(weight, &residuals, &vec![true; residuals.len()]);
+        let noise = ResidualNoise(vec![OutputNoise {
             slow: Autoregression::white(2.0),
-            fast: 1.0,
+            fast_variance: 1.0,
         }]);
         // A block of two samples whose mean has the variance 2 gives the sum over it 8.
         let expected = weight * weight * 8.0 * f64::from(count) / 2.0;
@@ -598,7 +413,7 @@ mod tests {
                     value
                 })
                 .collect();
-            stated += of_the_mean(&values, &used).covariance[(0, 0)] / f64::from(draws);
+            stated += estimate_mean(&values, &used).covariance[(0, 0)] / f64::from(draws);
             let counted: Vec<f64> = values
                 .iter()
                 .zip(&used)
@@ -621,8 +436,8 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_mean_of_few_coloured_values_as_often_as_they_say() {
-        // 30 periods of a slow process: normal intervals hold the truth in nine cases of ten.
+    fn student_intervals_of_few_coloured_values_have_their_nominal_coverage() {
+        // With 30 periods of a slow process, normal intervals cover the truth in nine cases of ten.
         let (samples, draws, c) = (160, 1000, 0.8_f64);
         let mut noise = Noise(20_260_303);
         let (mut normal, mut student) = (0, 0);
@@ -635,10 +450,10 @@ mod tests {
                 })
                 .collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            let said = of_the_mean(&values, &vec![true; samples]);
+            let estimate = estimate_mean(&values, &vec![true; samples]);
             let within = |variance: f64| u32::from(mean.abs() < 1.96 * variance.sqrt());
-            normal += within(said.covariance[(0, 0)]);
-            student += within(said.of_student()[(0, 0)]);
+            normal += within(estimate.covariance[(0, 0)]);
+            student += within(estimate.widened()[(0, 0)]);
         }
         let (normal, student) = (
             f64::from(normal) / f64::from(draws),

@@ -1,33 +1,32 @@
-//! "Consider" covariance: the part of a bound that the uncertainty of held values makes.
+//! "Consider" covariance: the effect of the held values' uncertainty on the estimates, G P Gᵀ with
+//! G = −H⁻¹ Σ S_fᵀ W S_h.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::dynamics::Equations;
+use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::inverse;
 use crate::output_error::case::Case;
 use crate::output_error::likelihood::cost::sums;
 use crate::output_error::likelihood::outcome::Fit;
 
-/// A maneuver with the held derivatives free as well, and the values at which their effect is
-/// wanted.
+/// Maneuver whose held values are uncertain.
 #[derive(Debug)]
 pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub case: &'a Case<NX, E>,
-    /// The same maneuver with the held derivatives free as well.
+    /// Same maneuver with the held derivatives free as well.
     pub wide: &'a Case<NX, E>,
-    /// Every parameter of `wide`, by name.
+    /// Value of every parameter of `wide`, by name.
     pub values: BTreeMap<&'a str, f64>,
-    /// The place of each parameter of `case` among those of the fit.
+    /// Place of each parameter of `case` among those of the fit.
     pub places: Vec<usize>,
 }
 
-/// Adds to a fit's covariances what the uncertainty of the held values does to the estimates: G P
-/// Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h ("consider" covariance).
+/// Adds the consider covariance of one maneuver to a fit's covariances.
 ///
-/// `wide` is the same maneuver with the held derivatives free as well; `values` has every
-/// derivative of it and `uncertainties` the standard uncertainty of each held one, by name.
+/// `wide` is the maneuver with the held derivatives free as well. `values` has every derivative of
+/// it, and `uncertainties` the standard uncertainty of each held one, by name.
 pub fn consider<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     wide: &Case<NX, E>,
@@ -48,8 +47,8 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     );
 }
 
-/// [`consider`] for maneuvers that share parameters: the error of a held value is common to all
-/// that hold it, so its effects on them add up before they are squared.
+/// Adds the consider covariance of maneuvers that share parameters. The error of a held value is
+/// common to all maneuvers that hold it, so its effects add up before they are squared.
 pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     members: &[Considered<NX, E>],
     uncertainties: &BTreeMap<&str, f64>,
@@ -60,38 +59,71 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
         return;
     };
     let n = covariance.nrows();
-    let mut own = DMatrix::zeros(n, n);
-    let mut crosses = vec![DVector::zeros(n); uncertainties.len()];
+    let mut blocks = InformationBlocks {
+        free: DMatrix::zeros(n, n),
+        held: vec![DVector::zeros(n); uncertainties.len()],
+    };
     for member in members {
-        let wide = member.wide;
-        let value = |name: &String| member.values.get(name.as_str()).copied().unwrap_or(0.0);
-        let start: Vec<f64> = wide.names.iter().map(value).collect();
-        let mut response = wide.response();
-        if wide.respond(&start, &mut response).is_err() {
+        let Some(information) = member.wide_information(&fit.weights) else {
             return;
-        }
-        let information = sums(&response, &fit.weights).information;
-        let at = |name: &str| wide.names.iter().position(|n| n == name);
-        let names = member.case.names.iter().zip(&member.places);
-        let free: Vec<(usize, usize)> = names
-            .filter_map(|(name, place)| Some((at(name)?, *place)))
-            .collect();
-        for &(i, row) in &free {
-            for &(j, column) in &free {
-                own[(row, column)] += information[(i, j)];
-            }
-            for (cross, name) in crosses.iter_mut().zip(uncertainties.keys()) {
-                cross[row] += at(name).map_or(0.0, |h| information[(i, h)]);
-            }
-        }
+        };
+        blocks.add(member, &information, uncertainties);
     }
-    let Some(inverse) = inverse(&own) else { return };
+    let Some(inverse) = inverse(&blocks.free) else {
+        return;
+    };
     let mut held = DMatrix::zeros(n, n);
-    for (cross, uncertainty) in crosses.into_iter().zip(uncertainties.values()) {
+    for (cross, uncertainty) in blocks.held.into_iter().zip(uncertainties.values()) {
         let shift = &inverse * cross * *uncertainty;
         held += &shift * shift.transpose();
     }
     *covariance += &held;
     *corrected += &held;
     fit.covariance_held = Some(held);
+}
+
+impl<const NX: usize, E: Equations<NX>> Considered<'_, NX, E> {
+    /// Information matrix with the held derivatives free as well; `None` where the integration
+    /// diverges.
+    fn wide_information(&self, weights: &[f64; OUTPUTS]) -> Option<DMatrix<f64>> {
+        let names = self.wide.names.iter();
+        let values: Vec<f64> = names
+            .map(|name| self.values.get(name.as_str()).copied().unwrap_or(0.0))
+            .collect();
+        let mut response = self.wide.response();
+        self.wide.respond(&values, &mut response).ok()?;
+        Some(sums(&response, weights).information)
+    }
+
+    fn wide_place(&self, name: &str) -> Option<usize> {
+        self.wide.names.iter().position(|n| n == name)
+    }
+}
+
+/// Blocks of the information matrix: of the free parameters, and one column for each held value.
+struct InformationBlocks {
+    free: DMatrix<f64>,
+    held: Vec<DVector<f64>>,
+}
+
+impl InformationBlocks {
+    fn add<const NX: usize, E: Equations<NX>>(
+        &mut self,
+        member: &Considered<NX, E>,
+        information: &DMatrix<f64>,
+        uncertainties: &BTreeMap<&str, f64>,
+    ) {
+        let names = member.case.names.iter().zip(&member.places);
+        let free: Vec<(usize, usize)> = names
+            .filter_map(|(name, place)| Some((member.wide_place(name)?, *place)))
+            .collect();
+        for &(i, row) in &free {
+            for &(j, column) in &free {
+                self.free[(row, column)] += information[(i, j)];
+            }
+            for (cross, name) in self.held.iter_mut().zip(uncertainties.keys()) {
+                cross[row] += member.wide_place(name).map_or(0.0, |h| information[(i, h)]);
+            }
+        }
+    }
 }

@@ -1,74 +1,81 @@
-//! How well the data determine the parameters: Cramér-Rao bounds (1.6, 1.7) in a form that holds
-//! for any weights.
+//! Cramér-Rao bounds (1.6, 1.7) in a form that holds for any weights.
 //!
-//! With H = Σ Sᵀ W S and residual covariance R̂ the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W
-//! S] H⁻¹; it is H⁻¹, the usual bound, when W = R̂⁻¹. The weights of Tables 2 and 4 are legitimate
-//! weights that are not. Correlated residuals are counted by their autocovariance ([`coloured`]),
-//! and the bound is never below the one for white ones. Where that autocovariance is known from
-//! little, the corrected bound is longer by what Student's t says, so that ±1.96 of it are an
-//! interval of 95 %.
+//! With H = Σ Sᵀ W S and residual covariance R̂, the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂
+//! W S] H⁻¹. It is H⁻¹, the usual bound, if W = R̂⁻¹, which the weights of Tables 2 and 4 are not.
+//!
+//! The corrected bound uses the residuals' autocovariance ([`coloured`]) and is never below the
+//! bound for white residuals. Student's t widens it where the autocovariance has few degrees of
+//! freedom, so that ±1.96 standard errors are an interval of 95 %.
 
 use nalgebra::DMatrix;
 
-use super::coloured;
-use super::data::Bounded;
-use crate::numerics::matrix::Padded;
-use crate::output_error::likelihood::information::{Identified, identified};
+use super::bounded::Bounded;
+use super::coloured::{self, ResidualNoise};
+use crate::numerics::matrix::AlignedMatrix;
+use crate::output_error::likelihood::information::Identification;
 use crate::output_error::likelihood::outcome::Fit;
 
-/// The two covariances of the parameters.
+/// Covariances of the parameters: for white residuals, and corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
     pub covariance: DMatrix<f64>,
     pub corrected: DMatrix<f64>,
 }
 
-/// Bounds of a fit, given the inverse of its information matrix.
+/// Computes the bounds of a fit from the inverse of its information matrix.
 #[must_use]
 pub fn bounds<D: Bounded>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Response>) -> Bounds {
-    let inverse = Padded::symmetric(inverse);
-    let scattered = |gradient: DMatrix<f64>| inverse.about(&Padded::symmetric(&gradient)).matrix();
-    let covariance = scattered(data.white_covariance(&fit.response, &fit.weights));
+    let inverse = AlignedMatrix::from_symmetric(inverse);
+    let white = data.white_covariance(&fit.response, &fit.weights);
+    let covariance = estimates_covariance(&inverse, &white);
     let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
-    let residuals = coloured::covariance(&inverse, &series).of_student();
-    let corrected = never_below(residuals, &covariance) + scattered(inputs);
+    let residuals = coloured::covariance(&inverse, &series).widened();
+    let corrected =
+        raise_to_white(residuals, &covariance) + estimates_covariance(&inverse, &inputs);
     Bounds {
         covariance,
         corrected,
     }
 }
 
-/// The noise of the outputs that a fit leaves; none where the data do not determine its parameters.
+/// Covariance of the estimates, H⁻¹ M H⁻¹, from the gradient's covariance M.
+fn estimates_covariance(inverse: &AlignedMatrix, gradient: &DMatrix<f64>) -> DMatrix<f64> {
+    let gradient = AlignedMatrix::from_symmetric(gradient);
+    inverse.sandwich(&gradient).to_dense()
+}
+
+/// Estimates the noise of the outputs from a fit's residuals; `None` where the data do not determine
+/// its parameters.
 #[must_use]
-pub fn noise<D: Bounded>(
+pub fn residual_noise<D: Bounded>(
     data: &D,
     fit: &Fit<D::Response>,
     max_condition_number: f64,
-) -> Option<coloured::Noise> {
+) -> Option<ResidualNoise> {
     let sums = data.sums(&fit.response, &fit.weights);
-    match identified(&sums.information, max_condition_number) {
-        Identified::Determined { inverse, .. } => Some(coloured::noise(
-            &inverse,
-            &data.series(&fit.response, &fit.weights),
-        )),
-        Identified::Undetermined { .. } => None,
+    match Identification::of(&sums.information, max_condition_number) {
+        Identification::Determined { inverse, .. } => {
+            let series = data.series(&fit.response, &fit.weights);
+            Some(coloured::residual_noise(&inverse, &series))
+        }
+        Identification::Undetermined { .. } => None,
     }
 }
 
-/// Raises variances that came out below the white ones to them, keeping the correlations.
-fn never_below(mut corrected: DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
+/// Raises corrected variances that are below the white ones; correlations stay.
+fn raise_to_white(mut corrected: DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
     for j in 0..corrected.nrows() {
-        let (have, need) = (corrected[(j, j)], white[(j, j)]);
-        if have < need {
-            if have > 0.0 {
-                let factor = (need / have).sqrt();
+        let (variance, least) = (corrected[(j, j)], white[(j, j)]);
+        if variance < least {
+            if variance > 0.0 {
+                let factor = (least / variance).sqrt();
                 corrected.row_mut(j).scale_mut(factor);
                 corrected.column_mut(j).scale_mut(factor);
             } else {
                 corrected.row_mut(j).copy_from(&white.row(j));
                 corrected.column_mut(j).copy_from(&white.column(j));
             }
-            corrected[(j, j)] = need;
+            corrected[(j, j)] = least;
         }
     }
     corrected

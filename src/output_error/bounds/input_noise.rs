@@ -1,12 +1,11 @@
-//! What noise of the measured surfaces does to the estimates. The equations take surfaces as exact,
-//! so their noise flies the computed aircraft a little; through a moment it is integrated to slow
-//! errors that residuals show hardly, beside the sensors' own noise, and that derivatives follow.
+//! Effect of the measured surfaces' noise on the estimates. The equations take surfaces as exact, so
+//! their noise moves the computed aircraft. Through a moment it is integrated to slow errors, which
+//! derivatives follow and residuals hardly show beside the sensors' own noise.
 //!
-//! The gradient Σ Sᵀ W v answers to an error of one sample of a surface through the outputs at once
-//! and through the states that it leaves behind: an adjoint λ = ∂(gradient)/∂(state), run
-//! backwards, has both. White noise of variance σ² then adds σ² Σ_k g_k g_kᵀ to the gradient's
-//! covariance. However many surfaces there are, they reach the aircraft through three coefficients,
-//! so three vectors g a sample are enough.
+//! An error of one surface sample changes the gradient Σ Sᵀ W v through the outputs at once and
+//! through the later states. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, has both.
+//! White noise of variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. Surfaces act through
+//! three coefficients, so three vectors g per sample suffice for any number of surfaces.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -16,66 +15,64 @@
 use nalgebra::{DMatrix, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
-use super::coloured::Series;
+use super::block_series::BlockSeries;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
-use crate::numerics::row_products::Rows;
-use crate::numerics::simd::{Aligned, VECTOR, load, store};
+use crate::numerics::row_products::StridedRows;
+use crate::numerics::simd::{AlignedBuffer, VECTOR, load, store};
 use crate::output_error::case::Case;
-use crate::output_error::case::blocks::samples_of_block;
+use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::chunking::CHUNK;
-use crate::output_error::case::surface_noise::Value;
+use crate::output_error::case::surface_noise::DerivativeValue;
 
-/// The gradient's covariance from the noise of the surfaces, along the measured motion, given the
+/// Covariance of the gradient from the noise of the surfaces, along the measured motion, given the
 /// outputs' series.
 #[must_use]
-pub(crate) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
+pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
-    series: &[Series],
+    series: &[BlockSeries],
     weights: &[f64; OUTPUTS],
 ) -> DMatrix<f64> {
-    let (n, width) = (
-        case.parameters(),
-        case.parameters().next_multiple_of(VECTOR),
-    );
+    let n = case.parameters();
+    let width = n.next_multiple_of(VECTOR);
     if case.noisy_surfaces.is_empty() || n == 0 {
         return DMatrix::zeros(n, n);
     }
-    let mut scatter = Aligned::zeros(width * width);
-    let adjoint = Adjoint {
+    let mut covariance = AlignedBuffer::zeros(width * width);
+    Arch::new().dispatch(Adjoint {
         case,
         parameters,
         series,
         weights,
         width,
-        scatter: scatter.slice_mut(),
-    };
-    Arch::new().dispatch(adjoint);
-    let at = |i: usize, j: usize| scatter.slice()[i.max(j) * width + i.min(j)];
-    DMatrix::from_fn(n, n, at)
+        covariance: covariance.slice_mut(),
+    });
+    let lower = covariance.slice();
+    DMatrix::from_fn(n, n, |i, j| lower[i.max(j) * width + i.min(j)])
 }
 
-/// The adjoint's run from the last block of samples to the first. Sensitivities change little
-/// within a block, so its samples answer alike to the noise.
+/// Integration of the adjoint from the last block of samples to the first. Sensitivities change
+/// little within a block, so all its samples respond alike to the noise.
 struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
     parameters: &'a [f64],
-    series: &'a [Series],
+    series: &'a [BlockSeries],
     weights: &'a [f64; OUTPUTS],
-    /// Parameters padded to whole vectors.
+    /// Number of parameters padded to whole vectors.
     width: usize,
-    scatter: &'a mut [f64],
+    covariance: &'a mut [f64],
 }
 
-/// What the adjoint needs to know of one block, in its middle.
-struct At<const NX: usize> {
-    /// How a state leaves its mark on that half a block later.
-    half: SMatrix<f64, NX, NX>,
-    /// Slopes of the outputs along states and coefficients, times the outputs' weights.
-    read: SMatrix<f64, OUTPUTS, NX>,
-    direct: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
-    /// What a coefficient at one sample leaves in the state.
-    driven: SMatrix<f64, NX, COEFFICIENTS>,
+/// Slopes of one block, taken in its middle.
+struct BlockSlopes<const NX: usize> {
+    /// State half a block later along the state.
+    half_block: SMatrix<f64, NX, NX>,
+    /// Weighted outputs along the states.
+    outputs_by_state: SMatrix<f64, OUTPUTS, NX>,
+    /// Weighted outputs along the coefficients.
+    outputs_by_coefficient: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
+    /// State along a coefficient during one sample.
+    state_by_coefficient: SMatrix<f64, NX, COEFFICIENTS>,
 }
 
 impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
@@ -84,25 +81,25 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let width = self.width;
-        let mut adjoint = Aligned::zeros(NX * width);
+        let mut adjoint = AlignedBuffer::zeros(NX * width);
         let adjoint = adjoint.slice_mut();
-        let mut rows = Aligned::zeros(CHUNK * COEFFICIENTS * width);
+        let mut rows = AlignedBuffer::zeros(CHUNK * COEFFICIENTS * width);
         let rows = rows.slice_mut();
-        let whole = vec![VECTOR; width / VECTOR];
-        let block = samples_of_block(self.case.step_s);
-        let blocks = self.case.samples().div_ceil(block);
+        let whole_vectors = vec![VECTOR; width / VECTOR];
+        let block_length = samples_per_block(self.case.step_s);
+        let blocks = self.case.samples().div_ceil(block_length);
         for b in (0..blocks).rev() {
-            let samples = block.min(self.case.samples() - b * block);
-            let middle = b * block + samples / 2;
-            let at = self.at(middle, samples);
-            let root = root(&self.noise(middle));
-            // Each of the block's samples has this part of the outputs' sums, and all of them
-            // together its square.
-            let all = (samples as f64).sqrt();
-            let mut part = [0.0; OUTPUTS];
-            for (part, series) in part.iter_mut().zip(self.series) {
-                *part = 1.0 / (series.counts[b].max(1.0) * samples as f64).sqrt();
+            let samples = block_length.min(self.case.samples() - b * block_length);
+            let middle = b * block_length + samples / 2;
+            let at = self.slopes(middle, samples);
+            let root = cholesky_root(&self.coefficient_noise(middle));
+            // A sample has this share of its output's sums, and the block's samples together the
+            // root of their number.
+            let mut share = [0.0; OUTPUTS];
+            for (share, series) in share.iter_mut().zip(self.series) {
+                *share = 1.0 / (series.counts[b].max(1.0) * samples as f64).sqrt();
             }
+            let all = (samples as f64).sqrt();
             let row = b % CHUNK * COEFFICIENTS * width;
             for lane in (0..width).step_by(S::F64_LANES) {
                 let mut by_coefficient = [simd.splat_f64s(0.0); COEFFICIENTS];
@@ -112,16 +109,18 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                     *sums = load::<S>(series.sensitivities.values(), b * width + lane);
                 }
                 for &(o, i) in E::OUTPUTS_BY_STATE {
-                    now[i] = simd.mul_add_f64s(simd.splat_f64s(at.read[(o, i)]), sums[o], now[i]);
+                    let slope = simd.splat_f64s(at.outputs_by_state[(o, i)]);
+                    now[i] = simd.mul_add_f64s(slope, sums[o], now[i]);
                 }
                 for &(o, c) in E::OUTPUTS_BY_COEFFICIENT {
-                    let slope = simd.splat_f64s(part[o] * at.direct[(o, c)]);
+                    let slope = simd.splat_f64s(share[o] * at.outputs_by_coefficient[(o, c)]);
                     by_coefficient[c] = simd.mul_add_f64s(slope, sums[o], by_coefficient[c]);
                 }
                 for j in 0..NX {
                     let s = load::<S>(adjoint, j * width + lane);
                     for i in 0..NX {
-                        later[i] = simd.mul_add_f64s(simd.splat_f64s(at.half[(j, i)]), s, later[i]);
+                        let slope = simd.splat_f64s(at.half_block[(j, i)]);
+                        later[i] = simd.mul_add_f64s(slope, s, later[i]);
                     }
                 }
                 let mut before = [simd.splat_f64s(0.0); NX];
@@ -129,91 +128,91 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                     // On average half of the block comes after a deflection in it.
                     let left = simd.mul_add_f64s(simd.splat_f64s(0.5), now[i], later[i]);
                     for c in 0..COEFFICIENTS {
-                        let slope = simd.splat_f64s(at.driven[(i, c)]);
+                        let slope = simd.splat_f64s(at.state_by_coefficient[(i, c)]);
                         by_coefficient[c] = simd.mul_add_f64s(slope, left, by_coefficient[c]);
                     }
                     let middle = simd.add_f64s(later[i], now[i]);
                     for j in 0..NX {
-                        before[j] =
-                            simd.mul_add_f64s(simd.splat_f64s(at.half[(i, j)]), middle, before[j]);
+                        let slope = simd.splat_f64s(at.half_block[(i, j)]);
+                        before[j] = simd.mul_add_f64s(slope, middle, before[j]);
                     }
                 }
                 for i in 0..NX {
                     store::<S>(adjoint, i * width + lane, before[i]);
                 }
                 for c in 0..COEFFICIENTS {
-                    let mut answer = simd.splat_f64s(0.0);
+                    let mut change = simd.splat_f64s(0.0);
                     for d in c..COEFFICIENTS {
-                        answer = simd.mul_add_f64s(
-                            simd.splat_f64s(all * root[d][c]),
-                            by_coefficient[d],
-                            answer,
-                        );
+                        let factor = simd.splat_f64s(all * root[d][c]);
+                        change = simd.mul_add_f64s(factor, by_coefficient[d], change);
                     }
-                    store::<S>(rows, row + c * width + lane, answer);
+                    store::<S>(rows, row + c * width + lane, change);
                 }
             }
             if b % CHUNK == 0 {
-                let samples = COEFFICIENTS * CHUNK.min(blocks - b);
-                Rows {
+                let changes = StridedRows {
                     values: rows,
                     stride: width,
-                    samples,
-                }
-                .add_squares(simd, &whole, self.scatter, width);
+                    count: COEFFICIENTS * CHUNK.min(blocks - b),
+                };
+                changes.add_gram(simd, &whole_vectors, self.covariance, width);
             }
         }
     }
 }
 
 impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
+    /// Slopes of a block of some samples around the sample k.
     #[inline(always)]
-    fn at(&self, k: usize, samples: usize) -> At<NX> {
+    fn slopes(&self, k: usize, samples: usize) -> BlockSlopes<NX> {
         let case = self.case;
         let x = &case.states[k];
-        let coefficients = case.coefficients_at(self.parameters, 2 * k);
-        let c = coefficients.with(x);
+        let build_up = case.build_up_at(self.parameters, 2 * k);
+        let c = build_up.coefficients(x);
         let mut c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::zeros();
         for k in 0..COEFFICIENTS {
             for i in 0..NX {
-                c_by_state[(k, i)] = coefficients.slope[k][i];
+                c_by_state[(k, i)] = build_up.slope[k][i];
             }
         }
-        let rates = E::rates(&case.known[2 * k], x, &c);
-        let read = E::outputs(&case.known[2 * k], &case.sensed[k], x, &c);
+        let rates = E::rates(&case.rate_inputs[2 * k], x, &c);
+        let read = E::outputs(&case.rate_inputs[2 * k], &case.sensor_inputs[k], x, &c);
         let half_s = 0.5 * samples as f64 * case.step_s;
-        let by_state = (rates.by_state + rates.by_coefficient * c_by_state) * half_s;
-        let square = by_state * by_state;
-        let mut at = At {
-            half: SMatrix::identity() + by_state + square * 0.5 + square * by_state * (1.0 / 6.0),
-            read: read.by_state + read.by_coefficient * c_by_state,
-            direct: read.by_coefficient,
-            driven: rates.by_coefficient * case.step_s,
+        let a = (rates.by_state + rates.by_coefficient * c_by_state) * half_s;
+        let square = a * a;
+        let mut at = BlockSlopes {
+            // exp(A t) to third order.
+            half_block: SMatrix::identity() + a + square * 0.5 + square * a * (1.0 / 6.0),
+            outputs_by_state: read.by_state + read.by_coefficient * c_by_state,
+            outputs_by_coefficient: read.by_coefficient,
+            state_by_coefficient: rates.by_coefficient * case.step_s,
         };
         for o in 0..OUTPUTS {
-            at.read.row_mut(o).scale_mut(self.weights[o]);
-            at.direct.row_mut(o).scale_mut(self.weights[o]);
+            at.outputs_by_state.row_mut(o).scale_mut(self.weights[o]);
+            at.outputs_by_coefficient
+                .row_mut(o)
+                .scale_mut(self.weights[o]);
         }
         at
     }
 
-    /// Covariance of the coefficients' errors at a sample: each surface's noise acts on all of them
-    /// together.
+    /// Covariance of the coefficients' errors at a sample; each surface's noise acts on all of them.
     #[inline(always)]
-    fn noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+    fn coefficient_noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
         for surface in &self.case.noisy_surfaces {
-            let mut shares = [0.0; COEFFICIENTS];
+            let mut effects = [0.0; COEFFICIENTS];
             for effect in &surface.effects {
                 let value = match effect.value {
-                    Value::Free(j) => self.parameters[j],
-                    Value::Held(value) => value,
+                    DerivativeValue::Free(j) => self.parameters[j],
+                    DerivativeValue::Held(value) => value,
                 };
-                shares[effect.coefficient] += value * effect.factors.get(k).copied().unwrap_or(1.0);
+                let factor = effect.factors.get(k).copied().unwrap_or(1.0);
+                effects[effect.coefficient] += value * factor;
             }
             for (c, row) in covariance.iter_mut().enumerate() {
                 for (d, v) in row.iter_mut().enumerate() {
-                    *v += surface.variance * shares[c] * shares[d];
+                    *v += surface.variance * effects[c] * effects[d];
                 }
             }
         }
@@ -221,22 +220,20 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     }
 }
 
-/// L with L Lᵀ = a covariance (Cholesky), zero in a column where nothing is left.
+/// Lower triangular L with L Lᵀ = a covariance (Cholesky); zero in columns without variance.
 #[inline(always)]
-fn root(covariance: &[[f64; COEFFICIENTS]; COEFFICIENTS]) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+fn cholesky_root(
+    covariance: &[[f64; COEFFICIENTS]; COEFFICIENTS],
+) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+    /// Share of a variance that rounding leaves, where there are fewer surfaces than coefficients.
+    const ROUNDING: f64 = 1e-14;
     let mut root = [[0.0; COEFFICIENTS]; COEFFICIENTS];
     for j in 0..COEFFICIENTS {
         for i in j..COEFFICIENTS {
-            let done: f64 = root[i]
-                .iter()
-                .zip(&root[j])
-                .take(j)
-                .map(|(a, b)| a * b)
-                .sum();
-            let left = covariance[i][j] - done;
+            let products = root[i].iter().zip(&root[j]).take(j).map(|(a, b)| a * b);
+            let left = covariance[i][j] - products.sum::<f64>();
             if i == j {
-                // Of fewer surfaces than coefficients rounding is all that is left.
-                root[j][j] = if left > 1e-14 * covariance[j][j] {
+                root[j][j] = if left > ROUNDING * covariance[j][j] {
                     left.sqrt()
                 } else {
                     0.0
@@ -259,14 +256,14 @@ mod tests {
     use crate::dynamics::tests::aircraft;
     use crate::dynamics::{Lateral, Longitudinal};
     use crate::flight::Record;
-    use crate::output_error::bounds::data::Bounded;
+    use crate::output_error::bounds::bounded::Bounded;
     use crate::output_error::case::surface_noise::noisy_surfaces;
     use crate::output_error::case::{InitialState, Model};
     use crate::output_error::tests::{Noise, SAMPLES, TABLE, nothing_measured, record, truth};
 
     const SURFACES: [&str; 5] = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
 
-    /// The record with white noise on its surfaces.
+    /// Record with white noise on its surfaces.
     fn noisy(sd_deg: f64, noise: &mut Noise) -> Record {
         let mut record = record();
         for name in SURFACES {
@@ -283,9 +280,9 @@ mod tests {
         Window::cut(record, 0..SAMPLES, SURFACES, MassProperties::Recorded).unwrap()
     }
 
-    /// The scatter of the gradient over draws of the surfaces' noise against what is said of it;
+    /// Compares the scatter of the gradient over draws of the surfaces' noise with its covariance;
     /// the last derivative is held.
-    fn scatter_is_as_said<const NX: usize, E: Equations<NX>>() {
+    fn assert_gradient_scatters_as_computed<const NX: usize, E: Equations<NX>>() {
         let (sd_deg, draws, mut noise) = (0.02, 150, Noise(77));
         let truth = truth(E::AXIS);
         let ((held, value), free) = truth.split_last().unwrap();
@@ -339,21 +336,21 @@ mod tests {
         let once = window(&noisy(sd_deg, &mut noise));
         case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
         let series = case.series(&response, &TABLE);
-        let said = gradient_covariance(&case, &parameters, &series, &TABLE);
+        let computed = gradient_covariance(&case, &parameters, &series, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
-            // 150 draws give a standard deviation to 6%, the noise's size is known to some 5%.
-            let ratio = (scatter[j] / said[(j, j)]).sqrt();
+            // 150 draws give a standard deviation to 6 %; the noise's size is an estimate to 5 %.
+            let ratio = (scatter[j] / computed[(j, j)]).sqrt();
             assert!(
                 (0.75..1.25).contains(&ratio),
-                "{name}: scatter is {ratio:.2} of what is said"
+                "{name}: scatter is {ratio:.2} of the computed one"
             );
         }
     }
 
     #[test]
-    fn the_gradient_scatters_with_the_noise_of_the_surfaces_as_said() {
-        scatter_is_as_said::<3, Longitudinal>();
-        scatter_is_as_said::<4, Lateral>();
+    fn the_gradient_scatters_with_the_noise_of_the_surfaces() {
+        assert_gradient_scatters_as_computed::<3, Longitudinal>();
+        assert_gradient_scatters_as_computed::<4, Lateral>();
     }
 
     #[test]

@@ -1,4 +1,7 @@
-//! The build-up: the three coefficients as functions of the state at every point.
+//! The aerodynamic build-up (2.10-2.13, 3.9-3.13): the three coefficients as functions of the state.
+//!
+//! Each coefficient is linear in the derivatives, c = Σ ξ_j r_j. A regressor r_j is known at every
+//! point or proportional to a state, so c = offset + slope · x.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -12,79 +15,92 @@ use nalgebra::SVector;
 
 use crate::dynamics::COEFFICIENTS;
 
-/// The three coefficients at every point as functions of the state: c = offset + slope · x; empty
-/// where zero throughout.
+/// Term of the build-up: one derivative's coefficient, the state its regressor is proportional to
+/// (if any), and the column of regressors or factors of proportion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Term {
+    pub coefficient: usize,
+    pub state: Option<usize>,
+    pub column: usize,
+}
+
+/// Term of the build-up with the value of its derivative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ValuedTerm {
+    pub term: Term,
+    pub value: f64,
+}
+
+/// Build-up at every point of a maneuver; a column is empty where it is zero throughout.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Coefficients<const NX: usize> {
+pub(crate) struct BuildUp<const NX: usize> {
     pub offset: [Vec<f64>; COEFFICIENTS],
     pub slope: [[Vec<f64>; NX]; COEFFICIENTS],
 }
 
-impl<const NX: usize> Coefficients<NX> {
+impl<const NX: usize> BuildUp<NX> {
     pub fn zero() -> Self {
-        Coefficients {
+        BuildUp {
             offset: std::array::from_fn(|_| vec![]),
             slope: std::array::from_fn(|_| std::array::from_fn(|_| vec![])),
         }
     }
 
-    /// Adds a derivative of this value.
-    pub fn add(&mut self, value: f64, acting: Acting, column: &[f64]) {
-        let sum = match acting.along {
-            Some(state) => &mut self.slope[acting.coefficient][state],
-            None => &mut self.offset[acting.coefficient],
+    /// Adds a term with its column of regressors.
+    pub fn add(&mut self, ValuedTerm { term, value }: ValuedTerm, column: &[f64]) {
+        let sum = match term.state {
+            Some(state) => &mut self.slope[term.coefficient][state],
+            None => &mut self.offset[term.coefficient],
         };
         sum.resize(column.len(), 0.0);
-        sum.iter_mut()
-            .zip(column)
-            .for_each(|(sum, r)| *sum += value * r);
+        for (sum, r) in sum.iter_mut().zip(column) {
+            *sum += value * r;
+        }
     }
 
-    /// Those of a point.
+    /// Build-up at one point.
     #[inline(always)]
-    pub(crate) fn at(&self, point: usize) -> At<NX> {
-        let value = |of: &Vec<f64>| of.get(point).copied().unwrap_or(0.0);
-        At {
-            offset: std::array::from_fn(|k| value(&self.offset[k])),
-            slope: std::array::from_fn(|k| std::array::from_fn(|i| value(&self.slope[k][i]))),
+    pub fn at(&self, point: usize) -> PointBuildUp<NX> {
+        PointBuildUp {
+            offset: std::array::from_fn(|k| value_at(&self.offset[k], point)),
+            slope: std::array::from_fn(|k| {
+                std::array::from_fn(|i| value_at(&self.slope[k][i], point))
+            }),
         }
     }
 }
 
-/// What a free derivative adds to a coefficient: its value times a column.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Term {
-    pub acting: Acting,
-    pub value: f64,
+fn value_at(column: &[f64], point: usize) -> f64 {
+    column.get(point).copied().unwrap_or(0.0)
 }
 
-/// The coefficients at one point.
+/// Build-up at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct At<const NX: usize> {
+pub(crate) struct PointBuildUp<const NX: usize> {
     pub offset: [f64; COEFFICIENTS],
     pub slope: [[f64; NX]; COEFFICIENTS],
 }
 
-impl<const NX: usize> At<NX> {
-    /// Their values when the state is x.
+impl<const NX: usize> PointBuildUp<NX> {
+    /// Adds a term with its regressor.
+    pub fn add(&mut self, ValuedTerm { term, value }: ValuedTerm, regressor: f64) {
+        let sum = match term.state {
+            Some(state) => &mut self.slope[term.coefficient][state],
+            None => &mut self.offset[term.coefficient],
+        };
+        *sum += value * regressor;
+    }
+
+    /// Coefficients at the state x.
     #[inline(always)]
-    pub(crate) fn with(&self, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
+    pub fn coefficients(&self, x: &SVector<f64, NX>) -> [f64; COEFFICIENTS] {
         let mut values = self.offset;
         for k in 0..COEFFICIENTS {
-            // The first state last: it is the one that the sum would wait for.
+            // The first state last: the integration delivers it last.
             for i in (0..NX).rev() {
                 values[k] = self.slope[k][i].mul_add(x[i], values[k]);
             }
         }
         values
     }
-}
-
-/// How a derivative acts: on which coefficient, along which state (where its regressor is one), and
-/// which column of regressors or factors of proportion is its own.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Acting {
-    pub coefficient: usize,
-    pub along: Option<usize>,
-    pub column: usize,
 }

@@ -1,4 +1,4 @@
-//! Sizes in which a pass goes through a maneuver.
+//! Sizes by which a pass steps through a maneuver.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -6,30 +6,32 @@
 
 use crate::numerics::simd::VECTOR;
 
-/// Samples between two calls of the sink, whole vectors of them: what they leave fits into the
-/// fastest memory.
+/// Samples between two calls of the sink: a whole number of vectors, whose rows fit into the
+/// first-level cache.
 pub(crate) const CHUNK: usize = 24;
 
-/// Samples, or points, at equal distances.
+/// Greatest distance between the samples of a coarse pass.
+pub(crate) const WIDEST_STRIDE: usize = 8;
+
+/// Points of a chunk: its samples, the halves between them, and the sample that follows.
+pub(crate) const POINTS: usize = 2 * CHUNK + 1;
+
+/// Points of a chunk rounded up to whole vectors.
+pub(crate) const PADDED_POINTS: usize = POINTS.next_multiple_of(VECTOR);
+
+/// Zero points behind the last sample: room for a chunk that begins there at the widest stride.
+pub(super) const ZERO_POINTS: usize = POINTS * WIDEST_STRIDE;
+
+/// Every `stride`-th sample or point, from `first` on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spaced {
+pub(crate) struct Strided {
     pub first: usize,
     pub stride: usize,
 }
 
-impl Spaced {
+impl Strided {
     #[inline(always)]
-    pub fn at(self, k: usize) -> usize {
+    pub fn index(self, k: usize) -> usize {
         self.first + k * self.stride
     }
 }
-
-/// A pass may take every so many samples at most.
-pub(crate) const WIDEST_STRIDE: usize = 8;
-
-/// Points kept beyond the last sample: those of a chunk that begins there, of the widest strides.
-pub(super) const BEYOND: usize = POINTS * WIDEST_STRIDE;
-
-/// Points of a chunk's samples and of the one that follows, and the same in whole vectors.
-pub(crate) const POINTS: usize = 2 * CHUNK + 1;
-pub(crate) const WHOLE: usize = POINTS.next_multiple_of(VECTOR);

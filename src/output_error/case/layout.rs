@@ -1,148 +1,186 @@
-//! Where the parameters stand in the processor's vectors. Those that the integration feels,
-//! derivatives and initial states, lie in lanes side by side; a bias shifts an output and never
-//! meets a state.
+//! Places of the parameters in the lanes of the processor's vectors. Derivatives and initial states,
+//! which the integration depends on, lie side by side. A bias shifts an output and needs no lane of
+//! the integration.
 //!
-//! The derivatives of one coefficient form a group and fill whole vectors, so that what a
-//! coefficient does is one number for all of a vector's lanes; those along a state come first, in
-//! the order of the states, so that they are the same lanes of each group, and the groups of all
-//! coefficients are equally long. Initial states are the last group. Two lanes that are left over
-//! hold the residual and a one when sums are taken.
+//! The derivatives of one coefficient form a group of whole vectors, so one coefficient's slope
+//! serves all lanes of a vector. Derivatives along a state come first, in the order of the states:
+//! the same lanes of each group. All groups are equally long. Initial states are the last group. Two
+//! spare lanes hold the residual and a one while sums are taken.
 //!
-//! What the derivatives multiply stands in rows, point by point. Where the columns of all
-//! coefficients together need no more room than the widest group, all groups read the same stretch
-//! of a row: most derivatives come three at a time, one of each coefficient, along the same
-//! surface. Lanes that nobody asked for are then computed too, and never read.
+//! Regressors stand in rows, point by point. Where the columns of all coefficients fit into the
+//! widest group, all groups read the same part of a row: most derivatives come three at a time, one
+//! of each coefficient, along the same surface. Lanes without a parameter are computed and ignored.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::build_up::Acting;
+use super::build_up::Term;
 use crate::dynamics::COEFFICIENTS;
 use crate::numerics::simd::VECTOR;
 
 /// Groups of lanes: one per coefficient, and the initial states.
 const GROUPS: usize = COEFFICIENTS + 1;
 
-/// The layout of one case.
+/// Layout of one case.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Lanes {
+pub(crate) struct LaneLayout {
     pub groups: [Range<usize>; GROUPS],
-    /// The lane of each parameter in order, without the biases.
-    pub places: Vec<usize>,
-    /// Lanes left over: for the residual and a one when sums are taken, for the biases when
-    /// sensitivities are kept.
+    /// Lane of each parameter in order, without the biases.
+    pub parameter_lanes: Vec<usize>,
+    /// Spare lane that holds the residual while sums are taken.
     pub residual: usize,
+    /// Spare lane that holds a one while sums are taken.
     pub one: usize,
+    /// Spare lanes that hold the biases' sensitivities where these are kept.
     pub biases: Vec<usize>,
     /// Lanes in use of each vector, from its first.
     pub used: Vec<usize>,
-    /// Where the regressors of each group of derivatives begin in a row of them, and how long a row
-    /// is.
+    /// Beginning of each group's regressors in a row of regressors.
     pub regressors: [usize; COEFFICIENTS],
+    /// Length of a row of regressors.
     pub row: usize,
-    /// Which column stands where in a row: (place, column).
+    /// Columns that make up a row of regressors: (place in the row, column).
     pub columns: Vec<(usize, usize)>,
+}
+
+impl LaneLayout {
+    /// Layout for these terms, sorted by coefficient. `followed` are the states that regressors can
+    /// be proportional to.
+    pub fn new(
+        terms: &[Term],
+        followed: &[usize],
+        initial_states: usize,
+        biases: usize,
+    ) -> LaneLayout {
+        let slots = GroupSlots::new(terms, followed);
+        let mut layout = LaneLayout::with_groups(&slots);
+        layout.place_terms(terms, &slots);
+        layout.place_initial_states(initial_states);
+        layout.place_spare_lanes(biases);
+        layout
+    }
+
+    fn with_groups(slots: &GroupSlots) -> LaneLayout {
+        let width = slots.width;
+        let mut layout = LaneLayout {
+            row: if slots.shared {
+                width
+            } else {
+                COEFFICIENTS * width
+            },
+            ..LaneLayout::default()
+        };
+        for k in 0..COEFFICIENTS {
+            layout.groups[k] = k * width..(k + 1) * width;
+            layout.regressors[k] = if slots.shared { 0 } else { k * width };
+        }
+        layout
+    }
+
+    fn place_terms(&mut self, terms: &[Term], slots: &GroupSlots) {
+        for term in terms {
+            let slot = slots.slot(term);
+            let group = &self.groups[term.coefficient];
+            self.parameter_lanes.push(group.start + slot);
+            let place = self.regressors[term.coefficient] + slot;
+            self.columns.push((place, term.column));
+        }
+        self.columns.sort_unstable();
+        self.columns.dedup();
+    }
+
+    fn place_initial_states(&mut self, count: usize) {
+        let first = self.groups[COEFFICIENTS - 1].end;
+        self.groups[COEFFICIENTS] = first..first + padded(count);
+        self.parameter_lanes.extend(first..first + count);
+    }
+
+    fn place_spare_lanes(&mut self, biases: usize) {
+        let spare: Vec<usize> = (0..)
+            .filter(|lane| !self.parameter_lanes.contains(lane))
+            .take(biases.max(2))
+            .collect();
+        (self.residual, self.one) = (spare[0], spare[1]);
+        self.biases = spare[..biases].to_vec();
+        let lanes = self.parameter_lanes.iter().chain(&spare);
+        let vectors = lanes.max().map_or(0, |last| last / VECTOR + 1);
+        self.used = (0..vectors).map(|v| self.lanes_used(v)).collect();
+    }
+
+    fn lanes_used(&self, vector: usize) -> usize {
+        let lanes = self
+            .parameter_lanes
+            .iter()
+            .chain([&self.residual, &self.one]);
+        lanes
+            .filter(|lane| **lane / VECTOR == vector)
+            .map(|lane| lane % VECTOR + 1)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Number of lanes: whole vectors.
+    pub fn width(&self) -> usize {
+        VECTOR * self.used.len().max(self.groups[COEFFICIENTS].end / VECTOR)
+    }
+
+    /// First lane of the initial states, behind those of the derivatives.
+    pub fn first_initial_state(&self) -> usize {
+        self.groups[COEFFICIENTS].start
+    }
 }
 
 fn padded(count: usize) -> usize {
     count.next_multiple_of(VECTOR)
 }
 
-impl Lanes {
-    /// The layout for these derivatives, sorted by coefficient, and this number of free initial
-    /// states. `followed` are the states that derivatives can be along.
-    pub fn new(acting: &[Acting], followed: &[usize], initial: usize, biases: usize) -> Lanes {
-        let of = |k: usize| -> Vec<usize> {
-            acting
-                .iter()
-                .filter(|a| a.coefficient == k && a.along.is_none())
-                .map(|a| a.column)
-                .collect()
+/// Slots of a group: the followed states, then columns of regressors.
+struct GroupSlots<'a> {
+    followed: &'a [usize],
+    columns: [Vec<usize>; COEFFICIENTS],
+    /// Lanes of a group.
+    width: usize,
+    /// All groups have the columns of all coefficients.
+    shared: bool,
+}
+
+impl<'a> GroupSlots<'a> {
+    fn new(terms: &[Term], followed: &'a [usize]) -> GroupSlots<'a> {
+        let own: [Vec<usize>; COEFFICIENTS] = std::array::from_fn(|k| columns_of(terms, k));
+        let all: BTreeSet<usize> = own.iter().flatten().copied().collect();
+        let room = |columns: usize| padded(followed.len() + columns);
+        let widest = own.iter().map(Vec::len).max().map_or(0, room);
+        let width = if terms.is_empty() { 0 } else { widest };
+        let shared = room(all.len()) <= width;
+        let columns = if shared {
+            std::array::from_fn(|_| all.iter().copied().collect())
+        } else {
+            own
         };
-        let all: Vec<usize> = (0..COEFFICIENTS)
-            .flat_map(of)
-            .collect::<BTreeSet<usize>>()
-            .into_iter()
-            .collect();
-        let room = |columns: &[usize]| padded(followed.len() + columns.len());
-        let widest = (0..COEFFICIENTS)
-            .map(|k| room(&of(k)))
-            .max()
-            .filter(|_| !acting.is_empty())
-            .unwrap_or(0);
-        let shared = room(&all) <= widest;
-        let slots: [Vec<usize>; COEFFICIENTS] =
-            std::array::from_fn(|k| if shared { all.clone() } else { of(k) });
-        let mut lanes = Lanes {
-            row: if shared {
-                widest
-            } else {
-                COEFFICIENTS * widest
-            },
-            ..Lanes::default()
-        };
-        for k in 0..COEFFICIENTS {
-            lanes.groups[k] = k * widest..(k + 1) * widest;
-            lanes.regressors[k] = if shared { 0 } else { k * widest };
+        GroupSlots {
+            followed,
+            columns,
+            width,
+            shared,
         }
-        for a in acting {
-            let along = a
-                .along
-                .and_then(|state| followed.iter().position(|f| *f == state));
-            let beside = || {
-                slots[a.coefficient]
-                    .iter()
-                    .position(|column| *column == a.column)
-            };
-            let slot = along
-                .or_else(|| beside().map(|slot| followed.len() + slot))
-                .unwrap_or(0);
-            lanes.places.push(lanes.groups[a.coefficient].start + slot);
-            lanes
-                .columns
-                .push((lanes.regressors[a.coefficient] + slot, a.column));
-        }
-        lanes.columns.sort_unstable();
-        lanes.columns.dedup();
-        let first = COEFFICIENTS * widest;
-        lanes.groups[COEFFICIENTS] = first..first + padded(initial);
-        lanes.places.extend(first..first + initial);
-        let left_over: Vec<usize> = (0..)
-            .filter(|lane| !lanes.places.contains(lane))
-            .take(biases.max(2))
-            .collect();
-        (lanes.residual, lanes.one) = (left_over[0], left_over[1]);
-        lanes.biases = left_over[..biases].to_vec();
-        let last = lanes
-            .places
-            .iter()
-            .chain(&left_over)
-            .copied()
-            .max()
-            .unwrap_or(0);
-        let last_of = |vector: usize| {
-            let lanes = lanes
-                .places
-                .iter()
-                .copied()
-                .chain([lanes.residual, lanes.one]);
-            lanes
-                .filter(|lane| lane / VECTOR == vector)
-                .map(|lane| lane % VECTOR + 1)
-                .max()
-                .unwrap_or(0)
-        };
-        lanes.used = (0..=last / VECTOR).map(last_of).collect();
-        lanes
     }
 
-    /// All lanes, a whole number of vectors.
-    pub fn width(&self) -> usize {
-        VECTOR * self.used.len().max(self.groups[COEFFICIENTS].end / VECTOR)
+    fn slot(&self, term: &Term) -> usize {
+        let slot = match term.state {
+            Some(state) => self.followed.iter().position(|f| *f == state),
+            None => self.columns[term.coefficient]
+                .iter()
+                .position(|column| *column == term.column)
+                .map(|slot| self.followed.len() + slot),
+        };
+        slot.unwrap_or(0)
     }
+}
 
-    /// Those of the derivatives; the first of the free initial states follows.
-    pub fn derivatives(&self) -> usize {
-        self.groups[COEFFICIENTS].start
-    }
+/// Columns of the terms of one coefficient that no state is a factor of.
+fn columns_of(terms: &[Term], coefficient: usize) -> Vec<usize> {
+    let own = terms
+        .iter()
+        .filter(|term| term.coefficient == coefficient && term.state.is_none());
+    own.map(|term| term.column).collect()
 }

@@ -1,12 +1,9 @@
-//! One maneuver made ready for estimation: everything that does not depend on the parameters, laid
-//! out for the inner loop.
+//! One maneuver prepared for estimation: everything that does not depend on the parameters, laid out
+//! for the inner loop.
 //!
-//! Each coefficient is linear in the derivatives: c = Σ ξ_j r_j, where r_j is known at every point
-//! or proportional to a state: c = offset + slope · x. Held derivatives are summed once into offset
-//! and slope, free ones once per iteration.
-//!
-//! Parameters in order: free derivatives (sorted by coefficient), free biases, then initial states
-//! if they are free.
+//! Held derivatives are summed once into the build-up ([`build_up`]), free ones once per iteration.
+//! Parameters in order: free derivatives (sorted by coefficient), free biases, then the initial
+//! states if they are free.
 
 pub(crate) mod blocks;
 pub(crate) mod build_up;
@@ -20,17 +17,16 @@ use std::ops::Range;
 
 use nalgebra::SVector;
 
-use self::build_up::{Acting, At, Coefficients, Term};
-use self::chunking::{BEYOND, WIDEST_STRIDE};
-use self::layout::Lanes;
-use self::regressors::{Along, Columns};
+use self::build_up::{BuildUp, PointBuildUp, Term, ValuedTerm};
+use self::layout::LaneLayout;
+use self::regressors::{PreparedMotion, RegressorColumns};
 use self::surface_noise::NoisySurface;
 use crate::aero::{Bias, Derivative};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
-/// Whether the initial states are estimated with the derivatives or taken from the record.
+/// Source of the initial states: estimated with the derivatives, or taken from the record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialState {
@@ -39,14 +35,14 @@ pub enum InitialState {
     Measured,
 }
 
-/// What the outputs read, deg, deg/s and g, and which samples count.
+/// Measured outputs (deg, deg/s, g), and the samples that count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     pub values: Vec<[f64; OUTPUTS]>,
     pub used: Vec<[bool; OUTPUTS]>,
 }
 
-/// What is free and what is held in a maneuver.
+/// Free and held parameters of a maneuver.
 #[derive(Clone, Debug, Default)]
 pub struct Model<'a> {
     pub free: Vec<&'a Derivative>,
@@ -55,38 +51,59 @@ pub struct Model<'a> {
     pub initial_state: InitialState,
 }
 
-/// One maneuver made ready.
+impl Model<'_> {
+    /// Names of the parameters in order, given the free derivatives sorted by coefficient.
+    fn parameter_names(&self, free: &[&Derivative], states: &[&str]) -> Vec<String> {
+        let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
+        names.extend(self.biases.iter().map(|b| b.name.clone()));
+        if self.initial_state == InitialState::Estimated {
+            names.extend(states.iter().map(|s| format!("initial {s}")));
+        }
+        names
+    }
+
+    /// Outputs that the biases shift.
+    fn biased_outputs<const NX: usize, E: Equations<NX>>(&self) -> Vec<usize> {
+        let outputs = E::AXIS.outputs();
+        let place = |bias: &&Bias| outputs.iter().position(|o| *o == bias.output);
+        self.biases.iter().filter_map(place).collect()
+    }
+}
+
+/// One maneuver prepared for estimation.
 #[derive(Debug)]
 pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(crate) step_s: f64,
-    pub(crate) known: Vec<E::Known>,
-    pub(crate) sensed: Vec<E::Sensed>,
-    /// What the held derivatives make of the coefficients.
-    pub(crate) held: Coefficients<NX>,
-    /// The distinct regressors and factors of proportion, each at every point.
+    pub(crate) rate_inputs: Vec<E::RateInputs>,
+    pub(crate) sensor_inputs: Vec<E::SensorInputs>,
+    /// Build-up of the held derivatives.
+    pub(crate) held: BuildUp<NX>,
+    /// Distinct regressors and factors of proportion, each at every point.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// How each free derivative acts.
-    pub(crate) acting: Vec<Acting>,
-    pub(crate) lanes: Lanes,
-    /// The free derivatives of each coefficient.
+    /// Term of each free derivative.
+    pub(crate) terms: Vec<Term>,
+    pub(crate) layout: LaneLayout,
+    /// Free derivatives of each coefficient.
     pub(crate) ranges: [Range<usize>; COEFFICIENTS],
-    /// The output that each free bias shifts.
-    pub(crate) biased: Vec<usize>,
+    /// Output that each free bias shifts.
+    pub(crate) biased_outputs: Vec<usize>,
+    /// State at which the integration starts unless it is estimated.
     pub(crate) start: SVector<f64, NX>,
     pub(crate) initial_state: InitialState,
-    /// The measured states at every sample, and the coefficients that the measured motion implies.
+    /// Measured states at every sample.
     pub(crate) states: Vec<SVector<f64, NX>>,
+    /// Coefficients that the measured motion implies at every sample.
     pub(crate) implied: Vec<[f64; COEFFICIENTS]>,
-    /// Surfaces whose noise the corrected bounds count; none unless asked for.
+    /// Surfaces whose noise the corrected bounds count; empty by default.
     pub noisy_surfaces: Vec<NoisySurface>,
     pub measurements: Measurements,
-    /// Names of the parameters in order; initial states are called `initial alpha` and so on.
+    /// Names of the parameters in order; initial states are named `initial alpha` and so on.
     pub names: Vec<String>,
     equations: PhantomData<E>,
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// Makes a maneuver ready. `window` must contain the surfaces of the model's derivatives.
+    /// Prepares a maneuver. `window` must contain the surfaces of the model's derivatives.
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
@@ -96,73 +113,48 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     ) -> Self {
         let mut free = model.free.clone();
         free.sort_by_key(|d| d.coefficient.index());
-        let mut columns = Columns::<NX, E>::new(aircraft, window);
-        let acting: Vec<Acting> = free.iter().map(|d| columns.acting(d)).collect();
-        let held: Vec<(Acting, f64)> = model
-            .held
-            .iter()
-            .map(|(d, value)| (columns.acting(d), *value))
-            .collect();
-        let mut along = Along::<NX, E>::over(aircraft, window);
-        let mut columns = columns.filled(&along);
-        for column in &mut columns {
-            column.extend([0.0; BEYOND]);
-        }
-        // A step needs three points, also the one that would follow the last sample.
-        along.known.extend(
-            along
-                .known
-                .last()
-                .cloned()
-                .into_iter()
-                .cycle()
-                .take(2 * WIDEST_STRIDE),
-        );
-        let mut held_part = Coefficients::zero();
-        for (acting, value) in held {
-            held_part.add(value, acting, &columns[acting.column]);
-        }
-        let before = |k: usize| free.iter().filter(|d| d.coefficient.index() < k).count();
-        let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
-        names.extend(model.biases.iter().map(|b| b.name.clone()));
-        if model.initial_state == InitialState::Estimated {
-            names.extend(E::STATES.iter().map(|s| format!("initial {s}")));
-        }
-        let outputs = E::AXIS.outputs();
-        let ranges = std::array::from_fn(|k| before(k)..before(k + 1));
-        let biased: Vec<usize> = model
-            .biases
-            .iter()
-            .filter_map(|b| outputs.iter().position(|o| *o == b.output))
-            .collect();
-        let initial = if model.initial_state == InitialState::Estimated {
-            NX
-        } else {
-            0
+        let mut columns = RegressorColumns::<NX, E>::new(aircraft, window);
+        let terms: Vec<Term> = free.iter().map(|d| columns.term(d)).collect();
+        let held = model.held.iter().map(|(d, value)| ValuedTerm {
+            term: columns.term(d),
+            value: *value,
+        });
+        let held: Vec<ValuedTerm> = held.collect();
+        let motion = PreparedMotion::<NX, E>::new(aircraft, window);
+        let columns = columns.values(&motion);
+        let biased_outputs = model.biased_outputs::<NX, E>();
+        let initial_states = match model.initial_state {
+            InitialState::Estimated => NX,
+            InitialState::Measured => 0,
         };
-        let lanes = Lanes::new(&acting, E::FOLLOWED, initial, biased.len());
+        let layout = LaneLayout::new(
+            &terms,
+            E::REGRESSOR_STATES,
+            initial_states,
+            biased_outputs.len(),
+        );
         Case {
             step_s: window.step_s,
-            known: along.known,
-            sensed: along.sensed,
-            held: held_part,
+            rate_inputs: motion.rate_inputs,
+            sensor_inputs: motion.sensor_inputs,
+            held: build_up_of(&held, &columns),
             columns,
-            acting,
-            lanes,
-            ranges,
-            biased,
-            start: mean(along.states.iter().take(TRIMMED)),
+            ranges: ranges_by_coefficient(&terms),
+            terms,
+            layout,
+            biased_outputs,
+            start: mean(motion.states.iter().take(TRIMMED_SAMPLES)),
             initial_state: model.initial_state,
-            states: along.states,
-            implied: along.implied,
+            states: motion.states,
+            implied: motion.implied,
             noisy_surfaces: vec![],
             measurements,
-            names,
+            names: model.parameter_names(&free, &E::STATES),
             equations: PhantomData,
         }
     }
 
-    /// Starts the integration at the measured state averaged over the first samples.
+    /// Starts the integration at the mean of the first measured states.
     pub fn start_from_mean_of(&mut self, samples: usize) {
         self.start = mean(self.states.iter().take(samples));
     }
@@ -177,83 +169,73 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.names.len()
     }
 
-    /// Number of free derivatives; the first parameters.
+    /// Number of free derivatives, which are the first parameters.
     #[must_use]
     pub fn derivatives(&self) -> usize {
-        self.ranges[COEFFICIENTS - 1].end
+        self.terms.len()
     }
 
-    /// Output samples that count, of each output.
+    /// Number of samples that count, of each output.
     #[must_use]
     pub fn used(&self) -> [usize; OUTPUTS] {
         std::array::from_fn(|o| self.measurements.used.iter().filter(|used| used[o]).count())
     }
 
-    /// The history of a free derivative's regressor along the measured motion, in what the
-    /// derivative multiplies: deg, rad of a reduced rate, for a vane deg over q̄S (and the
-    /// reference length).
+    /// History of a free derivative's regressor along the measured motion: deg, rad of a reduced
+    /// rate, for a vane deg over q̄S (and the reference length).
     #[must_use]
-    pub fn regressor_as_flown(&self, derivative: usize) -> Vec<f64> {
-        let acting = self.acting[derivative];
-        let at = |(sample, state): (usize, &SVector<f64, NX>)| {
-            let factor = self.columns[acting.column][2 * sample];
-            acting.along.map_or(factor, |i| factor * state[i])
-        };
-        self.states.iter().enumerate().map(at).collect()
-    }
-
-    /// The coefficients with these parameters, at every point.
-    pub(crate) fn with(&self, parameters: &[f64]) -> Coefficients<NX> {
-        let mut sum = self.held.clone();
-        for (acting, value) in self.acting.iter().zip(parameters) {
-            sum.add(*value, *acting, &self.columns[acting.column]);
-        }
-        sum
-    }
-
-    /// The coefficients with these parameters, at one point.
-    pub(crate) fn coefficients_at(&self, parameters: &[f64], point: usize) -> At<NX> {
-        let mut sum = self.held.at(point);
-        for (acting, value) in self.acting.iter().zip(parameters) {
-            let own = match acting.along {
-                Some(state) => &mut sum.slope[acting.coefficient][state],
-                None => &mut sum.offset[acting.coefficient],
-            };
-            *own += value * self.columns[acting.column][point];
-        }
-        sum
-    }
-
-    /// What the free derivatives add to the coefficients.
-    pub(crate) fn terms(&self, parameters: &[f64]) -> Vec<Term> {
-        self.acting
-            .iter()
-            .zip(parameters)
-            .map(|(acting, value)| Term {
-                acting: *acting,
-                value: *value,
-            })
+    pub fn measured_regressor(&self, derivative: usize) -> Vec<f64> {
+        let term = self.terms[derivative];
+        let states = self.states.iter().enumerate();
+        states
+            .map(|(sample, x)| self.regressor(term, 2 * sample, x))
             .collect()
     }
 
-    /// The regressor of each free derivative at a point and state.
+    /// Build-up with these parameters at every point.
+    pub(crate) fn build_up(&self, parameters: &[f64]) -> BuildUp<NX> {
+        let mut sum = self.held.clone();
+        for valued in self.valued_terms(parameters) {
+            sum.add(valued, &self.columns[valued.term.column]);
+        }
+        sum
+    }
+
+    /// Build-up with these parameters at one point.
+    pub(crate) fn build_up_at(&self, parameters: &[f64], point: usize) -> PointBuildUp<NX> {
+        let mut sum = self.held.at(point);
+        for valued in self.valued_terms(parameters) {
+            sum.add(valued, self.columns[valued.term.column][point]);
+        }
+        sum
+    }
+
+    /// Terms of the free derivatives with their values.
+    pub(crate) fn valued_terms(&self, parameters: &[f64]) -> impl Iterator<Item = ValuedTerm> {
+        let both = self.terms.iter().zip(parameters);
+        both.map(|(term, value)| ValuedTerm {
+            term: *term,
+            value: *value,
+        })
+    }
+
+    /// Regressor of each free derivative at a point and state.
     pub(crate) fn regressors_at(&self, point: usize, x: &SVector<f64, NX>, regressors: &mut [f64]) {
-        for (r, acting) in regressors.iter_mut().zip(&self.acting) {
-            *r = self.columns[acting.column][point] * acting.along.map_or(1.0, |i| x[i]);
+        for (r, term) in regressors.iter_mut().zip(&self.terms) {
+            *r = self.regressor(*term, point, x);
         }
     }
 
-    /// The parameters to start from: `derivative` by name, biases zero, initial states as measured
-    /// (rad, rad/s).
+    fn regressor(&self, term: Term, point: usize, x: &SVector<f64, NX>) -> f64 {
+        self.columns[term.column][point] * term.state.map_or(1.0, |i| x[i])
+    }
+
+    /// Starting values: `derivative` by name, biases zero, initial states as measured (rad, rad/s).
     #[must_use]
     pub fn starting_values(&self, derivative: impl Fn(&str) -> f64) -> Vec<f64> {
-        let mut values: Vec<f64> = self
-            .names
-            .iter()
-            .take(self.derivatives())
-            .map(|name| derivative(name))
-            .collect();
-        values.extend(self.biased.iter().map(|_| 0.0));
+        let derivatives = self.names.iter().take(self.derivatives());
+        let mut values: Vec<f64> = derivatives.map(|name| derivative(name)).collect();
+        values.extend(self.biased_outputs.iter().map(|_| 0.0));
         if self.initial_state == InitialState::Estimated {
             values.extend(self.start.iter());
         }
@@ -261,8 +243,22 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     }
 }
 
-/// Samples from which the initial state is averaged: there the maneuver is still trimmed.
-const TRIMMED: usize = 10;
+fn build_up_of<const NX: usize>(terms: &[ValuedTerm], columns: &[Vec<f64>]) -> BuildUp<NX> {
+    let mut sum = BuildUp::zero();
+    for valued in terms {
+        sum.add(*valued, &columns[valued.term.column]);
+    }
+    sum
+}
+
+/// Ranges of the terms of each coefficient, sorted by coefficient.
+fn ranges_by_coefficient(terms: &[Term]) -> [Range<usize>; COEFFICIENTS] {
+    let first_of = |k: usize| terms.partition_point(|term| term.coefficient < k);
+    std::array::from_fn(|k| first_of(k)..first_of(k + 1))
+}
+
+/// Samples from which the initial state is averaged: the maneuver is still trimmed there.
+const TRIMMED_SAMPLES: usize = 10;
 
 fn mean<'a, const NX: usize>(
     states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>,

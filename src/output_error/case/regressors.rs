@@ -1,4 +1,4 @@
-//! Regressors at every point, and what a case keeps of the measured motion.
+//! The measured motion and the regressors at every point of a maneuver.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::marker::PhantomData;
@@ -6,172 +6,184 @@ use std::marker::PhantomData;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::build_up::Acting;
-use super::chunking::{BEYOND, WIDEST_STRIDE};
-use crate::aero::{Derivative, Regressor};
+use super::build_up::Term;
+use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
+use crate::aero::{Axis, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::flight::signal;
 use crate::units::DEG;
 
-/// What a case keeps of the motion.
-pub(super) struct Along<const NX: usize, E: Equations<NX>> {
-    pub known: Vec<E::Known>,
+/// Measured motion of a window, prepared for the equations of one axis.
+pub(super) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
+    pub rate_inputs: Vec<E::RateInputs>,
     /// α and β at the c.g. at every point, rad.
     flow: Vec<[f64; 2]>,
-    pub sensed: Vec<E::Sensed>,
+    pub sensor_inputs: Vec<E::SensorInputs>,
     pub states: Vec<SVector<f64, NX>>,
     pub implied: Vec<[f64; COEFFICIENTS]>,
 }
 
-impl<const NX: usize, E: Equations<NX>> Along<NX, E> {
-    pub fn over(aircraft: &Aircraft, window: &Window) -> Self {
+impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
+    pub fn new(aircraft: &Aircraft, window: &Window) -> Self {
         let (points, samples) = (window.len(), window.samples);
-        let mut along = Along {
-            known: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
+        let mut prepared = PreparedMotion {
+            rate_inputs: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
             flow: Vec::with_capacity(points),
-            sensed: Vec::with_capacity(samples),
+            sensor_inputs: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),
             implied: Vec::with_capacity(samples),
         };
-        Arch::new().dispatch(Over {
+        Arch::new().dispatch(Preparation {
             aircraft,
             window,
-            along: &mut along,
+            prepared: &mut prepared,
         });
-        along
+        // A step reads three points, also the one that begins at the last sample.
+        let last = prepared.rate_inputs.last().cloned();
+        let repeated = last.into_iter().cycle().take(2 * WIDEST_STRIDE);
+        prepared.rate_inputs.extend(repeated);
+        prepared
     }
 }
 
-/// Takes over the motion point by point, compiled for the processor at hand.
-struct Over<'a, const NX: usize, E: Equations<NX>> {
+/// Preparation point by point, compiled for the processor at hand.
+struct Preparation<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
-    along: &'a mut Along<NX, E>,
+    prepared: &'a mut PreparedMotion<NX, E>,
 }
 
-impl<const NX: usize, E: Equations<NX>> WithSimd for Over<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Over {
+        let Preparation {
             aircraft,
             window,
-            along,
+            prepared,
         } = self;
         let motion = window.motion(aircraft);
         for point in 0..window.len() {
             let motion = motion.at(point);
-            let known = E::known(aircraft, &motion);
-            along.flow.push([motion.alpha, motion.beta]);
+            let inputs = E::rate_inputs(aircraft, &motion);
+            prepared.flow.push([motion.alpha, motion.beta]);
             if point % 2 == 0 {
-                along.sensed.push(E::sensed(aircraft, &motion));
-                along.states.push(E::measured_state(&motion));
-                along
-                    .implied
-                    .push(E::coefficients(aircraft, &motion, &known));
+                let sensors = E::sensor_inputs(aircraft, &motion);
+                prepared.sensor_inputs.push(sensors);
+                prepared.states.push(E::measured_state(&motion));
+                let implied = E::implied_coefficients(aircraft, &motion, &inputs);
+                prepared.implied.push(implied);
             }
-            along.known.push(known);
+            prepared.rate_inputs.push(inputs);
         }
     }
 }
 
-/// Distinct columns of regressors.
-pub(super) struct Columns<'a, const NX: usize, E: Equations<NX>> {
+/// Distinct columns of regressors, collected term by term.
+pub(super) struct RegressorColumns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
-    /// Of each column a derivative that has it.
-    asked: Vec<&'a Derivative>,
+    /// A derivative of each column.
+    derivatives: Vec<&'a Derivative>,
     equations: PhantomData<E>,
 }
 
-impl<'a, const NX: usize, E: Equations<NX>> Columns<'a, NX, E> {
+impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     pub fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
-        Columns {
+        RegressorColumns {
             aircraft,
             window,
-            asked: vec![],
+            derivatives: vec![],
             equations: PhantomData,
         }
     }
 
-    /// How a derivative acts. Two share a column when they have the same regressor, but a vane's
-    /// moment is not its force.
-    pub fn acting(&mut self, derivative: &'a Derivative) -> Acting {
-        let moment =
-            |d: &Derivative| matches!(d.regressor, Regressor::Vane(_)) && d.coefficient.is_moment();
-        let same = |d: &&Derivative| {
-            d.regressor == derivative.regressor && moment(d) == moment(derivative)
-        };
-        let column = self.asked.iter().position(same).unwrap_or_else(|| {
-            self.asked.push(derivative);
-            self.asked.len() - 1
+    /// Term of a derivative, with a new column where no earlier derivative has the same.
+    pub fn term(&mut self, derivative: &'a Derivative) -> Term {
+        let known = self
+            .derivatives
+            .iter()
+            .position(|d| have_same_column(d, derivative));
+        let column = known.unwrap_or_else(|| {
+            self.derivatives.push(derivative);
+            self.derivatives.len() - 1
         });
-        Acting {
+        Term {
             coefficient: derivative.coefficient.index(),
-            along: E::state_of(&derivative.regressor),
+            state: E::state_of(&derivative.regressor),
             column,
         }
     }
 
-    /// Every column at every point, with room for points beyond.
-    pub fn filled(&self, along: &Along<NX, E>) -> Vec<Vec<f64>> {
-        let filled = |derivative: &&Derivative| {
-            let mut column = Vec::with_capacity(self.window.len() + BEYOND);
-            self.fill(derivative, along, &mut column);
-            column
-        };
-        self.asked.iter().map(filled).collect()
+    /// Values of every column at every point, followed by zero points.
+    pub fn values(&self, motion: &PreparedMotion<NX, E>) -> Vec<Vec<f64>> {
+        let mut columns = Vec::with_capacity(self.derivatives.len());
+        for derivative in &self.derivatives {
+            let mut column = Vec::with_capacity(self.window.len() + ZERO_POINTS);
+            self.fill(derivative, motion, &mut column);
+            column.extend([0.0; ZERO_POINTS]);
+            columns.push(column);
+        }
+        columns
     }
 
-    /// A derivative's regressor at every point; where it is a state the factor of proportion.
-    fn fill(&self, derivative: &Derivative, along: &Along<NX, E>, column: &mut Vec<f64>) {
-        let (aircraft, velocity) = (self.aircraft, self.window.signal(signal::VELOCITY));
-        let regressor = &derivative.regressor;
-        if E::state_of(regressor).is_some() {
-            let factor = |v: &f64| {
-                E::state_regressor(aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor)
-            };
-            return column.extend(velocity.iter().map(factor));
-        }
-        let mut rate = |name: &str, length: f64| {
-            let both = self.window.signal(name).iter().zip(velocity);
-            column.extend(both.map(|(rate, v)| rate / DEG * length / (2.0 * v)));
-        };
-        match regressor {
-            Regressor::RollRate => rate(signal::P, aircraft.span_ft),
-            Regressor::PitchRate => rate(signal::Q, aircraft.chord_ft),
-            Regressor::YawRate => rate(signal::R, aircraft.span_ft),
+    /// A derivative's regressor at every point, or its factor of proportion to a state.
+    fn fill(&self, derivative: &Derivative, motion: &PreparedMotion<NX, E>, column: &mut Vec<f64>) {
+        let aircraft = self.aircraft;
+        match &derivative.regressor {
+            state if E::state_of(state).is_some() => self.fill_state_factor(state, column),
+            Regressor::RollRate => self.fill_reduced_rate(signal::P, aircraft.span_ft, column),
+            Regressor::PitchRate => self.fill_reduced_rate(signal::Q, aircraft.chord_ft, column),
+            Regressor::YawRate => self.fill_reduced_rate(signal::R, aircraft.span_ft, column),
             Regressor::Constant => column.resize(self.window.len(), 1.0),
-            Regressor::Alpha => column.extend(along.flow.iter().map(|[alpha, _]| alpha * DEG)),
-            Regressor::Beta => column.extend(along.flow.iter().map(|[_, beta]| beta * DEG)),
+            Regressor::Alpha => column.extend(motion.flow.iter().map(|[alpha, _]| alpha * DEG)),
+            Regressor::Beta => column.extend(motion.flow.iter().map(|[_, beta]| beta * DEG)),
             Regressor::Surface(name) => column.extend(self.window.signal(name)),
             Regressor::Vane(name) => {
-                let both = self
-                    .window
-                    .signal(name)
-                    .iter()
-                    .zip(self.window.signal(signal::QBAR));
-                column.extend(
-                    both.map(|(force, qbar)| force * surface_factor(aircraft, *qbar, derivative)),
-                );
+                let force = self.window.signal(name).iter();
+                let both = force.zip(self.window.signal(signal::QBAR));
+                column
+                    .extend(both.map(|(f, qbar)| f * surface_factor(aircraft, *qbar, derivative)));
             }
         }
     }
+
+    fn fill_state_factor(&self, regressor: &Regressor, column: &mut Vec<f64>) {
+        let velocity = self.window.signal(signal::VELOCITY).iter();
+        column.extend(velocity.map(|v| {
+            E::state_regressor(self.aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor)
+        }));
+    }
+
+    fn fill_reduced_rate(&self, rate: &str, length_ft: f64, column: &mut Vec<f64>) {
+        let rate = self.window.signal(rate).iter();
+        let both = rate.zip(self.window.signal(signal::VELOCITY));
+        column.extend(both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v)));
+    }
 }
 
-/// Regressor per deflection, 1/deg times deg or per lbf: one for a surface; a vane's force and
-/// moment are made coefficients.
+/// Equality of two derivatives' columns: the same regressor, but a vane's moment is not its force.
+fn have_same_column(a: &Derivative, b: &Derivative) -> bool {
+    a.regressor == b.regressor && is_vane_moment(a) == is_vane_moment(b)
+}
+
+fn is_vane_moment(derivative: &Derivative) -> bool {
+    matches!(derivative.regressor, Regressor::Vane(_)) && derivative.coefficient.is_moment()
+}
+
+/// Regressor per deflection (deg) or per force of a vane (lbf): one for a surface; a vane's force
+/// and moment become coefficients.
 pub(crate) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
     if !matches!(derivative.regressor, Regressor::Vane(_)) {
         return 1.0;
     }
     let force = qbar * aircraft.wing_area_ft2;
     let length = match derivative.coefficient.axis() {
-        crate::aero::Axis::Longitudinal => aircraft.chord_ft,
-        crate::aero::Axis::Lateral => aircraft.span_ft,
+        Axis::Longitudinal => aircraft.chord_ft,
+        Axis::Lateral => aircraft.span_ft,
     };
     1.0 / if derivative.coefficient.is_moment() {
         force * length

@@ -1,4 +1,4 @@
-//! White noise of the measured surfaces, and the coefficients that it acts on.
+//! White noise of the measured surfaces, and the coefficients that it reaches.
 
 use pulp::Arch;
 
@@ -8,26 +8,27 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::flight::signal;
 
-/// A surface with noise: how much, and what it acts on.
+/// Surface with noise on its measured deflection.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoisySurface {
     pub(crate) variance: f64,
     pub(crate) effects: Vec<Effect>,
 }
 
-/// One derivative along the surface.
+/// Effect of a deflection through one derivative.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Effect {
     pub coefficient: usize,
-    pub value: Value,
+    pub value: DerivativeValue,
     /// Coefficient per deflection and unit of the derivative, sample by sample; one throughout
     /// where empty.
     pub factors: Vec<f64>,
 }
 
+/// Value of a derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Value {
-    /// A parameter.
+pub(crate) enum DerivativeValue {
+    /// Index of a parameter.
     Free(usize),
     Held(f64),
 }
@@ -41,59 +42,74 @@ pub fn noisy_surfaces(
     free: &[&Derivative],
     held: &[(&Derivative, f64)],
 ) -> Vec<NoisySurface> {
-    let qbar = window.signal(signal::QBAR);
-    let free = free.iter().enumerate().map(|(j, d)| (*d, Value::Free(j)));
-    let all: Vec<(&Derivative, Value)> = free
-        .chain(held.iter().map(|(d, v)| (*d, Value::Held(*v))))
-        .collect();
-    let mut names: Vec<&str> = all
+    let free = free.iter().enumerate();
+    let mut derivatives: Vec<(&Derivative, DerivativeValue)> =
+        free.map(|(j, d)| (*d, DerivativeValue::Free(j))).collect();
+    derivatives.extend(held.iter().map(|(d, v)| (*d, DerivativeValue::Held(*v))));
+    let surfaces = derivatives
         .iter()
-        .filter_map(|(d, _)| d.regressor.surface())
-        .collect();
-    names.sort_unstable();
-    names.dedup();
-    let surface = |name: &&str| {
-        let samples: Vec<f64> = window
-            .signal(name)
-            .chunks(2)
-            .map(|points| points[0])
-            .collect();
-        let variance = white_variance(&samples);
-        let acting = all
-            .iter()
-            .filter(|(d, _)| d.regressor.surface() == Some(name));
-        let effect = |(d, value): &(&Derivative, Value)| Effect {
-            coefficient: d.coefficient.index(),
-            value: *value,
-            factors: match d.regressor {
-                Regressor::Vane(_) => {
-                    let times_qbar = surface_factor(aircraft, 1.0, d);
-                    qbar.chunks(2).map(|qbar| times_qbar / qbar[0]).collect()
-                }
-                _ => vec![],
-            },
-        };
-        (variance > 0.0).then(|| NoisySurface {
-            variance,
-            effects: acting.map(effect).collect(),
-        })
-    };
-    names.iter().filter_map(surface).collect()
+        .filter_map(|(d, _)| d.regressor.surface());
+    let mut surfaces: Vec<&str> = surfaces.collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    let mut noisy = Vec::new();
+    for surface in surfaces {
+        let variance = white_variance(&samples_of(window, surface));
+        if variance > 0.0 {
+            let own = derivatives
+                .iter()
+                .filter(|(d, _)| d.regressor.surface() == Some(surface));
+            let effects = own.map(|(d, value)| Effect::new(aircraft, window, d, *value));
+            noisy.push(NoisySurface {
+                variance,
+                effects: effects.collect(),
+            });
+        }
+    }
+    noisy
 }
 
-/// Variance of the white noise on a signal that is otherwise smooth but for few steps: of third
-/// differences, which have 1 + 9 + 9 + 1 times that of the noise, the median size decides.
-#[must_use]
-pub fn white_variance(samples: &[f64]) -> f64 {
+impl Effect {
+    fn new(
+        aircraft: &Aircraft,
+        window: &Window,
+        derivative: &Derivative,
+        value: DerivativeValue,
+    ) -> Effect {
+        let factors = match derivative.regressor {
+            Regressor::Vane(_) => {
+                let times_qbar = surface_factor(aircraft, 1.0, derivative);
+                let qbar = samples_of(window, signal::QBAR);
+                qbar.iter().map(|qbar| times_qbar / qbar).collect()
+            }
+            _ => vec![],
+        };
+        Effect {
+            coefficient: derivative.coefficient.index(),
+            value,
+            factors,
+        }
+    }
+}
+
+/// Values of a signal at the samples, without the halves between them.
+fn samples_of(window: &Window, name: &str) -> Vec<f64> {
+    window.signal(name).iter().step_by(2).copied().collect()
+}
+
+/// Variance of the white noise on a signal that is otherwise smooth but for few steps.
+///
+/// Third differences have 1 + 9 + 9 + 1 times the noise's variance, and their median size ignores
+/// the steps.
+fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
-    // Sizes are in the order of their bits, which are compared faster; what is no number comes
-    // last.
-    let size = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
-    let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.windows(4).map(size).collect());
-    let finite = sizes
-        .iter()
-        .filter(|size| **size < f64::INFINITY.to_bits())
-        .count();
+    // Bit patterns of positive numbers have the order of the numbers and compare faster; infinity
+    // and NaN come last.
+    let third_difference = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
+    let mut sizes: Vec<u64> =
+        Arch::new().dispatch(|| samples.windows(4).map(third_difference).collect());
+    let infinity = f64::INFINITY.to_bits();
+    let finite = sizes.iter().filter(|size| **size < infinity).count();
     let median = if finite == 0 {
         0.0
     } else {
@@ -110,7 +126,7 @@ mod tests {
     use crate::output_error::tests::Noise;
 
     #[test]
-    fn white_noise_is_told_from_doublets_and_feedback() {
+    fn doublets_and_feedback_do_not_count_as_white_noise() {
         let mut noise = Noise(5);
         let values: Vec<f64> = (0..800)
             .map(|k| {

@@ -1,19 +1,21 @@
-//! What the data of a maneuver tell apart: correlations, variance inflation, condition indices with
-//! variance proportions (Belsley, Kuh and Welsch 1980), on the unit-length columns of `W^½ S`, that
-//! is on H with unit diagonal.
+//! Collinearity of the parameters: correlations, variance inflation, and condition indices with
+//! variance proportions (Belsley, Kuh and Welsch 1980). All are computed on H with unit diagonal,
+//! that is on unit-length columns of `W^½ S`.
 //!
 //! With `H_s = D H D`, `D = diag H^-½`, eigenvalues λ and unit eigenvectors v:
-//! - variance inflation of parameter j: `H_jj (H⁻¹)_jj = Σ_k v_jk²/λ_k`, the factor by which the other parameters raise the
-//!   variance of j above what it would be if they were known;
-//! - condition index of direction k: `√(λ_max/λ_k)`, the ratio of the lengths of the best and this determined direction;
+//! - variance inflation of parameter j: `H_jj (H⁻¹)_jj = Σ_k v_jk²/λ_k`, the factor by which
+//!   estimating the other parameters raises the variance of j;
+//! - condition index of direction k: `√(λ_max/λ_k)`, the ratio of the lengths of the best
+//!   determined direction and this one;
 //! - variance proportion of j in k: `(v_jk²/λ_k) / Σ_l v_jl²/λ_l`.
 //!
 //! A direction of high index that makes more than half of the variance of two or more parameters
-//! names a group that the data hardly tell apart.
+//! names a group that the data hardly separate.
+
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::numerics::symmetric::{scale, scaled};
 use crate::settings::settings;
-use nalgebra::{DMatrix, SymmetricEigen};
 
 settings! {
     /// Limits of the identifiability measures.
@@ -34,30 +36,29 @@ settings! {
     }
 }
 
-/// Parameters that the data hardly tell apart.
+/// Group of parameters that the data hardly separate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// Infinite where the data do not tell them apart at all.
+    /// Condition index; infinite where the data do not separate them at all.
     pub condition_index: f64,
     pub parameters: Vec<usize>,
 }
 
-/// The measures of one information matrix.
+/// Collinearity of one information matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collinearity {
-    /// Of each parameter; none for one that takes part in a direction that the data do not
-    /// determine.
+    /// Variance inflation of each parameter; `None` if it takes part in an undetermined direction.
     pub inflation: Vec<Option<f64>>,
-    /// Of the estimates, from H⁻¹; absent where H has none.
+    /// Correlation of the estimates, from H⁻¹; `None` where H has no inverse.
     pub correlation: Option<DMatrix<f64>>,
-    /// `√(λ_max/λ_min)`; infinite where the data do not determine a direction.
+    /// Largest condition index, `√(λ_max/λ_min)`; infinite where a direction is undetermined.
     pub largest_index: f64,
-    /// Worst first.
+    /// Groups, worst first.
     pub groups: Vec<Group>,
 }
 
-/// Measures an information matrix; none where it is empty or no number. A parameter that the data
-/// do not feel at all (`H_jj = 0`) is in no group.
+/// Computes the collinearity of an information matrix; `None` where it is empty or not finite. A
+/// parameter that is not excited (`H_jj = 0`) is in no group.
 #[must_use]
 pub fn collinearity(
     information: &DMatrix<f64>,
@@ -68,27 +69,26 @@ pub fn collinearity(
     if n == 0 || !information.iter().all(|h| h.is_finite()) {
         return None;
     }
-    let felt: Vec<usize> = (0..n).filter(|&j| information[(j, j)] > 0.0).collect();
-    if felt.is_empty() {
+    let excited: Vec<usize> = (0..n).filter(|&j| information[(j, j)] > 0.0).collect();
+    if excited.is_empty() {
         return None;
     }
-    let own = DMatrix::from_fn(felt.len(), felt.len(), |i, j| {
-        information[(felt[i], felt[j])]
+    let own = DMatrix::from_fn(excited.len(), excited.len(), |i, j| {
+        information[(excited[i], excited[j])]
     });
     let eigen = SymmetricEigen::new(scaled(&own, &scale(&own)));
     let most = eigen.eigenvalues.max();
-    // Rounding leaves a direction that the data do not determine with some tiny length of either
-    // sign.
+    // Rounding leaves an undetermined direction a tiny eigenvalue of either sign.
     let floor = most / max_condition_number;
     let directions = Directions { eigen, most, floor };
-    let determined = felt.len() == n && directions.eigen.eigenvalues.iter().all(|l| *l > floor);
+    let determined = excited.len() == n && directions.eigen.eigenvalues.iter().all(|l| *l > floor);
     let mut inflation = vec![None; n];
-    for (i, &j) in felt.iter().enumerate() {
+    for (i, &j) in excited.iter().enumerate() {
         inflation[j] = directions.inflation(i);
     }
     let mut groups = directions.groups(limits);
     for j in groups.iter_mut().flat_map(|g| &mut g.parameters) {
-        *j = felt[*j];
+        *j = excited[*j];
     }
     let least = directions.eigen.eigenvalues.min();
     Some(Collinearity {
@@ -103,10 +103,11 @@ pub fn collinearity(
     })
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square
-/// is at least this: more than rounding, for however small its part, its variance has no bound.
-const TAKES_PART: f64 = 1e-6;
+/// Share of an undetermined direction's unit square from which a parameter takes part: above
+/// rounding. With any part in it, its variance has no bound.
+const UNDETERMINED_SHARE: f64 = 1e-6;
 
+/// Eigenvalues and directions of the scaled information matrix.
 struct Directions {
     eigen: SymmetricEigen<f64, nalgebra::Dyn>,
     most: f64,
@@ -114,14 +115,14 @@ struct Directions {
 }
 
 impl Directions {
-    fn length(&self, k: usize) -> f64 {
+    fn eigenvalue(&self, k: usize) -> f64 {
         self.eigen.eigenvalues[k].max(self.floor)
     }
 
-    /// `v_jk²/λ_k`: what direction k makes of the scaled variance of parameter j.
+    /// `v_jk²/λ_k`: part of the scaled variance of parameter j from direction k.
     fn part(&self, j: usize, k: usize) -> f64 {
         let v = self.eigen.eigenvectors[(j, k)];
-        v * v / self.length(k)
+        v * v / self.eigenvalue(k)
     }
 
     fn variance(&self, j: usize) -> f64 {
@@ -131,10 +132,14 @@ impl Directions {
     }
 
     fn inflation(&self, j: usize) -> Option<f64> {
-        let lost = |k: usize| self.eigen.eigenvalues[k] <= self.floor;
-        let takes_part = |k: usize| self.eigen.eigenvectors[(j, k)].powi(2) >= TAKES_PART;
-        let determined = !(0..self.eigen.eigenvalues.len()).any(|k| lost(k) && takes_part(k));
-        determined.then(|| self.variance(j))
+        let undetermined = (0..self.eigen.eigenvalues.len()).any(|k| {
+            self.is_undetermined(k) && self.eigen.eigenvectors[(j, k)].powi(2) >= UNDETERMINED_SHARE
+        });
+        (!undetermined).then(|| self.variance(j))
+    }
+
+    fn is_undetermined(&self, k: usize) -> bool {
+        self.eigen.eigenvalues[k] <= self.floor
     }
 
     fn correlation(&self) -> DMatrix<f64> {
@@ -149,26 +154,29 @@ impl Directions {
         let n = self.eigen.eigenvalues.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| self.eigen.eigenvalues[*a].total_cmp(&self.eigen.eigenvalues[*b]));
-        let named = order.into_iter().filter_map(|k| {
-            let index = (self.most / self.length(k)).sqrt();
-            let share =
-                |j: &usize| self.part(*j, k) / self.variance(*j) >= limits.variance_proportion;
-            let parameters: Vec<usize> = (0..n).filter(share).collect();
-            let condition_index = if self.eigen.eigenvalues[k] <= self.floor {
-                f64::INFINITY
-            } else {
-                index
-            };
-            (index >= limits.condition_index && parameters.len() >= 2).then_some(Group {
-                condition_index,
-                parameters,
-            })
-        });
-        named.collect()
+        let groups = order.into_iter().map(|k| self.group(k, limits));
+        groups.flatten().collect()
+    }
+
+    /// Group of a direction; `None` below the limits.
+    fn group(&self, k: usize, limits: &Limits) -> Option<Group> {
+        let index = (self.most / self.eigenvalue(k)).sqrt();
+        let parameters: Vec<usize> = (0..self.eigen.eigenvalues.len())
+            .filter(|&j| self.part(j, k) / self.variance(j) >= limits.variance_proportion)
+            .collect();
+        let condition_index = if self.is_undetermined(k) {
+            f64::INFINITY
+        } else {
+            index
+        };
+        (index >= limits.condition_index && parameters.len() >= 2).then_some(Group {
+            condition_index,
+            parameters,
+        })
     }
 }
 
-/// Correlation of two histories; none where one of them does not move.
+/// Correlation of two histories; `None` where one of them is constant.
 #[must_use]
 pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let (da, db) = (about_mean(a), about_mean(b));
@@ -177,7 +185,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     (size > 0.0).then(|| (product / size).clamp(-1.0, 1.0))
 }
 
-/// Root mean square of a history about its mean. What rounding leaves of a constant counts as zero.
+/// Root mean square of a history about its mean; rounding of a constant counts as zero.
 #[must_use]
 pub fn excitation(values: &[f64]) -> f64 {
     root_mean_square(&about_mean(values))
@@ -207,8 +215,8 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The information of regressors of unit weight, `Xᵀ X`, of two that correlate by ρ and one
-    /// that stands apart; with lengths that unit diagonal must take out.
+    /// Information `Xᵀ X` of two regressors that correlate by ρ and an independent third, of
+    /// different lengths.
     fn designed(rho: f64) -> DMatrix<f64> {
         let (a, b, c) = (1.0, 1e3, 1e-4);
         DMatrix::from_row_slice(

@@ -1,53 +1,50 @@
-//! Which parameters to hold at values known from elsewhere: those of which the wind tunnel knows
-//! more than the maneuver.
+//! Choice of the parameters to hold at wind-tunnel values: those whose tunnel values are more
+//! accurate than estimates from the maneuver.
 //!
-//! Estimated, parameter j has the variance `V_j` from noise; held, the variance `u_j²` of the value
-//! it is held at. Holding it changes the covariance of all others by `g (u_j² − V_j) gᵀ`: with
-//! weights that are the inverse of the noise's variances it lowers the mean square error of every
-//! one of them exactly where `u_j² < V_j`, and raises it everywhere else (Toro-Vizcarrondo and
-//! Wallace 1968). So the ratio `√V_j / u_j` decides, above one for hold. `V_j` is the corrected
-//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F; information matrix H and gradient covariance M of
+//! An estimated parameter j has the variance `V_j` from noise; a held one has the variance `u_j²`
+//! of its tunnel value. Holding it changes the covariance of all others by `g (u_j² − V_j) gᵀ`.
+//! With weights that are the inverse of the noise's variances, holding lowers the mean square error
+//! of every other parameter exactly if `u_j² < V_j`, and raises it otherwise (Toro-Vizcarrondo and
+//! Wallace 1968). So the ratio `√V_j / u_j` decides: hold above one. `V_j` is the corrected
+//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F. Information matrix H and gradient covariance M of
 //! all parameters give it for every F without another fit.
 //!
-//! What the errors of values already held do to parameter j is no reason to hold it too: free, it
-//! takes those errors up and spares the others. Counted, they would make each held value hold the
-//! next.
+//! Errors of values that are already held do not count in `V_j`: a free parameter absorbs them and
+//! spares the others. If they counted, each held value would cause the next to be held.
 //!
-//! The worst is held first, until none is above one; then each held one that alone would be below
-//! one again is freed, at most once. So it ends.
+//! The parameter of the largest ratio is held first, until no ratio is above one. Then each held
+//! parameter whose ratio alone is below one is freed, at most once, so the iteration ends.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::{scale, scaled};
-use crate::output_error::bounds::coloured;
-use crate::output_error::bounds::coloured::Noise;
-use crate::output_error::bounds::data::Bounded;
+use crate::output_error::bounds::bounded::Bounded;
+use crate::output_error::bounds::coloured::{self, ResidualNoise};
 use crate::output_error::case::Case;
 use crate::output_error::likelihood::cost::sums;
 
-/// Parameters to be held or estimated: what the data say of all of them together, and how well some
-/// of them are known from elsewhere.
+/// Information on all parameters that may be held or estimated, with the uncertainty of their
+/// tunnel values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidates {
+pub struct HoldingCandidates {
     information: DMatrix<f64>,
-    /// Σ Sᵀ W R W S.
-    scatter: DMatrix<f64>,
-    /// Standard uncertainty of the value a parameter may be held at; none for one that may not be
-    /// held.
+    /// Covariance Σ Sᵀ W R W S of the gradient.
+    gradient_covariance: DMatrix<f64>,
+    /// Standard uncertainty of the tunnel value; `None` for a parameter that may not be held.
     uncertainty: Vec<Option<f64>>,
     max_condition_number: f64,
 }
 
-/// Why a parameter is better held, all others being as they are.
+/// Reason to hold a parameter, all others being as they are.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Because {
-    /// The data do not feel it: its regressor did not move.
-    NotFelt,
+pub enum HoldingReason {
+    /// Its regressor did not move: the data do not depend on it.
+    NotExcited,
     /// Free, it would take part in a direction that the data do not determine, with these others.
-    NotToldApart(Vec<usize>),
-    /// Free, its bound would be larger than the uncertainty of the value it is held at. The
-    /// estimate it would correlate with most, and how.
+    NotSeparable(Vec<usize>),
+    /// Free, its bound would exceed the uncertainty of its tunnel value. `partner` is the estimate
+    /// it would correlate with most, with the correlation.
     Bound {
         bound: f64,
         uncertainty: f64,
@@ -55,66 +52,67 @@ pub enum Because {
     },
 }
 
-/// A parameter takes part in an undetermined direction when its share of the unit vector's square
-/// is at least this: a smaller part would hardly be determined by holding it.
-const TAKES_PART: f64 = 0.01;
+/// Share of an undetermined direction's unit square from which a parameter takes part. Holding one
+/// with a smaller part would hardly determine the direction.
+const DIRECTION_SHARE: f64 = 0.01;
 
-/// What a set of free parameters knows of itself.
-enum Known {
+/// Identifiability of a set of free parameters.
+enum FreeSet {
     Determined {
         bounds: DVector<f64>,
         inverse: DMatrix<f64>,
     },
-    /// The least determined direction, in the parameters' units; zero where one takes no part.
+    /// Least determined direction, in the parameters' units; zero where a parameter takes no part.
     Undetermined(DVector<f64>),
 }
 
-impl Candidates {
-    /// What the data say of a case with all parameters free at `values`; none where its integration
-    /// diverges.
+impl HoldingCandidates {
+    /// Gathers the information on a case with all parameters free at `values`; `None` where its
+    /// integration diverges.
     ///
-    /// The noise is best that of the fit that holds least: with more held, residuals are errors of
-    /// the held values too, and would make the data look worse than they are.
+    /// The noise is best taken from the fit that holds least. With more held, residuals contain
+    /// errors of the held values, and the data would appear worse than they are.
     #[must_use]
     pub fn gather<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
         values: &[f64],
-        noise: &Noise,
+        noise: &ResidualNoise,
         weights: &[f64; OUTPUTS],
         uncertainty: Vec<Option<f64>>,
         max_condition_number: f64,
-    ) -> Option<Candidates> {
+    ) -> Option<HoldingCandidates> {
         let mut response = case.response();
         case.respond(values, &mut response).ok()?;
         let information = sums(&response, weights).information;
-        let scatter = coloured::gradient_covariance(&case.series(&response, weights), noise);
-        Some(Candidates {
+        let gradient_covariance =
+            coloured::gradient_covariance(&case.series(&response, weights), noise);
+        Some(HoldingCandidates {
             information,
-            scatter,
+            gradient_covariance,
             uncertainty,
             max_condition_number,
         })
     }
 
-    /// What must be held besides `held` for the data to determine the rest, as far as it may be
+    /// Holds parameters besides `held` until the data determine the rest, as far as they may be
     /// held.
     #[must_use]
-    pub fn determined(&self, mut held: Vec<bool>) -> Vec<bool> {
-        while let Some(lost) = self.undetermined(&held) {
+    pub fn hold_undetermined(&self, mut held: Vec<bool>) -> Vec<bool> {
+        while let Some(lost) = self.first_undetermined(&held) {
             held[lost] = true;
         }
         held
     }
 
-    /// Which parameters to hold, from those `held` so far. `released` remembers which have been
-    /// freed again: a second time none is.
+    /// Chooses the parameters to hold, starting from `held`. `released` marks those that were freed
+    /// before; none is freed twice.
     #[must_use]
-    pub fn settle(&self, mut held: Vec<bool>, released: &mut [bool]) -> Vec<bool> {
+    pub fn choose(&self, mut held: Vec<bool>, released: &mut [bool]) -> Vec<bool> {
         loop {
-            while let Some(worst) = self.worst(&held) {
-                held[worst] = true;
+            while let Some(next) = self.next_to_hold(&held) {
+                held[next] = true;
             }
-            match self.wrongly_held(&held, released) {
+            match self.next_to_free(&held, released) {
                 Some(j) => {
                     held[j] = false;
                     released[j] = true;
@@ -124,27 +122,29 @@ impl Candidates {
         }
     }
 
-    /// Why a held parameter is held; none where, freed alone, it would be determined better than by
-    /// what it is held at.
+    /// Reason to hold a held parameter; `None` if, freed alone, its bound would be below the
+    /// tunnel's uncertainty.
     #[must_use]
-    pub fn because(&self, held: &[bool], parameter: usize) -> Option<Because> {
+    pub fn reason(&self, held: &[bool], parameter: usize) -> Option<HoldingReason> {
         if self.information[(parameter, parameter)] <= 0.0 {
-            return Some(Because::NotFelt);
+            return Some(HoldingReason::NotExcited);
         }
         let mut freed = held.to_vec();
         freed[parameter] = false;
         let free = indices(&freed, false);
         let at = free.iter().position(|&j| j == parameter)?;
-        match self.known(&free) {
-            Known::Undetermined(direction) if direction[at] != 0.0 => {
+        match self.free_set(&free) {
+            FreeSet::Undetermined(direction) if direction[at] != 0.0 => {
                 let others = free
                     .iter()
                     .enumerate()
                     .filter(|(i, _)| *i != at && direction[*i] != 0.0);
-                Some(Because::NotToldApart(others.map(|(_, &j)| j).collect()))
+                Some(HoldingReason::NotSeparable(
+                    others.map(|(_, &j)| j).collect(),
+                ))
             }
-            Known::Undetermined(_) => None,
-            Known::Determined { bounds, inverse } => {
+            FreeSet::Undetermined(_) => None,
+            FreeSet::Determined { bounds, inverse } => {
                 let uncertainty = self.uncertainty[parameter]?;
                 let unit = scale(&inverse);
                 let correlation = |i: usize| inverse[(i, at)] * unit[i] * unit[at];
@@ -153,7 +153,7 @@ impl Candidates {
                     .max_by(|&a, &b| correlation(a).abs().total_cmp(&correlation(b).abs()))
                     .map(|i| (free[i], correlation(i)));
                 let bound = bounds[at];
-                (bound > uncertainty).then_some(Because::Bound {
+                (bound > uncertainty).then_some(HoldingReason::Bound {
                     bound,
                     uncertainty,
                     partner,
@@ -162,33 +162,36 @@ impl Candidates {
         }
     }
 
-    /// The free parameter that is not felt, or of an undetermined direction the one that the tunnel
-    /// knows best along it.
-    fn undetermined(&self, held: &[bool]) -> Option<usize> {
+    /// Free parameter that is not excited; else, in an undetermined direction, the one with the
+    /// most accurate tunnel value along it.
+    fn first_undetermined(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
         let silent =
             |j: &usize| self.uncertainty[*j].is_some() && self.information[(*j, *j)] <= 0.0;
         match free.iter().copied().find(silent) {
             Some(j) => Some(j),
-            None => match self.known(&free) {
-                Known::Undetermined(direction) => self.largest_ratio(&free, &direction.abs(), 0.0),
-                Known::Determined { .. } => None,
+            None => match self.free_set(&free) {
+                FreeSet::Undetermined(direction) => {
+                    self.largest_ratio(&free, &direction.abs(), 0.0)
+                }
+                FreeSet::Determined { .. } => None,
             },
         }
     }
 
-    /// The free parameter that is best held: an undetermined one, or that of the largest ratio
-    /// above one.
-    fn worst(&self, held: &[bool]) -> Option<usize> {
+    /// Free parameter to hold next: an undetermined one, or the one with the largest ratio above
+    /// one.
+    fn next_to_hold(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
-        self.undetermined(held).or_else(|| match self.known(&free) {
-            Known::Determined { bounds, .. } => self.largest_ratio(&free, &bounds, 1.0),
-            Known::Undetermined(_) => None,
-        })
+        self.first_undetermined(held)
+            .or_else(|| match self.free_set(&free) {
+                FreeSet::Determined { bounds, .. } => self.largest_ratio(&free, &bounds, 1.0),
+                FreeSet::Undetermined(_) => None,
+            })
     }
 
-    /// Of the parameters that may be held that of the largest size over the tunnel's uncertainty,
-    /// above a limit.
+    /// Parameter that may be held with the largest size relative to the tunnel's uncertainty, above
+    /// a limit.
     fn largest_ratio(&self, free: &[usize], sizes: &DVector<f64>, limit: f64) -> Option<usize> {
         let ratios = free
             .iter()
@@ -200,16 +203,16 @@ impl Candidates {
             .map(|(j, _)| j)
     }
 
-    /// The held parameter of the smallest ratio, below one, that has not been freed yet.
-    fn wrongly_held(&self, held: &[bool], released: &[bool]) -> Option<usize> {
+    /// Held parameter with the smallest ratio below one, unless freed before.
+    fn next_to_free(&self, held: &[bool], released: &[bool]) -> Option<usize> {
         let ratio = |j: usize| {
             let mut freed = held.to_vec();
             freed[j] = false;
             let free = indices(&freed, false);
             let at = free.iter().position(|&i| i == j)?;
-            match self.known(&free) {
-                Known::Determined { bounds, .. } => Some(bounds[at] / self.uncertainty[j]?),
-                Known::Undetermined(_) => None,
+            match self.free_set(&free) {
+                FreeSet::Determined { bounds, .. } => Some(bounds[at] / self.uncertainty[j]?),
+                FreeSet::Undetermined(_) => None,
             }
         };
         let candidates = indices(held, true)
@@ -222,13 +225,13 @@ impl Candidates {
             .map(|(j, _)| j)
     }
 
-    fn known(&self, free: &[usize]) -> Known {
+    fn free_set(&self, free: &[usize]) -> FreeSet {
         let part = |m: &DMatrix<f64>| {
             DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i], free[j])])
         };
         let own = part(&self.information);
         if own.is_empty() {
-            return Known::Determined {
+            return FreeSet::Determined {
                 bounds: DVector::zeros(0),
                 inverse: own,
             };
@@ -238,8 +241,8 @@ impl Candidates {
         let least = eigen.eigenvalues.imin();
         if eigen.eigenvalues[least] <= eigen.eigenvalues.max() / self.max_condition_number {
             let vector = eigen.eigenvectors.column(least);
-            let takes_part = |v: f64| if v * v >= TAKES_PART { v } else { 0.0 };
-            return Known::Undetermined(DVector::from_fn(free.len(), |i, _| {
+            let takes_part = |v: f64| if v * v >= DIRECTION_SHARE { v } else { 0.0 };
+            return FreeSet::Undetermined(DVector::from_fn(free.len(), |i, _| {
                 takes_part(vector[i]) * unit[i]
             }));
         }
@@ -247,8 +250,8 @@ impl Candidates {
             * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
             * eigen.eigenvectors.transpose();
         let inverse = scaled(&inverse, &unit);
-        let covariance = &inverse * part(&self.scatter) * &inverse;
-        Known::Determined {
+        let covariance = &inverse * part(&self.gradient_covariance) * &inverse;
+        FreeSet::Determined {
             bounds: covariance.diagonal().map(f64::sqrt),
             inverse,
         }
@@ -269,46 +272,46 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// White noise of unit variance and weight: the scatter is the information.
-    fn evidence(information: DMatrix<f64>, uncertainty: Vec<Option<f64>>) -> Candidates {
-        Candidates {
-            scatter: information.clone(),
+    /// HoldingCandidates under white noise of unit variance and weight: the gradient's covariance is the
+    /// information.
+    fn candidates(information: DMatrix<f64>, uncertainty: Vec<Option<f64>>) -> HoldingCandidates {
+        HoldingCandidates {
+            gradient_covariance: information.clone(),
             information,
             uncertainty,
             max_condition_number: 1e10,
         }
     }
 
-    fn settled(evidence: &Candidates) -> Vec<bool> {
-        let n = evidence.uncertainty.len();
-        evidence.settle(vec![false; n], &mut vec![false; n])
+    fn chosen(candidates: &HoldingCandidates) -> Vec<bool> {
+        let n = candidates.uncertainty.len();
+        candidates.choose(vec![false; n], &mut vec![false; n])
     }
 
-    /// Two parameters that correlate by ρ = 0.9, of bound 1/√(1-ρ²) = 2.29 when both are free and 1
-    /// when alone.
-    fn pair(first: Option<f64>, second: Option<f64>) -> Candidates {
-        evidence(
+    /// Two parameters that correlate by ρ = 0.9. The bound is 1/√(1-ρ²) = 2.29 with both free, and
+    /// 1 alone.
+    fn pair(first: Option<f64>, second: Option<f64>) -> HoldingCandidates {
+        candidates(
             DMatrix::from_row_slice(2, 2, &[1.0, 0.9, 0.9, 1.0]),
             vec![first, second],
         )
     }
 
     #[test]
-    fn what_the_maneuver_knows_better_than_the_tunnel_is_estimated() {
-        assert_eq!(settled(&pair(Some(2.4), Some(2.4))), [false, false]);
+    fn parameters_with_bounds_below_the_tunnel_s_are_estimated() {
+        assert_eq!(chosen(&pair(Some(2.4), Some(2.4))), [false, false]);
     }
 
     #[test]
-    fn of_two_that_correlate_the_one_that_the_tunnel_knows_best_is_held_and_the_other_is_then_free()
-    {
-        // The second's bound, with the first held, is 1: below the tunnel's 1.2.
+    fn of_two_correlated_parameters_the_one_with_the_better_tunnel_value_is_held() {
+        // With the first held, the second's bound is 1: below the tunnel's 1.2.
         let e = pair(Some(0.5), Some(1.2));
-        assert_eq!(settled(&e), [true, false]);
-        let Some(Because::Bound {
+        assert_eq!(chosen(&e), [true, false]);
+        let Some(HoldingReason::Bound {
             bound,
             uncertainty,
             partner,
-        }) = e.because(&[true, false], 0)
+        }) = e.reason(&[true, false], 0)
         else {
             panic!()
         };
@@ -320,50 +323,50 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_what_is_held_is_no_reason_to_hold_the_next() {
-        // With the first held at ±1.0 the second is off by √(1 + 0.9²) = 1.35, more than the
-        // tunnel's 1.2, but from noise by 1 only: it takes up the error of the first.
-        assert_eq!(settled(&pair(Some(1.0), Some(1.2))), [true, false]);
-        assert_eq!(settled(&pair(Some(0.95), Some(0.9))), [true, true]);
+    fn errors_of_held_values_do_not_cause_the_next_to_be_held() {
+        // With the first held at ±1.0 the second is in error by √(1 + 0.9²) = 1.35, above the
+        // tunnel's 1.2. Its error from noise is 1 only: it absorbs the error of the first.
+        assert_eq!(chosen(&pair(Some(1.0), Some(1.2))), [true, false]);
+        assert_eq!(chosen(&pair(Some(0.95), Some(0.9))), [true, true]);
     }
 
     #[test]
-    fn what_cannot_be_held_is_free_however_badly_it_is_determined() {
-        assert_eq!(settled(&pair(None, None)), [false, false]);
-        assert_eq!(settled(&pair(None, Some(1e-3))), [false, true]);
+    fn parameters_without_a_tunnel_value_stay_free() {
+        assert_eq!(chosen(&pair(None, None)), [false, false]);
+        assert_eq!(chosen(&pair(None, Some(1e-3))), [false, true]);
     }
 
     #[test]
-    fn of_two_that_are_proportional_one_is_held_and_said_not_to_be_told_apart() {
-        let e = evidence(
+    fn one_of_two_proportional_parameters_is_held_as_not_separable() {
+        let e = candidates(
             DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 4.0]),
             vec![Some(50.0), Some(20.0)],
         );
-        // Along the undetermined direction (2, -1) the tunnel's uncertainties are passed at 50/2
-        // and 20/1: the second first.
-        assert_eq!(settled(&e), [false, true]);
+        // Along the undetermined direction (2, -1) the tunnel's ratios are 50/2 and 20/1: the
+        // second is held.
+        assert_eq!(chosen(&e), [false, true]);
         assert_eq!(
-            e.because(&[false, true], 1),
-            Some(Because::NotToldApart(vec![0]))
+            e.reason(&[false, true], 1),
+            Some(HoldingReason::NotSeparable(vec![0]))
         );
     }
 
     #[test]
-    fn what_the_data_do_not_feel_is_held() {
-        let e = evidence(
+    fn a_parameter_without_excitation_is_held() {
+        let e = candidates(
             DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]),
             vec![Some(10.0), Some(10.0)],
         );
-        assert_eq!(settled(&e), [false, true]);
-        assert_eq!(e.because(&[false, true], 1), Some(Because::NotFelt));
+        assert_eq!(chosen(&e), [false, true]);
+        assert_eq!(e.reason(&[false, true], 1), Some(HoldingReason::NotExcited));
     }
 
     #[test]
-    fn one_that_was_held_for_another_s_sake_is_freed_again_once() {
+    fn a_wrongly_held_parameter_is_freed_once() {
         let e = pair(Some(0.5), Some(1.2));
         let mut released = vec![false; 2];
-        assert_eq!(e.settle(vec![true, true], &mut released), [true, false]);
+        assert_eq!(e.choose(vec![true, true], &mut released), [true, false]);
         assert_eq!(released, [false, true]);
-        assert_eq!(e.settle(vec![true, true], &mut released), [true, true]);
+        assert_eq!(e.choose(vec![true, true], &mut released), [true, true]);
     }
 }

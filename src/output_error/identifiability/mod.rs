@@ -1,4 +1,5 @@
-//! How well the data separate the parameters, and the parameters to hold.
+//! Identifiability: collinearity of the parameters ([`collinearity`]), and the parameters that are
+//! better held than estimated ([`holding`]).
 
 pub mod collinearity;
 pub mod holding;

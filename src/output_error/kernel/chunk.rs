@@ -1,4 +1,4 @@
-//! A chunk of points: its coefficients, and its regressors in the rows that the lanes read.
+//! One chunk of points: the build-up, and the regressors in the rows that the lanes read.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -12,23 +12,48 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::case::Case;
-use crate::output_error::case::build_up::Term;
-use crate::output_error::case::chunking::{POINTS, Spaced, WHOLE};
+use crate::output_error::case::build_up::ValuedTerm;
+use crate::output_error::case::chunking::{PADDED_POINTS, POINTS, Strided};
 
-/// The three coefficients at the points of a chunk.
+/// Build-up at the points of a chunk: c = offset + slope · x.
 #[repr(align(64))]
-pub(crate) struct Near<const NX: usize> {
-    pub offset: [[f64; WHOLE]; COEFFICIENTS],
-    pub slope: [[[f64; WHOLE]; NX]; COEFFICIENTS],
+pub(crate) struct ChunkBuildUp<const NX: usize> {
+    pub offset: [[f64; PADDED_POINTS]; COEFFICIENTS],
+    pub slope: [[[f64; PADDED_POINTS]; NX]; COEFFICIENTS],
 }
 
-impl<const NX: usize> Near<NX> {
-    pub const NONE: Near<NX> = Near {
-        offset: [[0.0; WHOLE]; COEFFICIENTS],
-        slope: [[[0.0; WHOLE]; NX]; COEFFICIENTS],
+impl<const NX: usize> ChunkBuildUp<NX> {
+    pub const ZERO: ChunkBuildUp<NX> = ChunkBuildUp {
+        offset: [[0.0; PADDED_POINTS]; COEFFICIENTS],
+        slope: [[[0.0; PADDED_POINTS]; NX]; COEFFICIENTS],
     };
 
-    /// Their values at one of the points when the state is x.
+    /// Sums the build-up of the held and the free derivatives at some points.
+    #[inline(always)]
+    pub fn set<E: Equations<NX>>(
+        &mut self,
+        case: &Case<NX, E>,
+        free: &[ValuedTerm],
+        points: Strided,
+    ) {
+        for k in 0..COEFFICIENTS {
+            self.offset[k].fill(0.0);
+            add(1.0, &case.held.offset[k], points, &mut self.offset[k]);
+            for &i in E::REGRESSOR_STATES {
+                self.slope[k][i].fill(0.0);
+                add(1.0, &case.held.slope[k][i], points, &mut self.slope[k][i]);
+            }
+        }
+        for ValuedTerm { term, value } in free {
+            let sum = match term.state {
+                Some(state) => &mut self.slope[term.coefficient][state],
+                None => &mut self.offset[term.coefficient],
+            };
+            add(*value, &case.columns[term.column], points, sum);
+        }
+    }
+
+    /// Coefficients at one of the points and the state x.
     #[inline(always)]
     pub fn coefficients<E: Equations<NX>>(
         &self,
@@ -38,19 +63,18 @@ impl<const NX: usize> Near<NX> {
         let mut values = [0.0; COEFFICIENTS];
         for k in 0..COEFFICIENTS {
             values[k] = self.offset[k][point];
-            // The first state last: it is the one that the sum would wait for.
-            for &i in E::FOLLOWED.iter().rev() {
+            // The first state last: the integration delivers it last.
+            for &i in E::REGRESSOR_STATES.iter().rev() {
                 values[k] = self.slope[k][i][point].mul_add(x[i], values[k]);
             }
         }
         values
     }
-}
 
-impl<const NX: usize> Near<NX> {
-    /// Slopes along states, with those through the coefficients added.
+    /// Total slopes along the states: those at constant coefficients and those through the
+    /// coefficients. `places` are the entries of `by_coefficient` that can differ from zero.
     #[inline(always)]
-    pub fn through<E: Equations<NX>, const N: usize>(
+    pub fn total_slopes<E: Equations<NX>, const N: usize>(
         &self,
         point: usize,
         mut by_state: SMatrix<f64, N, NX>,
@@ -58,7 +82,7 @@ impl<const NX: usize> Near<NX> {
         places: &[(usize, usize)],
     ) -> SMatrix<f64, N, NX> {
         for &(i, k) in places {
-            for &j in E::FOLLOWED {
+            for &j in E::REGRESSOR_STATES {
                 by_state[(i, j)] =
                     by_coefficient[(i, k)].mul_add(self.slope[k][j][point], by_state[(i, j)]);
             }
@@ -67,50 +91,32 @@ impl<const NX: usize> Near<NX> {
     }
 }
 
-impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// The coefficients at the points of a chunk.
-    #[inline(always)]
-    pub(crate) fn near(&self, terms: &[Term], points: Spaced, near: &mut Near<NX>) {
-        for k in 0..COEFFICIENTS {
-            near.offset[k].fill(0.0);
-            add(1.0, &self.held.offset[k], points, &mut near.offset[k]);
-            for &i in E::FOLLOWED {
-                near.slope[k][i].fill(0.0);
-                add(1.0, &self.held.slope[k][i], points, &mut near.slope[k][i]);
-            }
-        }
-        for Term { acting, value } in terms {
-            let sum = match acting.along {
-                Some(state) => &mut near.slope[acting.coefficient][state],
-                None => &mut near.offset[acting.coefficient],
-            };
-            add(*value, &self.columns[acting.column], points, sum);
-        }
-    }
-
-    /// What the derivatives multiply at the points of a chunk, in the rows that the lanes read.
-    #[inline(always)]
-    pub(crate) fn spread(&self, points: Spaced, rows: &mut [f64]) {
-        for &(place, column) in &self.lanes.columns {
-            let column = &self.columns[column][points.first..][..=points.stride * (POINTS - 1)];
-            for k in 0..POINTS {
-                rows[k * self.lanes.row + place] = column[k * points.stride];
-            }
+/// Copies the regressors at the points of a chunk into rows in the order of the lanes.
+#[inline(always)]
+pub(crate) fn fill_regressor_rows<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    points: Strided,
+    rows: &mut [f64],
+) {
+    for &(place, column) in &case.layout.columns {
+        let column = &case.columns[column][points.first..][..=points.stride * (POINTS - 1)];
+        for k in 0..POINTS {
+            rows[k * case.layout.row + place] = column[k * points.stride];
         }
     }
 }
 
-/// Adds a value times a column's points; a column that is empty is zero throughout.
+/// Adds a value times a column at some points; an empty column is zero throughout.
 #[inline(always)]
-fn add(value: f64, column: &[f64], points: Spaced, sum: &mut [f64; WHOLE]) {
+fn add(value: f64, column: &[f64], points: Strided, sum: &mut [f64; PADDED_POINTS]) {
     let Some(column) = column.get(points.first..) else {
         return;
     };
     if points.stride == 1 {
-        let Some(column) = column.first_chunk::<WHOLE>() else {
+        let Some(column) = column.first_chunk::<PADDED_POINTS>() else {
             return;
         };
-        for k in 0..WHOLE {
+        for k in 0..PADDED_POINTS {
             sum[k] = value.mul_add(column[k], sum[k]);
         }
     } else {

@@ -1,16 +1,14 @@
-//! The inner loop: one pass over a maneuver integrates the states, and beside them the
-//! sensitivities of all parameters.
+//! One pass over a maneuver: the states, and the sensitivities of all parameters beside them.
 //!
-//! A pass goes chunk by chunk. The states themselves are a chain of dependent operations
-//! ([`Course`]); what it leaves of each stage becomes the propagators of all its steps side by side
-//! ([`Propagators`]); with them all sensitivities take a step at once, s ← Φ s + Σ Γ_jk r_j over
-//! the stages j, k being the coefficient of a derivative and r its regressor, and outputs read y =
-//! C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`Lanes`]).
-//! While the sink sums what one chunk left, the states of the next one move on: the chain waits for
-//! itself, the sums do not.
+//! A pass goes chunk by chunk. The [`Trajectory`] integrates the states and records the slopes of
+//! each stage. [`Propagators`] turn the slopes into matrices for all steps of the chunk side by side.
+//! With them all sensitivities take a step at once, s ← Φ s + Σ_j Γ_jk r_j over the stages j, where k
+//! is the coefficient of a derivative and r its regressor. Outputs have the sensitivities
+//! C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`LaneLayout`]).
+//! While the sink sums one chunk, the trajectory of the next one advances between the rows.
 //!
-//! Compiled for several widths of vectors, chosen when the program runs. Each lane is computed
-//! alike in all of them, with fused multiplication, so the width does not show in the results.
+//! The loops are compiled for several widths of vectors and chosen when the program runs. Each lane
+//! is computed alike in all of them, with fused multiplication, so every width gives the same bits.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"
@@ -23,44 +21,42 @@
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::chunk::Near;
+use super::chunk::{ChunkBuildUp, fill_regressor_rows};
 use super::propagators::Propagators;
-use super::trajectory::{Course, Path};
+use super::trajectory::{StageHistory, Trajectory};
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
-use crate::numerics::row_products::Meanwhile;
+use crate::numerics::row_products::Interleaved;
 use crate::numerics::runge_kutta::{POINT, STAGES};
-use crate::numerics::simd::load;
-use crate::numerics::simd::{Aligned, VECTOR};
-use crate::output_error::case::chunking::{CHUNK, Spaced};
-use crate::output_error::case::chunking::{POINTS, WIDEST_STRIDE};
-use crate::output_error::case::layout::Lanes;
+use crate::numerics::simd::{AlignedBuffer, VECTOR, load};
+use crate::output_error::case::build_up::ValuedTerm;
+use crate::output_error::case::chunking::{CHUNK, POINTS, Strided, WIDEST_STRIDE};
+use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::case::{Case, InitialState};
 
-/// The integration left every bound of sense: these parameters describe no flight.
+/// End of an integration whose state left all bounds: the parameters describe no flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Diverged {
     pub sample: usize,
 }
 
-/// What becomes of the sensitivities of the outputs.
+/// Consumer of the outputs' sensitivities.
 pub(crate) trait Sink {
-    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by
-    /// output one row of lanes. Nobody needs the rows afterwards. There is something to do
-    /// meanwhile.
+    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by output
+    /// one row of lanes. The sink may overwrite the rows, and interleaves the other work.
     fn take<S: Simd>(
         &mut self,
         simd: S,
-        samples: Spaced,
+        samples: Strided,
         outputs: &[[f64; OUTPUTS]],
         rows: &mut [f64],
-        meanwhile: &mut impl Meanwhile,
+        interleaved: &mut impl Interleaved,
     );
 }
 
-/// One pass.
+/// One pass, ready to be run with the vectors of some width.
 pub(crate) struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
     case: &'a Case<NX, E>,
-    parameters: &'a [f64],
+    terms: Vec<ValuedTerm>,
     start: SVector<f64, NX>,
     biases: [f64; OUTPUTS],
     stride: usize,
@@ -69,46 +65,52 @@ pub(crate) struct Pass<'a, const NX: usize, E: Equations<NX>, K: Sink> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// Integrates with these parameters in steps of `stride` samples: outputs to the front of
+    /// Integrates with these parameters in steps of `stride` samples. Outputs go to the front of
     /// `outputs`, sensitivities to the sink.
     ///
     /// # Errors
-    /// [`Diverged`] when the state leaves the bounds of sense or is no number.
-    pub(crate) fn pass(
+    /// [`Diverged`] when the state leaves its bounds or is not a number.
+    pub(crate) fn run_pass(
         &self,
         parameters: &[f64],
         stride: usize,
         outputs: &mut [[f64; OUTPUTS]],
         sink: &mut impl Sink,
     ) -> Result<(), Diverged> {
-        Arch::new().dispatch(self.prepared(parameters, stride, outputs, sink))
+        Arch::new().dispatch(self.prepare_pass(parameters, stride, outputs, sink))
     }
 
-    /// The same, yet to be done with the vectors of some width.
-    pub(crate) fn prepared<'a, K: Sink>(
+    /// Prepares the pass of [`Case::run_pass`].
+    pub(crate) fn prepare_pass<'a, K: Sink>(
         &'a self,
-        parameters: &'a [f64],
+        parameters: &[f64],
         stride: usize,
         outputs: &'a mut [[f64; OUTPUTS]],
         sink: &'a mut K,
     ) -> Pass<'a, NX, E, K> {
         let mut biases = [0.0; OUTPUTS];
-        for (&o, bias) in self.biased.iter().zip(&parameters[self.derivatives()..]) {
+        let values = &parameters[self.derivatives()..];
+        for (&o, bias) in self.biased_outputs.iter().zip(values) {
             biases[o] += bias;
         }
-        let first = self.parameters() - NX.min(self.parameters());
-        let start = match self.initial_state {
-            InitialState::Measured => self.start,
-            InitialState::Estimated => SVector::from_fn(|i, _| parameters[first + i]),
-        };
         Pass {
             case: self,
-            parameters,
-            start,
+            terms: self.valued_terms(parameters).collect(),
+            start: self.start_state(parameters),
             biases,
             stride: stride.clamp(1, WIDEST_STRIDE),
             outputs,
             sink,
+        }
+    }
+
+    fn start_state(&self, parameters: &[f64]) -> SVector<f64, NX> {
+        match self.initial_state {
+            InitialState::Measured => self.start,
+            InitialState::Estimated => {
+                let first = self.parameters() - NX;
+                SVector::from_fn(|i, _| parameters[first + i])
+            }
         }
     }
 }
@@ -118,141 +120,138 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(), Diverged> {
-        let (case, lanes, stride) = (self.case, &self.case.lanes, self.stride);
+        let (case, layout, stride) = (self.case, &self.case.layout, self.stride);
         let samples = case.samples().div_ceil(stride);
         let length = |first: usize| CHUNK.min(samples - first);
-        let mut sensitivities = at_start::<NX>(case.initial_state, lanes);
+        let mut sensitivities = initial_sensitivities::<NX>(case.initial_state, layout);
         let sensitivities = sensitivities.slice_mut();
-        let row = OUTPUTS * lanes.width();
-        let mut rows = Aligned::zeros(CHUNK * row);
+        let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
         let rows = rows.slice_mut();
-        let mut regressors = Aligned::zeros(POINTS * lanes.row);
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
         let regressors = regressors.slice_mut();
-        let terms = case.terms(self.parameters);
-        let mut near = Near::<NX>::NONE;
-        let mut paths = [Path::<NX>::NONE; 2];
-        let mut propagators = Propagators::<NX>::NONE;
+        let mut build_up = ChunkBuildUp::<NX>::ZERO;
+        let mut histories = [StageHistory::<NX>::EMPTY; 2];
+        let mut propagators = Propagators::<NX>::ZERO;
         let mut x = self.start;
         if samples > 0 {
-            let points = Spaced { first: 0, stride };
-            case.near(&terms, points, &mut near);
-            let mut course = Course::new(case, &near, &mut paths[0], x, points, length(0));
-            course.finish();
-            x = course.state();
+            let points = Strided { first: 0, stride };
+            build_up.set(case, &self.terms, points);
+            let [history, _] = &mut histories;
+            x = Trajectory::new(case, &build_up, history, x, points, length(0)).finish();
         }
         for (chunk, first) in (0..samples).step_by(CHUNK).enumerate() {
-            // What one chunk left is read while the states of the next one leave theirs beside it.
-            let [even, odd] = &mut paths;
-            let (path, ahead) = if chunk % 2 == 0 {
+            // The history of this chunk is read while the next chunk's is written.
+            let [even, odd] = &mut histories;
+            let (history, next_history) = if chunk % 2 == 0 {
                 (&*even, odd)
             } else {
                 (&*odd, even)
             };
             let count = length(first);
-            if let Some(sample) = path.senseless(count) {
+            if let Some(sample) = history.first_out_of_bounds(count) {
                 return Err(Diverged {
                     sample: stride * (first + sample),
                 });
             }
             for k in 0..count {
-                let y = propagators.read(case, &near, path, stride * (first + k), k);
+                let sample = stride * (first + k);
+                let y = propagators.read_outputs(case, &build_up, history, sample, k);
                 for o in 0..OUTPUTS {
                     self.outputs[first + k][o] = y[o] + self.biases[o];
                 }
             }
-            propagators.set::<S, E>(simd, path, count, stride as f64 * case.step_s);
-            case.spread(
-                Spaced {
-                    first: 2 * stride * first,
-                    stride,
-                },
-                regressors,
-            );
+            propagators.set_steps::<S, E>(simd, history, count, stride as f64 * case.step_s);
+            let points = Strided {
+                first: 2 * stride * first,
+                stride,
+            };
+            fill_regressor_rows(case, points, regressors);
             let next = first + count;
-            let left = if next < samples { length(next) } else { 0 };
-            let points = Spaced {
+            let next_count = if next < samples { length(next) } else { 0 };
+            let next_points = Strided {
                 first: 2 * stride * next.min(samples - 1),
                 stride,
             };
-            case.near(&terms, points, &mut near);
-            let mut course = Course::new(case, &near, ahead, x, points, left);
-            let mut work = Work {
+            build_up.set(case, &self.terms, next_points);
+            let mut trajectory =
+                Trajectory::new(case, &build_up, next_history, x, next_points, next_count);
+            let mut propagation = Propagation {
                 simd,
-                lanes,
+                layout,
                 regressors: S::as_simd_f64s(regressors).0,
                 sensitivities: S::as_mut_simd_f64s(sensitivities).0,
                 rows: S::as_mut_simd_f64s(rows).0,
-                path,
+                history,
                 propagators: &propagators,
                 count,
             };
-            work.all::<E>();
-            self.sink.take(
-                simd,
-                Spaced {
-                    first: stride * first,
-                    stride,
-                },
-                &self.outputs[first..next],
-                rows,
-                &mut course,
-            );
-            course.finish();
-            x = course.state();
+            propagation.run::<E>();
+            let samples = Strided {
+                first: stride * first,
+                stride,
+            };
+            let outputs = &self.outputs[first..next];
+            self.sink
+                .take(simd, samples, outputs, rows, &mut trajectory);
+            x = trajectory.finish();
         }
         Ok(())
     }
 }
 
-/// Zero, but one for each free initial state along itself.
-fn at_start<const NX: usize>(initial_state: InitialState, lanes: &Lanes) -> Aligned {
-    let mut sensitivities = Aligned::zeros(NX * lanes.width());
+/// Sensitivities at the first sample: one for each free initial state along itself, else zero.
+fn initial_sensitivities<const NX: usize>(
+    initial_state: InitialState,
+    layout: &LaneLayout,
+) -> AlignedBuffer {
+    let mut sensitivities = AlignedBuffer::zeros(NX * layout.width());
     if initial_state == InitialState::Estimated {
         for i in 0..NX {
-            sensitivities.slice_mut()[i * lanes.width() + lanes.derivatives() + i] = 1.0;
+            let lane = layout.first_initial_state() + i;
+            sensitivities.slice_mut()[i * layout.width() + lane] = 1.0;
         }
     }
     sensitivities
 }
 
-/// A chunk's work on the lanes.
-struct Work<'a, S: Simd, const NX: usize> {
+/// Propagation of all sensitivities over a chunk.
+struct Propagation<'a, S: Simd, const NX: usize> {
     simd: S,
-    lanes: &'a Lanes,
+    layout: &'a LaneLayout,
     /// Rows of regressors, point by point.
     regressors: &'a [S::f64s],
     sensitivities: &'a mut [S::f64s],
+    /// Sensitivities of the outputs: sample by sample, output by output a row of lanes.
     rows: &'a mut [S::f64s],
-    path: &'a Path<NX>,
+    history: &'a StageHistory<NX>,
     propagators: &'a Propagators<NX>,
     count: usize,
 }
 
-impl<S: Simd, const NX: usize> Work<'_, S, NX> {
-    /// Reads the sensors and takes the chunk's steps: the groups of all coefficients side by side,
-    /// so that the processor has several independent sums to work on, then that of the initial
-    /// states.
+impl<S: Simd, const NX: usize> Propagation<'_, S, NX> {
+    /// Propagates the groups of all coefficients side by side, so that the processor has several
+    /// independent sums, then the group of the initial states.
     #[inline(always)]
-    fn all<E: Equations<NX>>(&mut self) {
-        let (from, end) = (self.lanes.groups[0].start, self.lanes.groups[0].end);
+    fn run<E: Equations<NX>>(&mut self) {
+        let (from, end) = (self.layout.groups[0].start, self.layout.groups[0].end);
         for lane in (from..end).step_by(S::F64_LANES) {
-            self.bundle::<E, COEFFICIENTS>(lane, [0, 1, 2]);
+            self.propagate::<E, COEFFICIENTS>(lane, [0, 1, 2]);
         }
-        let initial = &self.lanes.groups[COEFFICIENTS];
+        let initial = &self.layout.groups[COEFFICIENTS];
         for lane in (0..initial.end - initial.start).step_by(S::F64_LANES) {
-            self.bundle::<E, 1>(lane, [COEFFICIENTS]);
+            self.propagate::<E, 1>(lane, [COEFFICIENTS]);
         }
     }
 
-    /// The vectors that begin at a lane of each of some groups, over the chunk.
+    /// Propagates one vector of each of some groups, which begins at a lane of the group.
     #[inline(always)]
-    fn bundle<E: Equations<NX>, const N: usize>(&mut self, lane: usize, groups: [usize; N]) {
-        let width = self.lanes.width();
+    fn propagate<E: Equations<NX>, const N: usize>(&mut self, lane: usize, groups: [usize; N]) {
+        let width = self.layout.width();
         let mut s = [[self.simd.splat_f64s(0.0); NX]; N];
         for n in 0..N {
             for i in 0..NX {
                 s[n][i] = self.sensitivities
-                    [(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES];
+                    [(i * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES];
             }
         }
         for k in 0..self.count {
@@ -260,25 +259,31 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
             let rows = &mut self.rows[k * OUTPUTS * width / S::F64_LANES..]
                 [..OUTPUTS * width / S::F64_LANES];
             for n in 0..N {
-                let y = read::<S, NX, E>(self.simd, groups[n], self.propagators, k, &s[n], r[n][0]);
+                let y = output_sensitivities::<S, NX, E>(
+                    self.simd,
+                    groups[n],
+                    self.propagators,
+                    k,
+                    &s[n],
+                    r[n][0],
+                );
                 for o in 0..OUTPUTS {
-                    rows[(o * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] =
+                    rows[(o * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES] =
                         y[o];
                 }
             }
-            s = step::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
+            s = next_sensitivities::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
         }
         for n in 0..N {
             for i in 0..NX {
                 self.sensitivities
-                    [(i * width + self.lanes.groups[groups[n]].start + lane) / S::F64_LANES] =
+                    [(i * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES] =
                     s[n][i];
             }
         }
     }
 
-    /// What the derivatives of some groups' lanes multiply at the stages of a step; nothing for
-    /// initial states.
+    /// Regressors of some groups' lanes at the stages of a step; zero for initial states.
     #[inline(always)]
     fn regressors_at<const N: usize>(
         &self,
@@ -292,12 +297,12 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
                 continue;
             }
             for stage in 0..STAGES {
-                let row = (2 * k + POINT[stage]) * self.lanes.row;
-                let regressor =
-                    self.regressors[(row + self.lanes.regressors[groups[n]] + lane) / S::F64_LANES];
+                let row = (2 * k + POINT[stage]) * self.layout.row;
+                let regressor = self.regressors
+                    [(row + self.layout.regressors[groups[n]] + lane) / S::F64_LANES];
                 r[n][stage] = if lane < VECTOR {
-                    self.simd
-                        .mul_f64s(regressor, load::<S>(&self.path.times[stage][k], lane))
+                    let factors = load::<S>(&self.history.factors[stage][k], lane);
+                    self.simd.mul_f64s(regressor, factors)
                 } else {
                     regressor
                 };
@@ -307,11 +312,11 @@ impl<S: Simd, const NX: usize> Work<'_, S, NX> {
     }
 }
 
-/// y = C s + D r for lanes of a coefficient.
+/// C s + D r for lanes of one group.
 #[inline(always)]
-fn read<S: Simd, const NX: usize, E: Equations<NX>>(
+fn output_sensitivities<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
-    coefficient: usize,
+    group: usize,
     at: &Propagators<NX>,
     k: usize,
     s: &[S::f64s; NX],
@@ -322,7 +327,7 @@ fn read<S: Simd, const NX: usize, E: Equations<NX>>(
         y[o] = simd.mul_add_f64s(simd.splat_f64s(at.c[o][i][k]), s[i], y[o]);
     }
     for &(o, c) in E::OUTPUTS_BY_COEFFICIENT {
-        if c == coefficient {
+        if c == group {
             y[o] = simd.mul_add_f64s(simd.splat_f64s(at.d[o][c][k]), r, y[o]);
         }
     }
@@ -331,7 +336,7 @@ fn read<S: Simd, const NX: usize, E: Equations<NX>>(
 
 /// Φ s + Σ Γ r for lanes of some groups.
 #[inline(always)]
-fn step<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
+fn next_sensitivities<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
     simd: S,
     groups: [usize; N],
     at: &Propagators<NX>,

@@ -1,93 +1,96 @@
-//! The computed response of a maneuver to a set of parameters: outputs, sums of the normal
-//! equations, and on demand the sensitivities themselves.
+//! Computed response of a maneuver to a set of parameters: outputs, sums of the normal equations, and
+//! on demand the sensitivities themselves.
 
 use pulp::Simd;
 
-use super::normal_equations::{Normal, Summing};
-use super::pass::Diverged;
-use super::pass::Sink;
+use super::normal_equations::{NormalAccumulator, NormalSums};
+use super::pass::{Diverged, Sink};
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::row_products::Meanwhile;
-use crate::numerics::simd::Aligned;
+use crate::numerics::row_products::Interleaved;
+use crate::numerics::simd::AlignedBuffer;
 use crate::output_error::case::Case;
-use crate::output_error::case::blocks::samples_of_block;
-use crate::output_error::case::chunking::{Spaced, WIDEST_STRIDE};
+use crate::output_error::case::blocks::samples_per_block;
+use crate::output_error::case::chunking::{Strided, WIDEST_STRIDE};
 
-/// Outputs at every sample and what the normal equations need; allocated once per maneuver and
-/// written over at every iteration.
+/// Outputs at every sample and the sums of the normal equations. Allocated once per maneuver and
+/// overwritten by every iteration.
 #[derive(Clone, Debug, Default)]
 pub struct Response {
     pub outputs: Vec<[f64; OUTPUTS]>,
-    pub(crate) normal: Normal,
+    pub(crate) sums: NormalSums,
 }
 
-/// How much of a maneuver a response looks at.
+/// Resolution of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Integrated in steps of about [`COARSE_STEP_S`] and compared at their ends only: near the
-    /// minimum, at a fraction of the work.
+    /// Steps of about [`COARSE_STEP_S`], compared at their ends only: near the minimum, at a
+    /// fraction of the work.
     Coarse,
-    /// Sample by sample.
+    /// Every sample.
     Whole,
 }
 
-/// Steps by which a maneuver's slow motion is followed well, though not its surfaces, s.
+/// Step of a coarse response, s: it follows the airframe's motion well, but not the surfaces.
 pub const COARSE_STEP_S: f64 = 0.1;
-/// So many samples a parameter are left at least.
-const SAMPLES_A_PARAMETER: usize = 8;
+/// Fewest samples per parameter of a coarse response.
+const SAMPLES_PER_PARAMETER: usize = 8;
 
-/// The slopes of every output along every parameter at every sample, zero where a sample does not
-/// count.
+/// Slopes of every output along every parameter at every sample; zero where a sample does not count.
 #[derive(Clone, Debug, Default)]
 pub struct Sensitivities {
-    /// Sample by sample, output by output a row of lanes.
-    rows: Aligned,
+    /// Rows of lanes: sample by sample, output by output.
+    rows: AlignedBuffer,
     pub(crate) width: usize,
-    /// The lane of each parameter.
+    /// Lane of each parameter.
     pub(crate) lanes: Vec<usize>,
 }
 
 impl Sensitivities {
-    /// The slope of one output at one sample along a parameter.
+    /// Slope of one output at one sample along a parameter.
     #[must_use]
     pub fn at(&self, sample: usize, output: usize, parameter: usize) -> f64 {
         self.row(sample, output)[self.lanes[parameter]]
     }
 
-    /// The lanes of one output at one sample.
+    /// Lanes of one output at one sample.
     pub(crate) fn row(&self, sample: usize, output: usize) -> &[f64] {
         &self.rows.slice()[(sample * OUTPUTS + output) * self.width..][..self.width]
     }
 }
 
-/// Keeps the rows of a pass.
-struct Keeping<'a> {
-    kept: &'a mut Sensitivities,
+/// Sink that keeps the rows of a pass.
+struct SensitivityRecorder<'a> {
+    sensitivities: &'a mut Sensitivities,
     used: &'a [[bool; OUTPUTS]],
-    /// The lane of each bias, and the output that it shifts.
+    /// Lane of each bias, and the output that it shifts.
     biases: Vec<(usize, usize)>,
 }
 
-impl Sink for Keeping<'_> {
+impl Sink for SensitivityRecorder<'_> {
     fn take<S: Simd>(
         &mut self,
         _: S,
-        samples: Spaced,
+        samples: Strided,
         outputs: &[[f64; OUTPUTS]],
         rows: &mut [f64],
-        _: &mut impl Meanwhile,
+        _: &mut impl Interleaved,
     ) {
-        let row = OUTPUTS * self.kept.width;
-        let kept = &mut self.kept.rows.slice_mut()[samples.first * row..][..outputs.len() * row];
-        kept.copy_from_slice(&rows[..outputs.len() * row]);
-        for (row, used) in kept.chunks_exact_mut(row).zip(&self.used[samples.first..]) {
-            for (o, row) in row.chunks_exact_mut(self.kept.width).enumerate() {
-                if used[o] {
-                    self.biases
-                        .iter()
-                        .for_each(|(lane, output)| row[*lane] = f64::from(u8::from(*output == o)));
-                } else {
+        let width = self.sensitivities.width;
+        let (first, length) = (
+            samples.first * OUTPUTS * width,
+            outputs.len() * OUTPUTS * width,
+        );
+        let kept = &mut self.sensitivities.rows.slice_mut()[first..first + length];
+        kept.copy_from_slice(&rows[..length]);
+        let used = self.used[samples.first..].iter();
+        for (kept, used) in kept.chunks_exact_mut(OUTPUTS * width).zip(used) {
+            for (o, row) in kept.chunks_exact_mut(width).enumerate() {
+                if !used[o] {
                     row.fill(0.0);
+                    continue;
+                }
+                for (lane, output) in &self.biases {
+                    row[*lane] = if *output == o { 1.0 } else { 0.0 };
                 }
             }
         }
@@ -95,33 +98,33 @@ impl Sink for Keeping<'_> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// A response of this case's size to write into.
+    /// Allocates a response of this case's size.
     #[must_use]
     pub fn response(&self) -> Response {
         Response {
             outputs: vec![[0.0; OUTPUTS]; self.samples()],
-            normal: Normal::new(
-                &self.lanes,
+            sums: NormalSums::new(
+                &self.layout,
                 self.derivatives(),
-                &self.biased,
+                &self.biased_outputs,
                 self.samples(),
-                samples_of_block(self.step_s),
+                samples_per_block(self.step_s),
             ),
         }
     }
 
-    /// Integrates the equations with these parameters into `response`.
+    /// Computes the response to these parameters.
     ///
     /// # Errors
-    /// [`Diverged`] when the state leaves the bounds of sense or is no number.
+    /// [`Diverged`] when the state leaves its bounds or is not a number.
     pub fn respond(&self, parameters: &[f64], response: &mut Response) -> Result<(), Diverged> {
         self.respond_with(Detail::Whole, parameters, response)
     }
 
-    /// The same in less detail, of which only the sums are of use.
+    /// Computes the response in some detail; of a coarse one only the sums have a meaning.
     ///
     /// # Errors
-    /// [`Diverged`] when the state leaves the bounds of sense or is no number.
+    /// [`Diverged`] when the state leaves its bounds or is not a number.
     pub fn respond_with(
         &self,
         detail: Detail,
@@ -132,20 +135,16 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             Detail::Coarse => self.coarse_stride(),
             Detail::Whole => 1,
         };
-        let Response { outputs, normal } = response;
-        normal.clear(stride);
-        self.pass(
-            parameters,
-            stride,
-            outputs,
-            &mut Summing {
-                normal,
-                measurements: &self.measurements,
-            },
-        )
+        let Response { outputs, sums } = response;
+        sums.clear(stride);
+        let mut accumulator = NormalAccumulator {
+            sums,
+            measurements: &self.measurements,
+        };
+        self.run_pass(parameters, stride, outputs, &mut accumulator)
     }
 
-    /// Whether coarse steps are longer than the samples' own.
+    /// Returns true if coarse steps are longer than the samples' own.
     #[must_use]
     pub fn has_coarse(&self) -> bool {
         self.coarse_stride() > 1
@@ -157,40 +156,33 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         reason = "a small positive number"
     )]
     fn coarse_stride(&self) -> usize {
-        let within = (COARSE_STEP_S / self.step_s).round() as usize;
-        let spare = self.samples() / (SAMPLES_A_PARAMETER * self.parameters().max(1));
-        within.min(spare).clamp(1, WIDEST_STRIDE)
+        let of_coarse_step = (COARSE_STEP_S / self.step_s).round() as usize;
+        let spare = self.samples() / (SAMPLES_PER_PARAMETER * self.parameters().max(1));
+        of_coarse_step.min(spare).clamp(1, WIDEST_STRIDE)
     }
 
-    /// The sensitivities to all parameters.
+    /// Computes the sensitivities to all parameters.
     ///
     /// # Errors
-    /// [`Diverged`] when the state leaves the bounds of sense or is no number.
+    /// [`Diverged`] when the state leaves its bounds or is not a number.
     pub fn sensitivities(&self, parameters: &[f64]) -> Result<Sensitivities, Diverged> {
-        let lanes = &self.lanes;
-        let (derivatives, initial) = lanes.places.split_at(self.derivatives());
-        let mut kept = Sensitivities {
-            rows: Aligned::zeros(self.samples() * OUTPUTS * lanes.width()),
-            width: lanes.width(),
-            lanes: [derivatives, &lanes.biases, initial].concat(),
+        let layout = &self.layout;
+        let (derivatives, initial_states) = layout.parameter_lanes.split_at(self.derivatives());
+        let mut sensitivities = Sensitivities {
+            rows: AlignedBuffer::zeros(self.samples() * OUTPUTS * layout.width()),
+            width: layout.width(),
+            lanes: [derivatives, &layout.biases, initial_states].concat(),
         };
-        let biases = lanes
-            .biases
-            .iter()
-            .copied()
-            .zip(self.biased.iter().copied())
-            .collect();
-        let mut keeping = Keeping {
-            kept: &mut kept,
+        let bias_lanes = layout.biases.iter().copied();
+        let mut recorder = SensitivityRecorder {
+            sensitivities: &mut sensitivities,
             used: &self.measurements.used,
-            biases,
+            biases: bias_lanes
+                .zip(self.biased_outputs.iter().copied())
+                .collect(),
         };
-        self.pass(
-            parameters,
-            1,
-            &mut vec![[0.0; OUTPUTS]; self.samples()],
-            &mut keeping,
-        )?;
-        Ok(kept)
+        let mut outputs = vec![[0.0; OUTPUTS]; self.samples()];
+        self.run_pass(parameters, 1, &mut outputs, &mut recorder)?;
+        Ok(sensitivities)
     }
 }

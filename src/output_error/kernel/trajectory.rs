@@ -1,8 +1,9 @@
-//! The states' own way through a chunk of samples, and what it leaves for the sensitivities: at
-//! each stage of each step the slopes A = ∂ẋ/∂x (through the coefficients included) and B = ∂ẋ/∂c.
+//! The trajectory of the states through a chunk of samples, integrated by the classical Runge-Kutta
+//! step. Each stage leaves its slopes A = ∂ẋ/∂x (through the coefficients included) and B = ∂ẋ/∂c for
+//! the sensitivities.
 //!
-//! A stage waits for the one before it, so the chain goes stage by stage beside other work
-//! ([`Meanwhile`]).
+//! Each stage depends on the one before it, so the chain is bound by latency. It advances stage by
+//! stage between the rows of the sums, which are bound by throughput.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -10,171 +11,160 @@
 
 use nalgebra::SVector;
 
-use super::chunk::Near;
+use super::chunk::ChunkBuildUp;
 use crate::dynamics::{COEFFICIENTS, Equations};
-use crate::numerics::row_products::Meanwhile;
-use crate::numerics::runge_kutta::{POINT, STAGES};
+use crate::numerics::row_products::Interleaved;
+use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::simd::VECTOR;
 use crate::output_error::case::Case;
-use crate::output_error::case::chunking::{CHUNK, Spaced};
+use crate::output_error::case::chunking::{CHUNK, Strided};
 
-/// A state beyond this (rad, rad/s) is no flight: it stops the integration before the numbers
-/// overflow.
-const BEYOND_SENSE: f64 = 50.0;
+/// Bound of a state, rad or rad/s. No flight reaches it, and numbers do not overflow below it.
+const STATE_BOUND: f64 = 50.0;
 
-/// What a chunk's course leaves: entry by entry, sample after sample.
+/// States and slopes of a chunk at every stage: entry by entry, sample after sample.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-pub(crate) struct Path<const NX: usize> {
-    /// The states at the samples.
+pub(crate) struct StageHistory<const NX: usize> {
+    /// States at the samples.
     pub states: [SVector<f64, NX>; CHUNK],
-    /// What the first lanes of a group multiply their regressors by: the states that they follow,
-    /// else one.
-    pub times: [[[f64; VECTOR]; CHUNK]; STAGES],
+    /// Factors of the regressors in the first vector of a group: the states they are proportional
+    /// to, else one.
+    pub factors: [[[f64; VECTOR]; CHUNK]; STAGES],
     /// A by stage, rate and state.
     pub a: [[[[f64; CHUNK]; NX]; NX]; STAGES],
     /// B by stage, rate and coefficient.
     pub b: [[[[f64; CHUNK]; COEFFICIENTS]; NX]; STAGES],
 }
 
-impl<const NX: usize> Path<NX> {
-    pub const NONE: Path<NX> = Path {
+impl<const NX: usize> StageHistory<NX> {
+    pub const EMPTY: StageHistory<NX> = StageHistory {
         states: [SVector::<f64, NX>::from_array_storage(nalgebra::ArrayStorage([[0.0; NX]; 1]));
             CHUNK],
-        times: [[[1.0; VECTOR]; CHUNK]; STAGES],
+        factors: [[[1.0; VECTOR]; CHUNK]; STAGES],
         a: [[[[0.0; CHUNK]; NX]; NX]; STAGES],
         b: [[[[0.0; CHUNK]; COEFFICIENTS]; NX]; STAGES],
     };
 
-    /// The first of some samples whose state left the bounds of sense or is no number.
-    pub fn senseless(&self, samples: usize) -> Option<usize> {
+    /// First of some samples whose state is out of bounds or not a number.
+    pub fn first_out_of_bounds(&self, samples: usize) -> Option<usize> {
         self.states[..samples]
             .iter()
-            .position(|x| !x.iter().all(|x| x.abs() < BEYOND_SENSE))
+            .position(|x| !x.iter().all(|x| x.abs() < STATE_BOUND))
     }
 }
 
-/// The classical Runge-Kutta steps of a chunk, stage by stage.
-pub(crate) struct Course<'a, const NX: usize, E: Equations<NX>> {
+/// Integration of the states over a chunk, stage by stage.
+pub(crate) struct Trajectory<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
-    near: &'a Near<NX>,
-    path: &'a mut Path<NX>,
-    /// The state at the sample, at the stage, and what is there of the next sample's.
+    build_up: &'a ChunkBuildUp<NX>,
+    history: &'a mut StageHistory<NX>,
+    /// State at the sample.
     x: SVector<f64, NX>,
+    /// State at the stage.
     at: SVector<f64, NX>,
+    /// State at the next sample, as far as the stages so far determine it.
     next: SVector<f64, NX>,
-    points: Spaced,
+    points: Strided,
     sample: usize,
     stage: usize,
     end: usize,
-    /// How far ahead each stage looks along its slope, and its part of the step, s.
-    ahead_s: [f64; STAGES],
-    part_s: [f64; STAGES],
+    reaches_s: [f64; STAGES],
+    weights_s: [f64; STAGES],
 }
 
-impl<'a, const NX: usize, E: Equations<NX>> Course<'a, NX, E> {
-    /// The course from the state `x` over `samples` samples: at the first of these points, at every
-    /// other of them.
+impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
+    /// Trajectory from the state `x` over `samples` samples: the first of these points, and every
+    /// other one after it.
     pub fn new(
         case: &'a Case<NX, E>,
-        near: &'a Near<NX>,
-        path: &'a mut Path<NX>,
+        build_up: &'a ChunkBuildUp<NX>,
+        history: &'a mut StageHistory<NX>,
         x: SVector<f64, NX>,
-        points: Spaced,
+        points: Strided,
         samples: usize,
     ) -> Self {
-        let h = points.stride as f64 * case.step_s;
-        let (ahead_s, part_s) = (
-            [0.5 * h, 0.5 * h, h, 0.0],
-            [h / 6.0, h / 3.0, h / 3.0, h / 6.0],
-        );
-        let (at, next) = (x, x);
-        let mut course = Course {
+        let step_s = points.stride as f64 * case.step_s;
+        let mut trajectory = Trajectory {
             case,
-            near,
-            path,
+            build_up,
+            history,
             x,
-            at,
-            next,
+            at: x,
+            next: x,
             points,
             sample: 0,
             stage: 0,
             end: samples,
-            ahead_s,
-            part_s,
+            reaches_s: reaches_s(step_s),
+            weights_s: weights_s(step_s),
         };
-        course.arrive(x);
-        course
+        trajectory.enter_stage(x);
+        trajectory
     }
 
-    /// Goes to the end.
+    /// Integrates to the end of the chunk and returns the state there.
     #[inline(always)]
-    pub fn finish(&mut self) {
+    pub fn finish(mut self) -> SVector<f64, NX> {
         while self.sample < self.end {
             self.advance();
         }
+        self.x
     }
 
-    /// Goes to a stage's state. What is written of it is written while the processor has it at
-    /// hand: reading it back at once, in another width, would hold up the chain.
+    /// Enters a stage at its state. The state is written while it is in registers: to read it back
+    /// at once in another width would stall (store forwarding) and hold up the chain.
     #[inline(always)]
-    fn arrive(&mut self, at: SVector<f64, NX>) {
+    fn enter_stage(&mut self, at: SVector<f64, NX>) {
         self.at = at;
         if self.sample < self.end {
-            for (slot, &state) in E::FOLLOWED.iter().enumerate() {
-                self.path.times[self.stage][self.sample][slot] = at[state];
+            for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
+                self.history.factors[self.stage][self.sample][slot] = at[state];
             }
         }
     }
-
-    /// The state at the sample that the course has reached.
-    pub fn state(&self) -> SVector<f64, NX> {
-        self.x
-    }
 }
 
-impl<const NX: usize, E: Equations<NX>> Meanwhile for Course<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
+    /// Takes one stage.
     #[inline(always)]
     fn advance(&mut self) {
         if self.sample >= self.end {
             return;
         }
         let (sample, stage) = (self.sample, self.stage);
-        let point = POINT[stage];
-        let c = self.near.coefficients::<E>(2 * sample + point, &self.at);
-        let rates = E::rates(
-            &self.case.known[self.points.at(2 * sample + point)],
-            &self.at,
-            &c,
-        );
+        let point = 2 * sample + POINT[stage];
+        let c = self.build_up.coefficients::<E>(point, &self.at);
+        let inputs = &self.case.rate_inputs[self.points.index(point)];
+        let rates = E::rates(inputs, &self.at, &c);
         for i in 0..NX {
-            self.next[i] = rates.rates[i].mul_add(self.part_s[stage], self.next[i]);
+            self.next[i] = rates.rates[i].mul_add(self.weights_s[stage], self.next[i]);
         }
-        let path = &mut *self.path;
+        let history = &mut *self.history;
         for &(i, j) in E::RATES_BY_COEFFICIENT {
-            path.b[stage][i][j][sample] = rates.by_coefficient[(i, j)];
+            history.b[stage][i][j][sample] = rates.by_coefficient[(i, j)];
         }
-        let a = self.near.through::<E, NX>(
-            2 * sample + point,
+        let a = self.build_up.total_slopes::<E, NX>(
+            point,
             rates.by_state,
             &rates.by_coefficient,
             E::RATES_BY_COEFFICIENT,
         );
         for &(i, j) in E::RATES_BY_STATE {
-            path.a[stage][i][j][sample] = a[(i, j)];
+            history.a[stage][i][j][sample] = a[(i, j)];
         }
         if stage + 1 < STAGES {
             let mut at = self.x;
             for i in 0..NX {
-                at[i] = rates.rates[i].mul_add(self.ahead_s[stage], at[i]);
+                at[i] = rates.rates[i].mul_add(self.reaches_s[stage], at[i]);
             }
             self.stage = stage + 1;
-            self.arrive(at);
+            self.enter_stage(at);
         } else {
-            path.states[sample] = self.x;
+            history.states[sample] = self.x;
             self.x = self.next;
             (self.stage, self.sample) = (0, sample + 1);
-            self.arrive(self.next);
+            self.enter_stage(self.next);
         }
     }
 }

@@ -1,9 +1,8 @@
-//! The cost J (eq. 1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums
-//! over the samples that count.
+//! The cost J (1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums over the
+//! samples that count.
 //!
-//! Here they are kept without the factor 1/(n_t n_z) of the print: as sums they are the
-//! likelihood's, and the information matrix (1.7) is the second gradient without any factor.
-//! [`Sums::cost`] is J as printed.
+//! The sums lack the printed factor 1/(n_t n_z): they are the likelihood's, and the information
+//! matrix (1.7) is the second gradient without any factor. [`Sums::cost`] is J as printed.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,7 +10,7 @@ use crate::dynamics::OUTPUTS;
 use crate::output_error::case::Measurements;
 use crate::output_error::kernel::response::Response;
 
-/// Σ w v², Σ Sᵀ W v and Σ Sᵀ W S over the samples that count.
+/// Sums Σ w v², Σ Sᵀ W v and Σ Sᵀ W S over the samples that count.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     pub weighted_square: f64,
@@ -22,14 +21,14 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// J of eq. 1.2.
+    /// Cost J (1.2).
     #[must_use]
     pub fn cost(&self) -> f64 {
         self.weighted_square / (2.0 * self.count.max(1) as f64)
     }
 }
 
-/// Residuals measured minus computed; zero where a sample does not count.
+/// Residuals, measured minus computed; zero where a sample does not count.
 #[must_use]
 pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; OUTPUTS]> {
     let rows = measurements
@@ -41,33 +40,33 @@ pub fn residuals(measurements: &Measurements, response: &Response) -> Vec<[f64; 
         .collect()
 }
 
-/// Sums of a response to the case's parameters for weights W (on residuals in deg, deg/s and g).
+/// Sums of a response for weights W (on residuals in deg, deg/s and g).
 #[must_use]
 pub fn sums(response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
-    let normal = &response.normal;
+    let sums = &response.sums;
     Sums {
-        weighted_square: (0..OUTPUTS).map(|o| weights[o] * normal.square(o)).sum(),
-        gradient: normal.gradient(weights),
-        information: normal.information(weights),
-        count: (0..OUTPUTS).map(|o| normal.count(o)).sum(),
+        weighted_square: (0..OUTPUTS).map(|o| weights[o] * sums.square(o)).sum(),
+        gradient: sums.gradient(weights),
+        information: sums.information(weights),
+        count: (0..OUTPUTS).map(|o| sums.count(o)).sum(),
     }
 }
 
+/// Variances of the residuals from Σ v² and the number of samples of each output. The parameters'
+/// degrees of freedom are spread evenly over the outputs.
+#[must_use]
+pub fn residual_variances(outputs: [(f64, usize); OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
+    let total: usize = outputs.iter().map(|(_, used)| used).sum();
+    let free_share = 1.0 - (parameters as f64 / total.max(1) as f64).min(0.9);
+    outputs.map(|(square, used)| square / (used.max(1) as f64 * free_share))
+}
+
 /// Adds w s sᵀ to the lower triangle.
-pub(crate) fn add_square(matrix: &mut DMatrix<f64>, w: f64, s: &[f64]) {
+pub(super) fn add_square(matrix: &mut DMatrix<f64>, w: f64, s: &[f64]) {
     for (j, mut column) in matrix.column_iter_mut().enumerate() {
         let factor = w * s[j];
         for (m, s) in column.as_mut_slice()[j..].iter_mut().zip(&s[j..]) {
             *m += factor * s;
         }
     }
-}
-
-/// Variances of the residuals from Σ v² and the samples of each output, with the parameters counted
-/// as spread evenly over the outputs.
-#[must_use]
-pub fn variances(outputs: [(f64, usize); OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
-    let total: usize = outputs.iter().map(|(_, used)| used).sum();
-    let freedom = 1.0 - (parameters as f64 / total.max(1) as f64).min(0.9);
-    outputs.map(|(square, used)| square / (used.max(1) as f64 * freedom))
 }

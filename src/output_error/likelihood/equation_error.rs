@@ -1,31 +1,31 @@
-//! Equation error: the derivatives by linear least squares on the coefficients that the measured
+//! Equation error: derivatives by linear least squares on the coefficients that the measured
 //! accelerations imply.
 //!
-//! It needs no integration and so cannot diverge, whatever the airframe's stability; noise in the
-//! regressors biases it, so it is a start for output error and a check of it ([`regression`]), not
-//! a result.
+//! It needs no integration and so cannot diverge, whatever the airframe's stability. Noise in the
+//! regressors biases it. So it serves as a start for output error and as a check of it
+//! ([`regression`]), not as a result.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::cost::add_square;
-use super::information::{Identified, identified};
+use super::information::Identification;
 use crate::dynamics::motion::SLOPE_REACH;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::symmetric::{scale, scaled};
 use crate::output_error::case::Case;
 
-/// Weight of the prior start against the data, on unit-diagonal scale: enough to hold what the data
-/// do not say.
-const PULL: f64 = 1e-4;
+/// Weight of the prior values against the data, at unit diagonal: small, but enough to hold what
+/// the data do not determine.
+const PRIOR_WEIGHT: f64 = 1e-4;
 
-/// Starting values with the derivatives from equation error; what the data do not determine stays
-/// near `prior`, as do biases and initial states.
+/// Starting values with the derivatives from equation error. Derivatives that the data do not
+/// determine stay near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
     let mut values = prior.to_vec();
     for k in 0..COEFFICIENTS {
         let range = case.ranges[k].clone();
-        if let Some(change) = regress(case, k, prior) {
+        if let Some(change) = regress_coefficient(case, k, prior) {
             for (v, d) in values[range].iter_mut().zip(change.iter()) {
                 *v += d;
             }
@@ -35,20 +35,20 @@ pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64
 }
 
 /// Least-squares change of the derivatives of one coefficient against the prior values.
-fn regress<const NX: usize, E: Equations<NX>>(
+fn regress_coefficient<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     coefficient: usize,
     prior: &[f64],
 ) -> Option<DVector<f64>> {
     let range = case.ranges[coefficient].clone();
     let mut regressors = vec![0.0; case.derivatives()];
-    let coefficients = case.with(prior);
+    let build_up = case.build_up(prior);
     let (mut normal, mut right) = (
         DMatrix::zeros(range.len(), range.len()),
         DVector::zeros(range.len()),
     );
     for (sample, (state, implied)) in case.states.iter().zip(&case.implied).enumerate() {
-        let computed = coefficients.at(2 * sample).with(state);
+        let computed = build_up.at(2 * sample).coefficients(state);
         case.regressors_at(2 * sample, state, &mut regressors);
         let error = implied[coefficient] - computed[coefficient];
         let row = &regressors[range.clone()];
@@ -61,26 +61,26 @@ fn regress<const NX: usize, E: Equations<NX>>(
     let unit = scale(&normal);
     let mut scaled = scaled(&normal, &unit);
     for i in 0..range.len() {
-        scaled[(i, i)] += PULL;
+        scaled[(i, i)] += PRIOR_WEIGHT;
     }
     let solution = Cholesky::new(scaled)?.solve(&right.component_mul(&unit));
     let change = solution.component_mul(&unit);
     change.iter().all(|d| d.is_finite()).then_some(change)
 }
 
-/// Condition number of the scaled normal matrix beyond which a regression says nothing.
-const SINGULAR: f64 = 1e10;
+/// Condition number of the scaled normal matrix beyond which a regression has no result.
+const MAX_CONDITION_NUMBER: f64 = 1e10;
 
-/// The derivatives by least squares on the measured accelerations alone, as a check of output
-/// error; parameters in the order of the case, none for biases and initial states and for a
-/// coefficient whose regressors are proportional.
+/// Derivatives by least squares on the measured accelerations alone, as a check of output error.
+/// Parameters are in the order of the case; `None` for biases, initial states, and a coefficient
+/// with proportional regressors.
 ///
-/// The measured angular accelerations are slopes of local straight lines through the rates, that is
-/// accelerations seen through a short window. Forces and regressors are seen through the same
-/// window, so that what is fast (the edge of a step) is not rounded on one side of the equation
-/// only; a straight filter over both sides leaves the derivatives alone. Samples whose window
-/// touches a marked one do not count. Noise in the regressors is left: it draws derivatives towards
-/// zero by its share of the regressor's motion.
+/// The measured angular accelerations are slopes of local straight lines through the rates:
+/// accelerations averaged by a short window. Forces and regressors are averaged by the same window,
+/// so that a fast change (the edge of a step) is not rounded on one side of the equation only. A
+/// linear filter on both sides leaves the derivatives unchanged. Samples whose window contains an
+/// excluded sample do not count. Noise in the regressors remains: it attenuates derivatives by its
+/// share of the regressor's variance.
 #[must_use]
 pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<Option<f64>> {
     let none = vec![0.0; case.parameters()];
@@ -91,26 +91,26 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
         if range.is_empty() {
             continue;
         }
-        let rows = rows(case, k, &none);
+        let rows = regression_rows(case, k, &none);
         let (mut normal, mut right) = (
             DMatrix::zeros(range.len(), range.len()),
             DVector::zeros(range.len()),
         );
         let moment = E::AXIS.coefficients()[k].is_moment();
-        for (seen, used) in rows
+        for (rows, used) in rows
             .windows(window.len())
             .zip(case.measurements.used.windows(window.len()))
         {
             if used.iter().any(|used| *used != [true; OUTPUTS]) {
                 continue;
             }
-            let row = seen_through(&window, seen);
+            let row = windowed_mean(&window, rows);
             let [regressors @ .., held, force] = row.as_slice() else {
                 continue;
             };
-            // A moment's acceleration is a slope: it has been seen through the window already.
+            // A moment's acceleration is a slope, which is averaged by the window already.
             let implied = if moment {
-                seen[SLOPE_REACH].last().unwrap_or(force)
+                rows[SLOPE_REACH].last().unwrap_or(force)
             } else {
                 force
             };
@@ -120,7 +120,9 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
             }
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        if let Identified::Determined { inverse, .. } = identified(&normal, SINGULAR) {
+        if let Identification::Determined { inverse, .. } =
+            Identification::of(&normal, MAX_CONDITION_NUMBER)
+        {
             for (v, d) in values[range].iter_mut().zip((inverse * right).iter()) {
                 *v = Some(*d);
             }
@@ -129,18 +131,18 @@ pub fn regression<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>) -> Vec<
     values
 }
 
-/// At every sample the regressors of a coefficient, then the held part of it, then what the
-/// measured motion implies.
-fn rows<const NX: usize, E: Equations<NX>>(
+/// Rows of all samples: regressors of a coefficient, its held part, and the value that the measured
+/// motion implies.
+fn regression_rows<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     coefficient: usize,
     none: &[f64],
 ) -> Vec<Vec<f64>> {
     let mut regressors = vec![0.0; case.derivatives()];
-    let coefficients = case.with(none);
+    let build_up = case.build_up(none);
     let samples = case.states.iter().zip(&case.implied).enumerate();
     let row = samples.map(|(sample, (state, implied))| {
-        let held = coefficients.at(2 * sample).with(state);
+        let held = build_up.at(2 * sample).coefficients(state);
         case.regressors_at(2 * sample, state, &mut regressors);
         let mut row = regressors[case.ranges[coefficient].clone()].to_vec();
         row.extend([held[coefficient], implied[coefficient]]);
@@ -149,24 +151,23 @@ fn rows<const NX: usize, E: Equations<NX>>(
     row.collect()
 }
 
-/// The weighted mean of the rows under the window.
-fn seen_through(window: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut seen = vec![0.0; rows.first().map_or(0, Vec::len)];
+/// Weighted mean of the rows under the window.
+fn windowed_mean(window: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
     for (weight, row) in window.iter().zip(rows) {
-        for (s, r) in seen.iter_mut().zip(row) {
+        for (s, r) in mean.iter_mut().zip(row) {
             *s += weight * r;
         }
     }
-    seen
+    mean
 }
 
-/// The window through which the slope of a local straight line sees the derivative: Σ d (x(k+d) −
-/// x(k−d)) / Σ 2 d² is a weighted mean of the increments, and an increment is the mean of the
-/// derivative at its ends.
+/// Window of the slope of a local straight line. The slope Σ d (x(k+d) − x(k−d)) / Σ 2 d² is a
+/// weighted mean of the increments, and an increment is the mean of the derivative at its ends.
 fn slope_window() -> Vec<f64> {
     let reach = SLOPE_REACH;
-    // Increment i lies between samples i and i+1 of the window; the slopes from a distance d of at
-    // least `nearest` cross it.
+    // Increment i lies between samples i and i+1 of the window. Slopes over a distance d of at
+    // least `nearest` contain it.
     let across = |i: usize| -> f64 {
         let nearest = if i < reach { reach - i } else { i + 1 - reach };
         (nearest..=reach).map(|d| d as f64).sum()
@@ -187,7 +188,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn the_window_sees_a_derivative_as_the_local_straight_line_does() {
+    fn the_windowed_mean_of_a_derivative_is_the_slope_of_the_straight_line() {
         // The mean of an increment's ends is exact for a derivative that is linear over it: x = t².
         let x = |t: f64| t.powi(2);
         let derivative = |t: f64| 2.0 * t;
@@ -204,9 +205,8 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_of_the_derivative_is_rounded_as_the_local_straight_line_rounds_it() {
-        // A derivative that begins to grow by one per sample at sample 0, and the rate that it
-        // makes.
+    fn the_window_rounds_an_edge_as_the_straight_line_does() {
+        // A derivative that grows by one per sample from sample 0 on, and its integral.
         let rate = |k: i32| 0.5 * f64::from(k.max(0)).powi(2);
         let derivative = |k: i32| f64::from(k.max(0));
         let reach = i32::try_from(SLOPE_REACH).unwrap();

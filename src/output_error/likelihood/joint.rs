@@ -1,16 +1,15 @@
-//! Several maneuvers that share derivatives while each keeps its biases and initial states, and
-//! those derivatives that stand for biases: one cost (1.2), the sum over the maneuvers.
+//! Several maneuvers that share derivatives: one cost (1.2), the sum over the maneuvers. Each keeps its
+//! biases, initial states, and derivatives that act as biases.
 //!
-//! Parameters in order: the shared derivatives, then each maneuver's own. The information matrix
-//! (1.5) is an arrow: a block for the derivatives, one for each maneuver's own parameters, and what
-//! ties these to the derivatives. Residuals of different maneuvers are independent; each has its
-//! own variances and autocorrelation.
+//! Parameters in order: the shared derivatives, then each maneuver's own. The information matrix (1.5)
+//! has a block for the shared derivatives, one for each maneuver's own parameters, and borders
+//! between the two. Residuals of different maneuvers are independent; each has its own variances and
+//! autocorrelation.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::cost;
-use super::cost::Sums;
-use super::data::Likelihood;
+use super::cost::{self, Sums};
+use super::definition::Likelihood;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::pass::Diverged;
@@ -20,23 +19,27 @@ use crate::output_error::kernel::response::{Detail, Response};
 #[derive(Debug)]
 pub struct Joint<'a, const NX: usize, E: Equations<NX>> {
     pub(crate) members: Vec<Member<'a, NX, E>>,
+    /// Places of the shared derivatives among a member's parameters.
     shared: Vec<usize>,
     names: Vec<String>,
 }
 
+/// One of the maneuvers.
 #[derive(Debug)]
 pub(crate) struct Member<'a, const NX: usize, E: Equations<NX>> {
     label: &'a str,
     pub case: &'a Case<NX, E>,
-    /// Where its parameters stand among the joint ones.
+    /// Place of each own parameter among the joint ones.
     pub places: Vec<usize>,
 }
 
 impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
+    /// The member's parameters among the joint ones.
     pub fn parameters(&self, joint: &[f64]) -> Vec<f64> {
         self.places.iter().map(|&place| joint[place]).collect()
     }
 
+    /// Adds the member's matrix to the joint one.
     pub fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
         for (j, &column) in self.places.iter().enumerate() {
             for (i, &row) in self.places.iter().enumerate() {
@@ -47,8 +50,8 @@ impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Joins maneuvers, each with a label that tells its own parameters from those of the others.
-    /// `is_own` names the derivatives that each keeps to itself.
+    /// Joins maneuvers, each with a label for its own parameters. `is_own` selects the derivatives
+    /// that each maneuver keeps to itself.
     ///
     /// # Errors
     /// A sentence that names the maneuver whose free derivatives are not those of the first.
@@ -63,33 +66,16 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         };
         for (label, case) in cases {
             let derivatives = &case.names[..case.derivatives()];
-            let first = joint.members.first().map_or(case, |m| m.case);
-            if *derivatives != first.names[..first.derivatives()] {
-                return Err(format!(
-                    "{label} has other free derivatives than the maneuvers it is joined with"
-                ));
-            }
-            if joint.members.is_empty() {
-                joint.shared = (0..derivatives.len())
-                    .filter(|&j| !is_own(&derivatives[j]))
-                    .collect();
-                joint
-                    .names
-                    .extend(joint.shared.iter().map(|&j| derivatives[j].clone()));
-            }
-            let mut places = Vec::with_capacity(case.names.len());
-            for (j, name) in case.names.iter().enumerate() {
-                places.push(
-                    joint
-                        .shared
-                        .iter()
-                        .position(|&s| s == j)
-                        .unwrap_or(joint.names.len()),
-                );
-                if !joint.shared.contains(&j) {
-                    joint.names.push(format!("{name} of {label}"));
+            match joint.members.first().map(|first| first.case) {
+                None => joint.share(derivatives, &is_own),
+                Some(first) if *derivatives == first.names[..first.derivatives()] => {}
+                Some(_) => {
+                    return Err(format!(
+                        "{label} has other free derivatives than the maneuvers it is joined with"
+                    ));
                 }
             }
+            let places = joint.place_parameters(label, &case.names);
             joint.members.push(Member {
                 label,
                 case,
@@ -99,20 +85,45 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         Ok(joint)
     }
 
-    /// The places of the shared derivatives among a member's parameters.
+    /// Sets the shared derivatives: those of the first maneuver that no maneuver keeps to itself.
+    fn share(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
+        for (j, name) in derivatives.iter().enumerate() {
+            if !is_own(name) {
+                self.shared.push(j);
+                self.names.push(name.clone());
+            }
+        }
+    }
+
+    /// Places of a maneuver's parameters; its own are appended to the joint ones.
+    fn place_parameters(&mut self, label: &str, names: &[String]) -> Vec<usize> {
+        let mut places = Vec::with_capacity(names.len());
+        for (j, name) in names.iter().enumerate() {
+            match self.shared.iter().position(|&s| s == j) {
+                Some(place) => places.push(place),
+                None => {
+                    places.push(self.names.len());
+                    self.names.push(format!("{name} of {label}"));
+                }
+            }
+        }
+        places
+    }
+
+    /// Places of the shared derivatives among a member's parameters.
     #[must_use]
     pub fn shared(&self) -> &[usize] {
         &self.shared
     }
 
-    /// Where each parameter of a member stands among the joint ones.
+    /// Place of each parameter of a member among the joint ones.
     #[must_use]
     pub fn places(&self, member: usize) -> &[usize] {
         self.members.get(member).map_or(&[], |m| &m.places)
     }
 
-    /// The joint parameters from the shared derivatives and each member's own full set (its own
-    /// part is taken).
+    /// Joint parameters from the shared derivatives and each member's full set, of which its own
+    /// part is used.
     #[must_use]
     pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
         let mut joint = shared.to_vec();
@@ -126,7 +137,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         joint
     }
 
-    /// J (1.2) of each member alone, at a joint response.
+    /// Cost J (1.2) of each member alone, at a joint response.
     #[must_use]
     pub fn costs(&self, response: &[Response], weights: &[f64; OUTPUTS]) -> Vec<f64> {
         let members = self.members.iter().zip(response);
@@ -137,9 +148,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Computes each member's response. The sample at which one diverges is counted through the
-    /// members in order.
-    fn each(
+    /// Computes each member's response. The sample of a divergence counts through the members in
+    /// order.
+    fn respond_each(
         &self,
         response: &mut [Response],
         respond: impl Fn(&Member<'a, NX, E>, &mut Response) -> Result<(), Diverged>,
@@ -176,7 +187,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         parameters: &[f64],
         response: &mut Vec<Response>,
     ) -> Result<(), Diverged> {
-        self.each(response, |member, response| {
+        self.respond_each(response, |member, response| {
             member
                 .case
                 .respond_with(detail, &member.parameters(parameters), response)
@@ -203,8 +214,8 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
         sums
     }
 
-    /// Pooled over the members by their samples. A member's freedom counts all its parameters, also
-    /// those it shares.
+    /// Variances pooled over the members by their samples. All parameters of a member count against
+    /// its degrees of freedom, also shared ones.
     fn variances(&self, response: &Vec<Response>) -> [f64; OUTPUTS] {
         let (mut squares, mut counts) = ([0.0; OUTPUTS], [0.0; OUTPUTS]);
         for (member, response) in self.members.iter().zip(response) {

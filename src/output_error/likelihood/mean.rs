@@ -1,15 +1,15 @@
-//! The mean of several estimates of the same parameters, weighted by their whole covariances: (Σ
-//! C⁻¹)⁻¹ Σ C⁻¹ θ.
+//! Mean of several estimates of the same parameters, weighted by their whole covariances:
+//! (Σ C⁻¹)⁻¹ Σ C⁻¹ θ.
 //!
-//! To first order it is what a joint estimation of the same data would find. Weighting each
-//! parameter by its own bound would not do: a constant and a slope of one maneuver are strongly
-//! correlated, and only their sum is well determined.
+//! To first order it is the joint estimate from the same data. Weights by each parameter's own bound
+//! would fail: constant and slope of one maneuver are strongly correlated, and only their sum is well
+//! determined.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::numerics::symmetric::{scale, scaled};
 
-/// One set of estimates: which of the wanted parameters it has, their values and covariance.
+/// Estimates of some of the wanted parameters, with their covariance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// Places among the wanted parameters, one for each value.
@@ -18,8 +18,8 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
 }
 
-/// The weighted mean of `n` parameters; none where some parameter is in no estimate or a covariance
-/// has no inverse.
+/// Weighted mean of `n` parameters; `None` where a parameter is in no estimate or a covariance has no
+/// inverse.
 #[must_use]
 pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
     let (mut information, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -39,7 +39,7 @@ pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
     mean.iter().all(|v| v.is_finite()).then_some(mean)
 }
 
-/// Inverse of a positive definite matrix, taken with unit diagonal.
+/// Inverse of a positive definite matrix, computed at unit diagonal.
 fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(matrix);
     Some(scaled(

@@ -1,7 +1,9 @@
-//! The likelihood of the measured outputs, and the iteration to its maximum.
+//! The likelihood of the measured outputs: cost (1.2) with its gradients ([`cost`]), the iteration to
+//! its minimum ([`newton_raphson`], 1.3), start values ([`equation_error`]), and several maneuvers as
+//! one ([`joint`]).
 
 pub mod cost;
-pub mod data;
+pub mod definition;
 pub mod equation_error;
 pub(crate) mod information;
 pub mod joint;

@@ -1,14 +1,13 @@
-//! Newton-Raphson with the Gauss-Newton second gradient (eqs. 1.3-1.5), damped where a full step
-//! does not lower the cost.
+//! Newton-Raphson with the Gauss-Newton second gradient (1.3-1.5), damped where a full step does not
+//! lower the cost.
 //!
-//! Far from the minimum the iteration goes by a coarse response, of fewer and longer steps, until
-//! it is as near as that can tell. That only makes a better start: from there on everything is
-//! exact, and decides where the iteration ends.
+//! Far from the minimum the iteration uses a coarse response, of fewer and longer steps. That only
+//! improves the start: from there on every response is whole, and decides where the iteration ends.
 
 use nalgebra::{Cholesky, DVector};
 
 use super::cost::Sums;
-use super::data::Likelihood;
+use super::definition::Likelihood;
 use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::symmetric::{scale, scaled};
@@ -31,12 +30,16 @@ settings! {
     }
 }
 
-/// Damping that is added first when a full step fails, relative to the unit diagonal of the scaled
-/// information matrix: about the smallest eigenvalue of a maneuver that determines its derivatives
-/// badly.
+/// First damping after a full step fails, relative to the unit diagonal of the scaled information
+/// matrix: about the smallest eigenvalue of a poorly conditioned maneuver.
 const FIRST_DAMPING: f64 = 1e-8;
+/// Damping at which no step lowers the cost.
 const MOST_DAMPING: f64 = 1e9;
-/// The iteration from a start with fixed weights, without bounds.
+/// Share of the coarse cost that a full step must promise to lower for another coarse iteration:
+/// below it, the samples left out matter as much.
+const COARSE_TOLERANCE: f64 = 0.1;
+
+/// Minimises the cost from a start with fixed weights; the fit has no bounds yet.
 #[must_use]
 pub fn minimise<D: Likelihood>(
     data: &D,
@@ -45,76 +48,61 @@ pub fn minimise<D: Likelihood>(
     settings: &Settings,
 ) -> Fit<D::Response> {
     let mut response = data.response();
-    let Some(near) = approach(data, &start, &weights, settings, &mut response) else {
+    let Some(coarse) = approach(data, &start, &weights, settings, &mut response) else {
         return descend(data, start, weights, settings, response);
     };
-    let mut fit = descend(data, near.values, weights, settings, response);
+    let mut fit = descend(data, coarse.values, weights, settings, response);
     if fit.initial_cost.is_none() {
         return descend(data, start, weights, settings, data.response());
     }
-    fit.iterations += near.iterations;
-    fit.initial_cost = Some(near.initial_cost);
+    fit.iterations += coarse.iterations;
+    fit.initial_cost = Some(coarse.initial_cost);
     fit
 }
 
-/// Where coarse steps lead.
-struct Near {
+/// End of the coarse iteration.
+struct CoarseFit {
     values: Vec<f64>,
     iterations: usize,
     initial_cost: f64,
 }
 
-/// A full step that would lower the coarse cost by less than this share of it ends in what the
-/// samples left out are worth.
-const NEAR: f64 = 0.1;
-
-/// Goes by the coarse response while that is still far from its minimum; none where there is no
-/// such response, or where it leads nowhere.
+/// Approaches the minimum by the coarse response. `None` where there is no coarse response, or where
+/// it diverges or is singular.
 fn approach<D: Likelihood>(
     data: &D,
     start: &[f64],
     weights: &[f64; OUTPUTS],
     settings: &Settings,
     response: &mut D::Response,
-) -> Option<Near> {
+) -> Option<CoarseFit> {
     if !data.has_coarse() {
         return None;
     }
     data.respond(Detail::Coarse, start, response).ok()?;
-    let mut at = data.sums(response, weights);
-    let mut near = Near {
+    let mut sums = data.sums(response, weights);
+    let mut fit = CoarseFit {
         values: start.to_vec(),
         iterations: 0,
-        initial_cost: at.cost(),
+        initial_cost: sums.cost(),
     };
-    let mut damping = 0.0;
-    while near.iterations < settings.max_iterations {
-        let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING))?;
-        near.iterations += 1;
-        if at.gradient.dot(&full) <= NEAR * at.weighted_square {
-            near.values
-                .iter_mut()
-                .zip(full.iter())
-                .for_each(|(value, d)| *value += d);
+    let mut search = StepSearch::new(data, Detail::Coarse, weights);
+    while fit.iterations < settings.max_iterations {
+        let full = full_step(&sums)?;
+        fit.iterations += 1;
+        if sums.gradient.dot(&full) <= COARSE_TOLERANCE * sums.weighted_square {
+            fit.values = moved(&fit.values, &full);
             break;
         }
-        let Some(better) = lower(
-            data,
-            Detail::Coarse,
-            &near.values,
-            &at,
-            weights,
-            &mut damping,
-            response,
-        ) else {
+        let Some(better) = search.lower(&fit.values, &sums, response) else {
             break;
         };
-        (near.values, at) = better;
+        (fit.values, sums) = better;
     }
-    Some(near)
+    Some(fit)
 }
 
-/// The iteration from a start with exact costs and gradients; `response` is written over.
+/// Iterates from a start with whole responses; `response` is overwritten.
 pub(crate) fn descend<D: Likelihood>(
     data: &D,
     start: Vec<f64>,
@@ -122,105 +110,99 @@ pub(crate) fn descend<D: Likelihood>(
     settings: &Settings,
     mut response: D::Response,
 ) -> Fit<D::Response> {
-    let mut trial = data.response();
-    let mut fit = Fit {
-        outcome: Outcome::NotConverged,
-        reason: format!("not converged after {} iterations", settings.max_iterations),
-        iterations: 0,
-        initial_cost: None,
-        final_cost: None,
-        values: start,
-        weights,
-        response: D::Response::default(),
-        condition_number: None,
-        undetermined: vec![],
-        covariance: None,
-        covariance_held: None,
-        covariance_calibration: None,
-        covariance_corrected: None,
-    };
+    let mut fit = Fit::unfinished(start, weights, settings.max_iterations);
     if let Err(diverged) = data.respond(Detail::Whole, &fit.values, &mut response) {
-        fit.reason = format!(
-            "the integration diverges {} with the starting values",
-            data.place(diverged)
-        );
+        let place = data.place(diverged);
+        fit.reason = format!("the integration diverges {place} with the starting values");
         fit.response = data.response();
         return fit;
     }
-    let mut at = data.sums(&response, &weights);
-    fit.initial_cost = Some(at.cost());
-    // Where the model fits to the last digit, rounding is all that a further step could lower.
-    let floor = f64::EPSILON * f64::EPSILON.sqrt() * at.weighted_square;
-    let mut damping = 0.0;
+    let mut trial = data.response();
+    let mut sums = data.sums(&response, &weights);
+    fit.initial_cost = Some(sums.cost());
+    // Rounding is all that a step can still lower where the model fits to the last digit.
+    let floor = f64::EPSILON * f64::EPSILON.sqrt() * sums.weighted_square;
+    let mut search = StepSearch::new(data, Detail::Whole, &weights);
     while fit.iterations < settings.max_iterations {
-        let full = step(&at, 0.0).or_else(|| step(&at, FIRST_DAMPING));
-        let gain = full.as_ref().map(|full| at.gradient.dot(full));
-        let Some(gain) = gain else {
+        let Some(full) = full_step(&sums) else {
             fit.reason = "the information matrix is singular".into();
             break;
         };
-        if gain <= settings.tolerance * at.weighted_square + floor {
+        let gain = sums.gradient.dot(&full);
+        if gain <= settings.tolerance * sums.weighted_square + floor {
             fit.outcome = Outcome::Converged;
             fit.reason = "a further step would not lower the cost".into();
             break;
         }
         fit.iterations += 1;
-        let better = lower(
-            data,
-            Detail::Whole,
-            &fit.values,
-            &at,
-            &weights,
-            &mut damping,
-            &mut trial,
-        );
-        let Some(better) = better else {
+        let Some(better) = search.lower(&fit.values, &sums, &mut trial) else {
             fit.reason = "no step lowers the cost".into();
             break;
         };
-        fit.values = better.0;
-        at = better.1;
+        (fit.values, sums) = better;
         std::mem::swap(&mut response, &mut trial);
     }
-    fit.final_cost = Some(at.cost());
+    fit.final_cost = Some(sums.cost());
     fit.response = response;
     fit
 }
 
-/// Tries steps of growing damping until one lowers the cost; the response to it is left in `trial`.
-fn lower<D: Likelihood>(
-    data: &D,
+/// Search for a step that lowers the cost; the damping carries over to the next iteration.
+struct StepSearch<'a, D> {
+    data: &'a D,
     detail: Detail,
-    values: &[f64],
-    at: &Sums,
-    weights: &[f64; OUTPUTS],
-    damping: &mut f64,
-    trial: &mut D::Response,
-) -> Option<(Vec<f64>, Sums)> {
-    while *damping < MOST_DAMPING {
-        if let Some(d) = step(at, *damping) {
-            let next: Vec<f64> = values.iter().zip(d.iter()).map(|(v, d)| v + d).collect();
-            if data.respond(detail, &next, trial).is_ok() {
-                let sums = data.sums(trial, weights);
-                let gain = at.weighted_square - sums.weighted_square;
-                if gain > 0.0 {
-                    *damping = next_damping(*damping, gain / predicted_gain(at, &d));
-                    return Some((next, sums));
+    weights: &'a [f64; OUTPUTS],
+    damping: f64,
+}
+
+impl<'a, D: Likelihood> StepSearch<'a, D> {
+    fn new(data: &'a D, detail: Detail, weights: &'a [f64; OUTPUTS]) -> Self {
+        StepSearch {
+            data,
+            detail,
+            weights,
+            damping: 0.0,
+        }
+    }
+
+    /// Tries steps of growing damping until one lowers the cost, and leaves its response in `trial`.
+    fn lower(
+        &mut self,
+        values: &[f64],
+        sums: &Sums,
+        trial: &mut D::Response,
+    ) -> Option<(Vec<f64>, Sums)> {
+        while self.damping < MOST_DAMPING {
+            if let Some(step) = damped_step(sums, self.damping) {
+                let next = moved(values, &step);
+                if self.data.respond(self.detail, &next, trial).is_ok() {
+                    let lower = self.data.sums(trial, self.weights);
+                    let gain = sums.weighted_square - lower.weighted_square;
+                    if gain > 0.0 {
+                        let kept = gain / predicted_gain(sums, &step);
+                        self.damping = next_damping(self.damping, kept);
+                        return Some((next, lower));
+                    }
                 }
             }
+            self.damping = (self.damping * 10.0).max(FIRST_DAMPING);
         }
-        *damping = (*damping * 10.0).max(FIRST_DAMPING);
+        None
     }
-    None
 }
 
-/// What a step would lower Σ w v² by if the residuals were linear in the parameters.
-fn predicted_gain(at: &Sums, d: &DVector<f64>) -> f64 {
-    2.0 * at.gradient.dot(d) - (&at.information * d).dot(d)
+fn moved(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
+    values.iter().zip(step.iter()).map(|(v, d)| v + d).collect()
 }
 
-/// Less damping after a step that did what it promised, more after one that overshot: where the
-/// residuals stay large, undamped Gauss-Newton steps zigzag across the minimum.
+/// Reduction of Σ w v² by a step if the residuals were linear in the parameters.
+fn predicted_gain(sums: &Sums, step: &DVector<f64>) -> f64 {
+    2.0 * sums.gradient.dot(step) - (&sums.information * step).dot(step)
+}
+
+/// Damping after a step that gained this share of its prediction: less after a good prediction, more
+/// after a poor one. Where residuals stay large, undamped Gauss-Newton steps zigzag across the
+/// minimum.
 fn next_damping(damping: f64, kept: f64) -> f64 {
     match kept {
         k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,
@@ -230,13 +212,18 @@ fn next_damping(damping: f64, kept: f64) -> f64 {
     }
 }
 
-/// Solves (H + damping · diag H) d = g on unit-diagonal scale.
-fn step(at: &Sums, damping: f64) -> Option<DVector<f64>> {
-    let unit = scale(&at.information);
-    let mut h = scaled(&at.information, &unit);
+/// Undamped step, with the least damping where the matrix is singular to rounding.
+fn full_step(sums: &Sums) -> Option<DVector<f64>> {
+    damped_step(sums, 0.0).or_else(|| damped_step(sums, FIRST_DAMPING))
+}
+
+/// Solves (H + damping · diag H) d = g at unit diagonal.
+fn damped_step(sums: &Sums, damping: f64) -> Option<DVector<f64>> {
+    let unit = scale(&sums.information);
+    let mut h = scaled(&sums.information, &unit);
     for i in 0..h.nrows() {
         h[(i, i)] += damping;
     }
-    let solution = Cholesky::new(h)?.solve(&at.gradient.component_mul(&unit));
+    let solution = Cholesky::new(h)?.solve(&sums.gradient.component_mul(&unit));
     Some(solution.component_mul(&unit))
 }

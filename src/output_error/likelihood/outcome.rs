@@ -1,4 +1,4 @@
-//! How an estimation ended: a failure is data.
+//! Result of an estimation. A failure is a result too, with its reason.
 
 use nalgebra::DMatrix;
 
@@ -6,39 +6,65 @@ use crate::dynamics::OUTPUTS;
 use crate::output_error::kernel::response::Response;
 pub use crate::tables::Outcome;
 
-/// The result of an estimation; `R` is the response of one maneuver, or of several joined.
+/// Result of an estimation; `R` is the response of one maneuver, or of several joined.
 #[derive(Clone, Debug)]
 pub struct Fit<R = Response> {
     pub outcome: Outcome,
     pub reason: String,
     pub iterations: usize,
-    /// J at the start and at the end.
+    /// J at the start.
     pub initial_cost: Option<f64>,
+    /// J at the end.
     pub final_cost: Option<f64>,
-    /// The parameters in the order of the case's names.
+    /// Parameters in the order of the case's names.
     pub values: Vec<f64>,
-    /// The weights in force at the end.
+    /// Weights of the last iteration.
     pub weights: [f64; OUTPUTS],
     pub response: R,
-    /// Of the information matrix with unit diagonal.
+    /// Condition number of the information matrix with unit diagonal.
     pub condition_number: Option<f64>,
-    /// The parameters that take part in the least determined direction, where the data do not
-    /// determine it.
+    /// Parameters that take part in the least determined direction, if it is undetermined.
     pub undetermined: Vec<usize>,
-    /// Sandwich covariance of the parameters, the held values' part in it; absent where the data
-    /// determine none.
+    /// Covariance of the parameters for white residuals, the held values' part included; absent
+    /// where the data determine none.
     pub covariance: Option<DMatrix<f64>>,
-    /// What the uncertainty of the held values contributes to both covariances.
+    /// Part of both covariances from the uncertainty of the held values.
     pub covariance_held: Option<DMatrix<f64>>,
-    /// What errors of calibration contribute to the corrected covariance.
+    /// Part of the corrected covariance from errors of calibration.
     pub covariance_calibration: Option<DMatrix<f64>>,
-    /// The covariance with the residuals' autocorrelation, noise of the surfaces and errors of
-    /// calibration counted.
+    /// Covariance that counts the residuals' autocorrelation, noise of the surfaces and errors of
+    /// calibration.
     pub covariance_corrected: Option<DMatrix<f64>>,
 }
 
+impl<R: Default> Fit<R> {
+    /// Fit before its iteration, which has not converged.
+    pub(super) fn unfinished(
+        values: Vec<f64>,
+        weights: [f64; OUTPUTS],
+        max_iterations: usize,
+    ) -> Fit<R> {
+        Fit {
+            outcome: Outcome::NotConverged,
+            reason: format!("not converged after {max_iterations} iterations"),
+            iterations: 0,
+            initial_cost: None,
+            final_cost: None,
+            values,
+            weights,
+            response: R::default(),
+            condition_number: None,
+            undetermined: vec![],
+            covariance: None,
+            covariance_held: None,
+            covariance_calibration: None,
+            covariance_corrected: None,
+        }
+    }
+}
+
 impl<R> Fit<R> {
-    /// The same result with another response in place of its own, and its own.
+    /// Exchanges the response for another one; returns the fit and its own response.
     #[must_use]
     pub fn with_response<S>(self, response: S) -> (Fit<S>, R) {
         let fit = Fit {

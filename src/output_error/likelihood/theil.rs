@@ -1,13 +1,12 @@
-//! How well a computed response predicts what was measured: Theil's inequality coefficient with its
+//! Agreement of a computed response with the measured one: Theil's inequality coefficient with its
 //! parts, and R².
 //!
 //! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean
-//! square in the numerator splits exactly into the square of the difference of the means (bias),
-//! the square of the difference of the standard deviations (variance) and 2 (1 − ρ) σ_y σ_z
-//! (covariance); each part is given as its share, and the shares add up to one (Theil 1966; Klein
-//! and Morelli 2006, section 11.3; Jategaonkar 2015, section 11.4). A good model leaves next to
-//! nothing to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and
-//! may be negative.
+//! square in the numerator splits exactly into three parts: the squared difference of the means
+//! (bias), the squared difference of the standard deviations (variance), and 2 (1 − ρ) σ_y σ_z
+//! (covariance). Each part is given as its share (Theil 1966; Klein and Morelli 2006, section 11.3;
+//! Jategaonkar 2015, section 11.4). A good model leaves almost nothing to bias and variance. R² = 1
+//! − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and can be negative.
 
 /// Theil's inequality coefficient and the shares of its parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,20 +17,22 @@ pub struct Theil {
     pub covariance: f64,
 }
 
-/// Sums over pairs of measured z and computed y of one output.
+/// Moments of pairs of measured z and computed y of one output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
     pub samples: usize,
     mean_measured: f64,
     mean_computed: f64,
-    /// Means of the squares about the means, and of the product.
+    /// Mean square of the measured values about their mean.
     square_measured: f64,
+    /// Mean square of the computed values about their mean.
     square_computed: f64,
+    /// Mean product of both about their means.
     product: f64,
 }
 
 impl Agreement {
-    /// Of pairs (measured, computed).
+    /// Moments of pairs (measured, computed).
     #[must_use]
     pub fn of(pairs: &[(f64, f64)]) -> Agreement {
         let n = pairs.len().max(1) as f64;
@@ -55,7 +56,7 @@ impl Agreement {
         [
             (self.mean_computed - self.mean_measured).powi(2),
             (y - z).powi(2),
-            // Never below zero but for rounding.
+            // Below zero by rounding only.
             (2.0 * (y * z - self.product)).max(0.0),
         ]
     }
@@ -66,24 +67,22 @@ impl Agreement {
         self.parts().iter().sum::<f64>().sqrt()
     }
 
-    /// Share of the measured variance that the computed response explains; none where nothing
-    /// varies.
+    /// Share of the measured variance that the computed response explains; `None` without variance.
     #[must_use]
     pub fn r_squared(&self) -> Option<f64> {
         let left: f64 = self.parts().iter().sum();
         (self.square_measured > 0.0).then(|| 1.0 - left / self.square_measured)
     }
 
-    /// Theil's coefficient of this output; none where there is nothing measured or computed.
+    /// Theil's coefficient of this output; `None` where both are zero throughout.
     #[must_use]
     pub fn theil(&self) -> Option<Theil> {
         theil(&[(*self, 1.0)])
     }
 }
 
-/// Theil's coefficient of several outputs together, each with the weight that it has in the cost;
-/// none where there is nothing measured or computed. Where the prediction is exact there is no
-/// difference to share out: the parts are zero.
+/// Theil's coefficient of several outputs together, weighted as in the cost; `None` where all are
+/// zero. An exact prediction has no difference to divide: its parts are zero.
 #[must_use]
 pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
     let (mut parts, mut measured, mut computed) = ([0.0; 3], 0.0, 0.0);

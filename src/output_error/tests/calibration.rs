@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use super::super::calibration_errors::{Calibration, Fitted, Misreading};
 use super::super::cost;
-use super::super::likelihood::information::{Identified, identified};
+use super::super::likelihood::information::Identification;
 use super::*;
 use crate::numerics::symmetric;
 
@@ -54,7 +54,9 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         };
         let shifts = fitted.gradient_shifts(std::slice::from_ref(error)).unwrap();
         let sums = cost::sums(&self.response, &TABLE);
-        let Identified::Determined { inverse, .. } = identified(&sums.information, 1e12) else {
+        let Identification::Determined { inverse, .. } =
+            Identification::of(&sums.information, 1e12)
+        else {
             panic!()
         };
         inverse * &shifts[0]

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 
-use super::case::blocks::Block;
+use super::case::blocks::BlockSums;
 use super::estimation::{Weights, estimate};
 use super::newton_raphson::Settings;
 use super::{
@@ -142,7 +142,7 @@ pub(crate) fn record() -> Record {
     }
 }
 
-fn window() -> Window {
+pub(crate) fn window() -> Window {
     let surfaces = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
     Window::cut(&record(), 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap()
 }
@@ -174,7 +174,7 @@ fn case<const NX: usize, E: Equations<NX>>(
     (case, parameters)
 }
 
-fn biases(axis: Axis) -> Vec<Bias> {
+pub(crate) fn biases(axis: Axis) -> Vec<Bias> {
     let outputs = axis.outputs();
     [outputs[1], outputs[4]]
         .map(|output| Bias {
@@ -235,13 +235,13 @@ fn a_whole_pass_adds_its_sensitivities_up_over_blocks_and_leaves_out_what_does_n
     case.respond(&parameters, &mut response).unwrap();
     let sensitivities = case.sensitivities(&parameters).unwrap();
     let residuals = cost::residuals(&case.measurements, &response);
-    let (normal, block) = (&response.normal, response.normal.block_samples());
+    let (normal, block) = (&response.sums, response.sums.samples_per_block());
     assert!(block > 1);
     for b in 0..SAMPLES.div_ceil(block) {
         let samples = b * block..((b + 1) * block).min(SAMPLES);
         for o in 0..OUTPUTS {
             let mut sums = vec![0.0; parameters.len()];
-            let Block { count, residual } = normal.block(b, o, &mut sums);
+            let BlockSums { count, residual } = normal.block(b, o, &mut sums);
             let counted = samples
                 .clone()
                 .filter(|&k| case.measurements.used[k][o])
@@ -285,7 +285,7 @@ impl Noise {
 }
 
 /// Measures the response to `parameters` with noise whose neighbours correlate by `colour`.
-fn measure<const NX: usize, E: Equations<NX>>(
+pub(crate) fn measure<const NX: usize, E: Equations<NX>>(
     case: &mut Case<NX, E>,
     parameters: &[f64],
     noise: &mut Noise,

@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use super::super::kernel::normal_equations::Summing;
+use super::super::kernel::normal_equations::NormalAccumulator;
 use super::*;
 
 /// Outputs, gradient and information of a pass with vectors of a width, as bits.
@@ -13,12 +13,12 @@ fn bits<S: Simd, const NX: usize, E: Equations<NX>>(
     stride: usize,
 ) -> Vec<u64> {
     let mut response = case.response();
-    response.normal.clear(stride);
-    let mut summing = Summing {
-        normal: &mut response.normal,
+    response.sums.clear(stride);
+    let mut summing = NormalAccumulator {
+        sums: &mut response.sums,
         measurements: &case.measurements,
     };
-    simd.vectorize(case.prepared(at, stride, &mut response.outputs, &mut summing))
+    simd.vectorize(case.prepare_pass(at, stride, &mut response.outputs, &mut summing))
         .unwrap();
     let sums = super::super::cost::sums(&response, &TABLE);
     let outputs = response.outputs.iter().flatten().copied();

@@ -1,48 +1,48 @@
-//! What the bounds (1.7) need of the data besides the likelihood: residuals with their sensitivities
-//! seen through blocks, and the noise of what the equations take as exact.
+//! Data of the bounds (1.7) besides the likelihood: residuals with their sensitivities in blocks,
+//! and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;
 
-use super::coloured::Series;
+use super::block_series::BlockSeries;
 use super::input_noise;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::response::Response;
-use crate::output_error::likelihood::data::Likelihood;
+use crate::output_error::likelihood::definition::Likelihood;
 use crate::output_error::likelihood::joint::{Joint, Member};
 
 /// Data whose estimates have bounds.
 pub trait Bounded: Likelihood {
-    /// Residuals of a whole response with their sensitivities, output by output; those of different
+    /// Residuals of a whole response with their sensitivities, one series per output; different
     /// series are independent.
-    fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<Series>;
+    fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries>;
 
     /// Σ Sᵀ W R W S for white residuals.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS])
     -> DMatrix<f64>;
 
-    /// These series, and what noise of what is taken as exact does to the gradient, at a whole
-    /// response to these parameters.
+    /// The residuals' series, and the gradient's covariance from the noise of measured surfaces, at
+    /// a whole response to these parameters.
     fn noisy(
         &self,
         parameters: &[f64],
         response: &Self::Response,
         weights: &[f64; OUTPUTS],
-    ) -> (Vec<Series>, DMatrix<f64>);
+    ) -> (Vec<BlockSeries>, DMatrix<f64>);
 }
 
 impl<const NX: usize, E: Equations<NX>> Bounded for Case<NX, E> {
-    fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<Series> {
-        let normal = &response.normal;
+    fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries> {
+        let normal = &response.sums;
         let series = |o: usize| {
             let (square, squares) = (normal.square(o), normal.squares(o));
-            Series::new(
+            BlockSeries::new(
                 self.step_s,
                 weights[o],
                 self.samples(),
                 square,
                 &squares,
-                |samples, row| normal.block(samples.start / normal.block_samples(), o, row),
+                |samples, row| normal.block(samples.start / normal.samples_per_block(), o, row),
             )
         };
         (0..OUTPUTS).map(series).collect()
@@ -50,7 +50,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Case<NX, E> {
 
     fn white_covariance(&self, response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let variances = Likelihood::variances(self, response);
-        response.normal.information(&std::array::from_fn(|o| {
+        response.sums.information(&std::array::from_fn(|o| {
             weights[o] * weights[o] * variances[o]
         }))
     }
@@ -60,7 +60,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Case<NX, E> {
         parameters: &[f64],
         response: &Response,
         weights: &[f64; OUTPUTS],
-    ) -> (Vec<Series>, DMatrix<f64>) {
+    ) -> (Vec<BlockSeries>, DMatrix<f64>) {
         let series = self.series(response, weights);
         let inputs = input_noise::gradient_covariance(self, parameters, &series, weights);
         (series, inputs)
@@ -68,7 +68,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Case<NX, E> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
-    fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<Series> {
+    fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries> {
         let members = self.members.iter().zip(response);
         members
             .flat_map(|(m, r)| m.widened(&m.case.series(r, weights), self.names().len()))
@@ -88,7 +88,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
         parameters: &[f64],
         response: &Vec<Response>,
         weights: &[f64; OUTPUTS],
-    ) -> (Vec<Series>, DMatrix<f64>) {
+    ) -> (Vec<BlockSeries>, DMatrix<f64>) {
         let n = self.names().len();
         let (mut all, mut sum) = (Vec::new(), DMatrix::zeros(n, n));
         for (member, own) in self.members.iter().zip(response) {
@@ -103,7 +103,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
-    fn widened(&self, series: &[Series], parameters: usize) -> Vec<Series> {
+    fn widened(&self, series: &[BlockSeries], parameters: usize) -> Vec<BlockSeries> {
         series
             .iter()
             .map(|own| own.widened(&self.places, parameters))

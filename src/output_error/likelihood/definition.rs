@@ -1,32 +1,30 @@
-//! What Newton-Raphson (1.3) and the bounds (1.7) need of the data, whether of one maneuver or of
-//! several joined.
+//! The likelihood as Newton-Raphson (1.3) sees it, of one maneuver or of several.
 
-use super::cost;
-use super::cost::Sums;
+use super::cost::{self, Sums};
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::pass::Diverged;
 use crate::output_error::kernel::response::{Detail, Response};
 
-/// Data that say something of parameters: cost, gradient and information at any values of them.
+/// Data with a likelihood: cost, gradient and information at any values of the parameters.
 pub trait Likelihood {
-    /// Computed outputs with the sums of the normal equations, allocated once and written over at
+    /// Computed outputs with the sums of the normal equations. Allocated once and overwritten by
     /// every iteration.
     type Response: Default;
 
     /// Names of the parameters in order.
     fn names(&self) -> &[String];
 
-    /// A response of the right size to write into.
+    /// Allocates a response.
     fn response(&self) -> Self::Response;
 
-    /// Whether a coarse response is less work than a rough one.
+    /// Returns true if a coarse response is less work than a whole one.
     fn has_coarse(&self) -> bool;
 
     /// Computes the response to these parameters.
     ///
     /// # Errors
-    /// [`Diverged`] when an integration leaves the bounds of sense.
+    /// [`Diverged`] when an integration leaves its bounds.
     fn respond(
         &self,
         detail: Detail,
@@ -40,7 +38,7 @@ pub trait Likelihood {
     /// Variances of the residuals, output by output.
     fn variances(&self, response: &Self::Response) -> [f64; OUTPUTS];
 
-    /// Where an integration diverged, in words.
+    /// Place at which an integration diverged, in words.
     fn place(&self, diverged: Diverged) -> String;
 }
 
@@ -73,15 +71,13 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Case<NX, E> {
     }
 
     fn variances(&self, response: &Response) -> [f64; OUTPUTS] {
-        let normal = &response.normal;
-        let output = |o: usize| (normal.square(o), normal.count(o));
-        cost::variances(std::array::from_fn(output), self.parameters())
+        let sums = &response.sums;
+        let outputs = std::array::from_fn(|o| (sums.square(o), sums.count(o)));
+        cost::residual_variances(outputs, self.parameters())
     }
 
     fn place(&self, diverged: Diverged) -> String {
-        format!(
-            "{:.2} s into the maneuver",
-            diverged.sample as f64 * self.step_s
-        )
+        let time_s = diverged.sample as f64 * self.step_s;
+        format!("{time_s:.2} s into the maneuver")
     }
 }

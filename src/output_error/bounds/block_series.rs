@@ -1,0 +1,178 @@
+//! Residuals and sensitivities of one output in blocks of samples.
+//!
+//! Noise slower than a block is an autoregressive process of the blocks' means, with few coefficients
+//! even where it is far slower. Noise faster than a block is white within the blocks. Parameters act
+//! slower than a block, so a slow component counts even if it is small beside the sensors' white
+//! noise.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::autoregression::Autoregression;
+use crate::numerics::matrix::{AlignedMatrix, LONGEST_LAG};
+use crate::output_error::case::blocks::{BlockSums, samples_per_block};
+
+/// Highest order of a process, blocks.
+const HIGHEST_ORDER: usize = 12;
+const _: () = assert!(HIGHEST_ORDER <= LONGEST_LAG);
+/// Fewest blocks per coefficient of a process.
+const BLOCKS_PER_COEFFICIENT: usize = 10;
+
+/// One output of one maneuver in blocks of samples.
+#[derive(Clone, Debug)]
+pub struct BlockSeries {
+    /// Weight of a sample.
+    pub(super) weight: f64,
+    /// Samples of a whole block.
+    pub(super) block_length: f64,
+    /// Mean residual of each block.
+    residuals: AlignedMatrix,
+    /// Variance of the samples about their block's mean.
+    pub(super) fast_variance: f64,
+    pub(super) fast_degrees_of_freedom: f64,
+    /// Samples that count, of each block.
+    pub(crate) counts: Vec<f64>,
+    /// Summed sensitivities of each block.
+    pub(crate) sensitivities: AlignedMatrix,
+    /// Σ s sᵀ of the blocks' sums.
+    pub(super) between: AlignedMatrix,
+    /// Σ s sᵀ of the samples' sensitivities about their block's mean.
+    pub(super) within: AlignedMatrix,
+}
+
+impl BlockSeries {
+    /// Divides one output's `samples` into blocks. `sums_of` returns a block's sums and writes its
+    /// summed sensitivities to a row. `square` and `squares` are Σ v² and Σ s sᵀ of all samples that
+    /// count.
+    #[must_use]
+    pub fn new(
+        step_s: f64,
+        weight: f64,
+        samples: usize,
+        square: f64,
+        squares: &DMatrix<f64>,
+        mut sums_of: impl FnMut(Range<usize>, &mut [f64]) -> BlockSums,
+    ) -> BlockSeries {
+        let (length, parameters) = (samples_per_block(step_s), squares.nrows());
+        let (blocks, block_length) = (samples.div_ceil(length), length as f64);
+        let mut sensitivities = AlignedMatrix::zeros(blocks, parameters);
+        let (mut counts, mut residuals) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
+        let (mut square, mut degrees_of_freedom) = (square, 0.0);
+        // Sensitivities of incomplete blocks, scaled to the excess of their means' squares.
+        let mut excess = Vec::new();
+        for (k, row) in sensitivities.rows_mut().enumerate() {
+            let within = k * length..samples.min((k + 1) * length);
+            let BlockSums { count, residual } = sums_of(within, row);
+            let mean = residual / count.max(1.0);
+            counts.push(count);
+            residuals.push(mean);
+            square -= residual * mean;
+            degrees_of_freedom += (count - 1.0).max(0.0);
+            if count > 0.0 && count < block_length {
+                let factor = (1.0 / count - 1.0 / block_length).sqrt();
+                excess.extend(row.iter().map(|s| factor * s));
+            }
+        }
+        let between = sensitivities.gram();
+        let mut within = AlignedMatrix::from_symmetric(squares);
+        within.add_scaled(&between, -1.0 / block_length);
+        if !excess.is_empty() {
+            let excess = AlignedMatrix::from_padded_rows(&excess, parameters);
+            within.add_scaled(&excess.gram(), -1.0);
+        }
+        let fast_degrees_of_freedom = f64::max(degrees_of_freedom, 1.0);
+        BlockSeries {
+            weight,
+            block_length,
+            residuals: AlignedMatrix::from_column(&residuals),
+            fast_variance: square.max(0.0) / fast_degrees_of_freedom,
+            fast_degrees_of_freedom,
+            counts,
+            sensitivities,
+            between,
+            within,
+        }
+    }
+
+    /// Series among more parameters; `places` has the place of each own parameter.
+    #[must_use]
+    pub fn widened(&self, places: &[usize], parameters: usize) -> BlockSeries {
+        let mut sensitivities = AlignedMatrix::zeros(self.blocks(), parameters);
+        let rows = self.sensitivities.rows().zip(sensitivities.rows_mut());
+        for (own, wide) in rows {
+            widen_row(own, places, wide);
+        }
+        BlockSeries {
+            sensitivities,
+            between: widen_square(&self.between, places, parameters),
+            within: widen_square(&self.within, places, parameters),
+            ..self.clone()
+        }
+    }
+
+    fn blocks(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// Number of lags of the autocovariances, lag 0 included.
+    pub(super) fn lags(&self) -> usize {
+        1 + HIGHEST_ORDER.min(self.blocks() / BLOCKS_PER_COEFFICIENT)
+    }
+
+    /// Number of pairs of blocks that count, at lags 0, 1, …, at least one.
+    pub(super) fn pairs(&self) -> Vec<f64> {
+        let used: Vec<f64> = self.counts.iter().map(|count| count.min(1.0)).collect();
+        let used = AlignedMatrix::from_column(&used);
+        let pairs = used.lagged_products(&used, self.lags());
+        pairs.iter().map(|pairs| pairs.max(1.0)).collect()
+    }
+
+    /// Autocovariances of the mean residuals at lags 0, 1, …
+    pub(super) fn autocovariances(&self, pairs: &[f64]) -> Vec<f64> {
+        let sums = self.residuals.lagged_products(&self.residuals, self.lags());
+        sums.iter()
+            .zip(pairs)
+            .map(|(sum, pairs)| sum / pairs)
+            .collect()
+    }
+
+    /// Filters rows of the blocks by a process, until the filter has decayed.
+    pub(super) fn filtered(&self, rows: &AlignedMatrix, process: &Autoregression) -> AlignedMatrix {
+        let mut filtered = rows.with_zero_rows(process.memory(self.blocks()));
+        filtered.filter_columns(&process.coefficients);
+        filtered
+    }
+
+    /// Multiplies the autocovariance R of a process with unit innovation by rows that are already
+    /// filtered once.
+    pub(super) fn times_autocovariance(
+        &self,
+        mut filtered: AlignedMatrix,
+        process: &Autoregression,
+    ) -> AlignedMatrix {
+        filtered.filter_columns_backwards(&process.coefficients);
+        filtered.truncate(self.blocks());
+        for (row, count) in filtered.rows_mut().zip(&self.counts) {
+            if *count <= 0.0 {
+                row.fill(0.0);
+            }
+        }
+        filtered
+    }
+}
+
+fn widen_row(own: &[f64], places: &[usize], wide: &mut [f64]) {
+    for (&place, s) in places.iter().zip(own) {
+        wide[place] = *s;
+    }
+}
+
+fn widen_square(own: &AlignedMatrix, places: &[usize], parameters: usize) -> AlignedMatrix {
+    let mut wide = AlignedMatrix::zeros(parameters, parameters);
+    let width = wide.width();
+    for (own, &row) in own.rows().zip(places) {
+        widen_row(own, places, &mut wide.values_mut()[row * width..][..width]);
+    }
+    wide
+}
