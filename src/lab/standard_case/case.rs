@@ -166,29 +166,24 @@ impl StandardCase {
         )
     }
 
-    /// Prepares the maneuver for the iteration.
+    /// Free and held parameters of the case.
     #[must_use]
-    pub fn case(&self, window: &Window) -> Case<3, Longitudinal> {
-        let model = Model {
+    pub fn model(&self) -> Model<'_> {
+        Model {
             free: self.free.iter().collect(),
             held: self.held.iter().map(|(d, v)| (d, *v)).collect(),
             biases: self.biases.iter().collect(),
             initial_state: InitialState::Measured,
-        };
-        let mut case = Case::new(
-            &self.aircraft,
-            window,
-            self.file.measurements(&self.record),
-            &model,
-        );
-        case.start_from_mean_of(self.file.x0_samples);
-        case
+        }
     }
 
-    /// Free derivatives, and held derivatives with their values.
+    /// Prepares the maneuver for the iteration.
     #[must_use]
-    pub fn derivatives(&self) -> (&[Derivative], &[(Derivative, f64)]) {
-        (&self.free, &self.held)
+    pub fn case(&self, window: &Window) -> Case<3, Longitudinal> {
+        let measurements = self.file.measurements(&self.record);
+        let mut case = Case::new(&self.aircraft, window, measurements, &self.model());
+        case.start_from_mean_of(self.file.x0_samples);
+        case
     }
 
     #[must_use]
