@@ -16,6 +16,7 @@ mod memory;
 mod nights;
 #[cfg(feature = "s3")]
 mod object_store;
+mod pages;
 mod paper;
 mod report;
 mod rows;
