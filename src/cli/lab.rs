@@ -1,7 +1,7 @@
 //! The commands of the laboratory: a simulated campaign, the study of the bounds, the timing of the
 //! standard case.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
@@ -11,6 +11,7 @@ use crate::error::Problem;
 use crate::lab::campaign::{self, SimulatedCampaign};
 use crate::lab::{bounds_study, standard_case};
 use crate::store::atomic;
+use crate::tables;
 
 /// Exit code when part of the work was rejected.
 const REJECTED: u8 = 2;
@@ -24,6 +25,8 @@ pub enum LabCommand {
     Validate(ValidateOptions),
     /// Time the estimate of a maneuver given as JSON with its record as CSV beside it
     Bench(BenchOptions),
+    /// Write the page that explains the tables, Markdown
+    Tables(TablesOptions),
 }
 
 #[derive(Args, Debug)]
@@ -71,6 +74,13 @@ pub struct BenchOptions {
 }
 
 #[derive(Args, Debug)]
+pub struct TablesOptions {
+    /// File to write [default: the terminal]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
 struct Execution {
     /// Number of threads; results do not depend on it [default: all cores]
     #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
@@ -93,6 +103,7 @@ pub fn run(command: &LabCommand) -> anyhow::Result<ExitCode> {
         LabCommand::Simulate(options) => simulate(options),
         LabCommand::Validate(options) => validate(options),
         LabCommand::Bench(options) => bench(options),
+        LabCommand::Tables(options) => write_or_print(options.out.as_deref(), &tables::page()),
     }
 }
 
@@ -145,7 +156,6 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     Ok(exit_code(study.problems.is_empty()))
 }
 
-#[expect(clippy::print_stdout, reason = "the command's output")]
 fn bench(options: &BenchOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let (case, repetitions) = (&options.case, options.repetitions);
@@ -156,11 +166,16 @@ fn bench(options: &BenchOptions) -> anyhow::Result<ExitCode> {
         let timed = standard_case::timed(&case, repetitions).map_err(anyhow::Error::msg)?;
         serde_json::to_string_pretty(&timed)?
     };
-    match &options.out {
+    write_or_print(options.out.as_deref(), &text)
+}
+
+#[expect(clippy::print_stdout, reason = "the command's output")]
+fn write_or_print(file: Option<&Path>, text: &str) -> anyhow::Result<ExitCode> {
+    match file {
         Some(file) => {
             atomic::place(file, text.as_bytes())?;
         }
-        None => println!("{text}"),
+        None => println!("{}", text.trim_end()),
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -33,9 +33,9 @@ ingest:
 `<signal>` and `<surface>` stand for names of `aircraft.yaml`, `[]` for each entry of a list. *required* marks keys without
 a default.
 
-`estimate: hold: evidence` has a price. On a simulated campaign its intervals for a nominal 95 % covered 89 %, those of
-`table` 94 % (`reports/validation.md`). The tunnel was worse than the 20 % that it was assumed to be. With tunnel tables
-in error by just that much they covered 93 %. State the tunnel's uncertainty where evidence decides.
+`estimate: hold: evidence` has a price: where the tunnel is worse than its stated uncertainty, its intervals cover less than
+those of `table` ([validity](validity.md#intervals-with-hold-evidence)). State the tunnel's uncertainty where evidence
+decides.
 ";
 
 fn source(text: &str) -> Source {
