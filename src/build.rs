@@ -26,9 +26,9 @@ fn gather(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         if path.is_dir() {
-            gather(&path, files)
+            gather(&path, files);
         } else {
-            files.push(path)
+            files.push(path);
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The build-up of the six coefficients: the list of derivatives, the sensor biases estimated with
-//! them, and the sums that the wind tunnel tabulates instead of their parts.
+//! Build-up of the six coefficients: derivatives, sensor biases estimated with them, and sums that the
+//! wind tunnel tabulates instead of their parts.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,9 +28,9 @@ impl Bias {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Combined {
     pub name: String,
-    /// The derivative taken once.
+    /// Derivative taken once.
     pub constant: String,
-    /// The derivative taken times the maneuver's mean α in deg.
+    /// Derivative taken times the maneuver's mean α in deg.
     pub slope: String,
 }
 

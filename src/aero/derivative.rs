@@ -17,7 +17,7 @@ words! {
 }
 
 impl Axis {
-    /// The three coefficients that act in this axis, in the order of the equations.
+    /// Coefficients that act in this axis, in the order of the equations.
     #[must_use]
     pub fn coefficients(self) -> [Coefficient; 3] {
         match self {
@@ -26,7 +26,7 @@ impl Axis {
         }
     }
 
-    /// The five outputs that are matched, in the order of Tables 2 and 4.
+    /// Outputs that are matched, in the order of Tables 2 and 4.
     #[must_use]
     pub fn outputs(self) -> [Output; 5] {
         match self {
@@ -42,7 +42,7 @@ impl Axis {
     }
 }
 
-/// A force or moment coefficient: normal and axial force, side force, and the three moments.
+/// Force or moment coefficient: normal and axial force, side force, and the three moments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Coefficient {
     CN,
@@ -62,7 +62,7 @@ impl Coefficient {
         }
     }
 
-    /// Its place among its axis's three.
+    /// Index among the coefficients of its axis.
     #[must_use]
     pub fn index(self) -> usize {
         self.axis()
@@ -105,7 +105,7 @@ words! {
 }
 
 impl Output {
-    /// The signal that measures it.
+    /// Signal that measures it.
     #[must_use]
     pub fn signal(self) -> &'static str {
         match self {
@@ -132,7 +132,7 @@ impl Output {
     }
 }
 
-/// What a derivative multiplies.
+/// Factor of a derivative.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Regressor {
     /// One: the coefficient at zero of everything else.
@@ -156,7 +156,7 @@ pub enum Regressor {
 }
 
 impl Regressor {
-    /// The signal of the surface or vane, where it is one.
+    /// Signal of the surface or vane; `None` for other regressors.
     #[must_use]
     pub fn surface(&self) -> Option<&str> {
         match self {
@@ -189,9 +189,10 @@ words! {
 }
 
 impl DerivativeUnit {
-    /// The factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`,
-    /// `nd`) to values in this one; exactly one for its own name, none where the two do not measure
-    /// the same.
+    /// Factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`, `nd`)
+    /// to values in this one.
+    ///
+    /// Exactly one for its own name; `None` for a unit of another quantity.
     #[must_use]
     pub fn factor_from(self, written: &str) -> Option<f64> {
         let (quantity, factor, angle) = spelled(written)?;
@@ -206,13 +207,12 @@ impl DerivativeUnit {
     }
 }
 
-/// What a value per this angle is multiplied by to be per degree.
+/// Factor from a value per this angle to a value per degree.
 fn per_degree(angle: &str) -> f64 {
     if angle == "rad" { 1.0 / DEG } else { 1.0 }
 }
 
-/// A derivative's unit taken apart: what it measures, the factor to that quantity's own unit, and
-/// the angle it is per.
+/// Parts of a derivative's unit: quantity, factor to that quantity's own unit, and angle.
 fn spelled(written: &str) -> Option<(&'static str, f64, Option<&'static str>)> {
     let plain: String = written
         .trim()

@@ -1,4 +1,4 @@
-//! Reading a table between its points: linear, or the monotone cubic of Fritsch and Carlson (1980)
+//! Interpolation in a table: linear, or the monotone cubic of Fritsch and Carlson (1980)
 //! with the slopes of Fritsch and Butland (1984), which never overshoots the points on either side.
 //!
 //! On an interval of length h with the values y₀, y₁ and the slopes d₀, d₁ the cubic is Hermite's.
@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a table is read between its points.
+/// Interpolation between the points of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
@@ -17,9 +17,11 @@ pub enum Interpolation {
     MonotoneCubic,
 }
 
-/// Where `x` lies among `n` ascending points: the interval below it (`low`, `low + 1`) and how far
-/// along it, 0 to 1. Beyond the ends it is the end; a point by itself is an interval of no length.
-pub(super) fn place(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f64) {
+/// Interval of `x` among `n` ascending points: the index of its lower point, and the fraction along
+/// it from 0 to 1.
+///
+/// Beyond the ends it is the end. A single point is an interval without length.
+pub(super) fn interval_at(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f64) {
     let last = n.saturating_sub(1);
     let (mut low, mut high) = (0, last);
     while high > low + 1 {
@@ -41,7 +43,7 @@ pub(super) fn place(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f6
     )
 }
 
-/// The value at a fraction of an interval: exactly the table's at its ends.
+/// Linear value at a fraction of an interval: exactly the table's at its ends.
 pub(super) fn linear(y0: f64, y1: f64, fraction: f64) -> f64 {
     if fraction >= 1.0 {
         y1
@@ -91,8 +93,8 @@ fn inner_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {
     (w0 + w1) / (w0 / chord0 + w1 / chord1)
 }
 
-/// The three-point slope at an end, `chord0` next to it; never against the chord nor steeper than
-/// three of it where the table turns.
+/// Three-point slope at an end, with `chord0` next to it. It has the sign of the chord, and at most
+/// three times its size where the table turns.
 fn end_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {
     let slope = ((2.0 * h0 + h1) * chord0 - h0 * chord1) / (h0 + h1);
     if slope * chord0 <= 0.0 {
@@ -122,7 +124,7 @@ mod tests {
     ];
 
     fn read(points: &[(f64, f64)], x: f64) -> f64 {
-        let (low, fraction) = place(points.len(), |i| points[i].0, x);
+        let (low, fraction) = interval_at(points.len(), |i| points[i].0, x);
         monotone(
             points.len(),
             low,
@@ -164,7 +166,7 @@ mod tests {
         let points = [(0.1, 0.3), (0.7, 0.1), (0.9, 0.7), (1.3, 0.2)];
         for (x, y) in points {
             assert_eq!(read(&points, x).to_bits(), y.to_bits());
-            let (low, fraction) = place(points.len(), |i| points[i].0, x);
+            let (low, fraction) = interval_at(points.len(), |i| points[i].0, x);
             assert_eq!(
                 linear(points[low].1, points[(low + 1).min(3)].1, fraction).to_bits(),
                 y.to_bits()

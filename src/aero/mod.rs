@@ -1,5 +1,6 @@
-//! The aerodynamic model as data: which derivatives make up which coefficient (eqs. 2.10-2.12,
-//! 3.9-3.11), and the wind-tunnel database they start from, are held at, and are compared with.
+//! Aerodynamic model as data: the build-up of the coefficients from derivatives (eqs. 2.10-2.12,
+//! 3.9-3.11), and the wind-tunnel database, at whose values they start and are held, and with which
+//! they are compared.
 
 pub mod buildup;
 pub mod derivative;

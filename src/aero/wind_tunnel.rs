@@ -3,14 +3,14 @@
 //!
 //! A table is read along α at the Mach numbers and third values on either side, then across Mach,
 //! then across the third variable, linearly or by a monotone cubic ([`super::interpolation`]).
-//! Beyond its ends it stays as at the end (clamped) or has no value (refused), as the analyst
-//! decides; [`WindTunnel::beyond`] tells where that was so.
+//! ExtrapolatedReading its ends a table has the value at the end (clamped) or none (refused), by the settings;
+//! [`WindTunnel::extrapolations`] lists such readings.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::interpolation::{Interpolation, linear, monotone, place};
+use super::interpolation::{Interpolation, interval_at, linear, monotone};
 use crate::settings::{settings, single_values};
 
 /// One tabulated value.
@@ -22,23 +22,23 @@ pub struct TunnelPoint {
     pub value: f64,
     /// Standard uncertainty of the value, where the database states one.
     pub uncertainty: Option<f64>,
-    /// Where the value comes from, where the database says.
+    /// Source of the value, where the database states one.
     pub source: Option<String>,
 }
 
-/// A value read off the tables between their points.
+/// A value read from the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TunnelValue {
     pub value: f64,
     pub uncertainty: Option<f64>,
 }
 
-/// Where the tables are read.
+/// Flight condition at which the tables are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     pub alpha_deg: f64,
     pub mach: f64,
-    /// The third variable; `None` where it is not known, and [`Third::at`] is taken.
+    /// Third variable; `None` where unknown, and [`Third::at`] is used.
     pub third: Option<f64>,
 }
 
@@ -57,14 +57,14 @@ settings! {
     }
 }
 
-/// What a table says beyond its ends.
+/// Reading of a table beyond its ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Extrapolation {
     /// The value at the end.
     #[default]
     Clamp,
-    /// Nothing.
+    /// No value.
     Refuse,
 }
 
@@ -82,25 +82,26 @@ settings! {
     }
 }
 
-/// A reading beyond the ends of a table.
+/// A reading of a table beyond its ends.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Beyond {
+pub struct ExtrapolatedReading {
     /// `alpha_deg`, `mach`, or the third variable's name.
     pub variable: String,
     pub read_at: f64,
-    /// The table's ends.
+    /// Lower end of the table.
     pub from: f64,
+    /// Upper end of the table.
     pub to: f64,
 }
 
-/// A point with its third variable; `None` for a table that does not depend on it.
+/// A point with its third variable, `None` for a table that does not depend on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Entry {
     third: Option<f64>,
     point: TunnelPoint,
 }
 
-/// The tables, by derivative name. Names are compared without underscores, so a database may write
+/// Tables by derivative name. Names are compared without underscores, so that a database may write
 /// `CNalpha`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WindTunnel {
@@ -114,7 +115,7 @@ fn key(derivative: &str) -> String {
 }
 
 impl WindTunnel {
-    /// Without tables yet, to be read as the settings say.
+    /// A database without tables yet, to be read by the settings.
     #[must_use]
     pub fn new(settings: Settings) -> WindTunnel {
         WindTunnel {
@@ -165,7 +166,7 @@ impl WindTunnel {
         self.tables.contains_key(&key(derivative))
     }
 
-    /// Where the values come from, as far as the database says: every source once, sorted.
+    /// Sources that the database states, each once, sorted.
     #[must_use]
     pub fn sources(&self) -> Vec<&str> {
         let mut sources: Vec<&str> = self
@@ -229,13 +230,13 @@ impl WindTunnel {
         )
     }
 
-    /// The value at a flight condition; none without a table, or where extrapolation would be
-    /// needed and is refused.
+    /// Value at a flight condition; `None` without a table, or where extrapolation is needed and
+    /// refused.
     #[must_use]
     pub fn at(&self, derivative: &str, condition: &Condition) -> Option<TunnelValue> {
         let table = self.tables.get(&key(derivative))?;
         let refused = self.settings.extrapolation == Extrapolation::Refuse;
-        if refused && !self.beyond(derivative, condition).is_empty() {
+        if refused && !self.extrapolations(derivative, condition).is_empty() {
             return None;
         }
         let scheme = self.settings.interpolation;
@@ -247,7 +248,7 @@ impl WindTunnel {
             let along_alpha = |j: usize| {
                 let row = rows[j];
                 let alpha = |k: usize| row[k].point.alpha_deg;
-                along(
+                interpolated(
                     row.len(),
                     alpha,
                     |k| row[k].value(),
@@ -255,9 +256,9 @@ impl WindTunnel {
                     scheme,
                 )
             };
-            along(rows.len(), mach, along_alpha, condition.mach, scheme)
+            interpolated(rows.len(), mach, along_alpha, condition.mach, scheme)
         };
-        Some(along(
+        Some(interpolated(
             blocks.len(),
             third,
             across_mach,
@@ -273,17 +274,24 @@ impl WindTunnel {
             .unwrap_or(0.0)
     }
 
-    /// In which variables a reading lies beyond a derivative's table: beyond the rows on either
-    /// side of it, which may be of different length.
+    /// Variables in which a reading lies beyond a derivative's table.
+    ///
+    /// The ends are those of the rows on either side of the reading, which may differ in length.
     #[must_use]
-    pub fn beyond(&self, derivative: &str, condition: &Condition) -> Vec<Beyond> {
+    pub fn extrapolations(
+        &self,
+        derivative: &str,
+        condition: &Condition,
+    ) -> Vec<ExtrapolatedReading> {
         let table = self.table(derivative);
         let third = self.third_at(condition);
         let mut beyond = Vec::new();
         let mut note = |variable: &str, read_at: f64, (from, to): (f64, f64)| {
-            let known = beyond.iter().any(|b: &Beyond| b.variable == variable);
+            let known = beyond
+                .iter()
+                .any(|b: &ExtrapolatedReading| b.variable == variable);
             if !known && !(from..=to).contains(&read_at) {
-                beyond.push(Beyond {
+                beyond.push(ExtrapolatedReading {
                     variable: variable.to_owned(),
                     read_at,
                     from,
@@ -337,7 +345,7 @@ fn rows_of_mach(block: &[Entry]) -> Vec<&[Entry]> {
         .collect()
 }
 
-/// The distinct values of a variable, ascending.
+/// Distinct values of a variable, ascending.
 fn breakpoints(table: &[Entry], of: impl Fn(&Entry) -> Option<f64>) -> Vec<f64> {
     let mut values: Vec<f64> = table.iter().filter_map(of).collect();
     values.sort_by(f64::total_cmp);
@@ -349,12 +357,12 @@ fn ends(ascending: &[f64]) -> Option<(f64, f64)> {
     Some((*ascending.first()?, *ascending.last()?))
 }
 
-/// The items on either side of `x`; one where it is at an item or beyond the ends.
+/// Items on either side of `x`; a single one where `x` is at an item or beyond the ends.
 fn either_side<T>(items: &[T], x_of: impl Fn(&T) -> f64, x: f64) -> &[T] {
     if items.is_empty() {
         return items;
     }
-    let (low, fraction) = place(items.len(), |i| x_of(&items[i]), x);
+    let (low, fraction) = interval_at(items.len(), |i| x_of(&items[i]), x);
     let high = (low + 1).min(items.len() - 1);
     if fraction <= 0.0 {
         &items[low..=low]
@@ -365,15 +373,15 @@ fn either_side<T>(items: &[T], x_of: impl Fn(&T) -> f64, x: f64) -> &[T] {
     }
 }
 
-/// The value along one variable; uncertainties are linear whatever the values are.
-fn along(
+/// Value interpolated along one variable. Uncertainties are interpolated linearly in any case.
+fn interpolated(
     n: usize,
     x_of: impl Fn(usize) -> f64,
     value_of: impl Fn(usize) -> TunnelValue,
     x: f64,
     scheme: Interpolation,
 ) -> TunnelValue {
-    let (low, fraction) = place(n, &x_of, x);
+    let (low, fraction) = interval_at(n, &x_of, x);
     let high = (low + 1).min(n.saturating_sub(1));
     let (a, b) = (value_of(low), value_of(high));
     let value = match scheme {
@@ -564,7 +572,7 @@ mod tests {
         };
         assert_relative_eq!(clamped.at("CN_alpha", &beyond).expect("clamped").value, 9.6);
         assert_eq!(refusing.at("CN_alpha", &beyond), None);
-        let named = |variable: &str, read_at, from, to| Beyond {
+        let named = |variable: &str, read_at, from, to| ExtrapolatedReading {
             variable: variable.into(),
             read_at,
             from,
@@ -574,13 +582,13 @@ mod tests {
             named("mach", 0.7, 0.2, 0.6),
             named("alpha_deg", 31.0, 0.0, 30.0),
         ];
-        assert_eq!(refusing.beyond("CN_alpha", &beyond), both);
+        assert_eq!(refusing.extrapolations("CN_alpha", &beyond), both);
         let inside = Condition {
             alpha_deg: 30.0,
             mach: 0.2,
             third: None,
         };
-        assert_eq!(refusing.beyond("CN_alpha", &inside), []);
+        assert_eq!(refusing.extrapolations("CN_alpha", &inside), []);
         assert_eq!(
             refusing.at("CN_alpha", &inside),
             clamped.at("CN_alpha", &inside)
@@ -596,7 +604,7 @@ mod tests {
             (10.0, Some(0.6), 1.0),
         ]);
         let at = |alpha_deg, mach| {
-            t.beyond(
+            t.extrapolations(
                 "CN_alpha",
                 &Condition {
                     alpha_deg,
@@ -608,7 +616,7 @@ mod tests {
         assert_eq!(at(20.0, 0.2), []);
         assert_eq!(
             at(20.0, 0.3),
-            [Beyond {
+            [ExtrapolatedReading {
                 variable: "alpha_deg".into(),
                 read_at: 20.0,
                 from: 0.0,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::aero::wind_tunnel::{Beyond, Extrapolation};
+use crate::aero::wind_tunnel::{ExtrapolatedReading, Extrapolation};
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::tables::{ComparisonRow, EstimateRow, ExtrapolationRow, Treatment};
@@ -56,9 +56,9 @@ fn at<'a>(
     tunnel: &WindTunnel,
 ) -> Vec<ExtrapolationRow> {
     // Tables that end alike share a row; the key is their ends to the bit.
-    let mut found: BTreeMap<(String, u64, u64), (Beyond, Vec<&str>)> = BTreeMap::new();
+    let mut found: BTreeMap<(String, u64, u64), (ExtrapolatedReading, Vec<&str>)> = BTreeMap::new();
     for name in derivatives {
-        for beyond in tunnel.beyond(name, condition) {
+        for beyond in tunnel.extrapolations(name, condition) {
             let key = (
                 beyond.variable.clone(),
                 beyond.from.to_bits(),
@@ -75,7 +75,7 @@ fn at<'a>(
         Extrapolation::Clamp => Treatment::Clamped,
         Extrapolation::Refuse => Treatment::Refused,
     };
-    let row = |(beyond, names): (Beyond, Vec<&str>)| ExtrapolationRow {
+    let row = |(beyond, names): (ExtrapolatedReading, Vec<&str>)| ExtrapolationRow {
         maneuver_id: maneuver_id.to_owned(),
         alpha_deg: condition.alpha_deg,
         mach: condition.mach,

@@ -1,15 +1,18 @@
-//! The build-up as DAVE-ML (ANSI/AIAA S-119-2011, DAVEfunc 2.0): a gridded function per derivative,
-//! a second one that says where it is flight's, and the coefficients as their sums.
+//! The build-up as DAVE-ML (ANSI/AIAA S-119-2011, DAVEfunc 2.0).
+//!
+//! Each derivative is a gridded function, with a second function that is 1 where the value is
+//! flight's. The coefficients are sums of them.
 
+use super::contents::{COEFFICIENTS, Contents, terms};
+use super::derivative_table::{DerivativeTable, GridCell};
 use super::xml::{Xml, escaped};
-use super::{COEFFICIENTS, Contents, Table, terms};
 use crate::aero::{Coefficient, Derivative, Regressor};
 
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n\
     <!DOCTYPE DAVEfunc PUBLIC \"-//AIAA//DTD for Flight Dynamic Models - Functions 2.0//EN\" \
     \"http://daveml.org/DTDs/2p0/DAVEfunc.dtd\">";
 
-/// Rates over twice the speed: identifier, words.
+/// Rates over twice the speed: identifier, description.
 const RATES: [(Regressor, &str, &str); 3] = [
     (
         Regressor::RollRate,
@@ -28,9 +31,9 @@ const RATES: [(Regressor, &str, &str); 3] = [
     ),
 ];
 
-/// The model, whole.
+/// The whole document.
 #[must_use]
-pub fn document(contents: &Contents, tables: &[Table]) -> String {
+pub fn document(contents: &Contents, tables: &[DerivativeTable]) -> String {
     let mut xml = Xml::new(DECLARATION);
     xml.open("DAVEfunc", &[("xmlns", "http://daveml.org/2010/DAVEML")]);
     header(contents, &mut xml);
@@ -93,7 +96,7 @@ fn header(contents: &Contents, xml: &mut Xml) {
     xml.close();
 }
 
-/// What a variable is for.
+/// Role of a variable.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Mark {
     Input,
@@ -117,7 +120,7 @@ fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, mark:
     xml.close();
 }
 
-fn inputs(contents: &Contents, tables: &[Table], xml: &mut Xml) {
+fn inputs(contents: &Contents, tables: &[DerivativeTable], xml: &mut Xml) {
     variable(
         xml,
         "angleOfAttack",
@@ -158,7 +161,7 @@ fn inputs(contents: &Contents, tables: &[Table], xml: &mut Xml) {
         .collect();
     surfaces.sort_unstable();
     surfaces.dedup();
-    // A surface that is a table's third variable is an input already.
+    // A surface that is a table's third variable is already an input.
     for signal in surfaces
         .into_iter()
         .filter(|s| Some(*s) != third(contents, tables))
@@ -174,7 +177,7 @@ fn inputs(contents: &Contents, tables: &[Table], xml: &mut Xml) {
     }
 }
 
-fn third<'a>(contents: &'a Contents, tables: &[Table]) -> Option<&'a str> {
+fn third<'a>(contents: &'a Contents, tables: &[DerivativeTable]) -> Option<&'a str> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
     contents
         .tunnel
@@ -185,9 +188,13 @@ fn third<'a>(contents: &'a Contents, tables: &[Table]) -> Option<&'a str> {
         .map(|third| third.name.as_str())
 }
 
-/// A coefficient without vanes as the sum of its terms, and the load of its vanes where it has
-/// some.
-fn coefficients(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
+/// Writes a coefficient without vanes as the sum of its terms, and the load of its vanes, if any.
+fn coefficients(
+    contents: &Contents,
+    tables: &[DerivativeTable],
+    coefficient: Coefficient,
+    xml: &mut Xml,
+) {
     let name = format!("{coefficient:?}");
     let load = if coefficient.is_moment() {
         "ft*lbf"
@@ -239,13 +246,13 @@ fn term(derivative: &Derivative, xml: &mut Xml) {
     xml.close();
 }
 
-/// The breakpoints of every table: those of one table's variable that has a grid.
+/// Writes the breakpoints of every variable of a table.
 fn breakpoints<'a>(
     contents: &Contents,
-    tables: &'a [Table],
+    tables: &'a [DerivativeTable],
 ) -> Vec<(String, &'a [f64], &'static str)> {
     let third = third(contents, tables).is_some();
-    let of = |table: &'a Table| {
+    let of = |table: &'a DerivativeTable| {
         let id = |variable: &str| format!("{}_{variable}", table.derivative);
         let mut all = vec![
             (id("alpha"), table.alphas_deg.as_slice(), "deg"),
@@ -259,9 +266,9 @@ fn breakpoints<'a>(
     tables.iter().flat_map(of).collect()
 }
 
-/// Which variables a table depends on, slowest first: the name of its breakpoints and the
-/// variable's identifier.
-fn variables<'a>(table: &Table, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
+/// Variables that a table depends on, slowest first: name of the breakpoints, identifier of the
+/// variable.
+fn variables<'a>(table: &DerivativeTable, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
     let mut variables = Vec::new();
     if !table.thirds.is_empty() {
         variables.push(("third", third.unwrap_or_default()));
@@ -273,9 +280,9 @@ fn variables<'a>(table: &Table, third: Option<&'a str>) -> Vec<(&'static str, &'
     variables
 }
 
-fn gridded(table: &Table, xml: &mut Xml) {
+fn gridded(table: &DerivativeTable, xml: &mut Xml) {
     let n = table.alphas_deg.len().max(1);
-    let lines = |of: &dyn Fn(&super::Cell) -> f64| -> Vec<String> {
+    let lines = |of: &dyn Fn(&GridCell) -> f64| -> Vec<String> {
         let values: Vec<f64> = table.cells.iter().map(of).collect();
         let rows: Vec<String> = values.chunks(n).map(numbers).collect();
         let last = rows.len().saturating_sub(1);
@@ -338,7 +345,13 @@ fn gridded(table: &Table, xml: &mut Xml) {
     xml.close();
 }
 
-fn function(contents: &Contents, table: &Table, variable: &str, gridded: &str, xml: &mut Xml) {
+fn function(
+    contents: &Contents,
+    table: &DerivativeTable,
+    variable: &str,
+    gridded: &str,
+    xml: &mut Xml,
+) {
     xml.open("function", &[("name", variable)]);
     for (_, id) in variables(table, third(contents, std::slice::from_ref(table))) {
         xml.empty(
@@ -369,7 +382,7 @@ fn numbers(values: &[f64]) -> String {
         .join(", ")
 }
 
-/// A unit as the standard spells it.
+/// Unit in the spelling of the standard.
 fn unit(unit: &str) -> String {
     match unit {
         "-" => "nd".to_owned(),

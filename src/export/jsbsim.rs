@@ -6,13 +6,14 @@
 //! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft
 //! lbf and are not multiplied by q̄S.
 
+use super::contents::{COEFFICIENTS, Contents, terms};
+use super::derivative_table::DerivativeTable;
 use super::xml::Xml;
-use super::{COEFFICIENTS, Contents, Table, terms};
 use crate::aero::{Coefficient, Derivative, Regressor};
 
-/// The section, as JSBSim's `<aerodynamics>`.
+/// JSBSim's `<aerodynamics>` section.
 #[must_use]
-pub fn section(contents: &Contents, tables: &[Table]) -> String {
+pub fn section(contents: &Contents, tables: &[DerivativeTable]) -> String {
     let mut xml = Xml::new("<?xml version=\"1.0\" encoding=\"UTF-8\"?>");
     xml.open("aerodynamics", &[]);
     let a = contents.aircraft;
@@ -68,7 +69,7 @@ fn axis_of(coefficient: Coefficient) -> (&'static str, Option<&'static str>) {
     }
 }
 
-/// The property that a signal is.
+/// Property of a signal.
 fn property(contents: &Contents, signal: &str) -> String {
     let given = contents.settings.jsbsim_properties.get(signal);
     given.cloned().unwrap_or_else(|| match signal {
@@ -80,8 +81,8 @@ fn property(contents: &Contents, signal: &str) -> String {
     })
 }
 
-/// The third variable's property, where a table depends on one.
-fn third(contents: &Contents, tables: &[Table]) -> Option<String> {
+/// Property of the third variable, if a table depends on one.
+fn third(contents: &Contents, tables: &[DerivativeTable]) -> Option<String> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
     let third = contents
         .tunnel
@@ -92,8 +93,8 @@ fn third(contents: &Contents, tables: &[Table]) -> Option<String> {
     Some(property(contents, &third.name))
 }
 
-/// The properties that JSBSim does not have by itself, each once.
-fn own_properties(contents: &Contents, tables: &[Table]) -> Vec<String> {
+/// Properties that JSBSim itself lacks, each once.
+fn own_properties(contents: &Contents, tables: &[DerivativeTable]) -> Vec<String> {
     let all = COEFFICIENTS
         .into_iter()
         .flat_map(|c| [false, true].map(|vanes| (c, vanes)));
@@ -111,7 +112,7 @@ fn own_properties(contents: &Contents, tables: &[Table]) -> Vec<String> {
     properties
 }
 
-/// The factors of one term: the derivative and what it multiplies.
+/// Factors of one term: the derivative and its regressor.
 fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
     let mut factors = vec![format!("aero/harvest/{}", derivative.name)];
     factors.extend(match &derivative.regressor {
@@ -135,7 +136,7 @@ fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
     factors
 }
 
-fn axis(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &mut Xml) {
+fn axis(contents: &Contents, tables: &[DerivativeTable], coefficient: Coefficient, xml: &mut Xml) {
     let (name, length) = axis_of(coefficient);
     xml.open("axis", &[("name", name)]);
     let kind = if coefficient.is_moment() {
@@ -160,7 +161,7 @@ fn axis(contents: &Contents, tables: &[Table], coefficient: Coefficient, xml: &m
     xml.close();
 }
 
-/// A sum of products of properties. JSBSim wants two operands or more in each.
+/// Writes a sum of products of properties. JSBSim requires two operands or more in each.
 fn sum(xml: &mut Xml, products: &[Vec<String>]) {
     if products.is_empty() {
         xml.text("value", &[], "0");
@@ -184,8 +185,8 @@ fn sum(xml: &mut Xml, products: &[Vec<String>]) {
     }
 }
 
-/// The table of one derivative.
-fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
+/// Writes the table of one derivative.
+fn function(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
     xml.open(
         "function",
         &[("name", &format!("aero/harvest/{}", table.derivative))],
@@ -207,7 +208,7 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
         (third.as_str(), table.thirds.as_slice()),
     ];
     let values: Vec<f64> = table.cells.iter().map(|c| c.value).collect();
-    // A variable with one breakpoint is none: the cells stay as they are.
+    // A variable with one breakpoint is no variable: the cells are the same without it.
     let axes: Vec<(&str, &[f64])> = axes
         .into_iter()
         .filter(|(_, points)| points.len() > 1)
@@ -252,8 +253,8 @@ fn function(contents: &Contents, table: &Table, xml: &mut Xml) {
     xml.close();
 }
 
-/// A table of two variables: the columns' breakpoints, then each row's with its values. The rows'
-/// variable varies fastest in `values`.
+/// Lines of a table of two variables: the columns' breakpoints, then each row's with its values.
+/// The rows' variable varies fastest in `values`.
 fn plane(rows: &[f64], columns: &[f64], values: &[f64]) -> Vec<String> {
     let words = |values: Vec<f64>| {
         values

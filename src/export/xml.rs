@@ -1,15 +1,15 @@
-//! XML in the making: indented elements, escaped text.
+//! Writer of XML: indented elements, escaped text.
 
 use std::fmt::Write;
 
-/// A document that grows.
+/// A document being written.
 #[derive(Debug, Default)]
 pub(super) struct Xml {
     text: String,
     open: Vec<&'static str>,
 }
 
-/// Text as it may stand in an element or an attribute.
+/// Escapes text for an element or an attribute.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -63,7 +63,7 @@ impl Xml {
         ));
     }
 
-    /// Lines of numbers as an element's text.
+    /// Writes an element whose text is lines of numbers.
     pub(super) fn block(
         &mut self,
         name: &'static str,

@@ -5,20 +5,24 @@
 mod grammar;
 mod jsbsim;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use approx::assert_relative_eq;
 use nalgebra::Vector3;
 
+use super::derivative_table::is_same_breakpoint;
 use super::*;
-use crate::aero::{Axis, wind_tunnel};
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::aero::{Axis, Condition, WindTunnel, wind_tunnel};
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
 use crate::lab::simulator::air_data::AirData;
-use crate::maneuver::{ManeuverOrigin, Status};
+use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
+use crate::tables::{EstimateRow, TrendRow};
 
 const ALPHAS: [f64; 7] = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0];
 
@@ -224,7 +228,7 @@ fn the_exported_constant_and_slope_add_up_to_the_sum_that_was_flown() {
         let table = tables.iter().find(|t| t.derivative == name).unwrap();
         table
             .points()
-            .find(|(at, _)| same(at.alpha_deg, alpha_deg))
+            .find(|(at, _)| is_same_breakpoint(at.alpha_deg, alpha_deg))
             .unwrap()
             .1
     };

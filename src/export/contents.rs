@@ -1,0 +1,49 @@
+//! Everything that an export is made from.
+
+use super::derivative_table::DerivativeTable;
+use super::settings::Settings;
+use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::maneuver::Maneuver;
+use crate::tables::{EstimateRow, TrendRow};
+use crate::trend;
+
+/// Everything that an export is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Contents<'a> {
+    pub title: &'a str,
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+    pub tunnel: &'a WindTunnel,
+    pub trends: &'a [TrendRow],
+    /// Estimates of converged maneuvers, for the flown ranges.
+    pub estimates: &'a [EstimateRow],
+    pub maneuvers: &'a [Maneuver],
+    pub groups: &'a trend::Settings,
+    pub settings: &'a Settings,
+}
+
+/// Derivatives of one coefficient that have a table: those of vanes, or all others.
+pub(super) fn terms<'a>(
+    contents: &'a Contents,
+    tables: &'a [DerivativeTable],
+    coefficient: Coefficient,
+    of_vanes: bool,
+) -> impl Iterator<Item = &'a Derivative> {
+    contents.buildup.derivatives.iter().filter(move |d| {
+        let is_vane = matches!(d.regressor, Regressor::Vane(_));
+        d.coefficient == coefficient
+            && is_vane == of_vanes
+            && tables.iter().any(|t| t.derivative == d.name)
+    })
+}
+
+/// All coefficients, forces first.
+pub(super) const COEFFICIENTS: [Coefficient; 6] = [
+    Coefficient::CN,
+    Coefficient::CA,
+    Coefficient::CY,
+    Coefficient::Cl,
+    Coefficient::Cm,
+    Coefficient::Cn,
+];
