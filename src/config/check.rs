@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::Config;
+use super::instruments::Instrument;
 use super::source::{Files, Source};
-use super::written::AircraftFile;
 use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Hold;
@@ -525,18 +525,15 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
 }
 
 /// Sizes of instrument errors: known signals, no negative sizes.
-pub(super) fn instruments(file: &AircraftFile, source: &Source) -> Result<()> {
-    let recorded = file.channels.values().map(|channel| &channel.signal);
-    let known = recorded.chain(file.constants.keys()).map(String::as_str);
+pub(super) fn instruments(
+    errors: &BTreeMap<String, Instrument>,
+    config: &Config,
+    source: &Source,
+) -> Result<()> {
     let mut examined = ingest::Settings::default().compatibility.ordinary;
-    for (name, instrument) in &file.instruments {
+    for (name, instrument) in errors {
         let error = |what: String| Err(source.error_under("instruments", name, what));
-        if !known.clone().any(|signal| signal == name) {
-            let near = did_you_mean(name, known.clone());
-            return error(format!(
-                "instruments: no channel gives the signal `{name}`{near}"
-            ));
-        }
+        known_signal(config, source, name, "instruments")?;
         let uncertainty = instrument.uncertainty;
         let (ordinary, fault) = (instrument.ordinary.given(), instrument.fault.given());
         let sizes = [uncertainty.bias, uncertainty.scale_pct].map(Some);

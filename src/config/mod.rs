@@ -93,7 +93,6 @@ impl Config {
         let files = source::Files::read(folder)?;
         let mut pipeline = files.pipeline()?;
         let aircraft = files.aircraft()?;
-        check::instruments(&aircraft, &files.aircraft)?;
         share_keys(&mut pipeline, &aircraft.instruments);
         let buildup = files.model()?;
         let classes = files.classes()?;
@@ -149,6 +148,7 @@ impl Config {
             files: files.all().map(|file| file.named(folder)).collect(),
         };
         check::whole(&config, &files)?;
+        check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
         Ok(config)
     }
 

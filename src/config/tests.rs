@@ -585,11 +585,7 @@ fn a_trend_group_of_an_unknown_class_is_answered_with_the_one_that_was_meant() {
 #[test]
 fn errors_of_an_unknown_instrument_or_of_a_negative_size_are_refused() {
     let copy = Copy::new();
-    let line = copy.spoil(
-        "aircraft.yaml",
-        "  qbar_psf: { uncertainty",
-        "  qbar_psi: { uncertainty",
-    );
+    let line = copy.spoil("aircraft.yaml", "  qbar_psf:\n", "  qbar_psi:\n");
     assert_eq!(
         copy.error(),
         format!(
