@@ -1,8 +1,8 @@
-//! How long the stages take on the demonstration campaign, side by side in one run: `make bench`.
+//! Times of the stages on one flight of the demonstration campaign, measured in one run: `make bench`.
 //!
-//! The machine's speed drifts, so quote ratios of lines of one run, not times: exact sensitivities
-//! against a response alone (finite differences would cost one response per parameter), and the
-//! stages against reading the flight.
+//! The speed of a machine drifts; compare lines of one run. Useful ratios: exact sensitivities against
+//! a response alone (finite differences cost one response per parameter), stages against reading the
+//! flight.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,16 +19,16 @@ use harvest::output_error::{Case, Measurements, Model};
 use harvest::store::archive;
 use harvest::{ingest, segment};
 
-/// A flight of the demonstration campaign with one maneuver in which every surface of its axis
-/// moves.
-struct Bench {
+/// A flight of the demonstration campaign, and one of its maneuvers that excites every longitudinal
+/// surface.
+struct BenchFlight {
     config: Config,
     record: Record,
     maneuver: Maneuver,
     class: Class,
 }
 
-fn load() -> anyhow::Result<Bench> {
+fn load() -> anyhow::Result<BenchFlight> {
     let config = Config::load(Path::new("pipelines/harv"), Overrides::default())?;
     for files in archive::find(&config.archive)? {
         let raw = archive::read(&files, &config.channels)
@@ -58,7 +58,7 @@ fn load() -> anyhow::Result<Bench> {
             .iter()
             .find_map(|m| Some((m.clone(), most_free(m)?)))
         {
-            return Ok(Bench {
+            return Ok(BenchFlight {
                 config,
                 record,
                 maneuver,
@@ -69,8 +69,8 @@ fn load() -> anyhow::Result<Bench> {
     anyhow::bail!("the demonstration campaign has no longitudinal maneuver with all surfaces")
 }
 
-/// The maneuver's case with the class's derivatives free, or with none.
-fn case(bench: &Bench, free: bool) -> Result<Case<3, Longitudinal>, String> {
+/// Case of the maneuver with the free derivatives of its class, or with none.
+fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String> {
     let derivatives: Vec<_> = bench
         .config
         .buildup
@@ -113,7 +113,7 @@ fn case(bench: &Bench, free: bool) -> Result<Case<3, Longitudinal>, String> {
     ))
 }
 
-fn responses(c: &mut Criterion, bench: &Bench) -> Result<(), String> {
+fn responses(c: &mut Criterion, bench: &BenchFlight) -> Result<(), String> {
     let values: BTreeMap<String, f64> = bench
         .config
         .buildup
@@ -142,41 +142,29 @@ fn responses(c: &mut Criterion, bench: &Bench) -> Result<(), String> {
     Ok(())
 }
 
-fn stages(c: &mut Criterion) {
-    let bench = match load() {
-        Ok(bench) => bench,
-        Err(error) => {
-            // A benchmark has nobody else to tell.
-            #[expect(clippy::print_stderr, reason = "the benchmark's own output")]
-            {
-                eprintln!("no benchmark: {error}");
-            }
-            return;
-        }
-    };
+fn stages(c: &mut Criterion) -> anyhow::Result<()> {
+    let bench = load()?;
     let config = &bench.config;
-    let Some(files) = archive::find(&config.archive)
-        .ok()
-        .and_then(|files| files.into_iter().next())
-    else {
-        return;
+    let Some(files) = archive::find(&config.archive)?.into_iter().next() else {
+        anyhow::bail!("the archive is empty");
     };
     c.bench_function("read one flight", |b| {
         b.iter(|| archive::read(&files, &config.channels))
     });
-    if let Ok(raw) = archive::read(&files, &config.channels).map(|mut files| files.swap_remove(0)) {
-        c.bench_function("ingest one flight", |b| {
-            b.iter(|| {
-                ingest::record(
-                    &raw,
-                    &config.channels,
-                    &config.constants,
-                    &config.aircraft,
-                    &config.ingest,
-                )
-            });
+    let raw = archive::read(&files, &config.channels)
+        .map_err(|p| anyhow::anyhow!(p.reason))?
+        .swap_remove(0);
+    c.bench_function("ingest one flight", |b| {
+        b.iter(|| {
+            ingest::record(
+                &raw,
+                &config.channels,
+                &config.constants,
+                &config.aircraft,
+                &config.ingest,
+            )
         });
-    }
+    });
     c.bench_function("segment one flight", |b| {
         b.iter(|| {
             segment::maneuvers(
@@ -196,17 +184,19 @@ fn stages(c: &mut Criterion) {
     c.bench_function("estimate one maneuver", |b| {
         b.iter(|| estimate::maneuver(&bench.record, &bench.maneuver, &bench.class, &context));
     });
-    if let Err(error) = responses(c, &bench) {
-        #[expect(clippy::print_stderr, reason = "the benchmark's own output")]
-        {
-            eprintln!("no benchmark of responses: {error}");
-        }
+    responses(c, &bench).map_err(anyhow::Error::msg)
+}
+
+#[expect(clippy::print_stderr, reason = "the benchmark's own output")]
+fn all(c: &mut Criterion) {
+    if let Err(error) = stages(c) {
+        eprintln!("no benchmark: {error}");
     }
 }
 
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10).measurement_time(std::time::Duration::from_secs(3));
-    targets = stages
+    targets = all
 }
 criterion_main!(benches);

@@ -1,10 +1,9 @@
-//! How fast an archive streams through ingest and segment, against polars reading the same columns
-//! and nothing else.
+//! Throughput of ingest and segment, beside polars reading the same columns.
 //!
-//! `cargo bench --bench streaming` takes the demonstration campaign; with an archive as argument,
-//! `cargo bench --bench streaming -- <folder>`, that one: a long flight says more. Each is done
-//! once before it is timed, so that the files are in the system's cache for both, and the best of
-//! three counts. The last line is the highest memory of the process.
+//! `cargo bench --bench streaming` uses the demonstration campaign, `cargo bench --bench streaming --
+//! <folder>` another archive; long flights give steadier figures. Each measurement follows a run that
+//! fills the file cache, and is the best of three. The last line is the maximum memory of the
+//! process.
 
 #![expect(clippy::print_stdout, reason = "a benchmark's own output")]
 
@@ -20,6 +19,7 @@ use harvest::pipeline::Progress;
 use harvest::store::archive;
 use polars::prelude::{ArrowDataType, ParquetReader, SerReader};
 
+/// Progress without output.
 struct Quiet;
 
 impl Progress for Quiet {
@@ -28,7 +28,7 @@ impl Progress for Quiet {
     fn end(&self) {}
 }
 
-/// The best of three, after one that does not count.
+/// Best time of three repetitions after a warm-up.
 fn best(mut work: impl FnMut() -> anyhow::Result<()>) -> anyhow::Result<Duration> {
     work()?;
     let mut best = Duration::MAX;
@@ -40,13 +40,14 @@ fn best(mut work: impl FnMut() -> anyhow::Result<()>) -> anyhow::Result<Duration
     Ok(best)
 }
 
+/// Maximum resident memory of the process, MB.
 fn memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
     Some(line.split_whitespace().next()?.parse::<f64>().ok()? * 1024.0 / 1e6)
 }
 
-/// A run into a new store, as far as a stage.
+/// Runs a pipeline into a new store as far as a stage.
 fn run(archive: Option<&str>, until: Stage) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     let own = Overrides {
@@ -76,8 +77,7 @@ fn main() -> anyhow::Result<()> {
         decoded = 0.0;
         for path in flights.iter().flat_map(|f| &f.files) {
             let schema = ParquetReader::new(File::open(path)?).schema()?;
-            // Polars as it is built here has no columns of small integers: flags are left to
-            // harvest.
+            // polars is built without small integers here, so flags are left out.
             let small = [
                 ArrowDataType::Int8,
                 ArrowDataType::Int16,
@@ -116,7 +116,7 @@ fn main() -> anyhow::Result<()> {
         ratio(segment)
     );
     if let Some(memory) = memory {
-        println!("highest memory of ingest and segment    {memory:8.0} MB");
+        println!("maximum memory of ingest and segment    {memory:8.0} MB");
     }
     Ok(())
 }

@@ -1,9 +1,35 @@
-//! harvest: flight-test archives in, trusted aerodynamic derivatives out.
+//! harvest turns archives of flight-test records into aerodynamic derivatives.
 //!
-//! The modules in order; a module uses only modules listed above it (`tests/stages/house.rs` holds
-//! that).
+//! # A sample's way from file to report
+//!
+//! 1. **File.** [`store::archive::find`] lists an archive as [`store::archive::FlightFiles`]. The
+//!    channel map of the [`config::Config`] gives each column as a [`flight::Channel`]: signal, unit
+//!    and sign.
+//! 2. **Sample.** [`ingest::survey`] reads the time channels and gives every row a sample of a
+//!    [`ingest::Clock`]. An [`ingest::ChannelReader`] converts a column to its signal, repairs it, and
+//!    flags each sample with a [`flight::Mark`].
+//! 3. **Record.** A [`flight::Record`] holds the signals of a flight on one clock.
+//!    [`ingest::compatibility`] estimates the errors of its instruments; a [`flight::Correction`]
+//!    removes them.
+//! 4. **Maneuver.** [`segment::maneuvers`] finds each [`maneuver::Maneuver`] in the record and its
+//!    [`maneuver::Class`].
+//! 5. **Case.** A [`dynamics::motion::Window`] is the maneuver's part of the record. An
+//!    [`output_error::Case`] adds the [`aero::Buildup`]: regressors, free and held derivatives,
+//!    measured outputs.
+//! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
+//!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. [`estimate::maneuver`] returns
+//!    the rows [`tables::FitRow`] and [`tables::EstimateRow`].
+//! 7. **Trend.** [`trend::trends`] fits the estimates of a derivative across angle of attack
+//!    ([`tables::TrendRow`]). [`compare::comparison`] sets the trend against the
+//!    [`aero::WindTunnel`] ([`tables::ComparisonRow`]).
+//! 8. **Report.** [`report::html`] makes the page of all results, [`pdf::pdf`] its PDF, and
+//!    [`night::run`] publishes both with the tables.
+//!
+//! [`pipeline`] runs the stages over flights and maneuvers; [`cli`] is the command line.
+//!
+//! The modules stand in order; a module uses only modules listed above it (`tests/stages/house.rs`).
 
-// Vocabulary: what the words mean.
+// Vocabulary: flights, aircraft, derivatives, tables.
 pub mod schema;
 pub mod units;
 pub mod numerics;

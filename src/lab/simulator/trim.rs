@@ -32,7 +32,7 @@ const ACCEPTED: f64 = 1e-8;
 /// Lower limit of the speed during the iteration.
 const LEAST_SPEED_FT_S: f64 = 50.0;
 
-/// Relative step of the central differences: rounding and truncation errors are about equal.
+/// Relative step of the central differences. It affects the rate of convergence, not the trim.
 const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Flight condition to trim.
