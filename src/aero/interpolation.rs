@@ -27,9 +27,9 @@ pub(super) fn interval_at(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usi
     while high > low + 1 {
         let middle = low.midpoint(high);
         if x_of(middle) <= x {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     let (a, b) = (x_of(low), x_of(high));

@@ -45,8 +45,5 @@ impl Lineage {
 
 /// The stage of a method: joint estimates and predictions belong to `estimate`.
 pub(super) fn method_stage(method: &str) -> Stage {
-    Stage::ALL
-        .into_iter()
-        .find(|s| s.name() == method)
-        .unwrap_or(Stage::Estimate)
+    Stage::from_word(method).unwrap_or(Stage::Estimate)
 }

@@ -4,7 +4,7 @@ use crate::schema::words;
 
 words! {
     /// Stage of a run, in order.
-    pub enum Stage {
+    pub enum Stage default Ingest {
         /// Flights to records.
         Ingest = "ingest",
         /// Records to maneuvers.
@@ -17,11 +17,5 @@ words! {
         Compare = "compare",
         /// The report.
         Report = "report",
-    }
-}
-
-impl Default for Stage {
-    fn default() -> Stage {
-        Stage::Ingest
     }
 }

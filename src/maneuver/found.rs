@@ -105,17 +105,11 @@ words! {
 
 words! {
     /// Verdict on a maneuver's quality.
-    pub enum Acceptance {
+    pub enum Acceptance default Accepted {
         /// The maneuver is estimated. The analyst's own maneuvers always are.
         Accepted = "accepted",
         /// The maneuver is not estimated; the reason names the limits that it exceeds.
         Rejected = "rejected",
-    }
-}
-
-impl Default for Acceptance {
-    fn default() -> Acceptance {
-        Acceptance::Accepted
     }
 }
 

@@ -132,7 +132,7 @@ pub fn stated(path: &Path) -> Result<(Stage, Lineage)> {
     }
     let pairs = table::provenance(path)?;
     let stage = pairs.get(STAGE).map(String::as_str).unwrap_or_default();
-    let stage = Stage::ALL.into_iter().find(|s| s.name() == stage);
+    let stage = Stage::from_word(stage);
     let stage =
         stage.ok_or_else(|| Error::damaged(path, &format!("its metadata has no `{STAGE}`")))?;
     let lineage = Lineage {

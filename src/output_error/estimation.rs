@@ -7,29 +7,7 @@ use super::likelihood::information::Identification;
 use super::likelihood::newton_raphson::{Settings, descend, minimise};
 use super::likelihood::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
-
-/// Source of the weights on the residuals.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Weights {
-    /// Tables 2 and 4.
-    #[default]
-    Table,
-    /// Inverse of the residuals' variances, re-estimated in alternation with the parameters until
-    /// both settle.
-    Estimated,
-}
-
-impl Weights {
-    /// Word of the configuration.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Weights::Table => "table",
-            Weights::Estimated => "estimated",
-        }
-    }
-}
+pub use crate::tables::Weights;
 
 /// Most rounds of re-estimating the weights.
 const WEIGHT_ROUNDS: usize = 20;

@@ -34,11 +34,12 @@ pub trait Words {
 /// ```
 ///
 /// The enum displays, serialises and deserialises as its words. Without `or text` it is `Copy`,
-/// has `name()`, and no other word deserialises; with it, any other text is the last variant.
+/// has `name()` and `from_word()`, and no other word deserialises; with it, any other text is the
+/// last variant. `pub enum Name default Variant { … }` implements `Default`.
 macro_rules! words {
     (
         $(#[$meta:meta])*
-        $vis:vis enum $name:ident {
+        $vis:vis enum $name:ident $(default $default:ident)? {
             $($(#[doc = $meaning:literal])+ $variant:ident = $word:literal,)+
         }
     ) => {
@@ -59,7 +60,22 @@ macro_rules! words {
                     $(Self::$variant => $word,)+
                 }
             }
+
+            /// The variant of a word.
+            #[must_use]
+            pub fn from_word(word: &str) -> Option<Self> {
+                match word {
+                    $($word => Some(Self::$variant),)+
+                    _ => None,
+                }
+            }
         }
+
+        $(impl Default for $name {
+            fn default() -> Self {
+                Self::$default
+            }
+        })?
 
         impl $crate::schema::Words for $name {
             const ENTRIES: &'static [$crate::schema::Entry] = &[
@@ -83,10 +99,8 @@ macro_rules! words {
                     }
 
                     fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<$name, E> {
-                        match word {
-                            $($word => Ok($name::$variant),)+
-                            other => Err(E::unknown_variant(other, &[$($word),+])),
-                        }
+                        $name::from_word(word)
+                            .ok_or_else(|| E::unknown_variant(word, &[$($word),+]))
                     }
                 }
 

@@ -1,6 +1,6 @@
 //! Tables of the study of bounds on simulated maneuvers (`harvest lab validate`).
 
-use crate::schema::table;
+use crate::schema::{table, words};
 
 table! {
     /// Coverage of the bounds: one simulated maneuver recorded many times with other noise.
@@ -10,10 +10,10 @@ table! {
         pub class: String,
         /// Mean angle of attack of the maneuver.
         pub alpha_deg: f64 ["deg"],
-        /// Noise of the records: `white` or `coloured` for the outputs, or `noise on every channel`.
-        pub residuals: String,
-        /// Weights of the cost: `table` or `estimated`.
-        pub weights: String,
+        /// Noise of the records.
+        pub residuals: Residuals,
+        /// Weights of the cost.
+        pub weights: Weights,
         /// Name of the derivative in the model.
         pub derivative: String,
         /// Unit of the derivative.
@@ -52,8 +52,8 @@ table! {
         pub class: String,
         /// Mean angle of attack of the maneuver.
         pub alpha_deg: f64 ["deg"],
-        /// Starting values: `twice the truth`, `half the truth` or `surfaces without effect`.
-        pub start: String,
+        /// Starting values.
+        pub start: StartVariant,
         /// Number of records.
         pub records: usize ["records"],
         /// Number of records whose iteration reached the minimum from these values.
@@ -61,5 +61,41 @@ table! {
         /// Number of records that reached the minimum with the other start tried as well: the
         /// equation-error solution where the first does not converge.
         pub reached: usize ["records"],
+    }
+}
+
+words! {
+    /// Noise of the records in the study of bounds.
+    pub enum Residuals {
+        /// White noise of the outputs.
+        White = "white",
+        /// Coloured noise of the outputs with the same standard deviation.
+        Coloured = "coloured",
+        /// White noise of every channel, including those that the estimator takes as exact:
+        /// surfaces, airspeed, the other axis.
+        EveryChannel = "noise on every channel",
+    }
+}
+
+words! {
+    /// Source of the weights on the residuals.
+    pub enum Weights default Table {
+        /// Tables 2 and 4.
+        Table = "table",
+        /// Inverse of the residuals' variances, re-estimated in alternation with the parameters
+        /// until both settle.
+        Estimated = "estimated",
+    }
+}
+
+words! {
+    /// Starting values relative to the true ones.
+    pub enum StartVariant {
+        /// Half of the true values.
+        Half = "half the truth",
+        /// True values, with the derivatives of surfaces zero.
+        NoSurfaces = "surfaces without effect",
+        /// Twice the true values.
+        Double = "twice the truth",
     }
 }

@@ -170,7 +170,7 @@ fn evidence_holds_nothing_where_all_is_excited() {
 #[test]
 fn evidence_holds_exactly_the_surface_that_did_not_move() {
     let flown = fly(truth(Axis::Longitudinal), |record| {
-        put(record, "dpv_deg", vec![0.0; SAMPLES])
+        put(record, "dpv_deg", vec![0.0; SAMPLES]);
     });
     let estimated = flown.estimated(Hold::Evidence, 0.5);
     assert_eq!(

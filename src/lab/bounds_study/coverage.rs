@@ -47,8 +47,8 @@ pub fn coverage(
             CoverageRow {
                 class: maneuver.class.name.clone(),
                 alpha_deg: maneuver.flown.maneuver.alpha_deg,
-                residuals: scenario.residuals.name().to_owned(),
-                weights: scenario.weights.name().to_owned(),
+                residuals: scenario.residuals,
+                weights: scenario.weights,
                 derivative: truth.derivative.clone(),
                 unit: truth.unit.to_owned(),
                 truth: truth.value,

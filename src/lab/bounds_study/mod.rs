@@ -24,7 +24,8 @@ use crate::pipeline::Progress;
 use crate::store::{atomic, table};
 use crate::tables::{CoverageRow, StartRow};
 
-use recordings::{Residuals, Scenario, StudyManeuver};
+use crate::tables::Residuals;
+use recordings::{Scenario, StudyManeuver};
 
 /// Tables of a study.
 #[derive(Clone, Debug, Default)]

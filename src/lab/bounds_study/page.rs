@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use crate::tables::{CoverageRow, StartRow};
+use crate::tables::{CoverageRow, Residuals, StartRow, StartVariant, Weights};
 
 /// Criterion for the bias of a derivative: below this share of the scatter.
 const BIAS: f64 = 0.1;
@@ -65,10 +65,10 @@ fn bias_error(coverage: &[CoverageRow]) -> f64 {
 }
 
 /// Pairs of residuals and weights, in order of appearance.
-fn scenarios(coverage: &[CoverageRow]) -> Vec<(&str, &str)> {
+fn scenarios(coverage: &[CoverageRow]) -> Vec<(Residuals, Weights)> {
     let mut found = Vec::new();
     for row in coverage {
-        let scenario = (row.residuals.as_str(), row.weights.as_str());
+        let scenario = (row.residuals, row.weights);
         if !found.contains(&scenario) {
             found.push(scenario);
         }
@@ -129,7 +129,7 @@ fn starts_table(starts: &[StartRow]) -> String {
          start from the equation-error solution.\n\n\
          | starting values | records | reached unaided | reached |\n|---|---|---|---|\n",
     );
-    let kinds: BTreeSet<&str> = starts.iter().map(|r| r.start.as_str()).collect();
+    let kinds: BTreeSet<StartVariant> = starts.iter().map(|r| r.start).collect();
     for kind in kinds {
         let rows = starts.iter().filter(|r| r.start == kind);
         let sum = |count: fn(&StartRow) -> usize| rows.clone().map(count).sum::<usize>();
@@ -187,12 +187,12 @@ fn derivatives_table<'a>(rows: impl Iterator<Item = &'a CoverageRow>) -> String 
 mod tests {
     use super::*;
 
-    fn row(residuals: &str, alpha_deg: f64, covered: f64) -> CoverageRow {
+    fn row(residuals: Residuals, alpha_deg: f64, covered: f64) -> CoverageRow {
         CoverageRow {
             class: "class".into(),
             alpha_deg,
-            residuals: residuals.into(),
-            weights: "table".into(),
+            residuals,
+            weights: Weights::Table,
             derivative: "derivative".into(),
             unit: "1/deg".into(),
             truth: 1.0,
@@ -213,14 +213,14 @@ mod tests {
     #[test]
     fn the_page_counts_the_derivatives_that_meet_the_criteria() {
         let rows = [
-            row("white", 10.0, 0.95),
-            row("white", 20.0, 0.90),
-            row("coloured", 10.0, 0.93),
+            row(Residuals::White, 10.0, 0.95),
+            row(Residuals::White, 20.0, 0.90),
+            row(Residuals::Coloured, 10.0, 0.93),
         ];
         let starts = [StartRow {
             class: "class".into(),
             alpha_deg: 10.0,
-            start: "half".into(),
+            start: StartVariant::Half,
             records: 200,
             alone: 150,
             reached: 199,
@@ -232,7 +232,10 @@ mod tests {
             ),
             "{page}"
         );
-        assert!(page.contains("| half | 200 | 75.0 % | 99.5 % |"), "{page}");
+        assert!(
+            page.contains("| half the truth | 200 | 75.0 % | 99.5 % |"),
+            "{page}"
+        );
         assert!(
             page.contains(
                 "| class | derivative | 10, 20 | 0.05, 0.05 | 2.00, 2.00 | 1.00, 1.00 | 68, 68 | 95.0, 90.0 |"

@@ -5,31 +5,7 @@ use crate::aero::{Output, WindTunnel};
 use crate::estimate::{self, Context, Estimated};
 use crate::lab::simulator::{FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::maneuver::Class;
-use crate::output_error::estimation::Weights;
-
-/// Noise of the recordings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Residuals {
-    /// White noise of the outputs.
-    White,
-    /// Coloured noise of the outputs with the same standard deviation.
-    Coloured,
-    /// White noise of every channel, including those that the estimator takes as exact: surfaces,
-    /// airspeed, the other axis.
-    EveryChannel,
-}
-
-impl Residuals {
-    /// Name in the tables.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Residuals::White => "white",
-            Residuals::Coloured => "coloured",
-            Residuals::EveryChannel => "noise on every channel",
-        }
-    }
-}
+use crate::tables::{Residuals, Weights};
 
 /// A maneuver to be recorded many times.
 #[derive(Clone, Debug)]

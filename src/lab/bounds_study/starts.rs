@@ -9,52 +9,34 @@ use crate::estimate::{self, Context, Estimated, Start};
 use crate::lab::simulator::TrueDerivative;
 use crate::lab::simulator::random::derived_seed;
 use crate::output_error::Outcome;
-use crate::tables::{EstimateRow, StartRow, StartingValues};
+use crate::tables::{EstimateRow, StartRow, StartVariant, StartingValues};
 
 /// Greatest difference between equal minima, as a share of each derivative's bound. The criterion of
 /// `docs/coverage.md`.
 const SAME_MINIMUM: f64 = 0.1;
 
-/// Starting values relative to the true ones.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum StartVariant {
-    Double,
-    Half,
-    NoSurfaces,
-}
-
-impl StartVariant {
-    fn name(self) -> &'static str {
-        match self {
-            StartVariant::Double => "twice the truth",
-            StartVariant::Half => "half the truth",
-            StartVariant::NoSurfaces => "surfaces without effect",
-        }
-    }
-
-    /// Tunnel tables with these values.
-    fn tables(self, truth: &[TrueDerivative], buildup: &Buildup) -> WindTunnel {
-        let is_surface = |name: &str| {
-            buildup
-                .derivatives
-                .iter()
-                .any(|d| d.name == name && d.regressor.surface().is_some())
-        };
-        let factor = |name: &str| match self {
-            StartVariant::Double => 2.0,
-            StartVariant::Half => 0.5,
-            StartVariant::NoSurfaces if is_surface(name) => 0.0,
-            StartVariant::NoSurfaces => 1.0,
-        };
-        let changed: Vec<TrueDerivative> = truth
+/// Tunnel tables with these values.
+fn start_tables(variant: StartVariant, truth: &[TrueDerivative], buildup: &Buildup) -> WindTunnel {
+    let is_surface = |name: &str| {
+        buildup
+            .derivatives
             .iter()
-            .map(|t| TrueDerivative {
-                value: factor(&t.derivative) * t.value,
-                ..t.clone()
-            })
-            .collect();
-        true_tables(&changed)
-    }
+            .any(|d| d.name == name && d.regressor.surface().is_some())
+    };
+    let factor = |name: &str| match variant {
+        StartVariant::Double => 2.0,
+        StartVariant::Half => 0.5,
+        StartVariant::NoSurfaces if is_surface(name) => 0.0,
+        StartVariant::NoSurfaces => 1.0,
+    };
+    let changed: Vec<TrueDerivative> = truth
+        .iter()
+        .map(|t| TrueDerivative {
+            value: factor(&t.derivative) * t.value,
+            ..t.clone()
+        })
+        .collect();
+    true_tables(&changed)
 }
 
 /// Minimum reached from other starting values, compared with the minimum from the true values.
@@ -79,7 +61,7 @@ pub fn starts(
         StartRow {
             class: maneuver.class.name.clone(),
             alpha_deg: maneuver.flown.maneuver.alpha_deg,
-            start: values.name().to_owned(),
+            start: values,
             records: realisations,
             alone: reached.iter().filter(|r| r.unaided).count(),
             reached: reached.iter().filter(|r| r.same).count(),
@@ -102,7 +84,7 @@ fn reached(
     seed: u64,
 ) -> Vec<Reached> {
     let truth = true_tables(&maneuver.flown.truth);
-    let start = values.tables(&maneuver.flown.truth, maneuver.context.buildup);
+    let start = start_tables(values, &maneuver.flown.truth, maneuver.context.buildup);
     (0..realisations)
         .into_par_iter()
         .map(|i| {

@@ -95,7 +95,7 @@ fn altitude_of_gravity_ft(g: f64) -> f64 {
 pub(super) fn bias(name: &str) -> Option<Bias> {
     let output = name.strip_suffix("_bias")?;
     let outputs = Axis::Longitudinal.outputs();
-    let output = outputs.into_iter().find(|o| o.name() == output)?;
+    let output = Output::from_word(output).filter(|o| outputs.contains(o))?;
     Some(Bias {
         name: name.to_owned(),
         output,
