@@ -150,18 +150,12 @@ impl Window {
     #[must_use]
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
-        let mut change = |name: &str, bias: f64| {
+        for (name, bias) in [(name, bias), (slope_name(name).as_str(), 0.0)] {
             if let Some(points) = window.points.get_mut(name) {
-                *points = Arc::new(
-                    points
-                        .iter()
-                        .map(|value| value + (scale * value + bias))
-                        .collect(),
-                );
+                let misread = points.iter().map(|value| value + (scale * value + bias));
+                *points = Arc::new(misread.collect());
             }
-        };
-        change(name, bias);
-        change(&slope_name(name), 0.0);
+        }
         window
     }
 

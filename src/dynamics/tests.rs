@@ -1,4 +1,4 @@
-//! Slopes against finite differences, and every sign of the equations in one physical sentence.
+//! Slopes against finite differences, and the sign of every term by a physical statement.
 
 use approx::assert_abs_diff_eq;
 use nalgebra::SVector;
@@ -8,7 +8,7 @@ use crate::aero::Regressor;
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
-/// An aircraft of the campaign's size, with its sensors well away from the c.g.
+/// Aircraft of the campaign's size, with its sensors well away from the c.g.
 pub(crate) fn aircraft() -> Aircraft {
     Aircraft {
         name: "test".into(),
@@ -81,8 +81,8 @@ pub(crate) fn steady() -> Motion {
     }
 }
 
-/// A motion in which every term of the equations is alive.
-fn lively() -> Motion {
+/// Motion in which no term of the equations vanishes.
+fn general_motion() -> Motion {
     Motion {
         beta: 0.08,
         rates: [0.3, 0.1, -0.12],
@@ -96,10 +96,10 @@ const C: [f64; COEFFICIENTS] = [1.4, -0.05, 0.1];
 
 fn slopes_match<const NX: usize, E: Equations<NX>>() {
     let (inputs, sensors) = (
-        E::rate_inputs(&aircraft(), &lively()),
-        E::sensor_inputs(&aircraft(), &lively()),
+        E::rate_inputs(&aircraft(), &general_motion()),
+        E::sensor_inputs(&aircraft(), &general_motion()),
     );
-    let x = E::measured_state(&lively());
+    let x = E::measured_state(&general_motion());
     let (rates, outputs) = (
         E::rates(&inputs, &x, &C),
         E::outputs(&inputs, &sensors, &x, &C),
@@ -153,14 +153,14 @@ fn lateral_slopes_are_those_of_finite_differences() {
     slopes_match::<4, Lateral>();
 }
 
-/// Slopes that are not zero stand where the axis says they can, those through coefficients that
-/// follow every regressor among them.
-fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
+/// Checks that slopes differ from zero only at the declared entries, those through coefficients
+/// included.
+fn assert_slopes_at_declared_entries<const NX: usize, E: Equations<NX>>() {
     let (inputs, sensors) = (
-        E::rate_inputs(&aircraft(), &lively()),
-        E::sensor_inputs(&aircraft(), &lively()),
+        E::rate_inputs(&aircraft(), &general_motion()),
+        E::sensor_inputs(&aircraft(), &general_motion()),
     );
-    let x = E::measured_state(&lively());
+    let x = E::measured_state(&general_motion());
     let (rates, outputs) = (
         E::rates(&inputs, &x, &C),
         E::outputs(&inputs, &sensors, &x, &C),
@@ -174,7 +174,7 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
     ];
     let along = regressors
         .iter()
-        .filter_map(|r| E::state_regressor(&aircraft(), lively().velocity, r));
+        .filter_map(|r| E::state_regressor(&aircraft(), general_motion().velocity, r));
     let mut c_by_state = nalgebra::SMatrix::<f64, COEFFICIENTS, NX>::zeros();
     for (state, factor) in along {
         assert!(E::REGRESSOR_STATES.contains(&state));
@@ -185,7 +185,7 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
         all.filter(|&(i, j)| at(i, j) != 0.0)
             .collect::<std::collections::BTreeSet<_>>()
     };
-    let said = |list: &[(usize, usize)]| {
+    let declared = |list: &[(usize, usize)]| {
         list.iter()
             .copied()
             .collect::<std::collections::BTreeSet<_>>()
@@ -194,22 +194,22 @@ fn slopes_stand_where_said<const NX: usize, E: Equations<NX>>() {
         rates.by_state + rates.by_coefficient * c_by_state,
         outputs.by_state + outputs.by_coefficient * c_by_state,
     );
-    assert!(nonzero(NX, NX, &|i, j| a[(i, j)]).is_subset(&said(E::RATES_BY_STATE)));
+    assert!(nonzero(NX, NX, &|i, j| a[(i, j)]).is_subset(&declared(E::RATES_BY_STATE)));
     assert!(
         nonzero(NX, COEFFICIENTS, &|i, j| rates.by_coefficient[(i, j)])
-            .is_subset(&said(E::RATES_BY_COEFFICIENT))
+            .is_subset(&declared(E::RATES_BY_COEFFICIENT))
     );
-    assert!(nonzero(OUTPUTS, NX, &|i, j| c[(i, j)]).is_subset(&said(E::OUTPUTS_BY_STATE)));
+    assert!(nonzero(OUTPUTS, NX, &|i, j| c[(i, j)]).is_subset(&declared(E::OUTPUTS_BY_STATE)));
     let by_coefficient = nonzero(OUTPUTS, COEFFICIENTS, &|i, j| {
         outputs.by_coefficient[(i, j)]
     });
-    assert!(by_coefficient.is_subset(&said(E::OUTPUTS_BY_COEFFICIENT)));
+    assert!(by_coefficient.is_subset(&declared(E::OUTPUTS_BY_COEFFICIENT)));
 }
 
 #[test]
-fn slopes_that_are_not_zero_stand_where_each_axis_says() {
-    slopes_stand_where_said::<3, Longitudinal>();
-    slopes_stand_where_said::<4, Lateral>();
+fn slopes_differ_from_zero_only_at_declared_entries() {
+    assert_slopes_at_declared_entries::<3, Longitudinal>();
+    assert_slopes_at_declared_entries::<4, Lateral>();
 }
 
 fn longitudinal(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 3>, SVector<f64, 5>) {
@@ -236,7 +236,7 @@ fn lateral(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 4>, SVector<f64, 5>) {
     )
 }
 
-/// The change of one number when a coefficient or a part of the motion changes.
+/// Change of one number when a coefficient or a part of the motion changes.
 macro_rules! change {
     ($axis:ident . $part:tt [$i:expr], $motion:expr => $other:expr) => {
         $axis(&$other, [0.0; 3]).$part[$i] - $axis(&$motion, [0.0; 3]).$part[$i]
@@ -263,7 +263,7 @@ fn a_nose_up_moment_raises_the_nose() {
 
 #[test]
 fn axial_force_points_aft_so_it_raises_alpha_where_alpha_is_positive() {
-    // Aft force has a component down the lift direction's opposite: −f_x sin α.
+    // Aft force has a component against the lift: −f_x sin α.
     assert!(change!(longitudinal.0[0], [0.0, 0.0, 1.0]) > 0.0);
 }
 
@@ -367,7 +367,7 @@ fn accelerometers_read_force_up_forward_and_right_in_g() {
 }
 
 #[test]
-fn the_axial_accelerometer_feels_thrust() {
+fn the_axial_accelerometer_senses_thrust() {
     let more = change!(longitudinal.1[4], steady() => Motion { thrust: 10_040.0, ..steady() });
     assert_abs_diff_eq!(more, 1.0 / G0_FT_S2, epsilon = 1e-12);
 }
@@ -545,13 +545,12 @@ fn rate_regressors_are_in_radians_over_the_reference_length() {
     );
 }
 
-/// The motion that the equations themselves produce with coefficients `C`, with matching
-/// accelerations and forces.
+/// Motion that the equations produce with coefficients `C`, with matching accelerations and forces.
 fn produced<const NX: usize, E: Equations<NX>>(
     forces: [f64; 3],
     accelerations: impl Fn(&SVector<f64, NX>) -> [f64; 3],
 ) -> Motion {
-    let m = lively();
+    let m = general_motion();
     let rates = E::rates(&E::rate_inputs(&aircraft(), &m), &E::measured_state(&m), &C).rates;
     let [force_x, force_y, force_z] = forces;
     Motion {
@@ -569,7 +568,7 @@ fn implied<const NX: usize, E: Equations<NX>>(m: &Motion) -> [f64; COEFFICIENTS]
 
 #[test]
 fn coefficients_come_back_from_the_motion_that_they_produce() {
-    let (m, force) = (lively(), 52.0 * 400.0 / 1040.0);
+    let (m, force) = (general_motion(), 52.0 * 400.0 / 1040.0);
     let [_, q_dot, _] = m.accelerations;
     let forces = [m.thrust / m.mass - force * C[2], 0.0, -force * C[0]];
     let longitudinal =

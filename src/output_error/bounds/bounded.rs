@@ -33,19 +33,20 @@ pub trait Bounded: Likelihood {
 
 impl<const NX: usize, E: Equations<NX>> Bounded for Case<NX, E> {
     fn series(&self, response: &Response, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries> {
-        let normal = &response.sums;
-        let series = |o: usize| {
-            let (square, squares) = (normal.square(o), normal.squares(o));
-            BlockSeries::new(
+        let sums = &response.sums;
+        let length = sums.samples_per_block();
+        let mut series = Vec::with_capacity(OUTPUTS);
+        for (o, weight) in weights.iter().enumerate() {
+            series.push(BlockSeries::new(
                 self.step_s,
-                weights[o],
+                *weight,
                 self.samples(),
-                square,
-                &squares,
-                |samples, row| normal.block(samples.start / normal.samples_per_block(), o, row),
-            )
-        };
-        (0..OUTPUTS).map(series).collect()
+                sums.square(o),
+                &sums.squares(o),
+                |samples, row| sums.block(samples.start / length, o, row),
+            ));
+        }
+        series
     }
 
     fn white_covariance(&self, response: &Response, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {

@@ -35,18 +35,15 @@ impl Agreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
     pub fn of(pairs: &[(f64, f64)]) -> Agreement {
-        let n = pairs.len().max(1) as f64;
-        let mean = |value: &dyn Fn(f64, f64) -> f64| {
-            pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>() / n
-        };
-        let (mean_measured, mean_computed) = (mean(&|z, _| z), mean(&|_, y| y));
+        let mean_measured = mean(pairs, |z, _| z);
+        let mean_computed = mean(pairs, |_, y| y);
         Agreement {
             samples: pairs.len(),
             mean_measured,
             mean_computed,
-            square_measured: mean(&|z, _| (z - mean_measured).powi(2)),
-            square_computed: mean(&|_, y| (y - mean_computed).powi(2)),
-            product: mean(&|z, y| (z - mean_measured) * (y - mean_computed)),
+            square_measured: mean(pairs, |z, _| (z - mean_measured).powi(2)),
+            square_computed: mean(pairs, |_, y| (y - mean_computed).powi(2)),
+            product: mean(pairs, |z, y| (z - mean_measured) * (y - mean_computed)),
         }
     }
 
@@ -81,6 +78,11 @@ impl Agreement {
     }
 }
 
+fn mean(pairs: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
+    let sum = pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>();
+    sum / pairs.len().max(1) as f64
+}
+
 /// Theil's coefficient of several outputs together, weighted as in the cost; `None` where all are
 /// zero. An exact prediction has no difference to divide: its parts are zero.
 #[must_use]
@@ -95,14 +97,11 @@ pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
         computed += weight * (output.square_computed + output.mean_computed.powi(2));
     }
     let (difference, size) = (parts.iter().sum::<f64>(), measured.sqrt() + computed.sqrt());
-    let share = |part: f64| {
-        if difference > 0.0 {
-            part / difference
-        } else {
-            0.0
-        }
+    let [bias, variance, covariance] = if difference > 0.0 {
+        parts.map(|part| part / difference)
+    } else {
+        [0.0; 3]
     };
-    let [bias, variance, covariance] = parts.map(share);
     (size > 0.0).then(|| Theil {
         coefficient: difference.sqrt() / size,
         bias,

@@ -1,4 +1,4 @@
-//! Errors of calibration against estimation from records that have them.
+//! Predicted effects of calibration errors against estimates from records that have the errors.
 
 use approx::assert_relative_eq;
 use nalgebra::DVector;
@@ -16,7 +16,7 @@ fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
     }
 }
 
-/// A maneuver without noise at its true parameters, with the window that it was flown in.
+/// Maneuver without noise at its true parameters, with its window.
 struct Exact<const NX: usize, E: Equations<NX>> {
     truth: Vec<(Derivative, f64)>,
     window: Window,
@@ -41,8 +41,8 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         }
     }
 
-    /// How the estimates move, as said.
-    fn said(&self, error: &Misreading) -> DVector<f64> {
+    /// Predicted change of the estimates.
+    fn predicted(&self, error: &Misreading) -> DVector<f64> {
         let model = model(&self.truth);
         let fitted = Fitted {
             aircraft: &aircraft(),
@@ -62,7 +62,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         inverse * &shifts[0]
     }
 
-    /// How the estimates move when the record has the error.
+    /// Change of the estimates when the record has the error.
     fn moved(&self, error: &Misreading) -> DVector<f64> {
         let mut measurements = self.case.measurements.clone();
         for (o, output) in E::AXIS
@@ -94,9 +94,8 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         DVector::from_vec(fit.values) - DVector::from_vec(self.parameters.clone())
     }
 
-    /// The estimates move as is said, parameter by parameter, in units of how well noise lets them
-    /// be known.
-    fn moves_as_said(&self, signals: &[(&str, f64)]) {
+    /// Compares predicted and actual changes, in units of each parameter's bound.
+    fn assert_predictions_hold(&self, signals: &[(&str, f64)]) {
         let sums = cost::sums(&self.response, &TABLE);
         let scale = symmetric::scale(&sums.information);
         for (signal, bias) in signals {
@@ -112,12 +111,12 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
                     bias: *bias,
                 },
             ] {
-                let (said, moved) = (self.said(&error), self.moved(&error));
-                let off = (&said - &moved).component_div(&scale).norm()
+                let (predicted, moved) = (self.predicted(&error), self.moved(&error));
+                let off = (&predicted - &moved).component_div(&scale).norm()
                     / moved.component_div(&scale).norm();
                 assert!(
                     moved.norm() > 0.0 && off < 0.05,
-                    "{error:?}: said and moved differ by {off:.3}"
+                    "{error:?}: prediction and change differ by {off:.3}"
                 );
             }
         }
@@ -125,7 +124,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
 }
 
 #[test]
-fn estimates_move_with_errors_of_inputs_and_outputs_as_said() {
+fn predicted_effects_of_input_and_output_errors_match_the_estimates() {
     let outputs = [
         (signal::ALPHA_VANE, 0.02),
         (signal::THETA, 0.02),
@@ -138,7 +137,7 @@ fn estimates_move_with_errors_of_inputs_and_outputs_as_said() {
         (signal::MASS, 1.0),
         ("de_deg", 0.01),
     ];
-    Exact::<3, Longitudinal>::new().moves_as_said(&[outputs, inputs].concat());
+    Exact::<3, Longitudinal>::new().assert_predictions_hold(&[outputs, inputs].concat());
     let outputs = [
         (signal::P, 0.01),
         (signal::R, 0.01),
@@ -151,13 +150,13 @@ fn estimates_move_with_errors_of_inputs_and_outputs_as_said() {
         ("dr_deg", 0.01),
         ("dyv_deg", 0.01),
     ];
-    Exact::<4, Lateral>::new().moves_as_said(&[outputs, inputs].concat());
+    Exact::<4, Lateral>::new().assert_predictions_hold(&[outputs, inputs].concat());
 }
 
 #[test]
-fn a_scale_error_of_a_surface_goes_into_its_own_derivatives_and_no_other() {
+fn a_scale_error_of_a_surface_changes_its_own_derivatives_only() {
     let exact = Exact::<3, Longitudinal>::new();
-    let shift = exact.said(&Misreading {
+    let shift = exact.predicted(&Misreading {
         signal: "de_deg",
         scale: 1e-4,
         bias: 0.0,
@@ -181,7 +180,7 @@ fn a_scale_error_of_a_surface_goes_into_its_own_derivatives_and_no_other() {
 }
 
 #[test]
-fn what_is_calibrated_exactly_has_no_errors() {
+fn exact_calibration_has_no_errors() {
     assert_eq!(Calibration::default().misreadings("q_deg_s").count(), 0);
     let both = Calibration {
         bias: 0.1,

@@ -1,4 +1,4 @@
-//! The coarse response: what it may be used for, and that where it leads decides nothing.
+//! The coarse response: its gradient, and its effect on the minimum, which must be none.
 
 use nalgebra::DVector;
 
@@ -6,16 +6,16 @@ use super::super::newton_raphson::{descend, minimise};
 use super::super::{Detail, Likelihood};
 use super::*;
 
-/// A maneuver of true derivatives, measured with noise.
-fn flown<const NX: usize, E: Equations<NX>>(seed: u64) -> (Case<NX, E>, Vec<f64>) {
+/// Maneuver of true derivatives, measured with noise.
+fn measured_case<const NX: usize, E: Equations<NX>>(seed: u64) -> (Case<NX, E>, Vec<f64>) {
     let (mut case, parameters) = case::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
     measure(&mut case, &parameters, &mut Noise(seed), 0.0);
     assert!(case.has_coarse());
     (case, parameters)
 }
 
-fn gradient_is_the_slope_of_the_cost<const NX: usize, E: Equations<NX>>() {
-    let (mut case, mut parameters) = flown::<NX, E>(20_261_121);
+fn assert_gradient_matches_differences<const NX: usize, E: Equations<NX>>() {
+    let (mut case, mut parameters) = measured_case::<NX, E>(20_261_121);
     case.measurements.used[7] = [false; OUTPUTS];
     case.measurements.used[8][2] = false;
     for value in &mut parameters {
@@ -45,14 +45,14 @@ fn gradient_is_the_slope_of_the_cost<const NX: usize, E: Equations<NX>>() {
 }
 
 #[test]
-fn the_coarse_gradient_is_the_slope_of_the_coarse_cost() {
-    gradient_is_the_slope_of_the_cost::<3, Longitudinal>();
-    gradient_is_the_slope_of_the_cost::<4, Lateral>();
+fn the_coarse_gradient_matches_differences_of_the_coarse_cost() {
+    assert_gradient_matches_differences::<3, Longitudinal>();
+    assert_gradient_matches_differences::<4, Lateral>();
 }
 
 #[test]
-fn coarse_sums_count_as_much_as_those_of_all_samples_and_say_about_the_same() {
-    let (case, parameters) = flown::<3, Longitudinal>(20_261_122);
+fn coarse_sums_approximate_those_of_all_samples() {
+    let (case, parameters) = measured_case::<3, Longitudinal>(20_261_122);
     let off: Vec<f64> = parameters.iter().map(|value| 1.2 * value).collect();
     let (mut coarse, mut whole) = (case.response(), case.response());
     Likelihood::respond(&case, Detail::Coarse, &off, &mut coarse).unwrap();
@@ -70,8 +70,8 @@ fn coarse_sums_count_as_much_as_those_of_all_samples_and_say_about_the_same() {
     }
 }
 
-fn same_minimum<const NX: usize, E: Equations<NX>>() {
-    let (case, parameters) = flown::<NX, E>(20_261_123);
+fn assert_same_minimum<const NX: usize, E: Equations<NX>>() {
+    let (case, parameters) = measured_case::<NX, E>(20_261_123);
     let start: Vec<f64> = parameters.iter().map(|value| 1.2 * value).collect();
     let settings = Settings {
         tolerance: 1e-13,
@@ -84,7 +84,7 @@ fn same_minimum<const NX: usize, E: Equations<NX>>() {
         (Outcome::Converged, Outcome::Converged)
     );
     let information = Likelihood::sums(&case, &alone.response, &TABLE).information;
-    // In standard deviations, squared, of those noises that the weights stand for.
+    // Squared distance in standard deviations of the noise that the weights assume.
     let apart = DVector::from_iterator(
         start.len(),
         approached
@@ -103,14 +103,14 @@ fn same_minimum<const NX: usize, E: Equations<NX>>() {
 }
 
 #[test]
-fn the_minimum_is_that_of_all_samples_wherever_the_coarse_steps_led() {
-    same_minimum::<3, Longitudinal>();
-    same_minimum::<4, Lateral>();
+fn the_coarse_approach_does_not_change_the_minimum() {
+    assert_same_minimum::<3, Longitudinal>();
+    assert_same_minimum::<4, Lateral>();
 }
 
 #[test]
 fn a_maneuver_with_few_samples_a_parameter_has_no_coarse_response() {
-    let (mut case, _) = flown::<3, Longitudinal>(20_261_124);
+    let (mut case, _) = measured_case::<3, Longitudinal>(20_261_124);
     let few = 15 * case.parameters();
     case.measurements.values.truncate(few);
     case.measurements.used.truncate(few);

@@ -8,8 +8,8 @@ use super::*;
 
 type Longitudinals = Case<3, Longitudinal>;
 
-/// A maneuver of true derivatives and of biases of its own, measured with noise.
-fn flown(seed: u64, biases_g: [f64; 2]) -> (Longitudinals, Vec<f64>) {
+/// Maneuver of true derivatives and of its own biases, measured with noise.
+fn measured_case(seed: u64, biases_g: [f64; 2]) -> (Longitudinals, Vec<f64>) {
     let (mut case, mut parameters) =
         case::<3, Longitudinal>(&truth(Axis::Longitudinal), &biases(Axis::Longitudinal));
     let first = case.derivatives();
@@ -39,8 +39,8 @@ fn fit_of<D: Bounded>(data: &D, start: Vec<f64>) -> Fit<D::Response> {
 }
 
 #[test]
-fn one_maneuver_joined_is_the_maneuver_alone() {
-    let (case, parameters) = flown(3, [0.01, 0.02]);
+fn a_joint_fit_of_one_maneuver_is_its_own_fit() {
+    let (case, parameters) = measured_case(3, [0.01, 0.02]);
     let joint = Joint::new([("only", &case)], |_| false).unwrap();
     let (alone, joined) = (
         fit_of(&case, parameters.clone()),
@@ -56,8 +56,8 @@ fn one_maneuver_joined_is_the_maneuver_alone() {
 }
 
 #[test]
-fn two_copies_of_a_maneuver_have_its_estimates_and_bounds_smaller_by_the_root_of_two() {
-    let (case, parameters) = flown(3, [0.01, 0.02]);
+fn two_copies_of_a_maneuver_divide_its_bounds_by_the_root_of_two() {
+    let (case, parameters) = measured_case(3, [0.01, 0.02]);
     let alone = fit_of(&case, parameters.clone());
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
     let shared = case.derivatives();
@@ -66,7 +66,7 @@ fn two_copies_of_a_maneuver_have_its_estimates_and_bounds_smaller_by_the_root_of
         &[parameters.clone(), parameters.clone()],
     );
     let both = fit_of(&joint, start);
-    // Shared parameters take less out of two maneuvers' noise than out of one's, which the
+    // Shared parameters absorb a smaller share of two maneuvers' noise than of one's, which the
     // corrected bound counts.
     for (one, two, max_relative) in [
         (alone.covariance.unwrap(), both.covariance.unwrap(), 1e-4),
@@ -93,8 +93,11 @@ fn two_copies_of_a_maneuver_have_its_estimates_and_bounds_smaller_by_the_root_of
 }
 
 #[test]
-fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
-    let ((a, at_a), (b, at_b)) = (flown(3, [0.0, 0.0]), flown(4, [0.05, -0.03]));
+fn the_joint_gradient_matches_finite_differences() {
+    let ((a, at_a), (b, at_b)) = (
+        measured_case(3, [0.0, 0.0]),
+        measured_case(4, [0.05, -0.03]),
+    );
     let joint = Joint::new([("a", &a), ("b", &b)], |_| false).unwrap();
     let mut at = joint.assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
     for (j, value) in at.iter_mut().enumerate() {
@@ -127,8 +130,8 @@ fn the_joint_gradient_is_that_of_finite_differences_of_the_joint_cost() {
 }
 
 #[test]
-fn shared_derivatives_and_each_maneuver_s_biases_come_back_within_their_bounds() {
-    let ((a, at_a), (b, at_b)) = (flown(5, [0.0, 0.0]), flown(6, [0.3, -0.05]));
+fn shared_derivatives_and_own_biases_are_recovered_within_their_bounds() {
+    let ((a, at_a), (b, at_b)) = (measured_case(5, [0.0, 0.0]), measured_case(6, [0.3, -0.05]));
     let joint = Joint::new([("a", &a), ("b", &b)], |_| false).unwrap();
     let truth = joint.assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
     let start = truth.iter().map(|v| 1.1 * v).collect();
@@ -152,9 +155,9 @@ fn shared_derivatives_and_each_maneuver_s_biases_come_back_within_their_bounds()
 }
 
 #[test]
-fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
+fn the_error_of_a_held_value_does_not_average_out() {
     let truth = truth(Axis::Longitudinal);
-    let (wide, parameters) = flown(3, [0.0, 0.0]);
+    let (wide, parameters) = measured_case(3, [0.0, 0.0]);
     let model = Model {
         free: truth
             .iter()
@@ -205,15 +208,16 @@ fn the_error_of_a_held_value_is_common_and_does_not_average_out() {
 
 #[test]
 fn maneuvers_with_other_free_derivatives_are_not_joined() {
-    let (a, _) = flown(3, [0.0, 0.0]);
+    let (a, _) = measured_case(3, [0.0, 0.0]);
     let (b, _) = case::<3, Longitudinal>(&truth(Axis::Longitudinal)[1..], &[]);
     let error = Joint::new([("a", &a), ("b", &b)], |_| false).unwrap_err();
     assert!(error.starts_with("b has other free derivatives"), "{error}");
 }
 
 #[test]
-fn a_derivative_that_is_each_maneuver_s_own_is_found_for_each() {
-    let ((a, at_a), (mut b, mut at_b)) = (flown(5, [0.0, 0.0]), flown(6, [0.0, 0.0]));
+fn a_derivative_of_each_maneuver_s_own_is_estimated_for_each() {
+    let ((a, at_a), (mut b, mut at_b)) =
+        (measured_case(5, [0.0, 0.0]), measured_case(6, [0.0, 0.0]));
     let constant = b.names.iter().position(|n| n == "Cm_0").unwrap();
     at_b[constant] += 0.002;
     measure(&mut b, &at_b, &mut Noise(6), 0.0);

@@ -1,5 +1,4 @@
-//! The estimator against itself: gradients by finite differences, simulated truth, Monte Carlo for
-//! the bounds.
+//! The estimator against finite differences, simulated truth, and Monte Carlo for the bounds.
 
 mod calibration;
 mod coarse;
@@ -38,7 +37,7 @@ pub(crate) fn surface(name: &str) -> Regressor {
     Regressor::Surface(name.into())
 }
 
-/// A build-up with every kind of regressor, and true values of a stable fighter at α 20°.
+/// Build-up with every kind of regressor, and true values of a stable fighter at α 20°.
 pub(crate) fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
     use Coefficient::{CA, CN, CY, Cl, Cm, Cn};
     let vane = |name: &str| Regressor::Vane(name.into());
@@ -83,7 +82,7 @@ fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
     }
 }
 
-/// A record of trimmed flight with doublets on every surface.
+/// Record of trimmed flight with doublets on every surface.
 pub(crate) fn record() -> Record {
     let constant = |v: f64| vec![v; SAMPLES];
     let of = |f: &dyn Fn(usize) -> f64| (0..SAMPLES).map(f).collect::<Vec<_>>();
@@ -154,7 +153,7 @@ pub(crate) fn nothing_measured() -> Measurements {
     }
 }
 
-/// A case with everything free, biases on two outputs too, and its true parameters.
+/// Case with everything free, biases on two outputs too, and its true parameters.
 fn case<const NX: usize, E: Equations<NX>>(
     truth: &[(Derivative, f64)],
     biases: &[Bias],
@@ -184,7 +183,7 @@ pub(crate) fn biases(axis: Axis) -> Vec<Bias> {
         .to_vec()
 }
 
-fn gradients_match<const NX: usize, E: Equations<NX>>() {
+fn assert_sensitivities_match_differences<const NX: usize, E: Equations<NX>>() {
     let (case, parameters) = case::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
     let (mut at, mut up, mut down) = (case.response(), case.response(), case.response());
     case.respond(&parameters, &mut at).unwrap();
@@ -216,8 +215,8 @@ fn gradients_match<const NX: usize, E: Equations<NX>>() {
 
 #[test]
 fn sensitivities_are_those_of_finite_differences_for_every_parameter() {
-    gradients_match::<3, Longitudinal>();
-    gradients_match::<4, Lateral>();
+    assert_sensitivities_match_differences::<3, Longitudinal>();
+    assert_sensitivities_match_differences::<4, Lateral>();
 }
 
 #[test]
@@ -225,7 +224,7 @@ fn sensitivities_are_those_of_finite_differences_for_every_parameter() {
     clippy::needless_range_loop,
     reason = "an output's number counts in the case, the pass and the residuals"
 )]
-fn a_whole_pass_adds_its_sensitivities_up_over_blocks_and_leaves_out_what_does_not_count() {
+fn a_whole_pass_sums_its_sensitivities_over_blocks_of_counted_samples() {
     let axis = Axis::Longitudinal;
     let (mut case, parameters) = case::<3, Longitudinal>(&truth(axis), &biases(axis));
     for k in (0..SAMPLES).filter(|k| k % 5 == 0) {
@@ -318,7 +317,7 @@ fn fit<const NX: usize, E: Equations<NX>>(
     )
 }
 
-fn recovered<const NX: usize, E: Equations<NX>>() {
+fn assert_truth_is_recovered<const NX: usize, E: Equations<NX>>() {
     let (mut case, parameters) = case::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
     let mut response = case.response();
     case.respond(&parameters, &mut response).unwrap();
@@ -344,9 +343,9 @@ fn recovered<const NX: usize, E: Equations<NX>>() {
 }
 
 #[test]
-fn true_parameters_come_back_from_a_response_without_noise() {
-    recovered::<3, Longitudinal>();
-    recovered::<4, Lateral>();
+fn true_parameters_are_recovered_from_a_response_without_noise() {
+    assert_truth_is_recovered::<3, Longitudinal>();
+    assert_truth_is_recovered::<4, Lateral>();
 }
 
 /// Scatter of estimates over bounds (white and corrected), parameter by parameter.
@@ -381,8 +380,8 @@ fn scatter<const NX: usize, E: Equations<NX>>(
 }
 
 #[test]
-fn the_bound_is_the_scatter_for_white_noise_and_weights_that_are_not_its_inverse() {
-    // 120 draws give a scatter to 6.5%; three standard errors to each side.
+fn bounds_match_the_scatter_under_white_noise_for_other_weights() {
+    // 120 draws give a scatter to 6.5 %; three standard errors to each side.
     for (name, white, _) in scatter::<3, Longitudinal>(120, 0.0, Weights::Table) {
         assert!(
             (0.8..1.2).contains(&white),
@@ -398,9 +397,9 @@ fn the_bound_is_the_scatter_for_white_noise_and_weights_that_are_not_its_inverse
 }
 
 #[test]
-fn the_corrected_bound_counts_colour_that_the_bound_for_white_noise_misses() {
-    // 80 draws give a scatter to 8%; three standard errors to each side. Student's t makes the
-    // bound some 10% longer.
+fn corrected_bounds_match_the_scatter_under_coloured_noise() {
+    // 80 draws give a scatter to 8 %; three standard errors to each side. Student's t widens the
+    // bound by some 10 %.
     for (name, white, corrected) in scatter::<3, Longitudinal>(80, 0.9, Weights::Table) {
         assert!(
             white > 2.0,
@@ -425,7 +424,7 @@ fn estimated_weights_settle_at_the_inverse_of_the_noise_s_variances() {
 }
 
 #[test]
-fn with_weights_that_are_the_inverse_of_the_residuals_variances_the_bound_is_cramer_and_rao_s() {
+fn with_estimated_weights_the_bound_is_that_of_cramer_and_rao() {
     let (mut case, parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &[]);
     measure(&mut case, &parameters, &mut Noise(7), 0.0);
     let fit = fit(&case, parameters, Weights::Estimated);
@@ -438,7 +437,7 @@ fn with_weights_that_are_the_inverse_of_the_residuals_variances_the_bound_is_cra
 }
 
 #[test]
-fn marked_samples_do_not_count() {
+fn flagged_samples_do_not_count() {
     let (mut case, parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &[]);
     measure(&mut case, &parameters, &mut Noise(3), 0.0);
     for k in 100..110 {
@@ -455,7 +454,7 @@ fn marked_samples_do_not_count() {
 }
 
 #[test]
-fn derivatives_that_the_data_cannot_tell_apart_are_named_and_have_no_bound() {
+fn inseparable_derivatives_are_named_and_have_no_bound() {
     let mut truth = truth(Axis::Longitudinal);
     truth.push((
         derivative("Cm_twin", Coefficient::Cm, surface("de_deg")),
@@ -499,7 +498,7 @@ fn a_surface_that_never_moves_is_named() {
 }
 
 #[test]
-fn an_integration_that_diverges_is_an_outcome_that_says_when() {
+fn a_diverging_integration_is_an_outcome_with_its_time() {
     let (mut case, parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &[]);
     measure(&mut case, &parameters, &mut Noise(3), 0.0);
     let at = case.names.iter().position(|n| n == "Cm_alpha").unwrap();
@@ -515,7 +514,7 @@ fn an_integration_that_diverges_is_an_outcome_that_says_when() {
 }
 
 #[test]
-fn what_an_error_of_a_held_value_does_is_what_the_consider_covariance_says() {
+fn the_consider_covariance_is_the_effect_of_a_held_value_s_error() {
     let truth = truth(Axis::Longitudinal);
     let (mut full, parameters) = case::<3, Longitudinal>(&truth, &[]);
     let mut response = full.response();
@@ -573,23 +572,23 @@ fn what_an_error_of_a_held_value_does_is_what_the_consider_covariance_says() {
         &[("Cm_de", error)].into(),
         &mut right,
     );
-    let said = right.covariance_held.unwrap();
+    let considered = right.covariance_held.unwrap();
     for (j, name) in case.names.iter().enumerate() {
         let shift = (wrong.values[j] - right.values[j]).abs();
         assert_relative_eq!(
-            said[(j, j)].sqrt(),
+            considered[(j, j)].sqrt(),
             shift,
             max_relative = 0.1,
             epsilon = 1e-3 * error,
         );
         assert!(!name.is_empty());
     }
-    assert!(said.diagonal().max() > 0.0);
+    assert!(considered.diagonal().max() > 0.0);
 }
 
 #[test]
-fn equation_error_starts_within_reach_from_zero() {
-    // The record's motion is not the response's, so put the response in its place first.
+fn equation_error_starts_near_the_truth() {
+    // The record's motion is not the response: the response replaces it first.
     let truth = truth(Axis::Longitudinal);
     let (case, parameters) = case::<3, Longitudinal>(&truth, &[]);
     let mut response = case.response();

@@ -1,4 +1,4 @@
-//! The width of the processor's vectors does not show in a single bit.
+//! Equal bits for every width of the processor's vectors.
 
 use pulp::Simd;
 
@@ -28,7 +28,7 @@ fn bits<S: Simd, const NX: usize, E: Equations<NX>>(
     numbers.map(f64::to_bits).collect()
 }
 
-fn alike<const NX: usize, E: Equations<NX>>() {
+fn assert_equal_bits<const NX: usize, E: Equations<NX>>() {
     let (mut case, parameters) = case::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
     measure(&mut case, &parameters, &mut Noise(20_261_130), 0.0);
     for stride in [1, 2, 3] {
@@ -54,6 +54,6 @@ fn alike<const NX: usize, E: Equations<NX>>() {
 
 #[test]
 fn a_pass_gives_the_same_bits_with_one_lane_four_and_eight() {
-    alike::<3, Longitudinal>();
-    alike::<4, Lateral>();
+    assert_equal_bits::<3, Longitudinal>();
+    assert_equal_bits::<4, Lateral>();
 }
