@@ -1,10 +1,9 @@
-//! The checks of a configuration that its types cannot make: names resolve, units fit, nothing is
-//! missing.
+//! Checks of a configuration beyond its types: names resolve, units fit, nothing is missing.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::Config;
+use super::checked::Config;
 use super::instruments::Instrument;
 use super::source::{Files, Source};
 use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
@@ -24,7 +23,7 @@ pub(super) fn tunnel(
     settings: &wind_tunnel::Settings,
 ) -> Result<WindTunnel> {
     let mut tunnel = WindTunnel::new(settings.clone());
-    let mut seen = Seen::default();
+    let mut read = TunnelRows::default();
     for (line, mut row) in tunnel_rows(path, buildup, settings)? {
         let error = |what: String| Err(Error::config(path, Some(line), what));
         let numbers = [
@@ -55,11 +54,11 @@ pub(super) fn tunnel(
             row.value *= factor;
             row.uncertainty = row.uncertainty.map(|u| u * factor);
         }
-        seen.add(&row)
+        read.add(&row)
             .map_err(|what| Error::config(path, Some(line), what))?;
         tunnel.insert_at(&row.derivative, row.third, row.point());
     }
-    if let Some(third) = settings.third.as_ref().filter(|_| !seen.third) {
+    if let Some(third) = settings.third.as_ref().filter(|_| !read.third) {
         let what = format!(
             "no table depends on `{}`, which pipeline.yaml names (tunnel: third:)",
             third.name
@@ -69,8 +68,8 @@ pub(super) fn tunnel(
     Ok(tunnel)
 }
 
-/// The rows of a tunnel's tables as written, with what a DAVE-ML file says of the model's
-/// derivatives and sums.
+/// Rows of the tunnel's tables as written; of a DAVE-ML file those of the model's derivatives and
+/// sums.
 pub(crate) fn tunnel_rows(
     path: &Path,
     buildup: &Buildup,
@@ -85,21 +84,21 @@ pub(crate) fn tunnel_rows(
     store::tunnel::rows(path, third, |variable| names.contains(&plain(variable)))
 }
 
-/// A name as tunnels are compared by.
+/// Name without underscores, as tunnels may write it.
 fn plain(name: &str) -> String {
     name.replace('_', "")
 }
 
-/// What the tunnel's rows have given so far: each point once, and of each derivative always the
-/// same variables.
+/// Rows of the tunnel read so far. Each point stands once, and all rows of a derivative have the same
+/// variables.
 #[derive(Default)]
-struct Seen {
+struct TunnelRows {
     points: BTreeSet<(String, [Option<u64>; 3])>,
     variables: BTreeMap<String, (bool, bool)>,
     third: bool,
 }
 
-impl Seen {
+impl TunnelRows {
     fn add(&mut self, row: &TunnelRow) -> std::result::Result<(), String> {
         let name = plain(&row.derivative);
         let given = (row.mach.is_some(), row.third.is_some());
@@ -127,7 +126,7 @@ impl Seen {
     }
 }
 
-/// Reads the analyst's events, where there are any.
+/// Reads the analyst's events.
 pub(super) fn events(path: Option<&Path>, classes: &[Class]) -> Result<Vec<Event>> {
     let Some(path) = path else {
         return Ok(Vec::new());
@@ -156,7 +155,7 @@ pub(super) fn events(path: Option<&Path>, classes: &[Class]) -> Result<Vec<Event
     Ok(events)
 }
 
-/// Checks everything against everything.
+/// Checks all files against each other.
 pub(super) fn whole(config: &Config, files: &Files) -> Result<()> {
     aircraft(config, &files.aircraft)?;
     channels(config, &files.aircraft)?;
@@ -236,7 +235,7 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// The names of all signals of the channel map and the constants.
+/// Names of all signals of the channel map and the constants.
 fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
     config
         .channels
@@ -434,7 +433,7 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// Lengths of pulses and rising frequencies that can be.
+/// Pulses and sweeps of a class.
 fn patterns(class: &Class, source: &Source) -> Result<()> {
     let error = |name: &str, what: &str| {
         Err(source.error_under("recognise", name, format!("class {}: {what}", class.name)))
@@ -470,7 +469,7 @@ fn patterns(class: &Class, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// What segment is told of signals, and its limits.
+/// Signals and limits of segment.
 fn segment(config: &Config, source: &Source) -> Result<()> {
     let settings = &config.segment;
     if settings.excitation_flag.is_empty() {
@@ -600,7 +599,7 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// Numbers of trends and tunnel that would make no sense.
+/// Numbers of trends, comparison and tunnel.
 fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
     let (trend, compare) = (&config.trend, &config.compare);
     let knots = trend.knots_deg.iter().chain(

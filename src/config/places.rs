@@ -1,4 +1,4 @@
-//! Where archive, store and reports lie: in folders, the first two also in an object store.
+//! Places of archive, store and reports: folders, the first two also in an object store.
 
 use std::path::{Path, PathBuf};
 
@@ -6,8 +6,7 @@ use super::source::Source;
 use crate::error::{Error, Result};
 use crate::store::object;
 
-/// The store's folder, and the place in an object store that it is the cache of, where there is
-/// one.
+/// Folder of the store, and the place in an object store that it caches.
 pub(super) fn store(
     store: Option<PathBuf>,
     cache: Option<PathBuf>,
@@ -30,8 +29,8 @@ pub(super) fn store(
     Ok((store.unwrap_or(default), None))
 }
 
-/// Checks that a place in an object store is one, and that this program knows such; nobody is
-/// asked.
+/// Checks the form of a place in an object store, and that this program supports object stores. It
+/// does not connect.
 pub(super) fn reachable(place: &Path) -> Result<()> {
     if object::is_object(place) {
         object::check(place).map_err(|e| e.at(place))
@@ -40,7 +39,7 @@ pub(super) fn reachable(place: &Path) -> Result<()> {
     }
 }
 
-/// A place that must be a folder.
+/// Checks that a place is no object store.
 pub(super) fn in_folder(place: PathBuf, why: &str) -> Result<PathBuf> {
     if object::is_object(&place) {
         return Err(Error::config(

@@ -1,12 +1,10 @@
-//! The text of a pipeline's files: parsed with errors that name file and line, and searched for the
-//! line of a name.
+//! Files of a pipeline: text, parser with file and line of each error, search for the line of a name.
 
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::moved;
-use super::written::{AircraftFile, ClassFile, ModelFile, PipelineFile};
+use super::written::{AircraftFile, ClassFile, ModelFile};
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
@@ -55,7 +53,7 @@ impl Source {
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
             let line = e.location().map(|l| l.line());
-            Error::config(&self.path, line, said(&e.to_string()))
+            Error::config(&self.path, line, message(&e.to_string()))
         })
     }
 
@@ -112,9 +110,9 @@ fn without_comment(line: &str) -> &str {
     }
 }
 
-/// What the parser says, without the place (the error begins with it) and, for an unknown key or
-/// word, with the one that was probably meant.
-fn said(parser: &str) -> String {
+/// Message of the parser without the place, which the error begins with. For an unknown key or word
+/// it ends with the one that was probably meant.
+fn message(parser: &str) -> String {
     let what = parser
         .rsplit_once(" at line ")
         .map_or(parser, |(what, _)| what);
@@ -140,7 +138,7 @@ impl Files {
     }
 
     pub fn read(folder: &Path) -> Result<Files> {
-        if !folder.join("pipeline.yaml").is_file() {
+        if !files::is_file(&folder.join("pipeline.yaml")) {
             let what = "no pipeline here: a pipeline is a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/";
             return Err(Error::config(folder, None, what));
         }
@@ -162,11 +160,6 @@ impl Files {
                 .map(Source::read)
                 .collect::<Result<_>>()?,
         })
-    }
-
-    pub fn pipeline(&self) -> Result<PipelineFile> {
-        let parsed = self.pipeline.parse();
-        parsed.map_err(|error| moved::refusal(&self.pipeline).unwrap_or(error))
     }
 
     pub fn aircraft(&self) -> Result<AircraftFile> {

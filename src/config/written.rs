@@ -193,7 +193,7 @@ pub struct ClassFile {
     pub overrides: Vec<OverrideLine>,
 }
 
-/// What differs in a class above an angle of attack.
+/// Differences of a class above an angle of attack.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OverrideLine {

@@ -13,6 +13,18 @@ use crate::error::{Error, Result};
 use crate::maneuver::Event;
 use crate::tables::PublishedTrend;
 
+/// Test for a file of the file system.
+#[must_use]
+pub fn is_file(path: &Path) -> bool {
+    path.is_file()
+}
+
+/// Test for a folder of the file system.
+#[must_use]
+pub fn is_folder(path: &Path) -> bool {
+    path.is_dir()
+}
+
 /// A text file whole; it may be an object.
 ///
 /// # Errors

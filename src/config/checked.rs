@@ -1,0 +1,66 @@
+//! The checked configuration of a pipeline.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::cluster::ClusterSettings;
+use super::written::ReportSettings;
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::flight::Channel;
+use crate::maneuver::{Class, Event};
+use crate::{compare, estimate, export, ingest, segment, trend};
+
+/// Configuration of a pipeline: everything that decides a campaign's results.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Name of the pipeline's folder.
+    pub name: String,
+    pub title: String,
+    /// Folder or glob of the flight archive, in the file system or in an object store
+    /// (`s3://bucket/prefix`).
+    pub archive: String,
+    /// File of the wind-tunnel tables, as the report names it.
+    pub wind_tunnel: PathBuf,
+    /// Folder of the artefacts.
+    pub store: PathBuf,
+    /// Place of the artefacts in an object store; `store` is then its cache.
+    pub shared_store: Option<PathBuf>,
+    pub reports: PathBuf,
+    pub aircraft: Aircraft,
+    pub channels: BTreeMap<String, Channel>,
+    pub constants: BTreeMap<String, f64>,
+    pub buildup: Buildup,
+    pub tunnel: WindTunnel,
+    pub classes: Vec<Class>,
+    pub events: Vec<Event>,
+    pub ingest: ingest::Settings,
+    pub segment: segment::Settings,
+    pub estimate: estimate::Settings,
+    pub trend: trend::Settings,
+    pub compare: compare::Settings,
+    pub export: export::Settings,
+    pub report: ReportSettings,
+    pub cluster: ClusterSettings,
+    /// Report template in place of the built-in one.
+    pub template: Option<String>,
+    /// Name and text of each file of the pipeline.
+    pub files: Vec<(String, String)>,
+}
+
+impl Config {
+    #[must_use]
+    pub fn class(&self, name: &str) -> Option<&Class> {
+        self.classes.iter().find(|c| c.name == name)
+    }
+
+    /// Names of derivatives and sums in the order of the model.
+    #[must_use]
+    pub fn derivative_names(&self) -> Vec<String> {
+        let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
+        derivatives
+            .chain(self.buildup.combined.iter().map(|c| &c.name))
+            .cloned()
+            .collect()
+    }
+}

@@ -1,0 +1,144 @@
+//! Loading of a pipeline's folder: files, options of the command line, checks.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::checked::Config;
+use super::instruments::{self, Instrument};
+use super::source::{Files, Source};
+use super::written::PipelineFile;
+use super::{check, moved, places};
+use crate::error::Result;
+use crate::output_error::calibration_errors::Calibration;
+use crate::{compare, ingest, store};
+
+/// Options of the command line that replace keys of `pipeline.yaml`.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    pub archive: Option<String>,
+    pub wind_tunnel: Option<PathBuf>,
+    pub store: Option<PathBuf>,
+    pub store_cache: Option<PathBuf>,
+    pub reports: Option<PathBuf>,
+    pub events: Option<PathBuf>,
+    /// Folders of earlier campaigns' tables; without any, those of the pipeline.
+    pub against: Vec<PathBuf>,
+    /// Memory that reading may use at once, MB.
+    pub memory_mb: Option<f64>,
+}
+
+impl Config {
+    /// Reads and checks a pipeline's folder.
+    ///
+    /// # Errors
+    /// [`crate::error::Error`] of the configuration with file, line and the probable meaning, for the
+    /// first mistake.
+    pub fn load(folder: &Path, overrides: Overrides) -> Result<Config> {
+        let files = Files::read(folder)?;
+        let mut pipeline = pipeline_file(&files.pipeline)?;
+        let aircraft = files.aircraft()?;
+        share_keys(&mut pipeline, &aircraft.instruments);
+        let buildup = files.model()?;
+        let classes = files.classes()?;
+        let wind_tunnel = overrides.wind_tunnel.unwrap_or(pipeline.wind_tunnel);
+        let name = folder.file_name().map_or_else(
+            || "pipeline".to_owned(),
+            |n| n.to_string_lossy().into_owned(),
+        );
+        let events = overrides.events.or(pipeline.events);
+        let template = pipeline
+            .report
+            .template
+            .as_deref()
+            .map(store::files::text)
+            .transpose()?;
+        let default = Path::new("data/store").join(&name);
+        let store = overrides.store.or(pipeline.store);
+        let cache = overrides.store_cache.or(pipeline.store_cache);
+        let (store, shared_store) = places::store(store, cache, default, &files.pipeline)?;
+        let reports = overrides
+            .reports
+            .or(pipeline.reports)
+            .unwrap_or_else(|| Path::new("reports").join(&name));
+        let archive = overrides.archive.unwrap_or(pipeline.archive);
+        places::reachable(Path::new(&archive))?;
+        let config = Config {
+            tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
+            events: check::events(events.as_deref(), &classes)?,
+            title: pipeline.title,
+            archive,
+            wind_tunnel,
+            store,
+            shared_store,
+            reports: places::in_folder(reports, "reports are published in a folder")?,
+            name,
+            aircraft: aircraft.aircraft,
+            channels: aircraft.channels,
+            constants: aircraft.constants,
+            buildup,
+            classes,
+            ingest: ingest::Settings {
+                memory_mb: overrides.memory_mb.unwrap_or(pipeline.ingest.memory_mb),
+                ..pipeline.ingest
+            },
+            segment: pipeline.segment,
+            estimate: pipeline.estimate,
+            trend: pipeline.trend,
+            compare: against(pipeline.compare, overrides.against),
+            export: pipeline.export,
+            report: pipeline.report,
+            cluster: pipeline.cluster,
+            template,
+            files: files.all().map(|file| file.named(folder)).collect(),
+        };
+        check::whole(&config, &files)?;
+        check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
+        Ok(config)
+    }
+}
+
+/// Parses `pipeline.yaml`; keys that have moved are refused with their new places.
+fn pipeline_file(source: &Source) -> Result<PipelineFile> {
+    let parsed = source.parse();
+    parsed.map_err(|error| moved::refusal(source).unwrap_or(error))
+}
+
+/// Copies keys that several stages share, and the sizes of instrument errors, to the stages that
+/// read them.
+fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>) {
+    pipeline.ingest.share();
+    let compatibility = &mut pipeline.ingest.compatibility;
+    for (signal, instrument) in errors {
+        if let Some(size) = compatibility.ordinary.of_signal(signal) {
+            instruments::replace(size, instrument.ordinary.given());
+        }
+        if let Some(size) = compatibility.faulty.of_signal(signal) {
+            instruments::replace(size, instrument.fault.given());
+        }
+    }
+    let estimate = &mut pipeline.estimate;
+    estimate.max_marked_share = pipeline.segment.quality.marked_share;
+    estimate.calibration = errors
+        .iter()
+        .filter(|(_, instrument)| instrument.uncertainty != Calibration::default())
+        .map(|(signal, instrument)| (signal.clone(), instrument.uncertainty))
+        .collect();
+    if let Some(joint) = &mut estimate.joint {
+        joint.share_constants = estimate.share_constants;
+    }
+    if let Some(prediction) = &mut estimate.prediction {
+        prediction.share_constants = estimate.share_constants;
+    }
+}
+
+/// Settings of the comparison, with the earlier campaigns of the command line where it names some.
+fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
+    if named.is_empty() {
+        settings
+    } else {
+        compare::Settings {
+            against: named,
+            ..settings
+        }
+    }
+}
