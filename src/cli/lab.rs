@@ -6,7 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{Bars, start_threads};
+use super::bars::Bars;
+use super::options::start_threads;
 use crate::error::Problem;
 use crate::lab::campaign::{self, SimulatedCampaign};
 use crate::lab::{bounds_study, standard_case};

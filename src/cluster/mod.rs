@@ -1,10 +1,9 @@
-//! Past one machine: a campaign's work dealt to shards, and the scripts that give them to a batch
-//! scheduler.
+//! Campaigns on a cluster: work dealt to shards, and scripts for a batch scheduler.
 //!
-//! The contract knows no scheduler. A [`plan::Plan`] fixes what is to be computed, from which
-//! input, configuration and code, and which shard computes it; a shard computes its share into the
-//! store, as often as it is told to; a merge publishes when nothing is missing. Placement, retries,
-//! lost nodes and queues are the scheduler's ([`scripts`]).
+//! The work itself depends on no scheduler. A [`plan::Plan`] fixes the items, their shards, and the
+//! lineage of input, configuration and code. A shard computes its share into the store, any number
+//! of times. A merge publishes when nothing is missing ([`shard`]). Placement, retries, lost nodes
+//! and queues are left to the scheduler ([`scripts`]).
 
 pub mod plan;
 pub mod scripts;

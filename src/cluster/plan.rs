@@ -1,4 +1,4 @@
-//! The plan: every item of work with its cost and its shard, and what it was made from.
+//! The plan of a campaign in shards: items with their costs and shards, and their lineage.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
@@ -7,82 +7,88 @@ use serde::{Deserialize, Serialize};
 
 use crate::lineage::{Lineage, Stage};
 
-/// The form of the file; another is refused.
+/// Version of the file; another version is refused.
 const FORM: u32 = 1;
 
-/// What is dealt.
+/// Kind of items that a plan deals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Of {
+pub enum Dealt {
     /// Flights: ingest and segment.
     Flights,
     /// Maneuvers of flights that are ingested and segmented: estimate.
     Maneuvers,
 }
 
-impl Of {
+impl Dealt {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Of::Flights => "flights",
-            Of::Maneuvers => "maneuvers",
+            Dealt::Flights => "flights",
+            Dealt::Maneuvers => "maneuvers",
         }
     }
 
-    /// The last stage that its shards work on.
+    /// Last stage that the shards compute.
     #[must_use]
-    pub fn stage(self) -> Stage {
+    pub fn last_stage(self) -> Stage {
         match self {
-            Of::Flights => Stage::Segment,
-            Of::Maneuvers => Stage::Estimate,
+            Dealt::Flights => Stage::Segment,
+            Dealt::Maneuvers => Stage::Estimate,
         }
     }
 }
 
-/// One flight or maneuver.
+/// A flight or maneuver in a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Item {
-    /// Of the flight or maneuver.
+    /// Id of the flight or maneuver.
     pub id: String,
-    /// The flight of the archive that it comes from.
+    /// Flight of the archive.
     pub flight_id: String,
     /// Expected cost; only ratios count.
     pub cost: f64,
-    /// 1 to the number of shards.
+    /// Number of the shard, from 1.
     pub shard: usize,
 }
 
-/// What is to be computed, and by whom.
+/// A flight or maneuver to be dealt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Work {
+    /// Id of the flight or maneuver.
+    pub id: String,
+    /// Flight of the archive.
+    pub flight_id: String,
+    /// Expected cost; only ratios count.
+    pub cost: f64,
+}
+
+/// A campaign's work, dealt to shards.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     form: u32,
-    pub of: Of,
+    pub of: Dealt,
     pub shards: usize,
     pub items: Vec<Item>,
-    /// Input, configuration and code, as far as they decide the items.
+    /// Lineage as far as the last stage of the shards.
     pub lineage: Lineage,
 }
 
 impl Plan {
-    /// Deals items (id, flight, cost), in their order, to shards of about equal cost.
+    /// Deals work, in its order, to shards of about equal cost.
     ///
-    /// A shard has neighbours: the maneuvers of a flight share its record. A shard's cost differs
-    /// from the mean by no more than that of the dearest item.
+    /// A shard gets neighbours: the maneuvers of a flight share its record. Its cost differs from the
+    /// mean by no more than the dearest item.
     #[must_use]
-    pub fn deal(
-        of: Of,
-        shards: usize,
-        items: Vec<(String, String, f64)>,
-        lineage: &Lineage,
-    ) -> Plan {
+    pub fn deal(of: Dealt, shards: usize, work: Vec<Work>, lineage: &Lineage) -> Plan {
         let shards = shards.max(1);
-        let total: f64 = items.iter().map(|(_, _, cost)| cost).sum();
+        let total: f64 = work.iter().map(|work| work.cost).sum();
         let mut before = 0.0;
-        let dealt = |(id, flight_id, cost): (String, String, f64)| {
-            let middle = (before + 0.5 * cost) / total.max(f64::MIN_POSITIVE);
-            before += cost;
+        let item = |work: Work| {
+            let middle = (before + 0.5 * work.cost) / total.max(f64::MIN_POSITIVE);
+            before += work.cost;
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -90,9 +96,9 @@ impl Plan {
             )]
             let shard = (middle * shards as f64) as usize;
             Item {
-                id,
-                flight_id,
-                cost,
+                id: work.id,
+                flight_id: work.flight_id,
+                cost: work.cost,
                 shard: shard.min(shards - 1) + 1,
             }
         };
@@ -100,16 +106,15 @@ impl Plan {
             form: FORM,
             of,
             shards,
-            items: items.into_iter().map(dealt).collect(),
-            lineage: lineage.until(of.stage()),
+            items: work.into_iter().map(item).collect(),
+            lineage: lineage.until(of.last_stage()),
         }
     }
 
     /// Reads a plan.
     ///
     /// # Errors
-    /// Why the text is none, or none that can be worked by: a plan of another program, an item
-    /// twice or in no shard.
+    /// The reason that the text is no valid plan: another program's, an item twice or in no shard.
     pub fn read(text: &str) -> Result<Plan, String> {
         let plan: Plan =
             serde_json::from_str(text).map_err(|e| format!("is no plan of this program: {e}"))?;
@@ -140,19 +145,19 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The plan as text.
+    /// Text of the plan's file.
     #[must_use]
     pub fn text(&self) -> String {
         // Strings, numbers and maps with strings as keys: nothing that JSON cannot hold.
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// The items of a shard.
+    /// Items of a shard.
     pub fn share(&self, shard: usize) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(move |item| item.shard == shard)
     }
 
-    /// The shards that have one of these items.
+    /// Shards that have one of these items.
     #[must_use]
     pub fn shards_of(&self, ids: &BTreeSet<String>) -> BTreeSet<usize> {
         self.items
@@ -162,7 +167,7 @@ impl Plan {
             .collect()
     }
 
-    /// The cost of each shard.
+    /// Cost of each shard.
     #[must_use]
     pub fn costs(&self) -> BTreeMap<usize, f64> {
         let mut costs: BTreeMap<usize, f64> = (1..=self.shards).map(|shard| (shard, 0.0)).collect();
@@ -173,7 +178,7 @@ impl Plan {
     }
 }
 
-/// Numbers as schedulers write the tasks of an array: `1,4-7`.
+/// Formats numbers as schedulers write the tasks of an array: `1,4-7`.
 #[must_use]
 pub fn array(shards: &BTreeSet<usize>) -> String {
     let shards: Vec<usize> = shards.iter().copied().collect();
@@ -185,7 +190,7 @@ pub fn array(shards: &BTreeSet<usize>) -> String {
     runs.map(run).collect::<Vec<String>>().join(",")
 }
 
-/// One shard of many, as typed: `3/24`.
+/// One shard of several, as typed: `3/24`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     pub number: usize,
@@ -210,11 +215,15 @@ impl FromStr for Shard {
 mod tests {
     use super::*;
 
-    fn items(costs: &[f64]) -> Vec<(String, String, f64)> {
+    fn work(costs: &[f64]) -> Vec<Work> {
         costs
             .iter()
             .enumerate()
-            .map(|(i, cost)| (format!("m{i:03}"), "f".to_owned(), *cost))
+            .map(|(i, cost)| Work {
+                id: format!("m{i:03}"),
+                flight_id: "f".to_owned(),
+                cost: *cost,
+            })
             .collect()
     }
 
@@ -222,7 +231,7 @@ mod tests {
     fn every_item_is_dealt_once_and_no_shard_is_dearer_than_the_mean_and_one_item() {
         for n in [1, 4, 24, 200] {
             let costs: Vec<f64> = (0..106).map(|i| 1.0 + f64::from(i * i % 17)).collect();
-            let plan = Plan::deal(Of::Maneuvers, n, items(&costs), &Lineage::default());
+            let plan = Plan::deal(Dealt::Maneuvers, n, work(&costs), &Lineage::default());
             assert_eq!((1..=n).flat_map(|shard| plan.share(shard)).count(), 106);
             let (mean, dearest) = (costs.iter().sum::<f64>() / n as f64, 17.0);
             assert!(
@@ -238,13 +247,13 @@ mod tests {
 
     #[test]
     fn items_that_cost_nothing_are_dealt_all_the_same() {
-        let plan = Plan::deal(Of::Flights, 3, items(&[0.0, 0.0]), &Lineage::default());
+        let plan = Plan::deal(Dealt::Flights, 3, work(&[0.0, 0.0]), &Lineage::default());
         assert_eq!(Plan::read(&plan.text()), Ok(plan));
     }
 
     #[test]
     fn a_plan_with_an_item_twice_or_in_no_shard_is_refused() {
-        let plan = Plan::deal(Of::Maneuvers, 2, items(&[1.0, 1.0]), &Lineage::default());
+        let plan = Plan::deal(Dealt::Maneuvers, 2, work(&[1.0, 1.0]), &Lineage::default());
         let refused = |change: &dyn Fn(&mut Plan)| {
             let mut other = plan.clone();
             change(&mut other);

@@ -1,51 +1,49 @@
-//! The scripts that a batch scheduler runs: an array over flights, the plan of their maneuvers, an
-//! array over these, the merge; each after the one before.
+//! Scripts for a batch scheduler: an array over flights, the plan of their maneuvers, an array over
+//! maneuvers, the merge; each waits for the one before.
 //!
-//! Slurm ends every dependency on an array (`afterok`) of which a task was requeued by
-//! `RequeueExit`; so a task that wants to be tried again requeues itself (`scontrol requeue`),
-//! which the dependency outlives. PBS has no such command for a running task: there a task is tried
-//! again in its own time.
+//! Slurm cancels a dependency on an array (`afterok`) if `RequeueExit` requeues one of its tasks. A
+//! task that needs another try therefore requeues itself (`scontrol requeue`), which the dependency
+//! survives. PBS has no such command: there the task repeats its command within its own time.
 
 use crate::config::ClusterSettings as Settings;
 
-/// The schedulers.
+/// Batch scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Engine {
     Slurm,
     Pbs,
 }
 
-/// What the scripts call.
+/// The campaign that the scripts compute.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// The program.
+    /// Path of the program.
     pub program: String,
-    /// Pipeline and options, as they are typed behind a command.
+    /// Pipeline and options, as typed after a command.
     pub arguments: Vec<String>,
-    /// Where the command is to be given.
+    /// Working folder of the commands.
     pub folder: String,
-    /// The plans' files.
+    /// Files of the plans.
     pub flights: String,
     pub maneuvers: String,
-    /// The folder of the scripts, and of what the tasks say.
+    /// Folder of the scripts and of the tasks' logs.
     pub out: String,
 }
 
-/// One file of the chain.
+/// One script of the chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Script {
     pub name: &'static str,
     pub text: String,
 }
 
-/// The chain's jobs in order.
+/// Jobs of the chain in order.
 const JOBS: [&str; 4] = ["flights", "plan", "maneuvers", "merge"];
 
-/// The largest array that schedulers take unless told otherwise: Slurm's `MaxArraySize` is 1001,
-/// which excludes 1001.
+/// Largest array under Slurm's default `MaxArraySize` of 1001, which is exclusive.
 pub const LARGEST_ARRAY: usize = 1000;
 
-/// A word that the shell takes as it is.
+/// Quotes a word for the shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -54,7 +52,7 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', "'\\''"))
 }
 
-/// All scripts; the last submits the others.
+/// Writes all scripts; the last submits the others.
 #[must_use]
 pub fn scripts(engine: Engine, settings: &Settings, campaign: &Campaign) -> Vec<Script> {
     let names = ["flights.sh", "plan.sh", "maneuvers.sh", "merge.sh"];
@@ -106,7 +104,7 @@ fn script(engine: Engine, settings: &Settings, campaign: &Campaign, job: &str) -
     lines.join("\n")
 }
 
-/// What the scheduler is told.
+/// Directives for the scheduler.
 fn directives(
     engine: Engine,
     s: &Settings,
@@ -125,8 +123,7 @@ fn directives(
             let mut lines = vec![
                 format!("--job-name={name}"),
                 format!("--output={output}"),
-                // A task that is tried again goes on in the same log, and a node that dies costs
-                // its tasks a new start.
+                // A repeated task appends to its log; the tasks of a dead node start again.
                 "--open-mode=append".to_owned(),
                 "--requeue".to_owned(),
                 format!("--time={}", s.time),
@@ -166,7 +163,7 @@ fn directives(
         .collect()
 }
 
-/// The command, tried again where it asks for it with 75.
+/// The command, repeated after exit code 75.
 fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -> String {
     let retries = settings.retries;
     match engine {
@@ -190,7 +187,7 @@ fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -
     }
 }
 
-/// Gives the jobs to the scheduler, each after the one before, and prints their numbers.
+/// Script that submits the jobs, each after the one before, and prints their numbers.
 fn submit(engine: Engine, campaign: &Campaign) -> String {
     let out = quoted(&campaign.out);
     let (first, next) = match engine {

@@ -1,33 +1,30 @@
-//! A campaign in shards: what a plan deals, what of it is missing, a shard's work, the merge of
-//! all.
+//! Computation of a campaign in shards: dealing the work, one shard's share, missing items, and the
+//! merge.
 //!
-//! Shards share nothing but the store. An artefact is named by what decides it, so a shard that
-//! runs twice, even at the same time, finds or makes the same bytes; a shard that died leaves what
-//! it had done. A merge is a run that finds everything made.
+//! Shards have only the store in common. An artefact is named by the fingerprint of everything that
+//! decides it, so a shard that runs twice, even at the same time, makes the same bytes; a shard that
+//! died leaves what it had made. A merge is a run that finds everything made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use rayon::prelude::*;
-
-use crate::cluster::plan::{self, Item, Of, Plan, Shard};
+use super::plan::{Dealt, Item, Plan, Shard, Work, array};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::flight::is_stretch;
-use crate::lineage::Stage;
+use crate::lineage::{Lineage, Stage};
 use crate::maneuver::{Maneuver, Status};
-use crate::night::publish::Done;
-use crate::night::{self, status};
-use crate::pipeline::{Campaign, Flight, Progress, Run};
+use crate::night::{RunOutcome, campaign_lineage, run};
+use crate::pipeline::{Absent, Campaign, Conductor, Progress, bring_maneuvers};
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Store, files};
+use crate::store::files;
 
 /// Reads a plan's file.
 ///
 /// # Errors
-/// [`Error::Config`] naming the file: it cannot be read, or is no plan to work by.
-pub fn read(file: &Path) -> Result<Plan> {
+/// [`Error::Config`] naming the file that cannot be read or is no valid plan.
+pub fn read_plan(file: &Path) -> Result<Plan> {
     Plan::read(&files::text(file)?).map_err(|why| Error::config(file, None, why))
 }
 
@@ -35,32 +32,33 @@ pub fn read(file: &Path) -> Result<Plan> {
 ///
 /// # Errors
 /// No archive, a store in use; for maneuvers, flights that are not yet ingested and segmented.
-pub fn plan(
+pub fn deal(
     config: &Config,
-    of: Of,
+    dealt: Dealt,
     shards: usize,
     file: &Path,
     progress: &dyn Progress,
 ) -> Result<Plan> {
-    let files = archive::find(&config.archive)?;
-    let run = join(config, &files, Duration::ZERO, progress)?;
-    run.store.remember(&run.contents)?;
-    let items = match of {
-        Of::Flights => run.flights(&files),
-        Of::Maneuvers => run.maneuvers(&files)?,
+    let archive = archive::find(&config.archive)?;
+    let conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
+    conductor.remember_contents()?;
+    let work = match dealt {
+        Dealt::Flights => flights(&conductor),
+        Dealt::Maneuvers => maneuvers(&conductor)?,
     };
-    let plan = Plan::deal(of, shards, items, &run.lineage);
-    run.store.check()?;
+    let plan = Plan::deal(dealt, shards, work, &campaign_lineage(&conductor));
+    conductor.runner.store.check_transfers()?;
     files::place_text(file, &plan.text())?;
     Ok(plan)
 }
 
-/// Computes a shard's share into the store, as far as `until`; how many artefacts were made for it.
+/// Computes a shard's share into the store, as far as `until`, and returns the number of artefacts
+/// that were made.
 ///
 /// # Errors
-/// The plan is of something else; a flight of it cannot be read; the disk says no
+/// The plan has another lineage; one of its flights cannot be read; the disk fails
 /// ([`Error::is_transient`]).
-pub fn work(
+pub fn compute(
     config: &Config,
     plan: &Plan,
     shard: Shard,
@@ -69,246 +67,190 @@ pub fn work(
     progress: &dyn Progress,
 ) -> Result<usize> {
     if shard.of != plan.shards {
-        return Err(Error::config(
-            &config.store,
-            None,
-            format!(
-                "the plan deals to {} shards, not {}: give --shard i/{0}",
-                plan.shards, shard.of
-            ),
-        ));
+        let what = format!(
+            "the plan deals to {} shards, not {}: give --shard i/{0}",
+            plan.shards, shard.of
+        );
+        return Err(Error::config(&config.store, None, what));
     }
     let items: Vec<&Item> = plan.share(shard.number).collect();
-    let wanted: BTreeSet<&str> = items.iter().map(|item| item.flight_id.as_str()).collect();
-    let mut files = archive::find(&config.archive)?;
-    files.retain(|f| wanted.contains(f.flight_id.as_str()));
-    let run = join(config, &files, wait, progress)?;
-    run.is_of(plan, Some(&wanted))?;
-    let mut campaign = Campaign::default();
-    run.ingest(&files, &mut campaign)?;
+    let flight_ids: BTreeSet<&str> = items.iter().map(|item| item.flight_id.as_str()).collect();
+    let mut archive = archive::find(&config.archive)?;
+    archive.retain(|f| flight_ids.contains(f.flight_id.as_str()));
+    let conductor = Conductor::join(config, archive, Absent::Make, wait, progress)?;
+    check_lineage(plan, &conductor, Some(&flight_ids))?;
+    let campaign = conductor.campaign(until.min(Stage::Segment))?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {
-        return Err(Error::store(
-            Path::new(flight),
-            &format!("the flight could not be read: {why}"),
-        ));
+        let what = format!("the flight could not be read: {why}");
+        return Err(Error::store(Path::new(flight), &what));
     }
-    if until >= Stage::Segment {
-        run.segment(&mut campaign)?;
+    if plan.of == Dealt::Maneuvers {
+        estimate(&conductor, &campaign, &items)?;
     }
-    if plan.of == Of::Maneuvers {
-        run.share(&campaign, &items)?;
-    }
-    run.store.send_rest()?;
-    Ok(run.store.made())
+    let store = &conductor.runner.store;
+    store.send_unsent()?;
+    Ok(store.made())
 }
 
-/// The items of a plan that are not in the store.
+/// Items of a plan whose artefacts are missing.
 ///
 /// # Errors
-/// No archive, or the plan is of something else.
-pub fn missing(config: &Config, plan: &Plan, progress: &dyn Progress) -> Result<BTreeSet<String>> {
-    let files = archive::find(&config.archive)?;
-    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-    let run = Run::of_store(config, store, &files, progress)?;
-    run.is_of(plan, None)?;
-    let missing = run.missing(plan, &files);
-    run.store.check()?;
-    Ok(missing)
+/// No archive, or the plan has another lineage.
+pub fn missing_items(
+    config: &Config,
+    plan: &Plan,
+    progress: &dyn Progress,
+) -> Result<BTreeSet<String>> {
+    let conductor = Conductor::look(config, progress)?;
+    check_lineage(plan, &conductor, None)?;
+    let mut campaign = conductor.campaign(plan.of.last_stage())?;
+    conductor.runner.store.check_transfers()?;
+    let mut missing = |stage| -> Vec<String> {
+        let artefacts = campaign.state(stage).missing.iter();
+        artefacts.map(|artefact| artefact.item.clone()).collect()
+    };
+    let flights = [missing(Stage::Ingest), missing(Stage::Segment)].concat();
+    let maneuvers: BTreeSet<String> = missing(Stage::Estimate).into_iter().collect();
+    let is_missing = |item: &&Item| {
+        maneuvers.contains(&item.id)
+            || flights
+                .iter()
+                .any(|flight| is_stretch(flight, &item.flight_id))
+    };
+    let items = plan.items.iter().filter(is_missing);
+    Ok(items.map(|item| item.id.clone()).collect())
 }
 
-/// Publishes what the shards of a plan of maneuvers computed: a run that finds everything made.
+/// Publishes the work of the shards of a plan of maneuvers.
 ///
 /// # Errors
-/// Something is missing, named by shard; or as [`crate::night::run`].
+/// Something is missing; then with its shards. Else as [`run`].
 pub fn merge(
     config: &Config,
     plan: &Plan,
     wait: Duration,
     progress: &dyn Progress,
-) -> Result<Done> {
-    if plan.of != Of::Maneuvers {
-        return Err(Error::config(
-            &config.store,
-            None,
-            "a merge takes the plan of maneuvers (harvest plan --of maneuvers)",
-        ));
+) -> Result<RunOutcome> {
+    if plan.of != Dealt::Maneuvers {
+        let what = "a merge takes the plan of maneuvers (harvest plan --of maneuvers)";
+        return Err(Error::config(&config.store, None, what));
     }
-    let missing = missing(config, plan, progress)?;
+    let missing = missing_items(config, plan, progress)?;
     if !missing.is_empty() {
-        let shards = plan::array(&plan.shards_of(&missing));
-        let count = missing.len();
+        let shards = array(&plan.shards_of(&missing));
+        let (count, all) = (missing.len(), plan.items.len());
+        let what =
+            format!("{count} of {all} maneuvers are missing, of shards {shards}: run these shards");
+        return Err(Error::config(&config.store, None, what));
+    }
+    run(config, Stage::Report, wait, progress)
+}
+
+/// Checks that a plan has the lineage of this archive, configuration and code; with `flights`, only
+/// of these flights.
+fn check_lineage(
+    plan: &Plan,
+    conductor: &Conductor,
+    flights: Option<&BTreeSet<&str>>,
+) -> Result<()> {
+    let mut planned: Lineage = plan.lineage.clone();
+    let mut now = campaign_lineage(conductor).until(plan.of.last_stage());
+    if let Some(flights) = flights {
+        planned
+            .flights
+            .retain(|id, _| flights.contains(id.as_str()));
+        // Copies that were left out concern the whole archive.
+        now.flights.retain(|id, _| planned.flights.contains_key(id));
+    }
+    let causes = now.differences(&planned);
+    if causes.is_empty() {
+        return Ok(());
+    }
+    let words: Vec<String> = causes.into_iter().map(|cause| cause.words).collect();
+    let what = format!(
+        "the plan is of something else: since then {}; plan again",
+        words.join("; ")
+    );
+    Err(Error::config(&conductor.runner.config.store, None, what))
+}
+
+/// Every flight whose files can be read, at the cost of its bytes.
+fn flights(conductor: &Conductor) -> Vec<Work> {
+    let contents = &conductor.runner.contents;
+    let bytes = |file: &FlightFiles| -> f64 {
+        let digests = file.files.iter().filter_map(|path| contents.of(path).ok());
+        digests.map(|digest| digest.bytes as f64).sum()
+    };
+    let is_readable = |file: &&FlightFiles| {
+        conductor
+            .flight_contents
+            .fingerprint(&file.flight_id)
+            .is_ok()
+    };
+    let work = |file: &FlightFiles| Work {
+        id: file.flight_id.clone(),
+        flight_id: file.flight_id.clone(),
+        cost: bytes(file),
+    };
+    let readable = conductor.archive.iter().filter(is_readable);
+    readable.map(work).collect()
+}
+
+/// Every maneuver of the campaign.
+fn maneuvers(conductor: &Conductor) -> Result<Vec<Work>> {
+    let config = conductor.runner.config;
+    let mut campaign = conductor.campaign(Stage::Segment)?;
+    let mut missing: BTreeSet<String> = BTreeSet::new();
+    for stage in [Stage::Ingest, Stage::Segment] {
+        let artefacts = campaign.state(stage).missing.iter();
+        missing.extend(artefacts.map(|artefact| artefact.item.clone()));
+    }
+    if let Some(first) = missing.first() {
         let what = format!(
-            "{count} of {} maneuvers are missing, of shards {shards}: run these shards",
-            plan.items.len()
+            "{} flights are not ingested and segmented, {first} first: run their shards",
+            missing.len()
         );
         return Err(Error::config(&config.store, None, what));
     }
-    night::run(config, Stage::Report, wait, progress)
+    let work = |m: &Maneuver| {
+        let mut archive = conductor.archive.iter();
+        let file = archive.find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
+        Some(Work {
+            id: m.maneuver_id.clone(),
+            flight_id: file.flight_id.clone(),
+            cost: cost(config, m),
+        })
+    };
+    Ok(campaign.maneuvers.iter().filter_map(work).collect())
 }
 
-/// A run that adds to the store beside others and publishes nothing.
-fn join<'a>(
-    config: &'a Config,
-    files: &[FlightFiles],
-    wait: Duration,
-    progress: &'a dyn Progress,
-) -> Result<Run<'a>> {
-    let store = Store::join(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
-    Run::of_store(config, store, files, progress)
+/// Cost of estimating a maneuver: samples times the square of the parameters.
+fn cost(config: &Config, maneuver: &Maneuver) -> f64 {
+    let statuses = config.class(&maneuver.class).map(|c| c.statuses.values());
+    let estimated = statuses
+        .into_iter()
+        .flatten()
+        .filter(|status| **status == Status::Estimated)
+        .count();
+    maneuver.samples as f64 * (1.0 + estimated as f64).powi(2)
 }
 
-impl Run<'_> {
-    /// Whether a plan is of this archive, configuration and code; of the archive, only these
-    /// flights where some are named.
-    fn is_of(&self, plan: &Plan, flights: Option<&BTreeSet<&str>>) -> Result<()> {
-        let mut planned = plan.lineage.clone();
-        if let Some(flights) = flights {
-            planned
-                .flights
-                .retain(|id, _| flights.contains(id.as_str()));
-        }
-        let mut now = self.lineage.until(plan.of.stage());
-        if flights.is_some() {
-            // Copies that were left out are the whole archive's affair.
-            now.flights.retain(|id, _| planned.flights.contains_key(id));
-        }
-        let differences: Vec<String> = now
-            .differences(&planned)
-            .into_iter()
-            .map(|cause| cause.words)
-            .collect();
-        if differences.is_empty() {
-            return Ok(());
-        }
-        let what = format!(
-            "the plan is of something else: since then {}; plan again",
-            differences.join("; ")
-        );
-        Err(Error::config(&self.config.store, None, what))
-    }
-
-    /// Every flight whose files can be read, at the cost of its bytes.
-    fn flights(&self, files: &[FlightFiles]) -> Vec<(String, String, f64)> {
-        let bytes = |file: &FlightFiles| -> f64 {
-            file.files
-                .iter()
-                .map(|path| {
-                    self.contents
-                        .of(path)
-                        .map_or(0.0, |content| content.bytes as f64)
-                })
-                .sum()
-        };
-        let readable = files
-            .iter()
-            .filter(|file| self.inputs.content(&file.flight_id).is_ok());
-        readable
-            .map(|file| (file.flight_id.clone(), file.flight_id.clone(), bytes(file)))
-            .collect()
-    }
-
-    /// Every maneuver of the campaign: a pass costs samples times the square of the parameters.
-    fn maneuvers(&self, files: &[FlightFiles]) -> Result<Vec<(String, String, f64)>> {
-        let (campaign, [ingest, segment]) = self.looked(files);
-        let stale: BTreeSet<&String> = [&ingest, &segment]
-            .iter()
-            .flat_map(|s| s.stale.values().flatten())
-            .collect();
-        if let Some(first) = stale.first() {
-            let what = format!(
-                "{} flights are not ingested and segmented, {first} first: run their shards",
-                stale.len()
-            );
-            return Err(Error::config(&self.config.store, None, what));
-        }
-        let cost = |m: &Maneuver| {
-            let free = self.config.class(&m.class).map_or(0, |c| {
-                c.statuses
-                    .values()
-                    .filter(|s| **s == Status::Estimated)
-                    .count()
-            });
-            m.samples as f64 * (1.0 + free as f64).powi(2)
-        };
-        let item = |m: &Maneuver| {
-            let file = files
-                .iter()
-                .find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
-            Some((m.maneuver_id.clone(), file.flight_id.clone(), cost(m)))
-        };
-        Ok(campaign.maneuvers.iter().filter_map(item).collect())
-    }
-
-    /// What the store has of ingest and segment.
-    fn looked(&self, files: &[FlightFiles]) -> (Campaign, [status::StageStatus; 2]) {
-        let mut campaign = Campaign::default();
-        let ingest = self.ingest_status(files, &mut campaign, None);
-        let segment = self.segment_status(&ingest, &mut campaign, None);
-        (campaign, [ingest, segment])
-    }
-
-    fn missing(&self, plan: &Plan, files: &[FlightFiles]) -> BTreeSet<String> {
-        let (campaign, looked) = self.looked(files);
-        let stale = |status: &status::StageStatus| {
-            status
-                .stale
-                .values()
-                .flatten()
-                .cloned()
-                .collect::<Vec<String>>()
-        };
-        let unfinished: Vec<String> = looked.iter().flat_map(stale).collect();
-        let unestimated: BTreeSet<String> = match plan.of {
-            Of::Flights => BTreeSet::new(),
-            Of::Maneuvers => stale(&self.estimate_status(&campaign, None))
-                .into_iter()
-                .collect(),
-        };
-        let is_missing = |item: &&Item| {
-            unestimated.contains(&item.id)
-                || unfinished
-                    .iter()
-                    .any(|stretch| is_stretch(stretch, &item.flight_id))
-        };
-        plan.items
-            .iter()
-            .filter(is_missing)
-            .map(|item| item.id.clone())
-            .collect()
-    }
-
-    /// Estimates the maneuvers of a shard.
-    fn share(&self, campaign: &Campaign, items: &[&Item]) -> Result<()> {
-        let found: BTreeMap<&str, &Maneuver> = campaign
-            .maneuvers
-            .iter()
-            .map(|m| (m.maneuver_id.as_str(), m))
-            .collect();
-        if let Some(lost) = items
-            .iter()
-            .find(|item| !found.contains_key(item.id.as_str()))
-        {
+/// Estimates the maneuvers of a shard.
+fn estimate(conductor: &Conductor, campaign: &Campaign, items: &[&Item]) -> Result<()> {
+    let by_id: BTreeMap<&str, &Maneuver> = campaign
+        .maneuvers
+        .iter()
+        .map(|m| (m.maneuver_id.as_str(), m))
+        .collect();
+    let maneuver = |item: &&Item| {
+        by_id.get(item.id.as_str()).copied().ok_or_else(|| {
             let what = format!(
                 "the plan's maneuver `{}` is not found in its flight: plan again",
-                lost.id
+                item.id
             );
-            return Err(Error::config(&self.config.store, None, what));
-        }
-        let mine: BTreeSet<&str> = items.iter().map(|item| item.id.as_str()).collect();
-        let of_flight = |flight: &Flight| -> Vec<&Maneuver> {
-            let own = campaign
-                .maneuvers
-                .iter()
-                .filter(|m| m.flight_id == flight.flight_id);
-            own.filter(|m| mine.contains(m.maneuver_id.as_str()))
-                .collect()
-        };
-        self.progress.begin("estimate", items.len());
-        let done = campaign
-            .flights
-            .par_iter()
-            .try_for_each(|f| self.estimate_flight(f, &of_flight(f)).map(|_| ()));
-        self.progress.end();
-        done
-    }
+            Error::config(&conductor.runner.config.store, None, what)
+        })
+    };
+    let maneuvers: Result<Vec<&Maneuver>> = items.iter().map(maneuver).collect();
+    bring_maneuvers(&conductor.runner, &campaign.flights, &maneuvers?).map(|_| ())
 }

@@ -19,23 +19,23 @@ words! {
     }
 }
 
-/// A maneuver that is new, gone, or no longer what it was.
+/// A maneuver that is new, gone or changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManeuverChange {
     pub maneuver_id: String,
     pub class: String,
     pub what: ManeuverDifference,
-    /// What is different about a changed one; the outcome of a new one.
+    /// Differences of a changed maneuver; outcome of a new one.
     pub words: String,
     pub because: String,
 }
 
-/// A number that moved by more than its uncertainty: of a maneuver, or of a trend at an angle of
-/// attack.
+/// A number that moved by more than its uncertainty: an estimate of a maneuver, or a trend at an
+/// angle of attack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moved {
     pub derivative: String,
-    /// The maneuver, or the trend's group.
+    /// Maneuver, or group of the trend.
     pub of: String,
     pub alpha_deg: f64,
     pub before: f64,
@@ -44,7 +44,7 @@ pub struct Moved {
     pub because: String,
 }
 
-/// A verdict that is another.
+/// A verdict that changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VerdictChange {
     pub derivative: String,
@@ -54,27 +54,27 @@ pub struct VerdictChange {
     pub because: String,
 }
 
-/// Everything that changed between two nights: the alert file, and a section of the report.
+/// Changes between two nights: the content of `alert.json`, and a section of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Changes {
-    /// The night that it is held against; none for a first one.
+    /// Name of the night compared with; `None` for a first night.
     pub since: Option<String>,
-    /// Whether somebody should look: something moved, is gone, or is not what it was. New maneuvers
-    /// alone are no alert.
+    /// `true` if a value moved, vanished or changed. New maneuvers alone are no alert.
     pub alert: bool,
-    /// What went in differently: flights, configuration, code.
+    /// Differences of flights, configuration and code.
     pub causes: Vec<Cause>,
     pub maneuvers: Vec<ManeuverChange>,
     pub estimates: Vec<Moved>,
     pub trends: Vec<Moved>,
-    /// Trends that one of the two nights does not have, `derivative, group`.
+    /// Trends that only the later night has, `derivative, group`.
     pub new_trends: Vec<String>,
+    /// Trends that only the earlier night has.
     pub gone_trends: Vec<String>,
     pub verdicts: Vec<VerdictChange>,
 }
 
 impl Changes {
-    /// Whether nothing that was published differs.
+    /// `true` if no published value differs.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.maneuvers.is_empty()

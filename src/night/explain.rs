@@ -1,110 +1,122 @@
-//! The whole story of one maneuver: where it comes from, which samples, what was held, how it was
-//! fitted, what it depends on. Told from the store; nothing is made and nothing changed.
+//! Origin, samples, fit and dependencies of one maneuver, from the store. Nothing is made or changed.
 
 use std::fmt::Write;
 use std::path::Path;
 
+use super::campaign_lineage::campaign_lineage;
 use crate::config::Config;
 use crate::error::{Error, Result, did_you_mean};
 use crate::estimate::Estimated;
+use crate::flight::is_stretch;
 use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
-use crate::pipeline::{Flight, Progress, Run};
-use crate::store::Store;
-use crate::store::archive::{self, FlightFiles};
+use crate::pipeline::{Campaign, Conductor, EstimateStep, Flight, LazyRecord, Progress};
+use crate::pipeline::{SegmentStep, Step};
+use crate::store::archive::FlightFiles;
 use crate::tables::{EstimateRow, StartingValues};
 
-/// The story as text.
+/// Explains the maneuver of this id, as text.
 ///
 /// # Errors
-/// No archive, or no such maneuver among what the store knows, with what was probably meant.
+/// No archive, or no such maneuver in the store; then with the likely name.
 pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<String> {
-    let files = archive::find(&config.archive)?;
-    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-    let run = Run::of_store(config, store, &files, progress)?;
-    let mut known = Vec::new();
-    // Ids begin with the flight's: of most flights nothing needs to be read.
-    let (likely, others): (Vec<&FlightFiles>, Vec<&FlightFiles>) = files
+    let conductor = Conductor::look(config, progress)?;
+    // Ids begin with the flight's: the artefacts of most flights need not be read.
+    let (likely, rest): (Vec<FlightFiles>, Vec<FlightFiles>) = conductor
+        .archive
         .iter()
+        .cloned()
         .partition(|f| id.starts_with(f.flight_id.as_str()));
-    for files in likely.into_iter().chain(others) {
-        let Ok(content) = run.inputs.content(&files.flight_id) else {
-            continue;
-        };
-        let Some(conditioned) = run.ingested(&files.flight_id, content) else {
-            continue;
-        };
-        for flight in conditioned.stretches.iter().filter(|f| f.ingested.accepted) {
-            let Some((segment, found)) = run.segmented(flight) else {
-                continue;
-            };
-            if let Some(maneuver) = found.maneuvers.iter().find(|m| m.maneuver_id == id) {
-                return Ok(run.story(files, content, flight, &segment, maneuver));
-            }
-            known.extend(found.maneuvers.into_iter().map(|m| m.maneuver_id));
+    let mut known = Vec::new();
+    for files in [likely, rest] {
+        let campaign = conductor.campaign_of(&files, Stage::Segment)?;
+        if let Some(maneuver) = campaign.maneuvers.iter().find(|m| m.maneuver_id == id) {
+            return explain_maneuver(&conductor, &campaign, maneuver);
         }
+        known.extend(campaign.maneuvers.into_iter().map(|m| m.maneuver_id));
     }
-    let near = did_you_mean(id, known.iter().map(String::as_str));
+    let likely = did_you_mean(id, known.iter().map(String::as_str));
     let what = format!(
-        "the store knows no maneuver `{id}`{near}; `harvest status` says whether it is up to date"
+        "the store has no maneuver `{id}`{likely}; `harvest status` reports whether it is up to date"
     );
     Err(Error::not_found(Path::new(&config.archive), what))
 }
 
-impl Run<'_> {
-    fn story(
-        &self,
-        files: &FlightFiles,
-        content: &str,
-        flight: &Flight,
-        segment: &Path,
-        maneuver: &Maneuver,
-    ) -> String {
-        let path = self.estimate_path(flight, maneuver);
-        let mut text = String::new();
-        origin(&mut text, self.config, maneuver);
-        samples(&mut text, flight, maneuver);
-        match self.store.load::<Estimated>(&path) {
-            Some(estimated) => {
-                fitted(&mut text, &estimated);
-                derivatives(&mut text, &estimated);
-                correlations(
-                    &mut text,
-                    &estimated,
-                    self.config.estimate.identifiability.correlation,
-                );
-            }
-            None => line(
-                &mut text,
-                "Estimate",
-                "not made yet, or stale: `harvest status` says why",
-            ),
+fn explain_maneuver(
+    conductor: &Conductor,
+    campaign: &Campaign,
+    maneuver: &Maneuver,
+) -> Result<String> {
+    let runner = &conductor.runner;
+    let config = runner.config;
+    let mut flights = campaign.flights.iter();
+    let flight = flights
+        .find(|f| f.id() == maneuver.flight_id)
+        .ok_or_else(|| Error::store(runner.store.folder(), &"the maneuver's flight is missing"))?;
+    let step = EstimateStep {
+        config,
+        store: &runner.store,
+        record: &LazyRecord::new(flight, &runner.store),
+        maneuver,
+    };
+    let mut text = String::new();
+    origin(&mut text, config, maneuver);
+    record(&mut text, flight, maneuver);
+    match runner.load(&step) {
+        Some(estimate) => {
+            let limit = config.estimate.identifiability.correlation;
+            fitted(&mut text, &estimate.artefact);
+            derivatives(&mut text, &estimate.artefact);
+            correlations(&mut text, &estimate.artefact, limit);
         }
-        heading(&mut text, "Depends on");
-        for file in &files.files {
-            line(&mut text, "file", &file.display().to_string());
-        }
-        line(&mut text, "content", content);
-        line(&mut text, "record", &name(&flight.record));
-        line(&mut text, "segment", &name(segment));
-        line(&mut text, "estimate", &name(&path));
-        let code = &self.lineage.code;
-        line(
+        None => line(
             &mut text,
-            "code",
-            &format!("harvest {} ({})", code.version, code.source),
-        );
-        let method = |m: &str| format!("{m} {}", code.methods.get(m).copied().unwrap_or_default());
-        line(
-            &mut text,
-            "methods",
-            &["ingest", "segment", "estimate"].map(method).join(", "),
-        );
-        let parts = self.lineage.until(Stage::Estimate).configuration;
-        let parts: Vec<String> = parts.values().flat_map(|p| p.keys().cloned()).collect();
-        line(&mut text, "configuration", &parts.join(", "));
-        text
+            "Estimate",
+            "not made yet, or stale: `harvest status` gives the reason",
+        ),
     }
+    input(&mut text, conductor, maneuver);
+    let record = flight.ingested.record.as_ref();
+    let segment = SegmentStep::new(config, &runner.store, flight)?.name();
+    line(
+        &mut text,
+        "record",
+        record.map_or("-", |record| record.name.file_name()),
+    );
+    line(&mut text, "segment", segment.file_name());
+    line(&mut text, "estimate", step.name().file_name());
+    method(&mut text, conductor);
+    Ok(text)
+}
+
+/// Writes the files of the maneuver's flight and the fingerprint of their content.
+fn input(text: &mut String, conductor: &Conductor, maneuver: &Maneuver) {
+    heading(text, "Depends on");
+    let mut archive = conductor.archive.iter();
+    let Some(files) = archive.find(|f| is_stretch(&maneuver.flight_id, &f.flight_id)) else {
+        return;
+    };
+    for file in &files.files {
+        line(text, "file", &file.display().to_string());
+    }
+    let content = conductor.flight_contents.fingerprint(&files.flight_id);
+    line(text, "content", content.unwrap_or("-"));
+}
+
+/// Writes program, methods and configuration behind the estimate.
+fn method(text: &mut String, conductor: &Conductor) {
+    let lineage = campaign_lineage(conductor).until(Stage::Estimate);
+    let code = &lineage.code;
+    let program = format!("harvest {} ({})", code.version, code.source);
+    line(text, "code", &program);
+    let methods = ["ingest", "segment", "estimate"].map(|name| {
+        let version = code.methods.get(name).copied().unwrap_or_default();
+        format!("{name} {version}")
+    });
+    line(text, "methods", &methods.join(", "));
+    let parts = lineage.configuration.values().flat_map(|p| p.keys());
+    let parts: Vec<&str> = parts.map(String::as_str).collect();
+    line(text, "configuration", &parts.join(", "));
 }
 
 fn heading(text: &mut String, title: &str) {
@@ -113,11 +125,6 @@ fn heading(text: &mut String, title: &str) {
 
 fn line(text: &mut String, name: &str, value: &str) {
     let _ = writeln!(text, "  {name:<16} {value}");
-}
-
-fn name(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 fn origin(text: &mut String, config: &Config, m: &Maneuver) {
@@ -148,8 +155,8 @@ fn origin(text: &mut String, config: &Config, m: &Maneuver) {
     );
 }
 
-/// What ingest did to the channels of its flight.
-fn samples(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
+/// Writes the repairs and failed checks of the flight's channels.
+fn record(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
     heading(text, &format!("The record of {}", maneuver.flight_id));
     let repaired = flight
         .ingested
@@ -286,7 +293,7 @@ fn correlations(text: &mut String, estimated: &Estimated, limit: f64) {
     }
 }
 
-/// Four digits, enough to be told apart.
+/// A number with five digits.
 fn number(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),

@@ -1,96 +1,109 @@
-//! Housekeeping: artefacts that no published night is made of, and nights beyond those that stay.
-//! Of a store in an object store only the cache is kept house in: what other machines have
-//! published is not known here.
+//! Removal of artefacts that no published night is made of, and of nights beyond those to keep.
+//!
+//! Of a store in an object store only this machine's cache is cleaned: the nights of other machines
+//! are unknown here.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::store::{Night, Nights, Store};
+use crate::store::{ArtefactName, Night, Nights, Store, files};
 
-/// What is, or would be, removed.
+/// Artefacts and nights that nothing published needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Litter {
-    /// Artefacts with their sizes, relative to the store.
-    pub artefacts: BTreeMap<String, u64>,
+pub struct Unneeded {
+    /// Artefacts with their sizes, bytes.
+    pub artefacts: BTreeMap<ArtefactName, u64>,
     pub nights: Vec<String>,
-    /// Artefacts that stay.
+    /// Number of artefacts that stay.
     pub kept: usize,
 }
 
-/// Finds what no published night needs, and removes it where `remove` says so. The store may serve
+/// A folder of reports that is published from the store.
+struct ServedReports {
+    nights: Nights,
+    /// `true` for the folder of this pipeline; only its nights are removed.
+    is_own: bool,
+}
+
+/// Finds what no published night needs, and removes it if `remove` is set. The store may serve
 /// several folders of reports; the nights of all of them count.
 ///
 /// # Errors
-/// A store in use; reports that cannot be found or a night whose manifest cannot be read, for what
-/// they need is unknown; a disk that says no.
-pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Litter> {
+/// A store in use; reports that cannot be found, or a night whose manifest cannot be read, since
+/// their needs are unknown; a disk that fails.
+pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Unneeded> {
     let store = Store::open(&config.store, wait)?;
+    let served = served_reports(config, &store, remove, wait)?;
     let keep = config.report.keep_nights;
-    let own = config.reports.canonicalize().ok();
-    let served: BTreeSet<PathBuf> = store.served().into_iter().chain(own.clone()).collect();
-    if let Some(away) = served.iter().find(|reports| !reports.is_dir()) {
-        // A disk that is not mounted today holds nights all the same.
-        let what = format!(
-            "the reports in {} are made of this store and cannot be found, so what they need is unknown: nothing is \
-             removed; if they are gone for good, take them out of serves.json",
-            away.display()
-        );
-        return Err(Error::store(&config.store, &what));
-    }
-    let open = |reports: &PathBuf| {
-        if remove {
-            Nights::open(reports, wait)
-        } else {
-            Ok(Nights::look(reports))
-        }
-    };
-    let opened: Vec<(&PathBuf, Nights)> = served
-        .iter()
-        .map(|r| Ok((r, open(r)?)))
-        .collect::<Result<_>>()?;
-    let mut litter = Litter::default();
-    let mut needed: BTreeMap<String, u64> = BTreeMap::new();
-    for (reports, nights) in &opened {
-        let superfluous = if own.as_ref() == Some(*reports) {
-            nights.superfluous(keep)
+    let mut unneeded = Unneeded::default();
+    let mut needed: BTreeSet<ArtefactName> = BTreeSet::new();
+    for reports in &served {
+        let superfluous = if reports.is_own {
+            reports.nights.superfluous(keep)
         } else {
             Vec::new()
         };
-        for name in nights
-            .names()
-            .iter()
-            .filter(|name| !superfluous.contains(name))
-        {
-            needed.extend(manifest(nights, name)?.artefacts);
+        for name in reports.nights.names() {
+            if !superfluous.contains(&name) {
+                needed.extend(manifest(&reports.nights, &name)?.artefacts.into_keys());
+            }
         }
-        litter.nights.extend(superfluous);
+        unneeded.nights.extend(superfluous);
     }
-    let artefacts = store.artefacts();
-    litter.kept = artefacts
-        .keys()
-        .filter(|name| needed.contains_key(*name))
-        .count();
-    litter.artefacts = artefacts
+    let (kept, artefacts): (BTreeMap<_, _>, BTreeMap<_, _>) = store
+        .artefacts()
         .into_iter()
-        .filter(|(name, _)| !needed.contains_key(name))
-        .collect();
+        .partition(|(name, _)| needed.contains(name));
+    unneeded.kept = kept.len();
+    unneeded.artefacts = artefacts;
     if remove {
-        // Nights first: one without its artefacts would be made of nothing.
-        for (_, nights) in opened
-            .iter()
-            .filter(|(reports, _)| own.as_ref() == Some(*reports))
-        {
-            nights.prune(keep)?;
-        }
-        litter
-            .artefacts
-            .keys()
-            .try_for_each(|name| store.remove(name))?;
+        // Nights first: a night without its artefacts would be damaged.
+        let own = served.iter().filter(|reports| reports.is_own);
+        own.map(|reports| &reports.nights)
+            .try_for_each(|nights| nights.prune(keep))?;
+        let mut artefacts = unneeded.artefacts.keys();
+        artefacts.try_for_each(|name| store.remove(name))?;
     }
-    Ok(litter)
+    Ok(unneeded)
+}
+
+/// Opens the folders of reports that are published from the store; for removal, locked.
+fn served_reports(
+    config: &Config,
+    store: &Store,
+    remove: bool,
+    wait: Duration,
+) -> Result<Vec<ServedReports>> {
+    let own = files::canonical(&config.reports);
+    let folders: BTreeSet<PathBuf> = store.reports().into_iter().chain(own.clone()).collect();
+    let open = |folder: PathBuf| {
+        if !files::is_folder(&folder) {
+            return Err(lost_reports(config, &folder));
+        }
+        let nights = if remove {
+            Nights::open(&folder, wait)?
+        } else {
+            Nights::look(&folder)
+        };
+        Ok(ServedReports {
+            nights,
+            is_own: own.as_ref() == Some(&folder),
+        })
+    };
+    folders.into_iter().map(open).collect()
+}
+
+/// A disk that is not mounted today still has its nights.
+fn lost_reports(config: &Config, folder: &Path) -> Error {
+    let what = format!(
+        "the reports in {} are made of this store and cannot be found, so what they need is unknown: nothing is \
+         removed; if they are gone for good, take them out of serves.json",
+        folder.display()
+    );
+    Error::store(&config.store, &what)
 }
 
 fn manifest(nights: &Nights, name: &str) -> Result<Night> {

@@ -1,13 +1,23 @@
-//! A night: a run's results published together with what decided them, and the questions of the
-//! morning after.
+//! The night: a run's results published together with everything that decided them, and the
+//! questions of the next morning.
+//!
+//! [`run()`] publishes a night. [`status`] reports the artefacts that a run would make, [`diff`]
+//! the changes since the night before, [`explain`] everything about one maneuver, [`verify`]
+//! whether a published night is still valid; [`gc`] removes what no night needs.
 
-pub mod changes;
+mod campaign_lineage;
+mod changes;
 pub mod diff;
 pub mod explain;
 pub mod gc;
-pub mod publish;
+pub mod model_export;
+mod published_night;
+mod published_tables;
 mod run;
 pub mod status;
+mod table_metadata;
 pub mod verify;
 
-pub use run::run;
+pub use run::{RunOutcome, has_rejections, run};
+
+pub(crate) use campaign_lineage::campaign_lineage;

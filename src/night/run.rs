@@ -1,49 +1,275 @@
 //! A run: the campaign brought up to date and published as a night.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::campaign_lineage::{campaign_lineage, rejection};
+use super::changes;
+use super::published_night::{ManeuverWindow, NightTables, PublishedNight};
+use super::published_tables::publish_tables;
 use crate::config::Config;
-use crate::error::Result;
-use crate::lineage::Stage;
-use crate::pipeline::{Campaign, Progress, Run, begin};
-use crate::store::archive::FlightFiles;
-use crate::store::{Nights, table};
+use crate::error::{Problem, ProblemStage, Result};
+use crate::lineage::{Changes, Lineage, Stage};
+use crate::maneuver::Maneuver;
+use crate::pipeline::{
+    Campaign, Conductor, PAGE, PRINTED_PAGE, Progress, Report, make_report, problem,
+};
+use crate::store::nights::{Night, Nights, Summary};
+use crate::store::{Fingerprint, atomic};
+use crate::tables::{PublishedTrend, PublishedVerdict};
 
-use super::publish::Done;
+/// Published file of the changes since the night before, for machines to read.
+pub const ALERT: &str = "alert.json";
 
-/// Brings the campaign up to date as far as `until` and publishes it as a night; waits up to `wait`
+/// End of a run.
+#[derive(Clone, Debug)]
+pub struct RunOutcome {
+    /// Name of the current night.
+    pub night: String,
+    /// `true` if this run published it.
+    pub is_new: bool,
+    pub summary: Summary,
+    /// Number of artefacts that this run made.
+    pub made: usize,
+    /// The report of a complete night.
+    pub report: Option<PathBuf>,
+}
+
+impl RunOutcome {
+    /// `true` if something that was recorded was rejected.
+    #[must_use]
+    pub fn has_rejections(&self) -> bool {
+        has_rejections(&self.summary.problems)
+    }
+}
+
+/// `true` if something that was recorded was rejected. A derivative with too few maneuvers for a
+/// trend is a problem, but no rejection.
+#[must_use]
+pub fn has_rejections(problems: &[Problem]) -> bool {
+    problems.iter().any(|p| p.stage != ProblemStage::Trend)
+}
+
+/// Brings the campaign up to date as far as `until` and publishes it as a night. Waits up to `wait`
 /// for another run to leave store and reports.
 ///
 /// # Errors
-/// What stops the whole run: no archive, a store in use, a disk that says no. What spoils a flight
-/// or a maneuver is among the problems of the night's summary.
-pub fn run(config: &Config, until: Stage, wait: Duration, progress: &dyn Progress) -> Result<Done> {
-    let (mut run, files) = begin(config, wait, progress)?;
+/// What stops the whole run: no archive, a store in use, a disk that fails. What spoils a flight or
+/// a maneuver is among the problems of the night's summary.
+pub fn run(
+    config: &Config,
+    until: Stage,
+    wait: Duration,
+    progress: &dyn Progress,
+) -> Result<RunOutcome> {
+    let conductor = Conductor::open(config, wait, progress)?;
     let nights = Nights::open(&config.reports, wait)?;
-    if let Some(done) = run.is_published(&nights, until) {
-        return Ok(done);
+    let run = NightRun {
+        lineage: campaign_lineage(&conductor),
+        printed_names: printed_names(config),
+        conductor,
+        nights,
+        until,
+    };
+    if let Some(night) = run.valid_night() {
+        return Ok(run.outcome(night, false));
     }
-    run.publish_into(nights.tonight()?);
-    let made = run.make(&files, until, &nights).and_then(|campaign| {
-        run.store.send_rest()?;
-        run.publish(&nights, &campaign, until)
-    });
-    if made.is_err() {
-        // What is left of tonight takes up room on a disk that may be full.
-        nights.forget_tonight();
+    let outcome = run.publish();
+    if outcome.is_err() {
+        // Its files may fill the disk that stopped the run.
+        run.nights.remove_tonight();
     }
-    made
+    outcome
 }
 
-impl Run<'_> {
-    /// All stages as far as `until`, their tables in tonight's folder.
-    fn make(&self, files: &[FlightFiles], until: Stage, nights: &Nights) -> Result<Campaign> {
-        let mut campaign = self.results(files, until)?;
-        if until >= Stage::Report {
-            campaign.overnight = self.changes(nights, &campaign)?;
-            self.report(&mut campaign)?;
+/// Names that the report prints and that decide no number: archive, tunnel, files of the
+/// configuration.
+fn printed_names(config: &Config) -> BTreeMap<String, String> {
+    let files = config.files.iter().map(|(name, text)| {
+        let fingerprint = Fingerprint::of("text", 1).with(text).finish();
+        (name.clone(), fingerprint)
+    });
+    let tunnel = config.wind_tunnel.display().to_string();
+    files
+        .chain([
+            ("archive".to_owned(), config.archive.clone()),
+            ("wind tunnel".to_owned(), tunnel),
+        ])
+        .collect()
+}
+
+/// A run with its campaign and reports opened.
+struct NightRun<'a> {
+    conductor: Conductor<'a>,
+    nights: Nights,
+    until: Stage,
+    lineage: Lineage,
+    printed_names: BTreeMap<String, String>,
+}
+
+impl NightRun<'_> {
+    fn config(&self) -> &Config {
+        self.conductor.runner.config
+    }
+
+    /// The current night, if this run would make the same: its lineage is this run's, it reaches as
+    /// far, and its files and artefacts are whole.
+    fn valid_night(&self) -> Option<Night> {
+        let night = self
+            .nights
+            .current()
+            .filter(|night| self.has_same_lineage(night) && night.until >= self.until)?;
+        let stored = self.conductor.runner.store.artefacts();
+        let mut artefacts = night.artefacts.iter();
+        let has_all = artefacts.all(|(name, size)| stored.get(name) == Some(size));
+        (has_all && self.nights.is_whole(&night)).then_some(night)
+    }
+
+    fn has_same_lineage(&self, night: &Night) -> bool {
+        night.lineage == self.lineage && night.shown == self.printed_names
+    }
+
+    /// Brings the campaign, writes tonight's files and puts them in their place.
+    fn publish(&self) -> Result<RunOutcome> {
+        let tonight = self.nights.tonight()?;
+        let mut campaign = self.conductor.campaign(self.until)?;
+        let changes = if self.until >= Stage::Report {
+            self.place_report(&tonight, &mut campaign)?
+        } else {
+            Changes::default()
+        };
+        publish_tables(&campaign, self.until, &tonight, &self.lineage)?;
+        let store = &self.conductor.runner.store;
+        store.send_unsent()?;
+        store.register_reports(&self.config().reports)?;
+        self.conductor.remember_contents()?;
+        self.place(&self.manifest(&campaign, &changes))
+    }
+
+    /// Places changes and report in tonight's folder. A report that cannot be printed is a problem
+    /// of the campaign.
+    fn place_report(&self, tonight: &Path, campaign: &mut Campaign) -> Result<Changes> {
+        let changes = self.changes(campaign);
+        let alert = serde_json::to_vec_pretty(&changes).unwrap_or_default();
+        atomic::place(&tonight.join(ALERT), &alert)?;
+        let Report { html, pdf } = make_report(&self.conductor, campaign, &changes)?;
+        atomic::place(&tonight.join(PAGE), html.as_bytes())?;
+        match pdf {
+            Ok(bytes) => atomic::place(&tonight.join(PRINTED_PAGE), &bytes)?,
+            Err(why) => {
+                let reason = format!("not made: the template's page is no well-formed XML: {why}");
+                let problem = problem(ProblemStage::Report, "", PRINTED_PAGE, &reason);
+                campaign.problems.push(problem);
+            }
         }
-        table::publish(&self.shelf(until), &campaign.problems)?;
-        Ok(campaign)
+        Ok(changes)
+    }
+
+    /// Changes since the last complete night; none if there is no such night, or if an older
+    /// program wrote tables that lack a column of today's.
+    fn changes(&self, campaign: &Campaign) -> Changes {
+        let before = self.night_before().and_then(|night| {
+            let tables = PublishedNight::read(&self.nights, &night).ok()?;
+            Some((night.name, tables))
+        });
+        let Some((name, before)) = before else {
+            return Changes::default();
+        };
+        let maneuvers: Vec<ManeuverWindow> = campaign.maneuvers.iter().map(window).collect();
+        let trends: Vec<PublishedTrend> =
+            campaign.trends.iter().map(PublishedTrend::from).collect();
+        let comparison = campaign.comparison.iter();
+        let verdicts: Vec<PublishedVerdict> = comparison.map(PublishedVerdict::from).collect();
+        let now = NightTables {
+            lineage: &self.lineage,
+            maneuvers: &maneuvers,
+            fits: &campaign.fits,
+            estimates: &campaign.estimates,
+            trends: &trends,
+            verdicts: &verdicts,
+        };
+        changes::between(&name, &before.tables(), &now)
+    }
+
+    /// The complete night that tonight's is compared with. A night that is repaired keeps its
+    /// predecessor.
+    fn night_before(&self) -> Option<Night> {
+        let last = self.nights.complete()?;
+        let before = if self.has_same_lineage(&last) {
+            self.nights.night(last.since.as_ref()?)?
+        } else {
+            last
+        };
+        self.nights.is_whole(&before).then_some(before)
+    }
+
+    /// Tonight's manifest, without its name and files.
+    fn manifest(&self, campaign: &Campaign, changes: &Changes) -> Night {
+        let mut lineage = self.lineage.clone();
+        let unread = campaign.unread.iter();
+        lineage
+            .flights
+            .extend(unread.map(|(flight, why)| (flight.clone(), rejection(why))));
+        Night {
+            until: self.until,
+            since: changes.since.clone(),
+            shown: self.printed_names.clone(),
+            lineage,
+            summary: Summary {
+                flights: campaign.flights.len(),
+                refused: campaign.rejected_flights(),
+                maneuvers: campaign.maneuvers.len(),
+                converged: campaign.converged(),
+                problems: campaign.problems.clone(),
+                alert: changes.alert,
+            },
+            artefacts: self.conductor.runner.store.required(),
+            ..Night::default()
+        }
+    }
+
+    /// Puts tonight's files in their place: as a new night, or in the current night of the same
+    /// lineage, which was damaged. A current night that reaches further stays.
+    fn place(&self, tonight: &Night) -> Result<RunOutcome> {
+        let current = self.nights.current();
+        match current.filter(|night| self.has_same_lineage(night)) {
+            Some(night) if night.until > self.until => {
+                self.nights.remove_tonight();
+                Ok(self.outcome(night, false))
+            }
+            Some(night) if night.until == self.until => {
+                let repaired = self.nights.repair(&night, tonight.clone())?;
+                Ok(self.outcome(repaired, false))
+            }
+            _ => {
+                let keep = self.config().report.keep_nights;
+                let published = self.nights.publish(tonight.clone(), keep)?;
+                Ok(self.outcome(published, true))
+            }
+        }
+    }
+
+    fn outcome(&self, night: Night, is_new: bool) -> RunOutcome {
+        let report = night
+            .is_complete()
+            .then(|| self.config().reports.join(PAGE));
+        RunOutcome {
+            night: night.name,
+            is_new,
+            summary: night.summary,
+            made: self.conductor.runner.store.made(),
+            report,
+        }
+    }
+}
+
+fn window(maneuver: &Maneuver) -> ManeuverWindow {
+    ManeuverWindow {
+        maneuver_id: maneuver.maneuver_id.clone(),
+        flight_id: maneuver.flight_id.clone(),
+        class: maneuver.class.clone(),
+        start_s: maneuver.start_s,
+        end_s: maneuver.end_s,
     }
 }

@@ -1,51 +1,48 @@
-//! What a run would do: per stage what is fresh, what is stale and why, what failed and why.
-//! Nothing is changed.
+//! Status: fresh, stale and failed artefacts of each stage, with the reasons. Nothing is changed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::campaign_lineage::campaign_lineage;
 use crate::config::Config;
 use crate::error::Result;
-use crate::estimate::Estimated;
 use crate::flight::is_stretch;
-use crate::lineage::{Lineage, Origin, Stage};
-use crate::output_error::Outcome;
-use crate::pipeline::{Campaign, Progress, Run, inputs, stretches};
-use crate::store::archive::{self, FlightFiles};
-use crate::store::{Nights, Store};
+use crate::lineage::{Cause, Lineage, Origin, Stage};
+use crate::pipeline::{Campaign, Conductor, Failure, MissingArtefact, Progress, StageState};
+use crate::store::{ArtefactName, Night, Nights};
 
-/// One stage: items are flights as far as segment, then maneuvers, then the whole campaign.
+/// Status of one stage. Its items are flights as far as segment, maneuvers and groups in estimate,
+/// then the whole campaign.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StageStatus {
     pub stage: Stage,
+    /// Number of items that are up to date.
     pub fresh: usize,
-    /// Of the fresh ones, those that failed; with the item and the reason.
-    pub failed: Vec<(String, String)>,
-    /// What a run would make, by the reason.
+    /// Items that were rejected.
+    pub failed: Vec<Failure>,
+    /// Items that a run would make, by the reason.
     pub stale: BTreeMap<String, Vec<String>>,
 }
 
 impl StageStatus {
-    fn new(stage: Stage) -> StageStatus {
+    fn new(stage: Stage, state: StageState) -> StageStatus {
         StageStatus {
             stage,
-            fresh: 0,
-            failed: Vec::new(),
+            fresh: state.fresh,
+            failed: state.failed,
             stale: BTreeMap::new(),
         }
     }
 
-    fn stale(&mut self, why: &str, item: &str) {
-        self.stale
-            .entry(why.to_owned())
-            .or_default()
-            .push(item.to_owned());
+    fn add_stale(&mut self, reason: &str, item: &str) {
+        let items = self.stale.entry(reason.to_owned()).or_default();
+        items.push(item.to_owned());
     }
 }
 
-/// The state of a pipeline.
+/// Status of a pipeline.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// The night that holds.
+    /// Name of the current night.
     pub night: Option<String>,
     pub stages: Vec<StageStatus>,
 }
@@ -57,194 +54,129 @@ impl Status {
     }
 
     #[must_use]
-    pub fn failed(&self) -> bool {
+    pub fn has_failures(&self) -> bool {
         self.stages.iter().any(|s| !s.failed.is_empty())
     }
 }
 
-/// Looks at every stage.
+/// Compares the store and the current night with what a run would make.
 ///
 /// # Errors
 /// There is no archive.
 pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
-    let files = archive::find(&config.archive)?;
-    let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-    let run = Run::of_store(config, store, &files, progress)?;
-    let nights = Nights::look(&config.reports);
-    let current = nights.current();
-    let before = current.as_ref().map(|night| &night.lineage);
-    let mut campaign = Campaign::default();
-    let ingest = run.ingest_status(&files, &mut campaign, before);
-    let segment = run.segment_status(&ingest, &mut campaign, before);
-    let mut estimate = run.estimate_status(&campaign, before);
-    let there = run.store.artefacts();
-    let needed = current.iter().flat_map(|night| night.artefacts.keys());
-    for gone in needed.filter(|name| !there.contains_key(*name)) {
-        estimate.stale("it is gone from the store", gone);
-    }
-    let mut stages = vec![ingest, segment, estimate];
-    for stage in [Stage::Trend, Stage::Compare, Stage::Report] {
-        let mut status = StageStatus::new(stage);
-        let upstream = stages.iter().any(|s: &StageStatus| !s.stale.is_empty());
-        let held = current.as_ref().filter(|night| night.until >= stage);
-        let changed = held.map(|night| {
-            run.lineage
-                .until(stage)
-                .differences(&night.lineage.until(stage))
-        });
-        match changed {
-            None => status.stale("no night with it has been published", &config.name),
-            Some(causes) if !causes.is_empty() => {
-                for cause in &causes {
-                    status.stale(&cause.words, &config.name);
-                }
-            }
-            Some(_) if upstream => status.stale("an earlier stage is stale", &config.name),
-            Some(_) => status.fresh = 1,
+    let conductor = Conductor::look(config, progress)?;
+    let mut campaign = conductor.campaign(Stage::Estimate)?;
+    let comparison = Comparison {
+        lineage: campaign_lineage(&conductor),
+        current: Nights::look(&config.reports).current(),
+    };
+    let mut stages: Vec<StageStatus> = [Stage::Ingest, Stage::Segment, Stage::Estimate]
+        .into_iter()
+        .map(|stage| comparison.step_stage(stage, &mut campaign))
+        .collect();
+    if let [ingest, segment, estimate] = stages.as_mut_slice() {
+        for flight in ingest.stale.values().flatten() {
+            segment.add_stale("its flight is stale", flight);
         }
-        stages.push(status);
+        for name in comparison.lost_artefacts(&conductor) {
+            estimate.add_stale("it is gone from the store", name.as_str());
+        }
+    }
+    for flight in stages[0]
+        .stale
+        .values()
+        .flatten()
+        .cloned()
+        .collect::<Vec<_>>()
+    {
+        stages[1].add_stale("its flight is stale", &flight);
+    }
+    for stage in [Stage::Trend, Stage::Compare, Stage::Report] {
+        let is_upstream_stale = stages.iter().any(|s| !s.stale.is_empty());
+        stages.push(comparison.whole_stage(stage, &config.name, is_upstream_stale));
     }
     Ok(Status {
-        night: current.map(|night| night.name),
+        night: comparison.current.map(|night| night.name),
         stages,
     })
 }
 
-impl Run<'_> {
-    /// Why something of a flight is not in the store.
-    fn why(
-        &self,
-        stage: Stage,
-        flight_id: &str,
-        class: Option<&str>,
-        before: Option<&Lineage>,
-    ) -> String {
-        let Some(before) = before else {
+/// Comparison of today's lineage with the current night.
+struct Comparison {
+    lineage: Lineage,
+    current: Option<Night>,
+}
+
+impl Comparison {
+    /// Status of a stage whose artefacts the store keeps.
+    fn step_stage(&self, stage: Stage, campaign: &mut Campaign) -> StageStatus {
+        let state = std::mem::take(campaign.state(stage));
+        let missing = state.missing.clone();
+        let mut status = StageStatus::new(stage, state);
+        for artefact in &missing {
+            status.add_stale(&self.reason(stage, artefact), &artefact.item);
+        }
+        status
+    }
+
+    /// Status of a stage that is made anew each time, for the whole campaign.
+    fn whole_stage(&self, stage: Stage, item: &str, is_upstream_stale: bool) -> StageStatus {
+        let mut status = StageStatus::new(stage, StageState::default());
+        let current = self.current.as_ref().filter(|night| night.until >= stage);
+        let Some(night) = current else {
+            status.add_stale("no night with it has been published", item);
+            return status;
+        };
+        let now = self.lineage.until(stage);
+        let causes = now.differences(&night.lineage.until(stage));
+        for cause in &causes {
+            status.add_stale(&cause.words, item);
+        }
+        if causes.is_empty() && is_upstream_stale {
+            status.add_stale("an earlier stage is stale", item);
+        }
+        status.fresh = usize::from(status.stale.is_empty());
+        status
+    }
+
+    /// Artefacts of the current night that the store has lost, besides those that the stages report
+    /// missing.
+    fn lost_artefacts(&self, conductor: &Conductor) -> BTreeSet<ArtefactName> {
+        let stored = conductor.runner.store.artefacts();
+        let missing = conductor.runner.missing();
+        let of_night = self.current.iter().flat_map(|night| night.artefacts.keys());
+        of_night
+            .filter(|name| !stored.contains_key(*name) && !missing.contains(*name))
+            .cloned()
+            .collect()
+    }
+
+    /// Reason that the store lacks an artefact.
+    fn reason(&self, stage: Stage, artefact: &MissingArtefact) -> String {
+        let Some(current) = &self.current else {
             return "not made yet".to_owned();
         };
-        let counts = |c: &&crate::lineage::Cause| {
-            if c.origin == Origin::Flight {
-                return is_stretch(flight_id, &c.subject);
-            }
-            let mut path = c.subject.split('.');
-            let of_class = path.next() == Some("classes");
-            c.stage <= stage && (!of_class || class.is_none_or(|class| path.next() == Some(class)))
-        };
-        let causes = self.lineage.differences(before);
-        let words: Vec<&str> = causes
-            .iter()
-            .filter(counts)
-            .map(|c| c.words.as_str())
-            .collect();
+        let causes = self.lineage.differences(&current.lineage);
+        let reaching = causes.iter().filter(|c| reaches(c, stage, artefact));
+        let words: Vec<&str> = reaching.map(|c| c.words.as_str()).collect();
         if words.is_empty() {
             "its artefact is missing or damaged".to_owned()
         } else {
             words.join("; ")
         }
     }
+}
 
-    pub(crate) fn ingest_status(
-        &self,
-        files: &[FlightFiles],
-        campaign: &mut Campaign,
-        before: Option<&Lineage>,
-    ) -> StageStatus {
-        let mut status = StageStatus::new(Stage::Ingest);
-        for file in files {
-            let id = &file.flight_id;
-            match self
-                .inputs
-                .content(id)
-                .map(|content| self.ingested(id, content))
-            {
-                Err(reason) => status
-                    .failed
-                    .push((id.clone(), format!("{}: {reason}", inputs::place(file)))),
-                Ok(Some(conditioned)) => {
-                    status.fresh += 1;
-                    campaign.flights.extend(conditioned.stretches);
-                }
-                Ok(None) => status.stale(&self.why(Stage::Ingest, id, None, before), id),
-            }
-        }
-        stretches::same_rows(campaign);
-        for flight in campaign.flights.iter().filter(|f| !f.ingested.accepted) {
-            let reasons = flight
-                .ingested
-                .problems
-                .iter()
-                .map(|p| format!("{}: {}", p.place, p.reason));
-            status.failed.push((
-                flight.flight_id.clone(),
-                reasons.collect::<Vec<_>>().join("; "),
-            ));
-        }
-        status
+/// `true` if a cause may have changed an artefact of a stage.
+fn reaches(cause: &Cause, stage: Stage, artefact: &MissingArtefact) -> bool {
+    if cause.origin == Origin::Flight {
+        return artefact.flight_id.is_empty() || is_stretch(&artefact.flight_id, &cause.subject);
     }
-
-    pub(crate) fn segment_status(
-        &self,
-        ingest: &StageStatus,
-        campaign: &mut Campaign,
-        before: Option<&Lineage>,
-    ) -> StageStatus {
-        let mut status = StageStatus::new(Stage::Segment);
-        for id in ingest.stale.values().flatten() {
-            status.stale("its flight is stale", id);
-        }
-        let mut maneuvers = Vec::new();
-        for flight in campaign.flights.iter().filter(|f| f.ingested.accepted) {
-            let id = &flight.flight_id;
-            let Some((_, found)) = self.segmented(flight) else {
-                status.stale(&self.why(Stage::Segment, id, None, before), id);
-                continue;
-            };
-            status.fresh += 1;
-            let failed = found
-                .problems
-                .into_iter()
-                .map(|p| (p.flight_id, format!("{}: {}", p.place, p.reason)));
-            status.failed.extend(failed);
-            maneuvers.extend(found.maneuvers);
-        }
-        campaign.maneuvers = maneuvers;
-        stretches::leave_out_same(campaign);
-        status
-    }
-
-    pub(crate) fn estimate_status(
-        &self,
-        campaign: &Campaign,
-        before: Option<&Lineage>,
-    ) -> StageStatus {
-        let mut status = StageStatus::new(Stage::Estimate);
-        for maneuver in &campaign.maneuvers {
-            let id = &maneuver.maneuver_id;
-            let flight = campaign
-                .flights
-                .iter()
-                .find(|f| f.flight_id == maneuver.flight_id);
-            let estimated = flight.and_then(|f| {
-                self.store
-                    .load::<Estimated>(&self.estimate_path(f, maneuver))
-            });
-            if let Some(Estimated { fit, .. }) = estimated {
-                status.fresh += 1;
-                if fit.outcome != Outcome::Converged {
-                    status
-                        .failed
-                        .push((id.clone(), format!("{}: {}", fit.outcome, fit.reason)));
-                }
-            } else {
-                let why = self.why(
-                    Stage::Estimate,
-                    &maneuver.flight_id,
-                    Some(&maneuver.class),
-                    before,
-                );
-                status.stale(&why, id);
-            }
-        }
-        status
-    }
+    let mut path = cause.subject.split('.');
+    let is_of_other_class = path.next() == Some("classes")
+        && artefact
+            .class
+            .as_deref()
+            .is_some_and(|class| path.next() != Some(class));
+    cause.stage <= stage && !is_of_other_class
 }

@@ -1,27 +1,31 @@
-//! Pictures of one flight or one maneuver: what it takes is brought up to date, then drawn.
+//! Strip charts of one flight or one maneuver.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Campaign, Flight, Progress, Run, begin};
+use super::campaign::Campaign;
+use super::conductor::Conductor;
+use super::estimate_step::estimate_maneuver;
+use super::ingested::Flight;
+use super::progress::Progress;
 use crate::aero::Regressor;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result, did_you_mean};
 use crate::flight::is_stretch;
+use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::report::strip_chart::{self, FlightView, ManeuverView, SignalGroups};
-use crate::store::archive::FlightFiles;
 use crate::store::atomic;
 
-/// A flight of more samples than this is drawn by the smallest and the largest of several: far more
-/// than a picture has columns.
-const DRAWN: usize = 1 << 18;
+/// Most samples of a flight that are drawn. Of a longer flight the smallest and the largest of
+/// several samples are drawn; a chart has far fewer columns.
+const DRAWN_SAMPLES: usize = 1 << 18;
 
-/// What of the record around a maneuver is at hand for its picture, s.
-const AROUND_S: f64 = 30.0;
+/// Time of the record drawn before and after a maneuver, s.
+const MARGIN_S: f64 = 30.0;
 
-/// What is to be seen.
+/// Flight or maneuver to draw.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Subject {
     /// By its `flight_id`.
@@ -30,200 +34,162 @@ pub enum Subject {
     Maneuver(String),
 }
 
-/// A picture that was written.
+/// A chart that was written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub path: PathBuf,
-    /// What of that which is shown was rejected.
+    /// Problems of the flight or maneuver.
     pub problems: Vec<Problem>,
 }
 
-/// Brings the flight or maneuver up to date as the stages do, and writes its strip chart to `out`,
-/// or else into the folder `show` of the reports. The table `problems`, which is the whole
-/// campaign's, is left to the stages.
+/// Brings the flight or maneuver up to date and writes its strip chart to `out`, by default into
+/// the folder `show` of the reports. No table is published.
 ///
 /// # Errors
-/// What stops a run, and a flight or maneuver that does not exist or was refused, with what was
-/// probably meant.
+/// What stops a run; a flight or maneuver that does not exist or was rejected, with the likely
+/// name.
 pub fn show(
     config: &Config,
     subject: &Subject,
     out: Option<&Path>,
     progress: &dyn Progress,
 ) -> Result<Picture> {
-    let (run, files) = begin(config, Duration::ZERO, progress)?;
-    let mut campaign = Campaign::default();
-    if let Subject::Flight(id) = subject {
-        known_flight(config, id, &files)?;
-    }
-    run.ingest(&files, &mut campaign)?;
-    run.segment(&mut campaign)?;
+    let conductor = Conductor::open(config, Duration::ZERO, progress)?;
     let (id, svg, problems) = match subject {
-        Subject::Flight(id) => (
-            id,
-            run.draw_flight(&campaign, id)?,
-            about(&campaign, |p| p.flight_id == *id),
-        ),
+        Subject::Flight(id) => {
+            check_flight(&conductor, id)?;
+            let campaign = conductor.campaign(Stage::Segment)?;
+            let chart = draw_flight(&conductor, &campaign, id)?;
+            (id, chart, problems_of(&campaign, |p| p.flight_id == *id))
+        }
         Subject::Maneuver(id) => {
-            known_maneuver(config, id, &campaign)?;
-            run.estimate(&mut campaign)?;
-            let of_it = |p: &Problem| p.place == *id;
-            (
-                id,
-                run.draw_maneuver(&campaign, id)?,
-                about(&campaign, of_it),
-            )
+            let mut campaign = conductor.campaign(Stage::Segment)?;
+            check_maneuver(config, id, &campaign)?;
+            conductor.estimate(&mut campaign)?;
+            let chart = draw_maneuver(&conductor, &campaign, id)?;
+            (id, chart, problems_of(&campaign, |p| p.place == *id))
         }
     };
-    let path = out.map_or_else(
-        || config.reports.join("show").join(file_name(id)),
-        Path::to_path_buf,
-    );
+    let default = || config.reports.join("show").join(file_name(id));
+    let path = out.map_or_else(default, Path::to_path_buf);
     atomic::place(&path, svg.as_bytes())?;
     Ok(Picture { path, problems })
 }
 
-fn about(campaign: &Campaign, is_it: impl Fn(&Problem) -> bool) -> Vec<Problem> {
-    campaign
-        .problems
-        .iter()
-        .filter(|p| is_it(p))
-        .cloned()
-        .collect()
+fn problems_of(campaign: &Campaign, is_wanted: impl Fn(&Problem) -> bool) -> Vec<Problem> {
+    let problems = campaign.problems.iter().filter(|p| is_wanted(p));
+    problems.cloned().collect()
 }
 
+/// Name of a chart's file, without characters that file systems reserve.
 fn file_name(id: &str) -> String {
-    let safe = |c: char| {
-        if c.is_alphanumeric() || "-_=.".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
-    format!("{}.svg", id.chars().map(safe).collect::<String>())
+    let is_safe = |c: char| c.is_alphanumeric() || "-_=.".contains(c);
+    let safe: String = id
+        .chars()
+        .map(|c| if is_safe(c) { c } else { '_' })
+        .collect();
+    format!("{safe}.svg")
 }
 
 fn unknown(config: &Config, what: String) -> Error {
     Error::not_found(Path::new(&config.archive), what)
 }
 
-fn known_flight(config: &Config, id: &str, files: &[FlightFiles]) -> Result<()> {
-    if files.iter().any(|f| is_stretch(id, &f.flight_id)) {
+fn check_flight(conductor: &Conductor, id: &str) -> Result<()> {
+    let ids = || conductor.archive.iter().map(|f| f.flight_id.as_str());
+    if ids().any(|flight_id| is_stretch(id, flight_id)) {
         return Ok(());
     }
-    let near = did_you_mean(id, files.iter().map(|f| f.flight_id.as_str()));
-    Err(unknown(config, format!("there is no flight `{id}`{near}")))
+    let likely = did_you_mean(id, ids());
+    let what = format!("there is no flight `{id}`{likely}");
+    Err(unknown(conductor.runner.config, what))
 }
 
-fn known_maneuver(config: &Config, id: &str, campaign: &Campaign) -> Result<()> {
-    if campaign.maneuvers.iter().any(|m| m.maneuver_id == id) {
+fn check_maneuver(config: &Config, id: &str, campaign: &Campaign) -> Result<()> {
+    let ids = || campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str());
+    if ids().any(|maneuver_id| maneuver_id == id) {
         return Ok(());
     }
-    if campaign.flights.iter().any(|f| f.flight_id == id) {
-        return Err(unknown(
-            config,
-            format!("`{id}` is a flight; `harvest show flight {id}` shows it"),
-        ));
+    if campaign.flights.iter().any(|f| f.id() == id) {
+        let what = format!("`{id}` is a flight; `harvest show flight {id}` shows it");
+        return Err(unknown(config, what));
     }
-    let near = did_you_mean(
-        id,
-        campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str()),
-    );
+    let likely = did_you_mean(id, ids());
     let list = config.reports.join("maneuvers.csv");
-    Err(unknown(
-        config,
-        format!(
-            "there is no maneuver `{id}`{near} (all of them: {})",
-            list.display()
-        ),
-    ))
+    let what = format!(
+        "there is no maneuver `{id}`{likely} (all of them: {})",
+        list.display()
+    );
+    Err(unknown(config, what))
 }
 
-impl Run<'_> {
-    fn draw_flight(&self, campaign: &Campaign, id: &str) -> Result<String> {
-        let file = self.flight(campaign, id)?.open(&self.store)?;
-        let (record, recorded) = (
-            file.outline(DRAWN)?,
-            (file.about.samples, file.about.step_s),
-        );
-        let events: Vec<_> = campaign
-            .events
-            .iter()
-            .filter(|e| e.flight_id == id)
-            .cloned()
-            .collect();
-        Ok(strip_chart::draw_flight(&FlightView {
-            aircraft: &self.config.aircraft.name,
-            record: &record,
-            recorded,
-            groups: &groups(self.config),
-            maneuvers: &of_flight(campaign, id),
-            unknown: &campaign
-                .unknown
-                .iter()
-                .filter(|u| u.flight_id == id)
-                .cloned()
-                .collect::<Vec<_>>(),
-            events: &events,
-            problems: &about(campaign, |p| p.flight_id == id),
-        }))
-    }
-
-    fn draw_maneuver(&self, campaign: &Campaign, id: &str) -> Result<String> {
-        let of_both = campaign
-            .maneuvers
-            .iter()
-            .zip(&campaign.fits)
-            .find(|(m, _)| m.maneuver_id == id);
-        let (maneuver, fit) =
-            of_both.ok_or_else(|| unknown(self.config, format!("there is no maneuver `{id}`")))?;
-        let file = self
-            .flight(campaign, &maneuver.flight_id)?
-            .open(&self.store)?;
-        let record = file.part(None, maneuver.start_s - AROUND_S, maneuver.end_s + AROUND_S)?;
-        // Computed again rather than stored, as for the report.
-        let history = if fit.outcome == Outcome::Rejected {
-            None
-        } else {
-            self.estimate_maneuver(&record, maneuver).history
-        };
-        Ok(strip_chart::draw_maneuver(&ManeuverView {
-            aircraft: &self.config.aircraft.name,
-            record: &record,
-            groups: &groups(self.config),
-            maneuver,
-            class: self.config.class(&maneuver.class),
-            flight: &of_flight(campaign, &maneuver.flight_id),
-            fit,
-            history: history.as_ref(),
-        }))
-    }
-
-    /// A flight that has a record.
-    fn flight<'c>(&self, campaign: &'c Campaign, id: &str) -> Result<&'c Flight> {
-        let flight = campaign.flights.iter().find(|f| f.flight_id == id);
-        let flight =
-            flight.ok_or_else(|| unknown(self.config, format!("there is no flight `{id}`")))?;
-        if flight.ingested.accepted {
-            return Ok(flight);
-        }
-        let reasons: Vec<String> = flight
-            .ingested
-            .problems
-            .iter()
-            .map(|p| format!("{}: {}", p.place, p.reason))
-            .collect();
-        Err(unknown(
-            self.config,
-            format!(
-                "flight `{id}` was refused, so there is no record to show: {}",
-                reasons.join("; ")
-            ),
-        ))
-    }
+fn draw_flight(conductor: &Conductor, campaign: &Campaign, id: &str) -> Result<String> {
+    let config = conductor.runner.config;
+    let record = accepted_flight(config, campaign, id)?.open(&conductor.runner.store)?;
+    let of_flight = |flight_id: &str| flight_id == id;
+    let events = campaign.events.iter().filter(|e| of_flight(&e.flight_id));
+    let unknown = campaign.unknown.iter().filter(|u| of_flight(&u.flight_id));
+    Ok(strip_chart::draw_flight(&FlightView {
+        aircraft: &config.aircraft.name,
+        record: &record.outline(DRAWN_SAMPLES)?,
+        recorded: (record.header.samples, record.header.step_s),
+        groups: &groups(config),
+        maneuvers: &maneuvers_of(campaign, id),
+        unknown: &unknown.cloned().collect::<Vec<_>>(),
+        events: &events.cloned().collect::<Vec<_>>(),
+        problems: &problems_of(campaign, |p| p.flight_id == id),
+    }))
 }
 
-fn of_flight(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
+fn draw_maneuver(conductor: &Conductor, campaign: &Campaign, id: &str) -> Result<String> {
+    let config = conductor.runner.config;
+    let (maneuver, fit) = campaign
+        .maneuvers
+        .iter()
+        .zip(&campaign.fits)
+        .find(|(m, _)| m.maneuver_id == id)
+        .ok_or_else(|| unknown(config, format!("there is no maneuver `{id}`")))?;
+    let flight = accepted_flight(config, campaign, &maneuver.flight_id)?;
+    let record = flight.open(&conductor.runner.store)?.part(
+        None,
+        maneuver.start_s - MARGIN_S,
+        maneuver.end_s + MARGIN_S,
+    )?;
+    // The stored history is thinned for the report; the chart shows every sample.
+    let history = if fit.outcome == Outcome::Rejected {
+        None
+    } else {
+        estimate_maneuver(config, &record, maneuver).history
+    };
+    Ok(strip_chart::draw_maneuver(&ManeuverView {
+        aircraft: &config.aircraft.name,
+        record: &record,
+        groups: &groups(config),
+        maneuver,
+        class: config.class(&maneuver.class),
+        flight: &maneuvers_of(campaign, &maneuver.flight_id),
+        fit,
+        history: history.as_ref(),
+    }))
+}
+
+/// Finds a flight that has a record.
+fn accepted_flight<'c>(config: &Config, campaign: &'c Campaign, id: &str) -> Result<&'c Flight> {
+    let mut flights = campaign.flights.iter();
+    let flight = flights
+        .find(|f| f.id() == id)
+        .ok_or_else(|| unknown(config, format!("there is no flight `{id}`")))?;
+    if flight.is_accepted() {
+        return Ok(flight);
+    }
+    let what = format!(
+        "flight `{id}` was refused, so there is no record to show: {}",
+        flight.reasons()
+    );
+    Err(unknown(config, what))
+}
+
+fn maneuvers_of(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
     campaign
         .maneuvers
         .iter()
@@ -232,8 +198,8 @@ fn of_flight(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
         .collect()
 }
 
-/// What the configuration says of the signals that it names: surfaces have derivatives, pilot
-/// controls have steps that are counted, flags are up or down in a class.
+/// Sorts the configured signals into groups: surfaces have derivatives, pilot controls have counted
+/// steps, flags are up or down in a class.
 fn groups(config: &Config) -> SignalGroups {
     let surface = |d: &crate::aero::Derivative| match &d.regressor {
         Regressor::Surface(name) | Regressor::Vane(name) => Some(name.clone()),

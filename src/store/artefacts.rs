@@ -1,61 +1,64 @@
-//! The store: artefacts of the stages under their fingerprints, one run at a time; a folder, and
-//! where it is shared by machines without a common disk, an object store that the folder is the
-//! cache of.
+//! Store of artefacts, each named by the fingerprint of everything that decides it.
+//!
+//! The store is a folder. Machines without a common disk share a store in an object store; the
+//! folder is then this machine's cache of it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::artefact_name::{ArtefactName, Kind};
 use super::atomic;
-use super::fingerprint::{sealed, unsealed};
+use super::contents::Contents;
+use super::fingerprint::{Digest, sealed, unsealed};
 use super::lock::Lock;
 use super::shared::Shared;
-use super::{Contents, Digest};
 use crate::error::{Error, Result};
 
-/// An opened store. While it lives no other run can open it.
+/// An opened store with the record of what this run requires and has made.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     _lock: Option<Lock>,
     shared: Option<Shared>,
-    /// What is in the folder and not yet in the object store: another run was killed before it had
-    /// sent it.
-    unsent: Mutex<BTreeSet<PathBuf>>,
-    /// Why something of the object store could not be had.
-    trouble: Mutex<Option<Error>>,
-    /// What the results of this run are made of.
-    needed: Mutex<BTreeSet<PathBuf>>,
-    /// What this run made.
-    made: Mutex<Vec<PathBuf>>,
+    /// Artefacts of the folder that the object store lacks: a killed run made them.
+    unsent: Mutex<BTreeSet<ArtefactName>>,
+    /// First failure to read from the object store.
+    transfer_error: Mutex<Option<Error>>,
+    /// One lock for each record being fetched: concurrent readers of a record fetch it once.
+    fetching: Mutex<BTreeMap<ArtefactName, Arc<Mutex<()>>>>,
+    /// Artefacts behind this run's results.
+    required: Mutex<BTreeSet<ArtefactName>>,
+    /// Number of artefacts that this run made.
+    made: Mutex<usize>,
 }
 
-/// The folders of the store, one per kind of artefact.
-pub const KINDS: &[&str] = &[
-    "ingest", "records", "segment", "estimate", "history", "joint", "predict",
-];
-
-/// Fingerprints of files' contents.
+/// File of the remembered digests of input files.
 const CONTENTS: &str = "contents.json";
 
-/// Names the folders of reports that the store serves.
-const SERVED: &str = "serves.json";
+/// File that lists the folders of reports published from this store.
+const REPORTS: &str = "serves.json";
+
+/// Locks a mutex. A panic of another holder leaves its value usable: each is changed in one step.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 impl Store {
-    /// Opens or creates a store, waiting up to `wait` for another run to leave it, and removes what
-    /// a killed run left half written.
+    /// Opens or creates a store for one run alone, waiting up to `wait` for another run to end.
+    /// Removes the temporary files of a killed run.
     ///
     /// # Errors
-    /// [`Error::Busy`] when another run uses it, [`Error::Io`] when the disk says no.
+    /// [`Error::Busy`] when another run uses it, [`Error::Io`] when the disk fails.
     pub fn open(folder: &Path, wait: Duration) -> Result<Store> {
         let lock = Lock::take(&folder.join("lock"), "store", wait)?;
         atomic::sweep(folder)?;
-        for kind in KINDS {
-            atomic::sweep(&folder.join(kind))?;
+        for kind in Kind::ALL {
+            atomic::sweep(&folder.join(kind.name()))?;
         }
         Ok(Store {
             _lock: Some(lock),
@@ -63,8 +66,8 @@ impl Store {
         })
     }
 
-    /// Opens or creates a store as one of many that add to it at the same time, waiting up to
-    /// `wait` for a run to leave it. What lies there half written may be another's work and stays.
+    /// Opens or creates a store for several processes that add to it at once, waiting up to `wait`
+    /// for a run that holds it alone. Temporary files stay: another process may be writing them.
     ///
     /// # Errors
     /// As [`Store::open`].
@@ -76,7 +79,7 @@ impl Store {
         })
     }
 
-    /// A store to look into while others use it; it need not exist.
+    /// A store to read without a lock; it need not exist.
     #[must_use]
     pub fn look(folder: &Path) -> Store {
         Store {
@@ -84,16 +87,17 @@ impl Store {
             _lock: None,
             shared: None,
             unsent: Mutex::default(),
-            trouble: Mutex::default(),
-            needed: Mutex::default(),
+            transfer_error: Mutex::default(),
+            fetching: Mutex::default(),
+            required: Mutex::default(),
             made: Mutex::default(),
         }
     }
 
-    /// The same store as the cache of one in an object store, where a place there is named.
+    /// The same store as the cache of one in an object store, if a place there is given.
     ///
     /// # Errors
-    /// [`Error::Store`] or [`Error::Archive`] naming the place: what is there cannot be listed.
+    /// [`Error::Store`] or [`Error::Archive`] naming the place that cannot be listed.
     pub fn sharing(self, place: Option<&Path>) -> Result<Store> {
         Ok(Store {
             shared: place.map(Shared::open).transpose()?,
@@ -101,21 +105,21 @@ impl Store {
         })
     }
 
-    /// What is remembered of files' contents; of objects, what others remember too.
+    /// Remembered digests of input files; of objects, those that other machines shared as well.
     #[must_use]
     pub fn contents(&self) -> Contents {
         let contents = Contents::load(&self.folder.join(CONTENTS));
-        let theirs = self
+        let of_others = self
             .shared
             .as_ref()
             .and_then(|shared| shared.get(CONTENTS).ok().flatten());
-        match theirs {
-            Some(theirs) => contents.with_objects(&theirs),
+        match of_others {
+            Some(text) => contents.with_objects(&text),
             None => contents,
         }
     }
 
-    /// Writes down what is known of files' contents, and tells others what is known of objects.
+    /// Saves the digests of input files, and shares those of objects with other machines.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -131,204 +135,148 @@ impl Store {
         &self.folder
     }
 
-    /// Where the artefact of a kind for an item (a flight, a maneuver) with a fingerprint lies.
+    /// Path of an artefact's file.
     #[must_use]
-    pub fn path(&self, kind: &str, item: &str, fingerprint: &str, extension: &str) -> PathBuf {
-        let safe: String = item
-            .chars()
-            .map(|c| {
-                if c.is_alphanumeric() || "-_=.".contains(c) {
-                    c
-                } else {
-                    '_'
-                }
-            })
-            .collect();
-        self.folder
-            .join(kind)
-            .join(format!("{safe}-{fingerprint}.{extension}"))
+    pub fn path(&self, name: &ArtefactName) -> PathBuf {
+        self.folder.join(name.as_str())
     }
 
-    /// Where the artefact of another kind under the same name and fingerprint lies.
+    /// Reads an artefact. A damaged one counts as absent and is made again.
     #[must_use]
-    pub fn beside(&self, path: &Path, kind: &str) -> PathBuf {
-        self.folder
-            .join(kind)
-            .join(path.file_name().unwrap_or_default())
-    }
-
-    /// The artefact at a path, where there is one that is as it was written; a damaged one counts
-    /// as none and is made again.
-    #[must_use]
-    pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Option<T> {
-        let read = |bytes: &[u8]| serde_json::from_slice(unsealed(bytes)?).ok();
-        if let Some(artefact) = std::fs::read(path).ok().and_then(|bytes| read(&bytes)) {
-            self.is_here(path);
+    pub fn load<T: DeserializeOwned>(&self, name: &ArtefactName) -> Option<T> {
+        let parse = |bytes: &[u8]| serde_json::from_slice(unsealed(bytes)?).ok();
+        let path = self.path(name);
+        if let Some(artefact) = std::fs::read(&path).ok().and_then(|bytes| parse(&bytes)) {
+            self.note_present(name);
             return Some(artefact);
         }
-        let (shared, name) = (self.shared.as_ref()?, self.name(path)?);
-        let fetched = shared.get(&name).and_then(|bytes| {
-            let bytes = bytes.filter(|bytes| unsealed(bytes).is_some());
-            bytes
-                .map(|bytes| atomic::place(path, &bytes).map(|()| bytes))
-                .transpose()
+        let shared = self.shared.as_ref()?;
+        let fetched = shared.get(name.as_str()).and_then(|bytes| {
+            let whole = bytes.filter(|bytes| unsealed(bytes).is_some());
+            if let Some(bytes) = &whole {
+                atomic::place(&path, bytes)?;
+            }
+            Ok(whole)
         });
         match fetched {
-            Ok(bytes) => read(&bytes?),
+            Ok(bytes) => parse(&bytes?),
             Err(error) => {
-                if let Ok(mut trouble) = self.trouble.lock() {
-                    trouble.get_or_insert(error);
-                }
+                locked(&self.transfer_error).get_or_insert(error);
                 None
             }
         }
     }
 
-    /// Notes that something is in the folder; what is only there is to be sent.
-    pub fn is_here(&self, path: &Path) {
-        let is_sent = |shared: &Shared| {
-            self.name(path)
-                .is_none_or(|name| shared.size(&name).is_some())
-        };
-        if self.shared.as_ref().is_some_and(|shared| !is_sent(shared))
-            && let Ok(mut unsent) = self.unsent.lock()
-        {
-            unsent.insert(path.to_owned());
-        }
-    }
-
-    /// Whether a file of this size lies in the object store, from where [`Store::fetch`] brings it.
-    #[must_use]
-    pub fn is_shared(&self, path: &Path, bytes: u64) -> bool {
-        let size = |shared: &Shared| shared.size(&self.name(path)?);
-        self.shared.as_ref().and_then(size) == Some(bytes)
-    }
-
-    /// Sees to it that a record that lies in the object store is in the folder, too.
-    ///
-    /// # Errors
-    /// It cannot be had, or is not what was written.
-    pub fn fetch(&self, path: &Path, digest: Option<&Digest>) -> Result<()> {
-        let (Some(shared), Some(name), Some(digest)) = (&self.shared, self.name(path), digest)
-        else {
-            return Ok(());
-        };
-        if path.exists() || shared.size(&name).is_none() {
-            return Ok(());
-        }
-        shared.fetch(&name, path, digest)
-    }
-
-    /// Sends what an earlier run has made and not sent.
-    ///
-    /// # Errors
-    /// It cannot be sent, or something could not be had before.
-    pub fn send_rest(&self) -> Result<()> {
-        let unsent = self
-            .unsent
-            .lock()
-            .map(|mut unsent| std::mem::take(&mut *unsent))
-            .unwrap_or_default();
-        unsent.iter().try_for_each(|path| self.send(path))?;
-        self.check()
-    }
-
-    /// Whether everything could be had of the object store that was asked for.
-    ///
-    /// # Errors
-    /// The first that could not.
-    pub fn check(&self) -> Result<()> {
-        self.trouble
-            .lock()
-            .ok()
-            .and_then(|mut trouble| trouble.take())
-            .map_or(Ok(()), Err)
-    }
-
-    fn send(&self, path: &Path) -> Result<()> {
-        match (&self.shared, self.name(path)) {
-            (Some(shared), Some(name)) => shared.send(path, &name),
-            _ => Ok(()),
-        }
-    }
-
-    /// A path's name relative to the store.
-    fn name(&self, path: &Path) -> Option<String> {
-        Some(
-            path.strip_prefix(&self.folder)
-                .ok()?
-                .to_string_lossy()
-                .into_owned(),
-        )
-    }
-
-    /// Stores an artefact whole, with a fingerprint of its bytes at its end.
+    /// Saves an artefact whole, sealed with a fingerprint of its bytes.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
-    pub fn save(&self, path: &Path, artefact: &impl Serialize) -> Result<()> {
-        let text = serde_json::to_vec(artefact).map_err(|e| Error::store(path, &e))?;
-        atomic::place(path, &sealed(text))?;
-        self.keep(path)
+    pub fn save(&self, name: &ArtefactName, artefact: &impl Serialize) -> Result<()> {
+        let path = self.path(name);
+        let text = serde_json::to_vec(artefact).map_err(|e| Error::store(&path, &e))?;
+        atomic::place(&path, &sealed(text))?;
+        self.note_made(name)
     }
 
-    /// Notes that this run made what lies at a path, and sends it where the store is shared.
+    /// Counts an artefact that this run wrote, and sends it to the object store.
     ///
     /// # Errors
-    /// It cannot be sent.
-    pub fn keep(&self, path: &Path) -> Result<()> {
-        if let Ok(mut made) = self.made.lock() {
-            made.push(path.to_owned());
-        }
-        self.send(path)
+    /// The artefact cannot be sent.
+    pub fn note_made(&self, name: &ArtefactName) -> Result<()> {
+        *locked(&self.made) += 1;
+        self.send(name)
     }
 
-    /// How many artefacts this run made.
+    /// Number of artefacts that this run made.
     #[must_use]
     pub fn made(&self) -> usize {
-        self.made.lock().map_or(0, |made| made.len())
+        *locked(&self.made)
     }
 
-    /// Notes that the results of this run are made of these artefacts: what is published names
-    /// them, and they are kept as long as it is.
-    pub fn need<'a>(&self, paths: impl IntoIterator<Item = &'a PathBuf>) {
-        if let Ok(mut needed) = self.needed.lock() {
-            needed.extend(paths.into_iter().cloned());
+    /// Notes an artefact of the folder; [`Store::send_unsent`] sends it if the object store lacks
+    /// it.
+    pub fn note_present(&self, name: &ArtefactName) {
+        let is_unsent = |shared: &Shared| shared.size(name.as_str()).is_none();
+        if self.shared.as_ref().is_some_and(is_unsent) {
+            locked(&self.unsent).insert(name.clone());
         }
     }
 
-    /// The artefacts that were noted as needed, relative to the store, with their sizes.
+    /// `true` if the object store has an artefact of this size, which [`Store::fetch`] can bring.
     #[must_use]
-    pub fn needed(&self) -> BTreeMap<String, u64> {
-        let Ok(needed) = self.needed.lock() else {
-            return BTreeMap::new();
-        };
-        let name = |path: &PathBuf| {
-            let name = self.name(path)?;
-            let here = std::fs::metadata(path).ok().map(|m| m.len());
-            let size = here.or_else(|| self.shared.as_ref()?.size(&name))?;
-            Some((name, size))
-        };
-        needed.iter().filter_map(name).collect()
+    pub fn is_shared(&self, name: &ArtefactName, bytes: u64) -> bool {
+        let size = |shared: &Shared| shared.size(name.as_str());
+        self.shared.as_ref().and_then(size) == Some(bytes)
     }
 
-    /// Whether an artefact, by its name relative to the store, is as it was written; not a record,
-    /// which has no seal.
-    #[must_use]
-    pub fn is_whole(&self, name: &str) -> bool {
-        self.holds(&self.folder.join(name))
+    /// Copies a record that only the object store has into the folder.
+    ///
+    /// # Errors
+    /// It cannot be read, or its bytes are not those that were written.
+    pub fn fetch(&self, name: &ArtefactName, digest: &Digest) -> Result<()> {
+        let Some(shared) = &self.shared else {
+            return Ok(());
+        };
+        let turn = Arc::clone(locked(&self.fetching).entry(name.clone()).or_default());
+        let _turn = locked(&turn);
+        let path = self.path(name);
+        if path.exists() || shared.size(name.as_str()).is_none() {
+            return Ok(());
+        }
+        shared.fetch(name.as_str(), &path, digest)
     }
 
-    /// Whether there is an artefact at a path that is as it was written; not a record, which has no
-    /// seal.
+    /// Sends the artefacts that an earlier run made and did not send.
+    ///
+    /// # Errors
+    /// One cannot be sent, or an earlier read from the object store failed.
+    pub fn send_unsent(&self) -> Result<()> {
+        let unsent = std::mem::take(&mut *locked(&self.unsent));
+        unsent.iter().try_for_each(|name| self.send(name))?;
+        self.check_transfers()
+    }
+
+    /// Returns the first failure to read from the object store.
+    ///
+    /// # Errors
+    /// That failure.
+    pub fn check_transfers(&self) -> Result<()> {
+        locked(&self.transfer_error).take().map_or(Ok(()), Err)
+    }
+
+    fn send(&self, name: &ArtefactName) -> Result<()> {
+        match &self.shared {
+            Some(shared) => shared.send(&self.path(name), name.as_str()),
+            None => Ok(()),
+        }
+    }
+
+    /// Notes that this run's results are made of an artefact. The night's manifest lists it, and it
+    /// stays as long as the night.
+    pub fn require(&self, name: &ArtefactName) {
+        locked(&self.required).insert(name.clone());
+    }
+
+    /// Required artefacts with their sizes, bytes.
     #[must_use]
-    pub fn holds(&self, path: &Path) -> bool {
+    pub fn required(&self) -> BTreeMap<ArtefactName, u64> {
+        let sized = |name: &ArtefactName| {
+            let in_folder = std::fs::metadata(self.path(name)).ok().map(|m| m.len());
+            let size = in_folder.or_else(|| self.shared.as_ref()?.size(name.as_str()))?;
+            Some((name.clone(), size))
+        };
+        locked(&self.required).iter().filter_map(sized).collect()
+    }
+
+    /// `true` if the store has an artefact whose seal fits its bytes. Records have no seal.
+    #[must_use]
+    pub fn has_sealed(&self, name: &ArtefactName) -> bool {
         let is_sealed = |bytes: &Vec<u8>| unsealed(bytes).is_some();
-        if std::fs::read(path).is_ok_and(|bytes| is_sealed(&bytes)) {
-            self.is_here(path);
+        if std::fs::read(self.path(name)).is_ok_and(|bytes| is_sealed(&bytes)) {
+            self.note_present(name);
             return true;
         }
-        let shared = |shared: &Shared| shared.get(&self.name(path)?).ok()?;
+        let shared = |shared: &Shared| shared.get(name.as_str()).ok()?;
         self.shared
             .as_ref()
             .and_then(shared)
@@ -336,66 +284,60 @@ impl Store {
             .is_some_and(is_sealed)
     }
 
-    /// Notes that what is published in this folder is made of this store's artefacts, so that none
-    /// of them is removed.
+    /// Lists a folder of reports as published from this store, so that its artefacts stay.
     ///
     /// # Errors
     /// [`Error::Io`] naming the file.
-    pub fn serves(&self, reports: &Path) -> Result<()> {
+    pub fn register_reports(&self, reports: &Path) -> Result<()> {
         let reports =
             std::fs::canonicalize(reports).map_err(Error::io(reports, "cannot find the folder"))?;
-        let mut served = self.served();
-        if served.insert(reports) {
-            let path = self.folder.join(SERVED);
-            atomic::place(
-                &path,
-                &serde_json::to_vec(&served).map_err(|e| Error::store(&path, &e))?,
-            )?;
+        let mut all = self.reports();
+        if all.insert(reports) {
+            let path = self.folder.join(REPORTS);
+            let text = serde_json::to_vec(&all).map_err(|e| Error::store(&path, &e))?;
+            atomic::place(&path, &text)?;
         }
         Ok(())
     }
 
-    /// The folders of reports that are made of this store's artefacts. Where the list is damaged, a
-    /// folder that cannot be found stands for those that were in it.
+    /// Folders of reports published from this store. A damaged list yields a folder that does not
+    /// exist, so that nothing is removed.
     #[must_use]
-    pub fn served(&self) -> BTreeSet<PathBuf> {
-        let Ok(bytes) = std::fs::read(self.folder.join(SERVED)) else {
+    pub fn reports(&self) -> BTreeSet<PathBuf> {
+        let Ok(bytes) = std::fs::read(self.folder.join(REPORTS)) else {
             return BTreeSet::new();
         };
         serde_json::from_slice(&bytes)
             .unwrap_or_else(|_| [PathBuf::from("unknown: serves.json was damaged")].into())
     }
 
-    /// All artefacts, relative to the store, with their sizes; where it is shared, those that
-    /// others see.
+    /// All artefacts with their sizes, bytes; of a shared store those in the object store.
     #[must_use]
-    pub fn artefacts(&self) -> BTreeMap<String, u64> {
-        if let Some(shared) = &self.shared {
-            return shared.all();
+    pub fn artefacts(&self) -> BTreeMap<ArtefactName, u64> {
+        match &self.shared {
+            Some(shared) => shared.artefacts(),
+            None => self.cached_artefacts(),
         }
+    }
+
+    fn cached_artefacts(&self) -> BTreeMap<ArtefactName, u64> {
         let mut found = BTreeMap::new();
-        for kind in KINDS {
-            for entry in std::fs::read_dir(self.folder.join(kind))
-                .into_iter()
-                .flatten()
-                .flatten()
-            {
-                let size = entry.metadata().map_or(0, |m| m.len());
-                found.insert(
-                    format!("{kind}/{}", entry.file_name().to_string_lossy()),
-                    size,
-                );
+        for kind in Kind::ALL {
+            let entries = std::fs::read_dir(self.folder.join(kind.name()));
+            for entry in entries.into_iter().flatten().flatten() {
+                let name = ArtefactName::of_file(kind, &entry.file_name().to_string_lossy());
+                found.insert(name, entry.metadata().map_or(0, |m| m.len()));
             }
         }
         found
     }
 
-    /// Removes an artefact by its name relative to the store.
+    /// Removes an artefact from the folder.
     ///
     /// # Errors
     /// [`Error::Io`] naming the file that cannot be removed.
-    pub fn remove(&self, name: &str) -> Result<()> {
-        let path = self.folder.join(name);
+    pub fn remove(&self, name: &ArtefactName) -> Result<()> {
+        let path = self.path(name);
         std::fs::remove_file(&path).map_err(Error::io(&path, "cannot remove it"))
     }
 }
@@ -405,7 +347,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_store_is_one_run_s_at_a_time() {
+    fn only_one_run_at_a_time_opens_a_store() {
         let folder = tempfile::tempdir().unwrap();
         let first = Store::open(folder.path(), Duration::ZERO).unwrap();
         let second = Store::open(folder.path(), Duration::ZERO).unwrap_err();
@@ -415,34 +357,35 @@ mod tests {
     }
 
     #[test]
-    fn an_artefact_with_one_bit_flipped_anywhere_counts_as_none() {
+    fn an_artefact_with_any_flipped_bit_is_absent() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path(), Duration::ZERO).unwrap();
-        let path = store.path("estimate", "m", "0123", "json");
-        store.save(&path, &vec![1.25, 2.5]).unwrap();
+        let name = ArtefactName::new(Kind::Estimate, "m", "0123");
+        let path = store.path(&name);
+        store.save(&name, &vec![1.25, 2.5]).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for bit in 0..8 * whole.len() {
             let mut flipped = whole.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
             std::fs::write(&path, flipped).unwrap();
-            assert_eq!(store.load::<Vec<f64>>(&path), None, "bit {bit}");
+            assert_eq!(store.load::<Vec<f64>>(&name), None, "bit {bit}");
         }
     }
 
     #[test]
-    fn numbers_come_back_to_the_bit_and_a_damaged_artefact_counts_as_none() {
+    fn numbers_keep_every_bit_and_a_truncated_artefact_is_absent() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path(), Duration::ZERO).unwrap();
-        let path = store.path("estimate", "flight_001/t00012", "0123", "json");
+        let name = ArtefactName::new(Kind::Estimate, "flight_001/t00012", "0123");
         let values = vec![
             0.1 + 0.2,
             1.0 / 3.0,
             f64::MIN_POSITIVE,
             -1.234_567_890_123_456_7e300,
         ];
-        store.save(&path, &values).unwrap();
-        assert_eq!(store.load::<Vec<f64>>(&path), Some(values));
-        std::fs::write(&path, "[0.3, ").unwrap();
-        assert_eq!(store.load::<Vec<f64>>(&path), None);
+        store.save(&name, &values).unwrap();
+        assert_eq!(store.load::<Vec<f64>>(&name), Some(values));
+        std::fs::write(store.path(&name), "[0.3, ").unwrap();
+        assert_eq!(store.load::<Vec<f64>>(&name), None);
     }
 }

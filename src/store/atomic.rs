@@ -1,5 +1,5 @@
-//! Files appear whole or not at all: written beside their place under a temporary name, synced,
-//! then renamed.
+//! Files that appear whole or not at all: written under a temporary name beside their place,
+//! synced, then renamed.
 
 use std::fs;
 use std::io::Write;
@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 use super::Digest;
 use crate::error::{Error, Result};
 
-/// How the temporary files of an interrupted run are told from everything else.
+/// Prefix of temporary files, by which those of a killed run are found.
 pub const TEMPORARY: &str = ".harvest-";
 
-/// Puts `bytes` at `path`, creating folders as needed. A file that holds these bytes already is
-/// left untouched.
+/// Places `bytes` at `path`, creating folders as needed. A file with these bytes is left untouched.
 ///
 /// # Errors
 /// [`Error::Io`] naming the path.
@@ -28,8 +27,7 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
     draft.place()
 }
 
-/// A file that is being written beside its place; dropped before it is placed, nothing of it
-/// remains.
+/// A file being written beside its place. A draft that is dropped leaves nothing.
 #[derive(Debug)]
 pub struct Draft {
     file: tempfile::NamedTempFile,
@@ -37,7 +35,7 @@ pub struct Draft {
     path: PathBuf,
 }
 
-/// What a draft is written through: the bytes are digested as they pass.
+/// Writer of a draft that digests the bytes as they pass.
 struct Digesting<'d> {
     file: &'d mut fs::File,
     written: &'d mut blake3::Hasher,
@@ -65,7 +63,7 @@ impl Draft {
         fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
         let mut builder = tempfile::Builder::new();
         builder.prefix(TEMPORARY);
-        // A temporary file is the owner's alone; what is published is for everybody to read.
+        // A temporary file is private to its owner; published files are for everybody to read.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
         let file = builder
@@ -78,7 +76,7 @@ impl Draft {
         })
     }
 
-    /// What is written goes into the draft.
+    /// Writer into the draft.
     pub fn writer(&mut self) -> impl Write + Send {
         let through = Digesting {
             file: self.file.as_file_mut(),
@@ -87,13 +85,13 @@ impl Draft {
         std::io::BufWriter::with_capacity(1 << 20, through)
     }
 
-    /// Of what was written, without reading it again.
+    /// Digest of the bytes written so far.
     #[must_use]
     pub fn digest(&self) -> Digest {
         Digest::so_far(&self.written)
     }
 
-    /// Where the draft lies until it is placed.
+    /// Path of the draft until it is placed.
     #[must_use]
     pub fn draft(&self) -> &Path {
         self.file.path()
@@ -115,7 +113,7 @@ impl Draft {
     }
 }
 
-/// Removes a file, where there is one: what it said is no longer so.
+/// Removes a file, if there is one.
 ///
 /// # Errors
 /// [`Error::Io`] naming the path.
@@ -128,14 +126,13 @@ pub fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Makes sure that the names in a folder are on the disk, as its files' contents are: what is
-/// renamed after this cannot survive a loss of power without what was renamed before.
+/// Syncs the names in a folder to the disk: after a loss of power no later rename survives without
+/// the earlier ones.
 ///
 /// # Errors
 /// [`Error::Io`] naming the folder.
 pub fn sync_folder(folder: &Path) -> Result<()> {
-    // Elsewhere than on Unix a folder cannot be opened as a file, and a rename is as durable as it
-    // gets.
+    // Only Unix opens a folder as a file.
     if cfg!(unix) {
         let synced = fs::File::open(folder).and_then(|f| f.sync_all());
         synced.map_err(Error::io(folder, "cannot write the folder to the disk"))?;
@@ -143,7 +140,7 @@ pub fn sync_folder(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes what a killed run left half written in a folder.
+/// Removes the temporary files of a killed run from a folder.
 ///
 /// # Errors
 /// [`Error::Io`] when a leftover cannot be removed.

@@ -1,15 +1,13 @@
-//! Fingerprints of files' contents, remembered from night to night, so that a night with nothing
-//! new reads no flight.
+//! Digests of input files, remembered from run to run, so that a run with nothing new reads no
+//! flight.
 //!
-//! What is remembered counts only while the file is the same to the file system: device, inode,
-//! size, time of last write and time of last change, which no program can set. A file that changed
-//! within [`SETTLED`] before it was read is not remembered: it may change again within the tick of
-//! the file system's clock. Where the system has no such times (not Unix), every file is read each
-//! time.
+//! A remembered digest counts while the file system reports the same device, inode, size, time of
+//! last write and time of last change, which no program can set. A file that changed within
+//! [`SETTLED`] before it was read is not remembered: it may change again within a tick of the file
+//! system's clock. A system without such times (not Unix) reads every file each time.
 //!
-//! An object is the same while its size and its ETag are: the store's own mark of its content. That
-//! holds on every machine, so what is known of objects is shared where the store is
-//! ([`Contents::objects`]).
+//! An object is unchanged while its size and its ETag are. That holds on every machine, so the
+//! digests of objects are shared with the store ([`Contents::objects`]).
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
@@ -23,31 +21,31 @@ use super::fingerprint::{sealed, unsealed};
 use super::{Digest, atomic, object};
 use crate::error::Result;
 
-/// A file must have been left alone for so long before it was read to be remembered. Clocks of file
-/// systems tick at most every two seconds; the rest is for a file server's clock that differs from
-/// ours.
+/// Shortest time between the last change of a file and its reading, for its digest to be
+/// remembered. Clocks of file systems tick every two seconds or faster; the rest allows for the
+/// different clock of a file server.
 const SETTLED: Duration = Duration::from_secs(10);
 
-/// What the file system says of a file's state; as text, so that it is compared and nothing else.
+/// State of a file as the file system reports it, as text to be compared.
 type Stamp = String;
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Known {
+struct Remembered {
     stamp: Stamp,
     content: Digest,
 }
 
-/// The fingerprints that are known. It can be shared between threads.
+/// Remembered digests, shared between threads.
 #[derive(Debug)]
 pub struct Contents {
     path: PathBuf,
-    known: BTreeMap<PathBuf, Known>,
-    /// What was asked for in this run: the state as read, and what is worth remembering.
-    seen: Mutex<BTreeMap<PathBuf, (Stamp, Option<Known>)>>,
+    known: BTreeMap<PathBuf, Remembered>,
+    /// Files of this run: their state when read, and the digest to remember, if any.
+    seen: Mutex<BTreeMap<PathBuf, (Stamp, Option<Remembered>)>>,
 }
 
 impl Contents {
-    /// What was remembered at `path`; nothing where there is nothing or it is damaged.
+    /// Loads the digests saved at `path`; none from a missing or damaged file.
     #[must_use]
     pub fn load(path: &Path) -> Contents {
         let known = std::fs::read(path)
@@ -61,7 +59,7 @@ impl Contents {
         }
     }
 
-    /// Remembers nothing: every file is read.
+    /// No remembered digests: every file is read.
     #[must_use]
     pub fn forgetful() -> Contents {
         Contents {
@@ -71,25 +69,25 @@ impl Contents {
         }
     }
 
-    /// Adds what others remember of objects, as [`Contents::objects`] gave it; nothing where it is
-    /// damaged.
+    /// Adds the digests of objects that another machine shared by [`Contents::objects`]; none from
+    /// damaged text.
     #[must_use]
     pub fn with_objects(mut self, text: &[u8]) -> Contents {
         let theirs = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
-        let theirs: BTreeMap<PathBuf, Known> = theirs.unwrap_or_default();
+        let theirs: BTreeMap<PathBuf, Remembered> = theirs.unwrap_or_default();
         let unknown = theirs
             .into_iter()
             .filter(|(path, _)| object::is_object(path) && !self.known.contains_key(path));
-        let unknown: Vec<(PathBuf, Known)> = unknown.collect();
+        let unknown: Vec<(PathBuf, Remembered)> = unknown.collect();
         self.known.extend(unknown);
         self
     }
 
-    /// What is known of objects, as text for other machines; none where nothing of it is new.
+    /// Digests of objects as text for other machines; `None` if none of them is new.
     #[must_use]
     pub fn objects(&self) -> Option<Vec<u8>> {
         let now = self.remembered();
-        let objects = |known: &BTreeMap<PathBuf, Known>| -> BTreeMap<PathBuf, Known> {
+        let objects = |known: &BTreeMap<PathBuf, Remembered>| -> BTreeMap<PathBuf, Remembered> {
             known
                 .iter()
                 .filter(|(path, _)| object::is_object(path))
@@ -100,7 +98,7 @@ impl Contents {
         (now != before).then(|| sealed(serde_json::to_vec(&now).unwrap_or_default()))
     }
 
-    /// What an object holds; only one that is not known is read.
+    /// Digest of an object, which is read unless its digest is remembered.
     fn of_object(&self, path: &Path) -> Result<Digest, String> {
         let about = object::listed(path).map_err(|e| e.to_string())?;
         let stamp = stamp_of(&about.ok_or("is no more")?);
@@ -115,7 +113,7 @@ impl Contents {
         self.see(
             path,
             &stamp,
-            is_marked.then(|| Known {
+            is_marked.then(|| Remembered {
                 stamp: stamp.clone(),
                 content: content.clone(),
             }),
@@ -123,16 +121,16 @@ impl Contents {
         Ok(content)
     }
 
-    /// What a file or an object holds.
+    /// Digest of a file or an object.
     ///
     /// # Errors
-    /// The reason in words: no regular file, cannot be read, or changes while it is read.
+    /// The reason: no regular file, cannot be read, or changes while it is read.
     pub fn of(&self, path: &Path) -> Result<Digest, String> {
         if object::is_object(path) {
             return self.of_object(path);
         }
         let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
-        // Anything else may block for ever: a pipe that nobody writes into.
+        // Anything else, such as a pipe, may block for ever.
         if !metadata.is_file() {
             return Err(if metadata.is_dir() {
                 let why = std::fs::read_dir(path)
@@ -161,7 +159,7 @@ impl Contents {
             );
         }
         if let Some(stamp) = before {
-            let known = Known {
+            let known = Remembered {
                 stamp: stamp.clone(),
                 content: content.clone(),
             };
@@ -170,7 +168,7 @@ impl Contents {
         Ok(content)
     }
 
-    /// Whether a file still is as it was when its fingerprint was taken.
+    /// `true` if a file is unchanged since it was digested.
     #[must_use]
     pub fn is_unchanged(&self, path: &Path) -> bool {
         let of_object = || {
@@ -190,7 +188,7 @@ impl Contents {
             .lock()
             .ok()
             .and_then(|seen| seen.get(path).map(|(stamp, _)| stamp.clone()));
-        // Where there are no stamps there is nothing to compare.
+        // Other systems report no state to compare.
         if cfg!(unix) {
             now.is_some() && now == seen
         } else {
@@ -198,7 +196,7 @@ impl Contents {
         }
     }
 
-    /// Writes down what was seen and has settled; what is no more is forgotten.
+    /// Saves the digests of settled files; those of removed files are dropped.
     ///
     /// # Errors
     /// [`crate::error::Error::Io`] naming the file.
@@ -213,19 +211,19 @@ impl Contents {
         )
     }
 
-    fn remembered(&self) -> BTreeMap<PathBuf, Known> {
+    fn remembered(&self) -> BTreeMap<PathBuf, Remembered> {
         let seen = self
             .seen
             .lock()
             .map(|seen| seen.clone())
             .unwrap_or_default();
-        // Whether an object that was not asked for is still there is not worth a question.
+        // To ask whether an unused object still exists would be a request each.
         let is_there = |path: &Path| object::is_object(path) || path.exists();
         let unasked = self
             .known
             .iter()
             .filter(|(path, _)| !seen.contains_key(*path) && is_there(path));
-        let mut known: BTreeMap<PathBuf, Known> = unasked
+        let mut known: BTreeMap<PathBuf, Remembered> = unasked
             .map(|(path, known)| (path.clone(), known.clone()))
             .collect();
         known.extend(
@@ -235,14 +233,14 @@ impl Contents {
         known
     }
 
-    fn see(&self, path: &Path, stamp: &str, known: Option<Known>) {
+    fn see(&self, path: &Path, stamp: &str, known: Option<Remembered>) {
         if let Ok(mut seen) = self.seen.lock() {
             seen.insert(path.to_owned(), (stamp.to_owned(), known));
         }
     }
 }
 
-fn stamp_of(about: &object::About) -> Stamp {
+fn stamp_of(about: &object::ObjectInfo) -> Stamp {
     format!(
         "{}:{}",
         about.bytes,
@@ -270,13 +268,13 @@ fn stamp(_: &Metadata) -> Option<Stamp> {
     None
 }
 
-/// Whether the file had been left alone for long enough when reading it began.
+/// `true` if the file was unchanged for long enough before it was read.
 #[cfg(unix)]
 fn is_settled(metadata: &Metadata, begun: SystemTime) -> bool {
     use std::os::unix::fs::MetadataExt;
     let seconds = metadata.ctime().max(metadata.mtime());
     let changed = UNIX_EPOCH + Duration::from_secs(u64::try_from(seconds).unwrap_or_default());
-    // A time of the future is a clock that differs: nothing to rely on.
+    // A time in the future comes from a wrong clock.
     begun.duration_since(changed).is_ok_and(|age| age > SETTLED)
 }
 
@@ -319,9 +317,9 @@ mod tests {
         };
         let remember = || {
             let stamp = stamp(&std::fs::metadata(&file).unwrap()).unwrap();
-            let known: BTreeMap<PathBuf, Known> = [(
+            let known: BTreeMap<PathBuf, Remembered> = [(
                 file.clone(),
-                Known {
+                Remembered {
                     stamp,
                     content: remembered.clone(),
                 },
@@ -331,8 +329,7 @@ mod tests {
         };
         remember();
         assert_eq!(Contents::load(&cache).of(&file).unwrap(), remembered);
-        // The same size, and the time of the last write put back: the time of the last change gives
-        // it away.
+        // Same size and time of last write: the time of last change reveals the edit.
         let written = std::fs::metadata(&file).unwrap().modified().unwrap();
         std::thread::sleep(Duration::from_millis(20));
         std::fs::write(&file, "two").unwrap();

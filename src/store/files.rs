@@ -1,5 +1,4 @@
-//! Small text files in and out: configuration, the wind-tunnel database, the analyst's events, a
-//! simulation's truth.
+//! Small text files: configuration, wind-tunnel database, the analyst's events, tables read back.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,19 +12,7 @@ use crate::error::{Error, Result};
 use crate::maneuver::Event;
 use crate::tables::PublishedTrend;
 
-/// Test for a file of the file system.
-#[must_use]
-pub fn is_file(path: &Path) -> bool {
-    path.is_file()
-}
-
-/// Test for a folder of the file system.
-#[must_use]
-pub fn is_folder(path: &Path) -> bool {
-    path.is_dir()
-}
-
-/// A text file whole; it may be an object.
+/// Reads a text file or object whole.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -38,7 +25,7 @@ pub fn text(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))
 }
 
-/// Places a small text file whole or not at all; it may be an object.
+/// Places a small text file or object, whole or not at all.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -49,7 +36,25 @@ pub fn place_text(path: &Path, text: &str) -> Result<()> {
     atomic::place(path, text.as_bytes())
 }
 
-/// The files of a folder with this extension, sorted.
+/// `true` for a folder that exists.
+#[must_use]
+pub fn is_folder(path: &Path) -> bool {
+    path.is_dir()
+}
+
+/// `true` for a file that exists.
+#[must_use]
+pub fn is_file(path: &Path) -> bool {
+    path.is_file()
+}
+
+/// Absolute path without links; `None` if there is no such file or folder.
+#[must_use]
+pub fn canonical(path: &Path) -> Option<std::path::PathBuf> {
+    path.canonicalize().ok()
+}
+
+/// Files of a folder with this extension, sorted.
 ///
 /// # Errors
 /// [`Error::Io`] naming the folder.
@@ -64,7 +69,7 @@ pub fn with_extension(folder: &Path, extension: &str) -> Result<Vec<std::path::P
     Ok(files)
 }
 
-/// One line of a wind-tunnel table as written.
+/// One line of a wind-tunnel table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TunnelRow {
     pub derivative: String,
@@ -77,7 +82,7 @@ pub struct TunnelRow {
     pub uncertainty: Option<f64>,
     #[serde(default)]
     pub source: Option<String>,
-    /// The third variable, whose column the analyst names.
+    /// Third variable, whose column the analyst names.
     #[serde(skip)]
     pub third: Option<f64>,
 }
@@ -95,7 +100,8 @@ impl TunnelRow {
     }
 }
 
-/// The analyst's events, CSV with columns `flight_id,class,start_s,end_s`, each with its line.
+/// Reads the analyst's events, CSV with columns `flight_id,class,start_s,end_s`, each with its line
+/// number.
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
@@ -103,8 +109,7 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
     rows(path)
 }
 
-/// The rows of a table that was published as CSV; columns that the row type does not have are
-/// passed over.
+/// Reads the rows of a published CSV. Columns that the row type lacks are ignored.
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
@@ -115,10 +120,11 @@ pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<
         .collect())
 }
 
-/// The columns of a CSV of numbers, by the names of its header.
+/// Reads the columns of a CSV of numbers, by the names of its header.
 ///
 /// # Errors
-/// [`Error::Io`] where it cannot be opened, [`Error::Config`] naming the line of what is no number.
+/// [`Error::Io`] for a file that cannot be opened, [`Error::Config`] naming the line of a value
+/// that is no number.
 pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     let text = text(path)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -140,7 +146,7 @@ pub fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     Ok(names.into_iter().zip(columns).collect())
 }
 
-/// The `trends` that an earlier campaign published in a folder.
+/// Reads the table `trends` of an earlier campaign's folder.
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read, or that the folder has no

@@ -1,5 +1,5 @@
-//! A fingerprint is everything that decides a result, in sixteen hexadecimal digits: the artefact
-//! of a stage carries it in its name, so an artefact with the right name is up to date by
+//! Fingerprints: sixteen hexadecimal digits of everything that decides a result. An artefact
+//! carries the fingerprint in its name, so an artefact of the right name is up to date by
 //! construction.
 
 use std::io::Read;
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// Collects what decides a result. The stage's name and the version of its method come first: a
-/// change of code that changes numbers changes the version.
+/// Hash over everything that decides a result. Name and version of the method come first: a change
+/// of code that changes numbers changes the version.
 #[derive(Clone, Debug)]
 pub struct Fingerprint(blake3::Hasher);
 
@@ -22,13 +22,10 @@ impl Fingerprint {
         Fingerprint(hasher)
     }
 
-    /// Adds a value, by its serialised form with its length, so that neighbours cannot run into
-    /// each other.
+    /// Adds a value in serialised form, preceded by its length so that neighbours stay apart.
     #[must_use]
     pub fn with(mut self, value: &impl Serialize) -> Self {
-        // A value that cannot be serialised would have to be a map with keys that are no strings;
-        // there is none, and a fixed text in its place could only make two results look alike that
-        // the other parts tell apart.
+        // Only a map whose keys are no strings fails; no key has one.
         let bytes = serde_json::to_vec(value).unwrap_or_default();
         self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(&bytes);
@@ -41,11 +38,11 @@ impl Fingerprint {
     }
 }
 
-/// What a file holds, in a few words: the same digest is the same content.
+/// Digest of a file's content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Digest {
     pub bytes: u64,
-    /// Hexadecimal.
+    /// BLAKE3, hexadecimal.
     pub blake3: String,
 }
 
@@ -57,10 +54,10 @@ impl Digest {
         Digest::of(&mut file).map_err(Error::io(path, "cannot read it"))
     }
 
-    /// Of all that a reader gives.
+    /// Digests everything that a reader yields.
     ///
     /// # Errors
-    /// A disk that says no.
+    /// The reader fails.
     pub fn of(reader: &mut impl Read) -> std::io::Result<Digest> {
         let mut hasher = blake3::Hasher::new();
         let mut buffer = vec![0; 1 << 20];
@@ -73,7 +70,7 @@ impl Digest {
         }
     }
 
-    /// Of what was digested so far.
+    /// Digest of the bytes so far.
     pub(super) fn so_far(hasher: &blake3::Hasher) -> Digest {
         Digest {
             bytes: hasher.count(),
@@ -82,18 +79,17 @@ impl Digest {
     }
 }
 
-/// Digits of the fingerprint at the end of a sealed text.
+/// Digits of the fingerprint that ends a sealed text.
 const SEAL: usize = 16;
 
-/// A text with a fingerprint of its bytes in a last line, which tells whether it is as it was
-/// written.
+/// Seals a text: appends a fingerprint of its bytes as a last line, which reveals damage.
 pub(super) fn sealed(mut text: Vec<u8>) -> Vec<u8> {
     let seal = seal(&text);
     text.extend_from_slice(seal.as_bytes());
     text
 }
 
-/// A sealed text without its seal; none where the seal is not its.
+/// Text of a sealed text; `None` if the seal does not fit.
 pub(super) fn unsealed(bytes: &[u8]) -> Option<&[u8]> {
     let (text, end) = bytes.split_at_checked(bytes.len().checked_sub(SEAL + 1)?)?;
     (end == seal(text).as_bytes()).then_some(text)

@@ -1,11 +1,11 @@
-//! One run at a time, or many shards: a lock on a file that also says which run holds it.
+//! Locks for one run at a time or for several shards, with a note of the holder.
 //!
-//! The lock is the operating system's and goes with the process that holds it, however that ends:
-//! the lock of a dead process blocks nobody, whatever its file still says. On a shared file system
-//! it reaches other machines where the file system carries locks; where it has none, everybody goes
-//! on without. Nothing hangs on it but waste: artefacts are named by what decides them and appear
-//! whole by a rename, so two who make the same one make the same bytes, and a leftover that a run
-//! sweeps away from under another costs that one a new try.
+//! The lock is the operating system's and ends with the process that holds it: a dead process
+//! blocks nobody, whatever the note still names. A shared file system may carry it to other
+//! machines; on one without locks every run goes on. The lock only prevents waste: artefacts are
+//! named by the fingerprint of everything that decides them and appear whole by a rename, so two
+//! runs that make the same artefact make the same bytes. A run whose temporary file another run
+//! sweeps away has to try again.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -15,27 +15,27 @@ use std::time::{Duration, Instant, SystemTime};
 use super::log::timestamp;
 use crate::error::{Error, Result};
 
-/// How often a waiting run looks again.
-const AGAIN: Duration = Duration::from_millis(100);
+/// Interval at which a waiting run tries again.
+const RETRY_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Longest note that is read: what is longer is no note of ours.
+/// Longest note of a holder, bytes; a longer file is no note.
 const LONGEST_NOTE: u64 = 1000;
 
-/// A lock that is held. It ends with its value.
+/// A held lock, released when it is dropped.
 #[derive(Debug)]
 pub struct Lock {
     file: File,
 }
 
 impl Lock {
-    /// Takes the lock at `path`, waiting for it up to `wait`, and notes who holds it. `what` names
-    /// what is locked.
+    /// Takes the lock at `path` alone, waiting for it up to `wait`, and writes the holder's note.
+    /// `what` names the locked thing in messages.
     ///
     /// # Errors
-    /// [`Error::Busy`] naming the holder when another has it, [`Error::Io`] when the disk says no.
+    /// [`Error::Busy`] naming the holder, [`Error::Io`] when the disk fails.
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
         let mut lock = Lock::get(path, what, wait, File::try_lock)?;
-        // Only a word for others: a disk that is too full for it stops nobody here.
+        // The note is a courtesy: a disk too full for it stops no run.
         let note = format!(
             "pid {} on {} since {}\n",
             std::process::id(),
@@ -50,8 +50,7 @@ impl Lock {
         Ok(lock)
     }
 
-    /// Takes a share of the lock at `path`: any number may hold one, and nobody the whole
-    /// meanwhile.
+    /// Takes a share of the lock at `path`; others may hold shares, but none the lock alone.
     ///
     /// # Errors
     /// As [`Lock::take`].
@@ -79,7 +78,7 @@ impl Lock {
             match lock(&file) {
                 Ok(()) => break,
                 Err(TryLockError::WouldBlock) if Instant::now() < patience => {
-                    std::thread::sleep(AGAIN)
+                    std::thread::sleep(RETRY_INTERVAL)
                 }
                 Err(TryLockError::WouldBlock) => {
                     return Err(Error::Busy {
@@ -95,8 +94,8 @@ impl Lock {
     }
 }
 
-/// Whether an error says that the file system has no locks: not supported, or no lock manager
-/// (Linux's `ENOLCK`).
+/// `true` for the error of a file system without locks: not supported, or no lock manager (Linux's
+/// `ENOLCK`).
 fn has_none(error: &std::io::Error) -> bool {
     error.kind() == std::io::ErrorKind::Unsupported
         || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
@@ -118,7 +117,7 @@ fn busy(file: &mut File, what: &str) -> String {
     )
 }
 
-/// The machine's name as the kernel knows it.
+/// Name of the machine.
 fn host() -> String {
     let name = ["/proc/sys/kernel/hostname", "/etc/hostname"]
         .into_iter()

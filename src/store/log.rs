@@ -1,5 +1,5 @@
-//! The run log: one JSON object per line with the time of day, appended to a file. The only place
-//! where a clock is read for what is kept.
+//! The run log: one JSON object per line with the time of day, appended to a file. No other output
+//! contains a time of day.
 
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -32,8 +32,8 @@ impl Log {
         })
     }
 
-    /// Appends a line: time, process, event and what belongs to it. A line is one write, so that
-    /// two runs that share a log do not mix theirs. A log that cannot be written stops no run; see
+    /// Appends a line of time, process, event and fields. A line is one write, so two runs that
+    /// share a log do not mix lines. A log that cannot be written stops no run; see
     /// [`Log::failure`].
     pub fn write(&self, event: &str, fields: &[(&str, Value)]) {
         let mut line = Map::new();
@@ -53,7 +53,7 @@ impl Log {
         }
     }
 
-    /// What went wrong with the log, if anything did.
+    /// First failure to write the log, if any.
     #[must_use]
     pub fn failure(&self) -> Option<Error> {
         let error = self.file.lock().ok()?.1.take()?;
@@ -61,7 +61,7 @@ impl Log {
     }
 }
 
-/// A time of day as RFC 3339 in UTC, to the millisecond.
+/// Formats a time of day as RFC 3339 in UTC, to the millisecond.
 #[must_use]
 pub fn timestamp(time: SystemTime) -> String {
     let since = time.duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);

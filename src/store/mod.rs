@@ -1,8 +1,9 @@
-//! Everything that touches the disk: the archive, the store of artefacts, the published tables,
-//! small text files.
+//! Everything that touches the disk: the archive, the store of artefacts, published tables and
+//! nights, small text files.
 
 pub mod archive;
-pub mod artefacts;
+mod artefact_name;
+mod artefacts;
 pub mod atomic;
 pub mod contents;
 pub mod files;
@@ -17,6 +18,7 @@ mod shared;
 pub mod table;
 pub mod tunnel;
 
+pub use artefact_name::{ArtefactName, Kind};
 pub use artefacts::Store;
 pub use contents::Contents;
 pub use fingerprint::{Digest, Fingerprint};

@@ -1,16 +1,15 @@
-//! Published nights: each in a folder of its own, and one name that says which of them holds.
+//! Published nights, each in a folder of its own, and the name of the current one.
 //!
 //! ```text
-//! reports/harv/nights/0007/   everything of one night, with its manifest night.json
+//! reports/harv/nights/0007/   all files of one night, with its manifest night.json
 //! reports/harv/current        → nights/0007
 //! reports/harv/fits.csv       → current/fits.csv, and so on
 //! ```
 //!
 //! A night is written beside the others under a temporary name, synced and renamed; then `current`
-//! is replaced by one rename. All paths change with it at once, so a reader sees last night's or
-//! tonight's files. One that opens several while it changes follows `current` once and stays in
-//! that folder. Where there are no symbolic links (not Unix), `current` is a text file and the
-//! files beside it are copies.
+//! is replaced by one rename. All paths change with it at once, so a reader sees the files of one
+//! night. A reader of several files follows `current` once and stays in that folder. Without
+//! symbolic links (not Unix), `current` is a text file and the files beside it are copies.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,8 +18,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::artefact_name::ArtefactName;
+use super::atomic;
+use super::fingerprint::Digest;
 use super::lock::Lock;
-use super::{Digest, atomic};
 use crate::error::{Error, Problem, Result};
 use crate::lineage::{Lineage, Stage};
 
@@ -28,38 +29,37 @@ const NIGHTS: &str = "nights";
 const CURRENT: &str = "current";
 const MANIFEST: &str = "night.json";
 
-/// What a night has to say in a few numbers.
+/// Counts and problems of a night.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     pub flights: usize,
-    /// Of them, refused by ingest.
+    /// Number of flights that ingest rejected.
     pub refused: usize,
     pub maneuvers: usize,
     pub converged: usize,
     pub problems: Vec<Problem>,
-    /// Whether something that was published before moved, is gone or changed.
+    /// `true` if a published value moved, vanished or changed.
     pub alert: bool,
 }
 
-/// A published night's manifest.
+/// Manifest of a published night.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Night {
-    /// Its number, as its folder is named.
+    /// Number of the night, the name of its folder.
     pub name: String,
-    /// How far it was brought; only a night with a report is complete.
+    /// Last stage of the night; only a night with a report is complete.
     pub until: Stage,
-    /// The complete night before it, which its changes are held against.
+    /// The complete night before it, for its changes.
     pub since: Option<String>,
-    /// What the report prints beside numbers: the archive and the wind-tunnel table as they were
-    /// named.
+    /// Names that the report prints and that decide no number, such as the archive's.
     pub shown: BTreeMap<String, String>,
     pub lineage: Lineage,
     pub summary: Summary,
-    /// What it is made of: artefacts of the store with their sizes.
-    pub artefacts: BTreeMap<String, u64>,
-    /// Its files, with fingerprints of their contents.
+    /// Artefacts behind the night, with their sizes, bytes.
+    pub artefacts: BTreeMap<ArtefactName, u64>,
+    /// Published files with their digests.
     pub files: BTreeMap<String, Digest>,
-    /// Fingerprint of all of the above.
+    /// Fingerprint of the fields above.
     pub seal: String,
 }
 
@@ -87,11 +87,11 @@ pub struct Nights {
 }
 
 impl Nights {
-    /// Opens a folder of reports to publish in, waiting up to `wait` for another run, and finishes
-    /// what a killed run has left: a night that is whole is published, anything half-written goes.
+    /// Opens a folder of reports to publish in, waiting up to `wait` for another run. Completes the
+    /// work of a killed run: a whole night becomes current, temporary files are removed.
     ///
     /// # Errors
-    /// [`Error::Busy`] when another run publishes there, [`Error::Io`] when the disk says no.
+    /// [`Error::Busy`] when another run publishes there, [`Error::Io`] when the disk fails.
     pub fn open(reports: &Path, wait: Duration) -> Result<Nights> {
         let lock = Lock::take(&reports.join(NIGHTS).join("lock"), "reports", wait)?;
         let nights = Nights {
@@ -106,12 +106,12 @@ impl Nights {
             .rev()
             .find_map(|name| nights.night(name))
         {
-            nights.point(&newest)?;
+            nights.make_current(&newest)?;
         }
         Ok(nights)
     }
 
-    /// The nights to look at while others publish; there need not be any.
+    /// The nights of a folder to read without a lock; the folder need not exist.
     #[must_use]
     pub fn look(reports: &Path) -> Nights {
         Nights {
@@ -120,13 +120,13 @@ impl Nights {
         }
     }
 
-    /// The night that holds.
+    /// Manifest of the current night.
     #[must_use]
     pub fn current(&self) -> Option<Night> {
-        self.night(&self.pointed()?)
+        self.night(&self.current_name()?)
     }
 
-    /// The last complete night.
+    /// Manifest of the last complete night.
     #[must_use]
     pub fn complete(&self) -> Option<Night> {
         self.names()
@@ -136,7 +136,7 @@ impl Nights {
             .find(Night::is_complete)
     }
 
-    /// The manifest of a night; none where there is none or it is damaged.
+    /// Manifest of a night; `None` if it is missing or damaged.
     #[must_use]
     pub fn night(&self, name: &str) -> Option<Night> {
         let night: Night =
@@ -144,13 +144,20 @@ impl Nights {
         (night.clone().sealed() == night).then_some(night)
     }
 
-    /// Where a night lies.
+    /// Manifest of the night of this name, given with or without leading zeros.
+    #[must_use]
+    pub fn named(&self, name: &str) -> Option<Night> {
+        self.night(name)
+            .or_else(|| self.night(&format!("{name:0>4}")))
+    }
+
+    /// Folder of a night.
     #[must_use]
     pub fn folder(&self, name: &str) -> PathBuf {
         self.reports.join(NIGHTS).join(name)
     }
 
-    /// The names of all nights, the oldest first.
+    /// Names of all nights, the oldest first.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.reports.join(NIGHTS))
@@ -165,13 +172,13 @@ impl Nights {
         names
     }
 
-    /// Whether all files of a night are as they were published.
+    /// `true` if all files of a night are as they were published.
     #[must_use]
     pub fn is_whole(&self, night: &Night) -> bool {
         self.damaged(night).is_empty()
     }
 
-    /// The files of a night that are not as they were published.
+    /// Files of a night that are not as they were published.
     #[must_use]
     pub fn damaged(&self, night: &Night) -> Vec<String> {
         let folder = self.folder(&night.name);
@@ -186,15 +193,16 @@ impl Nights {
             .collect()
     }
 
-    /// An empty folder to write tonight's files into.
+    fn tonight_folder(&self) -> PathBuf {
+        self.folder(&format!("{}tonight", atomic::TEMPORARY))
+    }
+
+    /// Creates an empty folder for tonight's files.
     ///
     /// # Errors
     /// [`Error::Io`] naming the folder.
     pub fn tonight(&self) -> Result<PathBuf> {
-        let folder = self
-            .reports
-            .join(NIGHTS)
-            .join(format!("{}tonight", atomic::TEMPORARY));
+        let folder = self.tonight_folder();
         if folder.exists() {
             fs::remove_dir_all(&folder).map_err(Error::io(&folder, "cannot remove a leftover"))?;
         }
@@ -202,27 +210,18 @@ impl Nights {
         Ok(folder)
     }
 
-    /// Removes what was written of tonight: something went wrong, or there is nothing new in it.
-    pub fn forget_tonight(&self) {
-        let _ = fs::remove_dir_all(
-            self.reports
-                .join(NIGHTS)
-                .join(format!("{}tonight", atomic::TEMPORARY)),
-        );
+    /// Removes tonight's folder.
+    pub fn remove_tonight(&self) {
+        let _ = fs::remove_dir_all(self.tonight_folder());
     }
 
-    /// Publishes what lies in tonight's folder as `night`, whose name and files are filled in. The
-    /// last `keep` complete nights stay.
+    /// Publishes tonight's folder as `night`, whose name and files are filled in, and removes the
+    /// nights before the last `keep` complete ones.
     ///
     /// # Errors
-    /// [`Error::Io`] when the disk says no; then the night before still holds.
+    /// [`Error::Io`] when the disk fails; then the night before stays current.
     pub fn publish(&self, night: Night, keep: usize) -> Result<Night> {
-        let (nights, tonight) = (
-            self.reports.join(NIGHTS),
-            self.reports
-                .join(NIGHTS)
-                .join(format!("{}tonight", atomic::TEMPORARY)),
-        );
+        let tonight = self.tonight_folder();
         let last = self
             .names()
             .last()
@@ -239,22 +238,19 @@ impl Nights {
         let folder = self.folder(&night.name);
         fs::rename(&tonight, &folder)
             .map_err(Error::io(&folder, "cannot put the night in its place"))?;
-        atomic::sync_folder(&nights)?;
-        self.point(&night)?;
+        atomic::sync_folder(&self.reports.join(NIGHTS))?;
+        self.make_current(&night)?;
         self.prune(keep)?;
         Ok(night)
     }
 
-    /// Puts the files of tonight's folder in the places of those of `night`, which was made of the
-    /// same and is damaged.
+    /// Replaces the files of the damaged `night` by those of tonight's folder, made of the same
+    /// lineage.
     ///
     /// # Errors
-    /// [`Error::Io`] when the disk says no.
+    /// [`Error::Io`] when the disk fails.
     pub fn repair(&self, night: &Night, made: Night) -> Result<Night> {
-        let tonight = self
-            .reports
-            .join(NIGHTS)
-            .join(format!("{}tonight", atomic::TEMPORARY));
+        let tonight = self.tonight_folder();
         let night = Night {
             name: night.name.clone(),
             files: digests(&tonight)?,
@@ -268,21 +264,21 @@ impl Nights {
             atomic::place(&folder.join(name), &bytes)?;
         }
         write_manifest(&folder, &night)?;
-        self.forget_tonight();
-        self.point(&night)?;
+        self.remove_tonight();
+        self.make_current(&night)?;
         Ok(night)
     }
 
-    /// The nights that `prune` would remove: complete ones before the last `keep`, and incomplete
-    /// ones that do not hold.
+    /// Nights that [`Nights::prune`] removes: complete ones before the last `keep`, and incomplete
+    /// ones that are not current.
     #[must_use]
     pub fn superfluous(&self, keep: usize) -> Vec<String> {
-        let current = self.pointed();
+        let current = self.current_name();
         let mut kept = 0;
         let mut superfluous = Vec::new();
         for name in self.names().into_iter().rev() {
             let is_current = current.as_ref() == Some(&name);
-            // What a damaged one was nobody knows.
+            // A damaged night may have been complete.
             let Some(is_complete) = self.night(&name).map(|n| n.is_complete()) else {
                 continue;
             };
@@ -295,7 +291,7 @@ impl Nights {
         superfluous
     }
 
-    /// Removes the nights that are superfluous.
+    /// Removes the superfluous nights.
     ///
     /// # Errors
     /// [`Error::Io`] naming the folder.
@@ -311,32 +307,32 @@ impl Nights {
         Ok(())
     }
 
-    /// Whether the changes of a night have been told already; from now on they have.
+    /// Marks the changes of a night as reported, and returns `true` if they already were.
     ///
     /// # Errors
     /// [`Error::Io`] naming the file.
-    pub fn tell_once(&self, night: &str) -> Result<bool> {
+    pub fn mark_reported(&self, night: &str) -> Result<bool> {
         let path = self.reports.join(NIGHTS).join("told");
-        let told = fs::read_to_string(&path).is_ok_and(|told| told.trim() == night);
-        if !told {
+        let was_reported = fs::read_to_string(&path).is_ok_and(|name| name.trim() == night);
+        if !was_reported {
             atomic::place(&path, format!("{night}\n").as_bytes())?;
         }
-        Ok(told)
+        Ok(was_reported)
     }
 
-    /// Makes a night the one that holds.
-    fn point(&self, night: &Night) -> Result<()> {
-        if self.pointed().as_ref() != Some(&night.name) {
+    /// Makes a night the current one.
+    fn make_current(&self, night: &Night) -> Result<()> {
+        if self.current_name().as_ref() != Some(&night.name) {
             link::place(
                 &self.reports.join(CURRENT),
                 &format!("{NIGHTS}/{}", night.name),
             )?;
             atomic::sync_folder(&self.reports)?;
         }
-        link::beside(&self.reports, &self.folder(&night.name), night.files.keys())
+        link::place_all(&self.reports, &self.folder(&night.name), night.files.keys())
     }
 
-    fn pointed(&self) -> Option<String> {
+    fn current_name(&self) -> Option<String> {
         let target = link::target(&self.reports.join(CURRENT))?;
         Some(
             target
@@ -355,7 +351,7 @@ fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
     )
 }
 
-/// The files of a folder but the manifest, with fingerprints of their contents.
+/// Digests of a folder's files except the manifest.
 fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
     let mut files = BTreeMap::new();
     let entries = fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
@@ -371,7 +367,7 @@ fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
     Ok(files)
 }
 
-/// Names that stand for others.
+/// Symbolic links.
 #[cfg(unix)]
 mod link {
     use super::{CURRENT, Error, Path, Result, atomic, fs};
@@ -380,7 +376,7 @@ mod link {
         Some(fs::read_link(path).ok()?.to_string_lossy().into_owned())
     }
 
-    /// Puts a link in its place by one rename, whatever was there.
+    /// Places a link by one rename, whatever was there.
     pub fn place(path: &Path, target: &str) -> Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let beside = folder.join(format!("{}link", atomic::TEMPORARY));
@@ -390,9 +386,8 @@ mod link {
         fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
     }
 
-    /// Gives each file of a night its name in the folder of reports; names that it does not have
-    /// go.
-    pub fn beside<'a>(
+    /// Links each file of a night in the folder of reports, and removes the links of other files.
+    pub fn place_all<'a>(
         reports: &Path,
         _: &Path,
         names: impl Iterator<Item = &'a String>,
@@ -423,7 +418,7 @@ mod link {
     }
 }
 
-/// Where there are no links: the pointer is a text file, the files are copies.
+/// Systems without links: the pointer is a text file, the files are copies.
 #[cfg(not(unix))]
 mod link {
     use super::{Error, Path, Result, atomic, fs};
@@ -436,7 +431,7 @@ mod link {
         atomic::place(path, target.as_bytes())
     }
 
-    pub fn beside<'a>(
+    pub fn place_all<'a>(
         reports: &Path,
         night: &Path,
         names: impl Iterator<Item = &'a String>,

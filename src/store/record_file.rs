@@ -1,10 +1,10 @@
-//! A record as a Parquet file: per signal a column of values and one of marks, the clock in the
+//! Records as Parquet files: for each signal a column of values and one of marks, the clock in the
 //! file's key-value metadata.
 //!
-//! It is written row group by row group, the signals of a group in parallel, and read by windows of
-//! time and by signals: nothing ever needs a whole record in memory. Writing and reading back
-//! returns the record to the bit. Nothing but the record is in the bytes: no time, no host, nor the
-//! pieces in which it was written.
+//! A record is written row group by row group, the signals of a group in parallel, and read by
+//! signals and windows of time, so no whole record is ever in memory. Reading back returns every
+//! bit. The bytes depend on the record alone: not on time, host, or the pieces in which it was
+//! written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::flight::record::Series;
 use crate::flight::{Correction, Mark, Record};
 
-/// The end of the name of a signal's column of marks.
+/// Suffix of a signal's column of marks.
 const MARK: &str = ":mark";
 
 const FLIGHT: &str = "flight_id";
@@ -40,28 +40,27 @@ const START: &str = "start_s";
 const STEP: &str = "step_s";
 const SAMPLES: &str = "samples";
 
-/// The beginning of the key of a signal that is one value throughout.
+/// Prefix of the metadata key of a constant signal.
 const CONSTANT: &str = "constant:";
 
-/// The samples of a row group: what is encoded of one signal is in memory until its group is
-/// written.
+/// Samples of a row group; the encoded signal stays in memory until its group is written.
 pub const GROUP: usize = 1 << 19;
 
-/// The samples of a page: what has to be decoded for one sample.
+/// Samples of a page, which is decoded whole for any of its samples.
 const PAGE: usize = 1 << 14;
 
-/// What a record is about: everything but its samples.
+/// Id, clock and constants of a record.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct About {
+pub struct RecordHeader {
     pub flight_id: String,
     pub start_s: f64,
     pub step_s: f64,
     pub samples: usize,
-    /// Signals that are one value throughout.
+    /// Values of constant signals.
     pub constants: BTreeMap<String, f64>,
 }
 
-impl About {
+impl RecordHeader {
     fn metadata(&self) -> Vec<KeyValue> {
         let constants = self
             .constants
@@ -87,7 +86,7 @@ impl About {
     }
 }
 
-/// A record that is being written.
+/// Writer of a record.
 #[expect(missing_debug_implementations, reason = "the writer within has none")]
 pub struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
@@ -103,22 +102,21 @@ impl<W: Write + Send> Writer<W> {
     /// Begins a record of these signals.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn create<'s>(
-        about: &About,
+        header: &RecordHeader,
         signals: impl Iterator<Item = &'s str>,
         out: W,
     ) -> Result<Writer<W>, String> {
         let mut fields = Vec::new();
-        // Uncompressed values: to compress what is mostly noise takes longer than to write it. A
-        // sample as it was measured, as nearly all are, has no mark: pages without one cost
-        // nothing.
+        // Values stay uncompressed: noise hardly compresses, and writing it is faster. An unchanged
+        // sample has a null mark: pages of nulls cost nothing.
         let mut properties = WriterProperties::builder()
             .set_compression(Compression::UNCOMPRESSED)
             .set_dictionary_enabled(false)
             .set_statistics_enabled(EnabledStatistics::None)
             .set_data_page_row_count_limit(PAGE)
-            .set_key_value_metadata(Some(about.metadata()));
+            .set_key_value_metadata(Some(header.metadata()));
         for signal in signals {
             fields.push(Field::new(signal, DataType::Float64, false));
             let marks = format!("{signal}{MARK}");
@@ -126,8 +124,7 @@ impl<W: Write + Send> Writer<W> {
             properties = properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
             fields.push(Field::new(marks, DataType::UInt8, true));
         }
-        // Without the serialised Arrow schema, the key-value metadata is all there is and its order
-        // is ours.
+        // Without the serialised Arrow schema the order of the metadata is fixed here.
         let schema = Arc::new(Schema::new(fields));
         let parquet = ArrowSchemaConverter::new()
             .convert(&schema)
@@ -143,11 +140,10 @@ impl<W: Write + Send> Writer<W> {
         })
     }
 
-    /// The writers of the next row group, one per signal in their order; each takes the group's
-    /// samples.
+    /// Begins a row group: one writer for each signal, in their order.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn group(&mut self) -> Result<Vec<SignalWriter>, String> {
         let mut columns = self
             .factory
@@ -169,11 +165,11 @@ impl<W: Write + Send> Writer<W> {
         Ok(signals)
     }
 
-    /// Writes the next row group: what its writers made, in batches, in their order. While one
-    /// batch is written the next is made.
+    /// Writes the row group, whose encoded signals `next` yields in batches, in their order. While
+    /// one batch is written the next is encoded.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn append(
         &mut self,
         mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String> + Send,
@@ -198,13 +194,13 @@ impl<W: Write + Send> Writer<W> {
     /// Ends the record.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn finish(self) -> Result<(), String> {
         self.file.close().map(|_| ()).map_err(|e| refused(&e))
     }
 }
 
-/// One signal's part of a row group, as it is written.
+/// Writer of one signal's part of a row group.
 #[expect(missing_debug_implementations, reason = "the writers within have none")]
 pub struct SignalWriter {
     values: ArrowColumnWriter,
@@ -212,22 +208,22 @@ pub struct SignalWriter {
     pending: Series,
 }
 
-/// One signal's part of a row group, encoded: its values and its marks.
+/// Encoded part of one signal in a row group: values and marks.
 #[expect(missing_debug_implementations, reason = "the columns within have none")]
 pub struct SignalChunk([ArrowColumnChunk; 2]);
 
 impl SignalWriter {
-    /// The next samples.
+    /// Adds the next samples.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn push(&mut self, series: &Series) -> Result<(), String> {
         if series.values.len() != series.marks.len() {
             return Err(refused(&"a series with more values than marks, or fewer"));
         }
         self.pending.values.extend_from_slice(&series.values);
         self.pending.marks.extend_from_slice(&series.marks);
-        // Whole pages, whatever the pieces: so the bytes do not tell them.
+        // Whole pages make the bytes independent of the pieces.
         let whole = self.pending.values.len() / PAGE * PAGE;
         for from in (0..whole).step_by(PAGE) {
             self.page(from..from + PAGE)?;
@@ -260,10 +256,10 @@ impl SignalWriter {
         Ok(())
     }
 
-    /// The encoded group.
+    /// Ends the row group of this signal.
     ///
     /// # Errors
-    /// The reason in words.
+    /// The reason.
     pub fn close(mut self) -> Result<SignalChunk, String> {
         let rest = self.pending.values.len();
         if rest > 0 {
@@ -277,9 +273,9 @@ impl SignalWriter {
 /// Writes a record that is in memory.
 ///
 /// # Errors
-/// The reason in words: a series of another length than the record, or a disk that said no.
+/// The reason: a series of another length than the record, or a disk that failed.
 pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
-    let about = About {
+    let header = RecordHeader {
         flight_id: record.flight_id.clone(),
         start_s: record.start_s,
         step_s: record.step_s,
@@ -293,7 +289,7 @@ pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
             record.samples
         )));
     }
-    let mut writer = Writer::create(&about, record.signals.keys().map(String::as_str), out)?;
+    let mut writer = Writer::create(&header, record.signals.keys().map(String::as_str), out)?;
     for from in (0..record.samples).step_by(GROUP) {
         let to = (from + GROUP).min(record.samples);
         let mut parts = writer.group()?.into_iter().zip(record.signals.values());
@@ -311,13 +307,13 @@ pub fn write(record: &Record, out: impl Write + Send) -> Result<(), String> {
     writer.finish()
 }
 
-/// A record on the disk: read by windows of time and by signals.
+/// A record on the disk, read by signals and windows of time.
 #[derive(Clone, Debug)]
 pub struct RecordFile {
     path: PathBuf,
     metadata: ArrowReaderMetadata,
-    pub about: About,
-    /// Applied to what is read.
+    pub header: RecordHeader,
+    /// Corrections applied as samples are read.
     corrections: Vec<Correction>,
 }
 
@@ -347,7 +343,7 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
     {
         constants.insert(name.to_owned(), number(key)?);
     }
-    let about = About {
+    let header = RecordHeader {
         flight_id: text(FLIGHT)?.clone(),
         start_s: number(START)?,
         step_s: number(STEP)?,
@@ -359,7 +355,7 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
     Ok(RecordFile {
         path: path.to_owned(),
         metadata,
-        about,
+        header,
         corrections: vec![],
     })
 }
@@ -371,17 +367,17 @@ fn not_a_record(path: &Path, what: &dyn std::fmt::Display) -> Error {
     )
 }
 
-/// Reads a whole record; a flight's is better read by windows.
+/// Reads a whole record. A long flight is better read by windows.
 ///
 /// # Errors
 /// As [`open`], and samples that cannot be read.
 pub fn read(path: &Path) -> Result<Record, Error> {
     let file = open(path)?;
-    file.window(None, 0..file.about.samples)
+    file.window(None, 0..file.header.samples)
 }
 
 impl RecordFile {
-    /// The same record, signals corrected as it is read.
+    /// The same record with corrections applied as it is read.
     #[must_use]
     pub fn corrected(self, corrections: Vec<Correction>) -> RecordFile {
         RecordFile {
@@ -390,16 +386,16 @@ impl RecordFile {
         }
     }
 
-    /// The sample nearest to a time, kept inside the record.
+    /// Index of the sample nearest to a time, inside the record.
     #[must_use]
     pub fn sample_at(&self, time_s: f64) -> usize {
-        self.about
-            .record(&(0..self.about.samples))
+        self.header
+            .record(&(0..self.header.samples))
             .sample_at(time_s)
     }
 
-    /// The part of the record from one time to another with a few samples more on each side, as
-    /// [`Record::part`] cuts it.
+    /// Reads from one time to another with a few samples more on each side, as [`Record::part`]
+    /// does.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
@@ -411,12 +407,12 @@ impl RecordFile {
     ) -> Result<Record, Error> {
         const MARGIN: usize = 10;
         let from = self.sample_at(start_s).saturating_sub(MARGIN);
-        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.about.samples);
+        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.header.samples);
         self.window(signals, from..to)
     }
 
-    /// A range of samples of some signals, or of all; signals that the record does not have are
-    /// left out.
+    /// Reads a range of samples of some signals, or of all. Signals that the record lacks are left
+    /// out.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -425,15 +421,15 @@ impl RecordFile {
         signals: Option<&BTreeSet<String>>,
         samples: Range<usize>,
     ) -> Result<Record, Error> {
-        let samples = samples.start.min(self.about.samples)..samples.end.min(self.about.samples);
+        let samples = samples.start.min(self.header.samples)..samples.end.min(self.header.samples);
         let reach = self
             .corrections
             .iter()
-            .map(|c| c.reach(self.about.step_s))
+            .map(|c| c.reach(self.header.step_s))
             .max()
             .unwrap_or(0);
         let wide =
-            samples.start.saturating_sub(reach)..(samples.end + reach).min(self.about.samples);
+            samples.start.saturating_sub(reach)..(samples.end + reach).min(self.header.samples);
         let mut record = self.as_written(signals, wide.clone())?;
         self.corrections
             .iter()
@@ -443,7 +439,7 @@ impl RecordFile {
         }
         let inside = samples.start - wide.start..samples.end - wide.start;
         Ok(Record {
-            start_s: self.about.record(&samples).start_s,
+            start_s: self.header.record(&samples).start_s,
             ..record.cut(None, inside)
         })
     }
@@ -453,9 +449,14 @@ impl RecordFile {
         signals: Option<&BTreeSet<String>>,
         samples: Range<usize>,
     ) -> Result<Record, Error> {
-        let mut record = self.about.record(&samples);
+        let mut record = self.header.record(&samples);
         let wanted = |name: &str| signals.is_none_or(|s| s.contains(name));
-        for (name, value) in self.about.constants.iter().filter(|(name, _)| wanted(name)) {
+        for (name, value) in self
+            .header
+            .constants
+            .iter()
+            .filter(|(name, _)| wanted(name))
+        {
             let constant = Series {
                 values: vec![*value; samples.len()],
                 marks: vec![Mark::Measured; samples.len()],
@@ -478,7 +479,7 @@ impl RecordFile {
         let mask = ProjectionMask::roots(builder.parquet_schema(), columns);
         let selection = RowSelection::from_consecutive_ranges(
             std::iter::once(samples.clone()),
-            self.about.samples,
+            self.header.samples,
         );
         let reader = builder
             .with_projection(mask)
@@ -492,7 +493,7 @@ impl RecordFile {
         match record.signals.iter().find(|(_, s)| !whole(s)) {
             Some((name, _)) => Err(bad(&format!(
                 "signal `{name}` has not {} samples",
-                self.about.samples
+                self.header.samples
             ))),
             None => Ok(record),
         }
@@ -500,23 +501,23 @@ impl RecordFile {
 }
 
 impl RecordFile {
-    /// The whole record for a picture: where it has more samples than `most`, the smallest and the
-    /// largest of each of several samples in their order. Signals are read one at a time.
+    /// Reads the whole record for a chart. Of more samples than `most`, the smallest and the
+    /// largest of several neighbours are kept in their order. Signals are read one at a time.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
     pub fn outline(&self, most: usize) -> Result<Record, Error> {
-        let all = 0..self.about.samples;
+        let all = 0..self.header.samples;
         if all.len() <= most {
             return self.window(None, all);
         }
         let width = (2 * all.len()).div_ceil(most.max(2)).max(2);
-        let mut outline = self.about.record(&(0..2 * all.len().div_ceil(width)));
-        outline.step_s = self.about.step_s * width as f64 / 2.0;
+        let mut outline = self.header.record(&(0..2 * all.len().div_ceil(width)));
+        outline.step_s = self.header.step_s * width as f64 / 2.0;
         let fields = self.metadata.schema().fields().iter().map(|f| f.name());
         let recorded = fields
             .filter(|name| !name.ends_with(MARK))
-            .chain(self.about.constants.keys());
+            .chain(self.header.constants.keys());
         for name in recorded {
             let signals = BTreeSet::from([name.clone()]);
             for (name, series) in self.window(Some(&signals), all.clone())?.signals {
@@ -527,8 +528,8 @@ impl RecordFile {
     }
 }
 
-/// The smallest and the largest of each so many samples, in their order; the mark of one with a
-/// fault, if there is one.
+/// Smallest and largest of every `step` samples, in their order, with the mark of a faulty sample
+/// if there is one.
 fn extremes(series: &Series, width: usize) -> Series {
     let mut outline = Series {
         values: Vec::new(),
@@ -668,7 +669,7 @@ mod tests {
         assert_eq!(bytes(&record()), bytes(&record()));
     }
 
-    /// A signal long enough for several row groups and pages.
+    /// A signal of several row groups and pages.
     fn long() -> Record {
         let samples = GROUP + 3 * PAGE + 77;
         let values: Vec<f64> = (0..samples).map(|k| (k as f64 * 0.01).sin()).collect();
@@ -740,14 +741,14 @@ mod tests {
 
     #[test]
     fn constants_come_back_in_every_window() {
-        let about = About {
+        let header = RecordHeader {
             samples: 3,
             step_s: 0.1,
             constants: [("mach".to_owned(), 0.3)].into(),
-            ..About::default()
+            ..RecordHeader::default()
         };
         let mut out = Vec::new();
-        let mut writer = Writer::create(&about, ["obes"].into_iter(), &mut out).expect("a writer");
+        let mut writer = Writer::create(&header, ["obes"].into_iter(), &mut out).expect("a writer");
         let mut parts = writer.group().expect("a group").into_iter();
         let flag = Series {
             values: vec![0.0; 3],

@@ -1,7 +1,7 @@
-//! A flight as its recorder writes it: Parquet, a column per channel in the recorder's unit, the
+//! Flights as a recorder writes them: Parquet, one column a channel in the recorder's unit, the
 //! unit in the field's metadata.
 //!
-//! What [`super::archive::read`] reads: a value that was lost is a null.
+//! [`super::archive::read`] reads these files. A lost value is a null.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -15,10 +15,10 @@ use parquet::file::properties::WriterProperties;
 use super::archive::UNIT;
 use crate::flight::channel::RawColumn;
 
-/// The columns, all of one length, as the bytes of a Parquet file.
+/// Encodes columns of one length as the bytes of a Parquet file.
 ///
 /// # Errors
-/// The reason in words.
+/// The reason.
 pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
     let field = |(name, column): (&String, &RawColumn)| {
         let unit = column

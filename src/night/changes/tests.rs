@@ -1,12 +1,13 @@
 //! Two nights that differ in one thing: that is found, with its cause, and nothing else is.
 
 use super::*;
+use crate::lineage::Lineage;
 use crate::tables::TunnelVerdict;
 
 #[derive(Clone)]
 struct Campaign {
     lineage: Lineage,
-    maneuvers: Vec<Window>,
+    maneuvers: Vec<ManeuverWindow>,
     fits: Vec<FitRow>,
     estimates: Vec<EstimateRow>,
     trends: Vec<PublishedTrend>,
@@ -14,7 +15,7 @@ struct Campaign {
 }
 
 impl Campaign {
-    fn tables(&self) -> Tables<'_> {
+    fn tables(&self) -> NightTables<'_> {
         let Campaign {
             lineage,
             maneuvers,
@@ -23,7 +24,7 @@ impl Campaign {
             trends,
             verdicts,
         } = self;
-        Tables {
+        NightTables {
             lineage,
             maneuvers,
             fits,
@@ -38,7 +39,7 @@ impl Campaign {
         self.lineage
             .flights
             .insert(flight.to_owned(), "01".to_owned());
-        self.maneuvers.push(Window {
+        self.maneuvers.push(ManeuverWindow {
             maneuver_id: maneuver_id.clone(),
             flight_id: flight.to_owned(),
             class: class.to_owned(),

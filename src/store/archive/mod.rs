@@ -1,8 +1,8 @@
-//! The archive: Parquet files of flight records in a folder, under a glob, or in a hive-partitioned
-//! tree; or objects of an object store under the same names.
+//! The archive: Parquet files of flights in a folder, under a glob, or in a hive-partitioned tree;
+//! or objects of an object store under the same names.
 //!
-//! Only the columns of the channel map are read, each by itself, row group by row group and page by
-//! page, into numbers; what a file cannot give is a problem of its flight, never a panic.
+//! Only the columns of the channel map are read, one at a time, page by page, into numbers. A fault
+//! of a file is a problem of its flight, never a panic.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,41 +30,40 @@ use crate::units::Unit;
 
 use super::object;
 
-/// The files of one flight, in the order of its time.
+/// Files of one flight, in the order of their names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlightFiles {
     pub flight_id: String,
     pub files: Vec<PathBuf>,
-    /// Files of another place that would be the same flight.
+    /// Files elsewhere in the archive that claim to be the same flight.
     pub rivals: Vec<PathBuf>,
 }
 
-/// A tree deeper than this is a loop of links.
+/// Deepest tree of folders; a deeper one is a loop of links.
 const DEPTH: usize = 16;
 
-/// Rows decoded at a time: a few MB, whatever the size of the file's row groups.
+/// Rows decoded at a time: a few MB for row groups of any size.
 const BATCH_ROWS: usize = 16_384;
 
-/// Whether other programs use such a name for their own.
+/// `true` for a name that other programs reserve for temporary files.
 fn is_hidden(name: &str) -> bool {
     name.starts_with(['.', '_'])
 }
 
-/// The most numbers that are read of a file, rows times mapped columns: ten hours of sixty channels
-/// at 200 Hz. A file of a few kilobytes can claim any number of rows, and would be read for as
-/// long.
+/// Most numbers of a file, rows times mapped columns: more than ten hours of sixty channels at 200
+/// Hz. A damaged file of a few kilobytes can claim any number of rows.
 const LARGEST_FILE: u64 = 500_000_000;
 
-/// The field metadata that states a column's unit.
+/// Key of the field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
 
-/// The flights of an archive, sorted by flight: a folder (searched for `*.parquet`, sub-folders
-/// too), a glob or a single file. The files of one folder `flight=007` are one flight of that name;
-/// otherwise a file is a flight named by its stem.
+/// Finds the flights of an archive, sorted by flight. An archive is a folder (searched for
+/// `*.parquet` with its sub-folders), a glob or a single file. The files of one folder `flight=007`
+/// are one flight of that name; any other file is a flight named by its stem.
 ///
 /// # Errors
-/// No file is found, or the archive's own folder cannot be read. A folder below it that cannot be
-/// read stands among the files, as one that cannot be read.
+/// No file is found, or the archive's own folder cannot be read. An unreadable folder below it is
+/// listed like an unreadable file.
 pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     let mut files = BTreeSet::new();
     if object::is_object(Path::new(archive)) {
@@ -95,8 +94,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     Ok(flights(files))
 }
 
-/// Adds the Parquet files below a folder; names that begin with a dot or an underscore are other
-/// programs' own.
+/// Adds the Parquet files below a folder, except names with a leading dot or underscore.
 fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
     let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
     for entry in fs::read_dir(folder).map_err(unreadable)? {
@@ -143,7 +141,7 @@ fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
     flights.into_values().map(|(_, flight)| flight).collect()
 }
 
-/// The flight that a file belongs to, and the folder or file that all of it comes from.
+/// Flight of a file, and the folder or file that holds the whole flight.
 fn identity(file: &Path) -> (String, PathBuf) {
     for folder in file.ancestors().skip(1) {
         let name = folder
@@ -165,13 +163,12 @@ fn identity(file: &Path) -> (String, PathBuf) {
 }
 
 thread_local! {
-    /// Whether this thread is reading a file of which it need not be said that it made the reader
-    /// panic.
+    /// `true` while this thread reads a file whose panic is not printed.
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The files of a flight, opened: what their footers say. Columns are read from them one at a time,
-/// so that memory holds one page of one column and not of all.
+/// Files of a flight with their footers. Columns are read one at a time, so memory holds one page
+/// of one column.
 #[derive(Debug)]
 pub struct Opened {
     flight_id: String,
@@ -181,7 +178,7 @@ pub struct Opened {
 #[derive(Debug)]
 struct OpenFile {
     path: PathBuf,
-    /// Where the file is an object.
+    /// Set for an object.
     object: Option<object::Reader>,
     metadata: ArrowReaderMetadata,
     columns: BTreeMap<String, OpenColumn>,
@@ -192,7 +189,7 @@ struct OpenFile {
 struct OpenColumn {
     at: usize,
     unit: Option<String>,
-    /// For timestamps and durations, from their ticks to the channel map's unit.
+    /// Factor from the ticks of timestamps and durations to the channel map's unit.
     clock_factor: Option<f64>,
 }
 
@@ -217,8 +214,8 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
     })
 }
 
-/// The Parquet reader is trusted with good files only: bytes that make it panic are a bad file,
-/// too; silently, for the reason goes into a table.
+/// Runs the Parquet reader and treats its panic as a fault of the file. The panic is not printed:
+/// its reason becomes a problem.
 fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -247,8 +244,7 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
         .transpose()
         .map_err(|e| e.to_string())?;
     let metadata = if let Some(object) = &object {
-        // Where its pages lie, a file in an object store is asked for if it knows: then no others
-        // are fetched.
+        // The page index of an object avoids fetching other pages.
         let options =
             ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
         ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
@@ -396,7 +392,7 @@ impl OpenFile {
     }
 }
 
-/// Hands over an array as numbers, a null as NaN.
+/// Passes an array on as numbers, a null as NaN.
 fn hand_over(
     array: &dyn Array,
     clock_factor: Option<f64>,
@@ -433,10 +429,10 @@ fn hand_over(
     Ok(())
 }
 
-/// The mapped columns of a flight in memory, file by file, for what looks at one flight alone.
+/// Reads the mapped columns of a flight into memory, file by file.
 ///
 /// # Errors
-/// As [`open`], and what cannot be read.
+/// As [`open`]; a column that cannot be read.
 pub fn read(
     files: &FlightFiles,
     channels: &BTreeMap<String, Channel>,
@@ -487,8 +483,7 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
     ))
 }
 
-/// For timestamps and durations, the factor from their ticks to the unit that the channel map
-/// states.
+/// Factor from the ticks of timestamps and durations to the unit of the channel map.
 fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
     let (DataType::Timestamp(tick, _) | DataType::Duration(tick)) = found else {
         return None;

@@ -1,5 +1,4 @@
-//! The archive in an object store: which objects are flights, and which of their bytes a column
-//! takes.
+//! The archive in an object store: the objects that are flights, and the byte ranges of a column.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -14,8 +13,8 @@ use super::super::object;
 use super::{is_hidden, unreadable};
 use crate::error::Error;
 
-/// The objects of an archive `s3://bucket/prefix`: those below it whose names end in `.parquet`,
-/// the one of this name, or those that match it as a glob.
+/// Finds the objects of an archive `s3://bucket/prefix`: those below it whose names end in
+/// `.parquet`, the object of this name, or those that match it as a glob.
 ///
 /// # Errors
 /// The objects cannot be listed.
@@ -53,8 +52,7 @@ pub(super) fn find(archive: &str) -> Result<BTreeSet<PathBuf>, Error> {
     Ok(found)
 }
 
-/// Whether an object lies in a folder, or is the one of this name; names that begin with a dot or
-/// an underscore are other programs' own.
+/// `true` for an object in a folder or of this name, except names with a leading dot or underscore.
 fn is_below(folder: &str, object: &str) -> bool {
     let Some(rest) = object.strip_prefix(folder) else {
         return false;
@@ -66,7 +64,7 @@ fn is_below(folder: &str, object: &str) -> bool {
     rest.is_empty() || rest.starts_with('/') && is_flight() && !rest.split('/').any(is_hidden)
 }
 
-/// Whether a glob matches an object, or a folder that it lies in.
+/// `true` if a glob matches an object or one of its folders.
 fn matches(glob: &Pattern, object: &str) -> bool {
     let options = MatchOptions {
         require_literal_separator: true,
@@ -77,14 +75,13 @@ fn matches(glob: &Pattern, object: &str) -> bool {
         || folders.any(|folder| glob.matches_with(folder, options) && is_below(folder, object))
 }
 
-/// Why an object cannot be opened: what the store says, or that it is no Parquet.
+/// Reason that an object cannot be opened: the store's answer, or that it is no Parquet.
 pub(super) fn why(path: &Path, error: &ParquetError) -> String {
     object::failed(path).unwrap_or_else(|| unreadable(error))
 }
 
-/// The bytes of an object that these rows of a column take: of each row group the column's pages
-/// that hold them, where the file tells its pages, else all of the column; and the dictionary
-/// before them.
+/// Byte ranges of these rows of a column. In each row group these are the dictionary and the pages
+/// with the rows, or the whole column of a file without a page index.
 pub(super) fn stretches(
     metadata: &ParquetMetaData,
     column: usize,
@@ -127,7 +124,7 @@ pub(super) fn stretches(
             stretches.push(begin(*first)..begin(last + 1));
         }
     }
-    // A first page right behind the dictionary is fetched with it.
+    // A first page directly after the dictionary is fetched with it.
     stretches.dedup_by(|next, before| {
         let joins = before.end == next.start;
         if joins {
@@ -201,8 +198,7 @@ mod tests {
         ));
     }
 
-    /// A file of two row groups of 1000 rows in pages of 100, with or without the places of its
-    /// pages.
+    /// A file of two row groups of 1000 rows in pages of 100, with or without a page index.
     fn metadata(pages: PageIndexPolicy) -> ArrowReaderMetadata {
         let schema = Arc::new(Schema::new(
             ["a", "b"]
@@ -247,7 +243,7 @@ mod tests {
         let few = stretches(told.metadata(), 1, &(1310..1390));
         let bytes: u64 = few.iter().map(|s| s.end - s.start).sum();
         let whole = column(1);
-        // The dictionary, which holds the thousand values, and one page of ten.
+        // The dictionary of a thousand values, and one page of ten.
         assert!(
             few.iter()
                 .all(|s| whole.start <= s.start && s.end <= whole.end),

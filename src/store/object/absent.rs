@@ -1,14 +1,13 @@
-//! What stands in place of the connection in a program that was built without object stores: an
-//! error that says so.
+//! The connection of a program built without object stores: every request fails with that reason.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use bytes::Bytes;
 
-use super::{About, Failure};
+use super::{Failure, ObjectInfo};
 
-/// There is none.
+/// No connection.
 #[derive(Debug)]
 pub enum Client {}
 
@@ -22,11 +21,11 @@ impl Client {
         available().and_then(|()| Err(Failure::Lasting(String::new())))
     }
 
-    pub fn list(&self, _: &str) -> Result<BTreeMap<String, About>, Failure> {
+    pub fn list(&self, _: &str) -> Result<BTreeMap<String, ObjectInfo>, Failure> {
         match *self {}
     }
 
-    pub fn remember(&self, _: String, _: About) {
+    pub fn remember(&self, _: String, _: ObjectInfo) {
         match *self {}
     }
 
@@ -34,11 +33,11 @@ impl Client {
         match *self {}
     }
 
-    pub fn listed(&self, _: &str) -> Option<About> {
+    pub fn listed(&self, _: &str) -> Option<ObjectInfo> {
         match *self {}
     }
 
-    pub fn about(&self, _: &str) -> Result<Option<About>, Failure> {
+    pub fn about(&self, _: &str) -> Result<Option<ObjectInfo>, Failure> {
         match *self {}
     }
 

@@ -1,9 +1,8 @@
-//! The connection to a bucket: requests of the `object_store` crate, each waited for by the thread
-//! that makes it.
+//! The connection to a bucket: requests of the `object_store` crate, each awaited by its thread.
 //!
-//! Retries with backoff are that crate's; they end within half a minute, and after [`SILENT`]
-//! requests in a row without an answer nobody is asked again in this run: a dead endpoint costs a
-//! minute, not a minute for every flight.
+//! The crate retries with backoff for up to half a minute. After [`SILENT_REQUESTS`] requests in a row
+//! without an answer no more are made in this run, so a dead endpoint costs one minute and not one
+//! for each flight.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,19 +19,19 @@ use object_store::{
 };
 use tokio::runtime::Runtime;
 
-use super::{About, Failure};
+use super::{Failure, ObjectInfo};
 
-/// So many requests in a row without an answer, and the endpoint is taken for dead.
-const SILENT: usize = 3;
+/// Requests in a row without an answer after which the endpoint counts as dead.
+const SILENT_REQUESTS: usize = 3;
 
-/// After so long a request that failed is not tried again. What was begun before may take as long
-/// once more.
+/// Time after which a failed request is not repeated. A repetition begun before may take as long
+/// again.
 const PATIENCE: Duration = Duration::from_secs(25);
 
 const ENDPOINTS: [&str; 3] = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
 
-/// Other sources of credentials than a key and its secret. Without any, machines in Amazon's cloud
-/// would be asked for theirs, and elsewhere nobody answers that.
+/// Other sources of credentials than a key and its secret. Without any the crate would ask the
+/// metadata service of Amazon's cloud, which does not exist elsewhere.
 const CREDENTIALS: [&str; 4] = [
     "AWS_WEB_IDENTITY_TOKEN_FILE",
     "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
@@ -44,24 +43,24 @@ pub struct Client {
     runtime: Runtime,
     store: AmazonS3,
     bucket: String,
-    /// As messages name it.
+    /// Name in messages.
     endpoint: String,
-    /// What lists have told, where it was asked to be remembered.
-    listed: Mutex<BTreeMap<String, About>>,
+    /// Remembered entries of listings.
+    listed: Mutex<BTreeMap<String, ObjectInfo>>,
     trouble: Mutex<Trouble>,
 }
 
-/// What did not go well.
+/// Failures of this run.
 #[derive(Default)]
 struct Trouble {
     silent: usize,
-    /// Keys whose request was not granted, and why.
+    /// Keys whose request failed, with the reason.
     failed: BTreeMap<String, String>,
 }
 
 impl std::fmt::Debug for Client {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Nothing more: the rest knows the credentials.
+        // The other fields hold credentials.
         f.debug_struct("Client")
             .field("bucket", &self.bucket)
             .field("endpoint", &self.endpoint)
@@ -81,7 +80,7 @@ fn set(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
-/// What is missing in the environment, or at odds there.
+/// Fault of the environment: something missing or contradictory.
 fn refuse_environment() -> Result<(), Failure> {
     let has_key = set("AWS_ACCESS_KEY_ID").is_some() && set("AWS_SECRET_ACCESS_KEY").is_some();
     if !has_key && !CREDENTIALS.iter().any(|name| set(name).is_some()) {
@@ -101,14 +100,14 @@ fn refuse_environment() -> Result<(), Failure> {
     }
 }
 
-/// An error and what caused it, each once.
+/// Messages of an error and its causes, each once.
 fn words(error: &dyn std::error::Error) -> Vec<String> {
     std::iter::successors(Some(error), |e| e.source())
         .map(ToString::to_string)
         .collect()
 }
 
-/// What S3 calls an error.
+/// S3's code of an error.
 fn code(text: &str) -> Option<&str> {
     text.split_once("<Code>")?
         .1
@@ -164,7 +163,7 @@ impl Client {
         })
     }
 
-    /// The answer to a request about a key; none where there is no such object.
+    /// Awaits the answer to a request about a key; `None` if there is no such object.
     fn ask<T>(
         &self,
         key: &str,
@@ -175,9 +174,9 @@ impl Client {
             trouble().failed.insert(key.to_owned(), what.clone());
             Failure::Passing(what)
         };
-        if trouble().silent >= SILENT {
+        if trouble().silent >= SILENT_REQUESTS {
             return Err(unanswered(format!(
-                "{} did not answer {SILENT} requests in a row and is not asked again; run again when it does",
+                "{} did not answer {SILENT_REQUESTS} requests in a row and is not asked again; run again when it does",
                 self.endpoint
             )));
         }
@@ -205,7 +204,7 @@ impl Client {
         }
     }
 
-    /// What an error tells of its request.
+    /// Classifies the error of a request.
     fn told(&self, error: &Error) -> Told {
         let (words, endpoint, bucket) = (words(error), &self.endpoint, &self.bucket);
         let text = words.join("\n");
@@ -262,8 +261,8 @@ impl Client {
             .cloned()
     }
 
-    /// All objects whose keys begin with this.
-    pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, About>, Failure> {
+    /// Lists the objects whose keys begin with a prefix.
+    pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, ObjectInfo>, Failure> {
         let (mut found, mut page_token) = (BTreeMap::new(), None);
         loop {
             let options = PaginatedListOptions {
@@ -295,14 +294,14 @@ impl Client {
         }
     }
 
-    pub fn remember(&self, key: String, about: About) {
+    pub fn remember(&self, key: String, about: ObjectInfo) {
         self.listed
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .insert(key, about);
     }
 
-    pub fn listed(&self, key: &str) -> Option<About> {
+    pub fn listed(&self, key: &str) -> Option<ObjectInfo> {
         self.listed
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -310,7 +309,7 @@ impl Client {
             .cloned()
     }
 
-    pub fn about(&self, key: &str) -> Result<Option<About>, Failure> {
+    pub fn about(&self, key: &str) -> Result<Option<ObjectInfo>, Failure> {
         let path = Self::key(key)?;
         Ok(self.ask(key, self.store.head(&path))?.as_ref().map(about))
     }
@@ -320,7 +319,7 @@ impl Client {
         self.ask(key, async { self.store.get(&path).await?.bytes().await })
     }
 
-    /// A part of an object, of the content that had this tag.
+    /// Reads a range of an object whose content has this tag.
     pub fn range(&self, key: &str, range: Range<u64>, tag: Option<&str>) -> Result<Bytes, Failure> {
         let path = Self::key(key)?;
         let expected = range.end - range.start;
@@ -355,7 +354,7 @@ impl Client {
         self.ask(key, self.store.delete(&path)).map(|_| ())
     }
 
-    /// Puts an object in parts, until one is empty; it appears with the last one.
+    /// Puts an object in parts until one is empty. The object appears with the last part.
     pub fn put_parts(
         &self,
         key: &str,
@@ -367,7 +366,7 @@ impl Client {
         let mut upload = self.written(upload)?;
         let sent = self.send_parts(key, first, next, &mut *upload);
         if sent.is_err() {
-            // Parts that cannot be taken back either are the bucket's lifecycle rules' to remove.
+            // Lifecycle rules of the bucket remove parts that cannot be aborted.
             let _ = self.runtime.block_on(upload.abort());
         }
         sent
@@ -388,7 +387,7 @@ impl Client {
         self.written(self.ask(key, upload.complete())?).map(|_| ())
     }
 
-    /// What is written is missing only where its bucket is.
+    /// A write fails with `not found` only if the bucket is missing.
     fn written<T>(&self, answer: Option<T>) -> Result<T, Failure> {
         let what = || {
             format!(
@@ -400,16 +399,16 @@ impl Client {
     }
 }
 
-/// What came of a request that was not granted.
+/// Kind of a failed request.
 enum Told {
     Missing,
     Refused(Failure),
-    /// Nobody answered, or with nothing that could be understood.
+    /// No answer, or none that could be parsed.
     Nothing(String),
 }
 
-fn about(object: &ObjectMeta) -> About {
-    About {
+fn about(object: &ObjectMeta) -> ObjectInfo {
+    ObjectInfo {
         bytes: object.size,
         tag: object.e_tag.clone(),
     }

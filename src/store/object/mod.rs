@@ -1,10 +1,9 @@
-//! Objects of an S3-compatible store, `s3://bucket/key`, as archive and store use them: listed,
-//! read by ranges, put whole.
+//! Objects of an S3-compatible store, `s3://bucket/key`: listed, read by ranges, put whole.
 //!
-//! What connects is the environment's alone (`AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
-//! `AWS_SESSION_TOKEN`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP` and what else the
-//! `object_store` crate reads there): no file of the pipeline and no option holds a secret. An
-//! object is replaced by a single request or not at all, so none is ever half written.
+//! Endpoint and credentials come from the environment alone (`AWS_ACCESS_KEY_ID`,
+//! `AWS_SECRET_ACCESS_KEY`, `AWS_SESSION_TOKEN`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP`
+//! and others that the `object_store` crate reads): no file of the pipeline and no option holds a
+//! secret. An object is replaced by a single request or not at all, so none is ever half written.
 
 #[cfg(not(feature = "s3"))]
 #[path = "absent.rs"]
@@ -25,15 +24,15 @@ pub use reader::Reader;
 
 const SCHEME: &str = "s3://";
 
-/// What is held in memory of an object that goes to or comes from a file, bytes.
+/// Memory for copying an object to or from a file, bytes.
 const PART: usize = 16 << 20;
 
-/// Why an object cannot be had, in words that say what to do.
+/// Failure of a request, with what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// It may go well another time: nobody answers, or the object was replaced meanwhile.
+    /// Another try may succeed: no answer, or the object was replaced meanwhile.
     Passing(String),
-    /// It will not: no such bucket, no right to it, or nothing to ask with.
+    /// Another try will fail as well: no such bucket, no right to it, or no credentials.
     Lasting(String),
 }
 
@@ -47,7 +46,7 @@ impl std::fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Failure {
-    /// The error that stops a run.
+    /// Converts to the error that stops a run.
     #[must_use]
     pub fn at(self, place: &Path) -> Error {
         match self {
@@ -63,22 +62,21 @@ impl Failure {
     }
 }
 
-/// What is known of an object without reading it.
+/// Size and tag of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct About {
+pub struct ObjectInfo {
     pub bytes: u64,
-    /// The store's own mark of its content; another content has another one. Not every store lists
-    /// it.
+    /// ETag, the store's mark of the content. Not every store lists it.
     pub tag: Option<String>,
 }
 
-/// Whether a path is an object's, or the prefix of some.
+/// `true` for the path of an object or of a prefix.
 #[must_use]
 pub fn is_object(path: &Path) -> bool {
     path.to_str().is_some_and(|text| text.starts_with(SCHEME))
 }
 
-/// Bucket and key.
+/// Splits a path into bucket and key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Address {
     bucket: String,
@@ -111,7 +109,7 @@ impl Address {
     }
 
     fn client(&self) -> Result<Arc<Client>, Failure> {
-        // Connections are the process's, as its environment is.
+        // Connections last as long as the process, like its environment.
         static OPENED: OnceLock<Mutex<BTreeMap<String, Arc<Client>>>> = OnceLock::new();
         let mut opened = OPENED
             .get_or_init(Mutex::default)
@@ -131,20 +129,21 @@ fn at(path: &Path) -> Result<(Arc<Client>, String), Failure> {
     Ok((address.client()?, address.key))
 }
 
-/// Checks that a path is one that objects can have; nobody is asked.
+/// Checks the form of an object's path, without a request.
 ///
 /// # Errors
-/// What is wrong with it, or that this program knows no object stores.
+/// The fault of the path, or that this program was built without object stores.
 pub fn check(path: &Path) -> Result<(), Failure> {
     Address::parse(path)?;
     client::available()
 }
 
-/// The objects whose key begins with the path's (a bucket alone: all), in the order of their keys.
+/// Lists the objects whose key begins with the path's (a bucket alone: all), in the order of their
+/// keys.
 ///
 /// # Errors
-/// Why they cannot be listed.
-pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, About>, Failure> {
+/// They cannot be listed.
+pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, ObjectInfo>, Failure> {
     let address = Address::parse(path)?;
     let listed = address.client()?.list(&address.key)?;
     Ok(listed
@@ -158,30 +157,30 @@ pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, About>, Failure> {
         .collect())
 }
 
-/// Remembers what was listed of an object, so that [`listed`] need not ask.
+/// Remembers the listed entry of an object, so that [`listed`] needs no request.
 ///
 /// # Errors
-/// It is no object's path.
-pub fn remember(path: &Path, about: &About) -> Result<(), Failure> {
+/// The path is no object's.
+pub fn remember(path: &Path, about: &ObjectInfo) -> Result<(), Failure> {
     let (client, key) = at(path)?;
     client.remember(key, about.clone());
     Ok(())
 }
 
-/// What is known of an object now; none where there is none.
+/// Asks for size and tag of an object; `None` if there is no such object.
 ///
 /// # Errors
-/// Why it cannot be asked for.
-pub fn about(path: &Path) -> Result<Option<About>, Failure> {
+/// The request fails.
+pub fn about(path: &Path) -> Result<Option<ObjectInfo>, Failure> {
     let (client, key) = at(path)?;
     client.about(&key)
 }
 
-/// What is known of an object, as it was remembered where that tells enough.
+/// Size and tag of an object, remembered from a listing if that had both.
 ///
 /// # Errors
-/// Why it cannot be asked for.
-pub fn listed(path: &Path) -> Result<Option<About>, Failure> {
+/// The request fails.
+pub fn listed(path: &Path) -> Result<Option<ObjectInfo>, Failure> {
     let (client, key) = at(path)?;
     match client.listed(&key) {
         Some(about) if about.tag.is_some() => Ok(Some(about)),
@@ -189,17 +188,17 @@ pub fn listed(path: &Path) -> Result<Option<About>, Failure> {
     }
 }
 
-/// Why an object could not be read a while ago, if that was not for its bytes.
+/// Reason of an earlier failure to read an object, if the network was at fault.
 #[must_use]
 pub fn failed(path: &Path) -> Option<String> {
     let (client, key) = at(path).ok()?;
     client.failed(&key)
 }
 
-/// A small object whole; none where there is none.
+/// Reads a small object whole; `None` if there is no such object.
 ///
 /// # Errors
-/// Why it cannot be read.
+/// It cannot be read.
 pub fn get(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     let (client, key) = at(path)?;
     Ok(client.get(&key)?.map(|bytes| bytes.to_vec()))
@@ -208,25 +207,25 @@ pub fn get(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
 /// Puts an object, whole.
 ///
 /// # Errors
-/// Why it cannot be written.
+/// It cannot be written.
 pub fn put(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
     let (client, key) = at(path)?;
     client.put(&key, bytes)
 }
 
-/// Removes an object, where there is one.
+/// Removes an object, if there is one.
 ///
 /// # Errors
-/// Why it cannot be removed.
+/// It cannot be removed.
 pub fn remove(path: &Path) -> Result<(), Failure> {
     let (client, key) = at(path)?;
     client.remove(&key)
 }
 
-/// Puts a file as an object, whole, in parts where it is large.
+/// Copies a file to an object, a large one in parts.
 ///
 /// # Errors
-/// Why file or object cannot be used.
+/// The file cannot be read or the object not written.
 pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
     let (client, key) = at(path)?;
     let unreadable =
@@ -248,15 +247,15 @@ pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes an object out, part by part; false where there is none.
+/// Writes an object to `out`, part by part; `false` if there is no such object.
 ///
 /// # Errors
-/// Why it cannot be read or written out.
+/// It cannot be read or written out.
 pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, Failure> {
     let Some(mut reader) = Reader::of(path)? else {
         return Ok(false);
     };
-    // What a full disk refuses at the end must not be taken for damage to the object.
+    // A full disk must not look like damage of the object.
     std::io::copy(&mut reader, out)
         .and_then(|_| out.flush())
         .map_err(|e| match e.downcast::<Failure>() {

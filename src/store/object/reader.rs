@@ -1,5 +1,4 @@
-//! An object read by ranges: what Parquet's reader asks for, and a little ahead of it, never the
-//! whole.
+//! Reading of objects by ranges: those that the Parquet reader asks for, with a little read-ahead.
 
 use std::io::{self, Read};
 use std::ops::Range;
@@ -11,14 +10,12 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{ChunkReader, Length};
 
 use super::client::Client;
-use super::{About, Failure, at};
+use super::{Failure, ObjectInfo, at};
 
-/// The most that is asked for at once beyond what is needed, bytes: a request costs as much as some
-/// hundred kilobytes.
+/// Longest read-ahead of a request, bytes: a request takes as long as some hundred kilobytes.
 const AHEAD: u64 = 1 << 20;
 
-/// An object that is being read; every copy reads the same content, or fails when it has been
-/// replaced.
+/// Reader of an object. Every clone reads the same content, or fails after the object was replaced.
 #[derive(Clone, Debug)]
 pub struct Reader {
     source: Arc<Source>,
@@ -29,16 +26,15 @@ pub struct Reader {
 struct Source {
     client: Arc<Client>,
     key: String,
-    about: About,
-    /// The stretches of the object that will be read: nothing is asked for ahead beyond the end of
-    /// one.
+    about: ObjectInfo,
+    /// Ranges of the object that will be read; read-ahead stops at the end of a range.
     wanted: Vec<Range<u64>>,
-    /// What was asked for last, with its beginning.
+    /// Bytes of the last request, with their start.
     held: Mutex<(u64, Bytes)>,
 }
 
 impl Reader {
-    /// Begins to read an object; none where there is none.
+    /// Opens an object; `None` if there is no such object.
     pub(super) fn of(path: &Path) -> Result<Option<Reader>, Failure> {
         let (client, key) = at(path)?;
         let Some(about) = client.about(&key)? else {
@@ -58,22 +54,22 @@ impl Reader {
         }))
     }
 
-    /// Begins to read an object that must be there.
+    /// Opens an object that must exist.
     ///
     /// # Errors
-    /// Why it cannot be read.
+    /// It cannot be read.
     pub fn open(path: &Path) -> Result<Reader, Failure> {
         Reader::of(path)?
             .ok_or_else(|| Failure::Passing("there is no such object (any more)".to_owned()))
     }
 
-    /// What is known of the object that is being read.
+    /// Size and tag of the object.
     #[must_use]
-    pub fn about(&self) -> &About {
+    pub fn about(&self) -> &ObjectInfo {
         &self.source.about
     }
 
-    /// The same object, of which only these stretches are read.
+    /// The same object, of which only these ranges are read.
     #[must_use]
     pub fn of_stretches(&self, wanted: Vec<Range<u64>>) -> Reader {
         let Source {
@@ -94,7 +90,7 @@ impl Reader {
 }
 
 impl Source {
-    /// At least `least` bytes from `start` (none beyond the end).
+    /// Reads at least `least` bytes from `start`; none beyond the end.
     fn bytes(&self, start: u64, least: u64) -> Result<Bytes, Failure> {
         let end = start.saturating_add(least).min(self.about.bytes);
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);

@@ -9,10 +9,10 @@ use roxmltree::{Document, Node, ParsingOptions};
 use crate::store::files::TunnelRow;
 use crate::units::DEG;
 
-/// What is wrong, with its line.
+/// A fault of the document, with its line.
 type Wrong = (Option<usize>, String);
 
-/// What a function's independent variable is.
+/// Independent variable of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Variable {
     Alpha { in_rad: bool },
@@ -20,7 +20,7 @@ enum Variable {
     Third,
 }
 
-/// One grid: breakpoints of each variable, values with the last variable fastest.
+/// A grid: breakpoints of each variable, values with the last variable fastest.
 struct Grid {
     axes: Vec<(Variable, Vec<f64>)>,
     values: Vec<f64>,
@@ -28,7 +28,7 @@ struct Grid {
     source: Option<String>,
 }
 
-/// The rows of the functions of wanted variables, each with the line of its function.
+/// Reads the functions of the wanted variables as rows, each with the line of its function.
 pub(super) fn rows(
     text: &str,
     third: Option<&str>,
@@ -94,7 +94,7 @@ fn child<'a, 'input>(node: Node<'a, 'input>, name: &'static str) -> Option<Node<
     children(node, name).next()
 }
 
-/// A name without what authors put between words.
+/// Name without the characters that authors put between words.
 fn plain(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
@@ -136,7 +136,7 @@ impl<'a, 'input> File<'a, 'input> {
             .unwrap_or("nd")
     }
 
-    /// What the independent variable of a reference is.
+    /// Independent variable of a reference.
     fn variable(&self, reference: Node) -> Result<Variable, Wrong> {
         let id = reference.attribute("varID").unwrap_or_default();
         let definition = self.variables.get(id);
@@ -237,7 +237,7 @@ impl<'a, 'input> File<'a, 'input> {
         )
     }
 
-    /// A grid of which the numbers fit each other.
+    /// Grid of a gridded table, with as many values as its breakpoints demand.
     fn whole(&self, at: Node, grid: Grid) -> Result<Grid, Wrong> {
         let expected: usize = grid.axes.iter().map(|(_, points)| points.len()).product();
         if grid.values.len() != expected || grid.axes.is_empty() {
@@ -288,7 +288,7 @@ impl<'a, 'input> File<'a, 'input> {
         self.numbers(values)
     }
 
-    /// Standard uncertainties, where the table states additive normal ones.
+    /// Standard uncertainties of a table that states additive normal ones.
     fn uncertainties(&self, table: Node<'a, 'input>, n: usize) -> Result<Option<Vec<f64>>, Wrong> {
         let Some(uncertainty) = child(table, "uncertainty") else {
             return Ok(None);
@@ -318,7 +318,7 @@ impl<'a, 'input> File<'a, 'input> {
         Ok(Some(values.into_iter().map(|v| v / sigmas).collect()))
     }
 
-    /// The numbers in an element's text, between commas and blanks.
+    /// Numbers in an element's text, separated by commas and blanks.
     fn numbers(&self, node: Node) -> Result<Vec<f64>, Wrong> {
         let text: String = node
             .children()
@@ -336,7 +336,7 @@ impl<'a, 'input> File<'a, 'input> {
     }
 }
 
-/// A grid's points as rows of a tunnel's table.
+/// Points of a grid as rows of a tunnel table.
 fn rows_of<'g>(
     name: &'g str,
     grid: &'g Grid,

@@ -1,5 +1,5 @@
-//! Wind-tunnel databases as written: CSV, Parquet or DAVE-ML, told apart by the file's name, to the
-//! same rows.
+//! Wind-tunnel databases in CSV, Parquet or DAVE-ML, by the file's extension, read to the same
+//! rows.
 
 mod daveml;
 #[cfg(test)]
@@ -14,12 +14,11 @@ use polars::prelude::{Column, DataFrame, DataType, ParquetReader, SerReader};
 use super::files::{self, TunnelRow};
 use crate::error::{Error, Result};
 
-/// The rows of a tunnel's tables, each with its line in the file (in Parquet its row, counted from
+/// Reads the rows of a tunnel database, each with its line in the file (in Parquet its row, from
 /// 1).
 ///
-/// `third` is the name of the tables' third variable, where they have one. Of a DAVE-ML file only
-/// the functions of the variables that are `wanted` are read: a model holds much that is no
-/// derivative.
+/// `third` names the third variable of the tables, if any. Of a DAVE-ML file only the functions of
+/// the `wanted` variables are read: a model has many that are no derivatives.
 ///
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
@@ -43,7 +42,7 @@ pub fn rows(
     }
 }
 
-/// CSV with a header.
+/// Rows of a CSV with a header.
 fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let mut rows: Vec<(usize, TunnelRow)> = files::rows(path)?;
     let Some(third) = third else { return Ok(rows) };
@@ -109,7 +108,7 @@ fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)
     (0..frame.height()).map(row).collect()
 }
 
-/// A table of Parquet, by column.
+/// Rows of a Parquet table.
 struct Frame<'a> {
     path: &'a Path,
     frame: &'a DataFrame,

@@ -1,5 +1,4 @@
-//! The commands past one machine: a plan, a shard of it, what is missing, the merge, the
-//! scheduler's scripts.
+//! The commands `plan`, `merge` and `submit`, and the options `--plan` and `--shard`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -7,17 +6,16 @@ use std::process::{Command, ExitCode};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 
-use super::{Bars, LOOK, Options, Patience, start_threads, summary};
-use crate::cluster::plan::{Of, Plan, Shard, array};
+use super::bars::Bars;
+use super::options::{ATTENTION, Options, Patience, REJECTED, TRY_AGAIN, exit_code, start_threads};
+use super::run_summary::print_summary;
+use crate::cluster::plan::{Dealt, Plan, Shard, array};
 use crate::cluster::scripts::{self, Campaign, Engine, LARGEST_ARRAY};
 use crate::cluster::shard;
 use crate::config::Config;
 use crate::error::Error;
 use crate::lineage::Stage;
 use crate::store::atomic;
-
-/// Another try may go well (`EX_TEMPFAIL`).
-const AGAIN: u8 = 75;
 
 #[derive(Args, Debug)]
 pub struct PlanOptions {
@@ -26,7 +24,7 @@ pub struct PlanOptions {
     /// What to deal: flights, to be ingested and segmented; or the maneuvers found in them, to be
     /// estimated
     #[arg(long, value_enum)]
-    of: Dealt,
+    of: DealtArgument,
     /// To how many shards [default: the pipeline's `cluster: shards:`]
     #[arg(long, value_name = "N")]
     shards: Option<usize>,
@@ -36,16 +34,16 @@ pub struct PlanOptions {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Dealt {
+enum DealtArgument {
     Flights,
     Maneuvers,
 }
 
-/// One shard's share instead of the whole campaign.
+/// Options to compute one shard instead of the whole campaign.
 #[derive(Args, Debug)]
 pub struct ShareOptions {
     /// Compute a shard of this plan into the store, and publish nothing; exit code 75: another try
-    /// may go well
+    /// may complete it
     #[arg(long, value_name = "FILE", requires = "shard")]
     plan: Option<PathBuf>,
     /// Which shard of how many: 3/24
@@ -74,7 +72,7 @@ pub struct SubmitOptions {
     /// Hand the jobs over; without it the scripts are written and nothing is run
     #[arg(long)]
     go: bool,
-    /// The folder of the scripts and of what the tasks say [default: cluster in the store]
+    /// The folder of the scripts and of the tasks' logs [default: cluster in the store]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 }
@@ -86,8 +84,8 @@ enum Scheduler {
     Pbs,
 }
 
-fn plan_file(config: &Config, of: Of) -> PathBuf {
-    // Where all machines see it.
+fn plan_file(config: &Config, of: Dealt) -> PathBuf {
+    // A shared store is seen by all machines.
     config
         .shared_store
         .as_ref()
@@ -95,13 +93,13 @@ fn plan_file(config: &Config, of: Of) -> PathBuf {
         .join(format!("{}.plan.json", of.name()))
 }
 
-/// Deals a campaign's work.
+/// Deals a campaign's work to shards and prints the plan's file.
 pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let of = match options.of {
-        Dealt::Flights => Of::Flights,
-        Dealt::Maneuvers => Of::Maneuvers,
+        DealtArgument::Flights => Dealt::Flights,
+        DealtArgument::Maneuvers => Dealt::Maneuvers,
     };
     let file = options
         .out
@@ -109,7 +107,7 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
         .unwrap_or_else(|| plan_file(&config, of));
     let shards = options.shards.unwrap_or(config.cluster.shards);
     anyhow::ensure!(shards > 0, "--shards must be at least 1");
-    let plan = shard::plan(
+    let plan = shard::deal(
         &config,
         of,
         shards,
@@ -117,13 +115,13 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
         &Bars::new(options.options.quiet, None),
     )?;
     if !options.options.quiet {
-        say(&plan, &file);
+        print_plan(&plan, &file);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-#[expect(clippy::print_stdout, reason = "what a plan says")]
-fn say(plan: &Plan, file: &Path) {
+#[expect(clippy::print_stdout, reason = "the output of a plan")]
+fn print_plan(plan: &Plan, file: &Path) {
     let costs = plan.costs();
     let dearest = costs.values().copied().fold(0.0, f64::max);
     let mean = costs.values().sum::<f64>() / costs.len() as f64;
@@ -138,35 +136,35 @@ fn say(plan: &Plan, file: &Path) {
 }
 
 impl ShareOptions {
-    /// Computes the shard that is asked for; none where none is.
-    pub fn work(
+    /// Computes the shard that the options name; `None` without a shard.
+    pub fn compute(
         &self,
         until: Stage,
         options: &Options,
         patience: &Patience,
     ) -> Option<anyhow::Result<ExitCode>> {
         let (plan, shard) = (self.plan.as_deref()?, self.shard?);
-        Some(match work(plan, shard, until, options, patience) {
+        Some(match compute(plan, shard, until, options, patience) {
             Err(error)
                 if error
                     .downcast_ref::<Error>()
                     .is_some_and(Error::is_transient) =>
             {
-                Ok(again(&error))
+                Ok(ask_for_another_try(&error))
             }
             done => done,
         })
     }
 }
 
-#[expect(clippy::print_stderr, reason = "why another try is asked for")]
-fn again(error: &anyhow::Error) -> ExitCode {
+#[expect(clippy::print_stderr, reason = "the reason for another try")]
+fn ask_for_another_try(error: &anyhow::Error) -> ExitCode {
     eprintln!("harvest: {error:#}; another try may go well");
-    ExitCode::from(AGAIN)
+    ExitCode::from(TRY_AGAIN)
 }
 
-#[expect(clippy::print_stdout, reason = "what a shard says")]
-fn work(
+#[expect(clippy::print_stdout, reason = "the output of a shard")]
+fn compute(
     file: &Path,
     shard: Shard,
     until: Stage,
@@ -175,15 +173,16 @@ fn work(
 ) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let config = options.load()?;
-    let plan = shard::read(file)?;
+    let plan = shard::read_plan(file)?;
     anyhow::ensure!(
-        until <= plan.of.stage() && (until == Stage::Estimate) == (plan.of == Of::Maneuvers),
+        until <= plan.of.last_stage()
+            && (until == Stage::Estimate) == (plan.of == Dealt::Maneuvers),
         "{} is a plan of {}: its shards are for `harvest {}`",
         file.display(),
         plan.of.name(),
-        plan.of.stage().name()
+        plan.of.last_stage().name()
     );
-    let made = shard::work(
+    let made = shard::compute(
         &config,
         &plan,
         shard,
@@ -203,7 +202,7 @@ fn work(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the shards of which something is missing, as a scheduler writes an array.
+/// Prints the shards with missing artefacts, as schedulers write an array.
 #[expect(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -211,8 +210,8 @@ fn work(
 )]
 pub fn missing(options: &Options, file: &Path) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
-    let (config, plan) = (options.load()?, shard::read(file)?);
-    let missing = shard::missing(&config, &plan, &Bars::new(options.quiet, None))?;
+    let (config, plan) = (options.load()?, shard::read_plan(file)?);
+    let missing = shard::missing_items(&config, &plan, &Bars::new(options.quiet, None))?;
     if !options.quiet {
         eprintln!(
             "{} of {} {} are missing",
@@ -225,29 +224,29 @@ pub fn missing(options: &Options, file: &Path) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     println!("{}", array(&plan.shards_of(&missing)));
-    Ok(ExitCode::from(LOOK))
+    Ok(ExitCode::from(ATTENTION))
 }
 
-/// Publishes what the shards computed.
+/// Publishes the work of the shards.
 pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let bars = Bars::new(options.options.quiet, None);
-    let plan = shard::read(&options.plan)?;
+    let plan = shard::read_plan(&options.plan)?;
     match shard::merge(&config, &plan, options.patience.wait(), &bars) {
-        Err(error) if error.is_transient() => Ok(again(&error.into())),
+        Err(error) if error.is_transient() => Ok(ask_for_another_try(&error.into())),
         Err(error) => Err(error.into()),
-        Ok(done) => {
+        Ok(outcome) => {
             if !options.options.quiet {
-                summary(&config, &done, Stage::Report);
+                print_summary(&config, &outcome, Stage::Report);
             }
-            Ok(ExitCode::from(if done.rejected() { 2 } else { 0 }))
+            Ok(exit_code(outcome.has_rejections(), REJECTED))
         }
     }
 }
 
-/// Writes the scripts, and hands them to the scheduler where that is asked for.
-#[expect(clippy::print_stdout, reason = "what a submission says")]
+/// Writes the scripts of a job array, and submits them if asked for.
+#[expect(clippy::print_stdout, reason = "the output of a submission")]
 pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
@@ -258,13 +257,11 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         .unwrap_or_else(|| config.store.join("cluster"));
     let shown = |path: &Path| path.display().to_string();
     let campaign = Campaign {
-        program: shown(
-            &std::env::current_exe().context("the program does not know where it lies")?,
-        ),
+        program: shown(&std::env::current_exe().context("cannot find the program's own file")?),
         arguments: options.options.typed(),
         folder: shown(&folder),
-        flights: shown(&plan_file(&config, Of::Flights)),
-        maneuvers: shown(&plan_file(&config, Of::Maneuvers)),
+        flights: shown(&plan_file(&config, Dealt::Flights)),
+        maneuvers: shown(&plan_file(&config, Dealt::Maneuvers)),
         out: shown(&folder.join(&out)),
     };
     let engine = match options.engine {
@@ -275,16 +272,16 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;
     }
     let bars = Bars::new(options.options.quiet, None);
-    let plan = shard::plan(
+    let plan = shard::deal(
         &config,
-        Of::Flights,
+        Dealt::Flights,
         config.cluster.shards,
-        &plan_file(&config, Of::Flights),
+        &plan_file(&config, Dealt::Flights),
         &bars,
     )?;
     let submit = out.join("submit.sh");
     if !options.options.quiet {
-        say(&plan, &plan_file(&config, Of::Flights));
+        print_plan(&plan, &plan_file(&config, Dealt::Flights));
         if config.cluster.shards > LARGEST_ARRAY {
             println!(
                 "arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler"

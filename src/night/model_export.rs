@@ -1,32 +1,34 @@
-//! The export: the campaign brought up to date as far as the comparison, and its derivatives
-//! written for simulators.
+//! Export of the flight-updated derivatives for simulators.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Campaign, Progress, comparison};
+use super::campaign_lineage::campaign_lineage;
+use super::table_metadata::shelf_of_stage;
 use crate::config::Config;
 use crate::error::{Problem, Result};
 use crate::export::{self, Contents, daveml, jsbsim};
 use crate::lineage::Stage;
+use crate::pipeline::{Campaign, Conductor, Progress, converged_estimates};
 use crate::store::table::Shelf;
 use crate::store::{atomic, table};
 
-/// What was written.
+/// Files and values of an export.
 #[derive(Clone, Debug)]
 pub struct Exported {
     pub files: Vec<PathBuf>,
-    /// Values that are flight's, of how many.
-    pub flight: usize,
+    /// Number of values from flight.
+    pub from_flight: usize,
+    /// Number of all values.
     pub values: usize,
-    /// Derivatives of the model that have a value nowhere.
+    /// Derivatives of the model that neither flight nor tunnel gives.
     pub missing: Vec<String>,
     pub problems: Vec<Problem>,
 }
 
 /// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and
 /// writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
-/// (`_jsbsim.xml`) into a folder. The published night is left alone.
+/// (`_jsbsim.xml`) into a folder. The published night stays as it is.
 ///
 /// # Errors
 /// What stops a run.
@@ -36,9 +38,10 @@ pub fn export(
     wait: Duration,
     progress: &dyn Progress,
 ) -> Result<Exported> {
-    let (run, files) = super::begin(config, wait, progress)?;
-    let campaign = run.results(&files, Stage::Compare)?;
-    let estimates = comparison::converged(config, &campaign);
+    let conductor = Conductor::open(config, wait, progress)?;
+    let campaign = conductor.campaign(Stage::Compare)?;
+    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Compare);
+    let estimates = converged_estimates(config, &campaign);
     let contents = Contents {
         title: &config.title,
         aircraft: &config.aircraft,
@@ -50,12 +53,7 @@ pub fn export(
         groups: &config.trend,
         settings: &config.export,
     };
-    write(
-        &contents,
-        &campaign,
-        folder,
-        &run.shelf_in(folder, Stage::Compare),
-    )
+    write(&contents, &campaign, folder, &shelf)
 }
 
 fn write(
@@ -84,7 +82,7 @@ fn write(
     let names = contents.buildup.derivatives.iter().map(|d| d.name.clone());
     Ok(Exported {
         files: tables_of_rows.into_iter().chain([dml, section]).collect(),
-        flight: rows.iter().filter(|r| r.is_flight == 1).count(),
+        from_flight: rows.iter().filter(|r| r.is_flight == 1).count(),
         values: rows.len(),
         missing: names
             .filter(|name| !tables.iter().any(|t| t.derivative == *name))

@@ -1,12 +1,13 @@
-//! The commands of the morning after: what is fresh, a maneuver's story, what changed, whether it
-//! still holds, what can go.
+//! The commands `status`, `explain`, `diff`, `verify` and `gc`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 
-use super::{Bars, LOOK, Options, Patience, cluster, start_threads};
+use super::bars::Bars;
+use super::cluster_commands;
+use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
 use crate::lineage::{Changes, Moved};
 use crate::night::{diff, explain, gc, status, verify};
 
@@ -14,8 +15,8 @@ use crate::night::{diff, explain, gc, status, verify};
 pub struct StatusOptions {
     #[command(flatten)]
     options: Options,
-    /// Instead, print the shards of this plan of which something is missing, as schedulers write an
-    /// array: 1,4-7
+    /// Instead, print the shards of this plan with missing artefacts, as schedulers write an array:
+    /// 1,4-7
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
 }
@@ -33,7 +34,7 @@ pub struct ExplainOptions {
 pub struct DiffOptions {
     #[command(flatten)]
     options: Options,
-    /// The night to hold against, e.g. 0006 [default: the complete night before]
+    /// The night to compare with, e.g. 0006 [default: the complete night before]
     #[arg(long, value_name = "NIGHT")]
     since: Option<String>,
     /// The night to look at [default: the last complete one]
@@ -42,7 +43,7 @@ pub struct DiffOptions {
     /// Print the changes as JSON, as in `alert.json`
     #[arg(long)]
     json: bool,
-    /// Tell each night's changes once: the second time there is nothing, and the exit code is 0
+    /// Report each night's changes once: the second time nothing is printed, and the exit code is 0
     #[arg(long)]
     once: bool,
 }
@@ -51,7 +52,7 @@ pub struct DiffOptions {
 pub struct VerifyOptions {
     #[command(flatten)]
     options: Options,
-    /// The night to verify, e.g. 0006 [default: the one that holds]
+    /// The night to verify, e.g. 0006 [default: the current one]
     #[arg(long, value_name = "NIGHT")]
     night: Option<String>,
     /// Only this table, e.g. `trends`; may be given several times
@@ -75,11 +76,11 @@ fn bars(options: &Options) -> anyhow::Result<Bars<'static>> {
     Ok(Bars::new(options.quiet, None))
 }
 
-/// Says per stage what is fresh, stale and failed, and why.
-#[expect(clippy::print_stdout, reason = "what a status says")]
+/// Prints the fresh, stale and failed artefacts of each stage.
+#[expect(clippy::print_stdout, reason = "the output of a status")]
 pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     if let Some(plan) = &options.plan {
-        return cluster::missing(&options.options, plan);
+        return cluster_commands::missing(&options.options, plan);
     }
     let options = &options.options;
     let status = status::status(&options.load()?, &bars(options)?)?;
@@ -103,9 +104,14 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
         }
         for stage in &status.stages {
             for (why, items) in &stage.stale {
-                println!("  {}: stale: {}: {why}", stage.stage.name(), some(items));
+                println!(
+                    "  {}: stale: {}: {why}",
+                    stage.stage.name(),
+                    first_items(items)
+                );
             }
-            for (item, why) in stage.failed.iter().take(MOST) {
+            for failure in stage.failed.iter().take(MOST) {
+                let (item, why) = (&failure.item, &failure.reason);
                 println!("  {}: failed: {item}: {why}", stage.stage.name());
             }
             if stage.failed.len() > MOST {
@@ -117,18 +123,18 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
             }
         }
     }
-    Ok(match (status.is_fresh(), status.failed()) {
-        (false, _) => ExitCode::from(LOOK),
-        (true, true) => ExitCode::from(2),
-        (true, false) => ExitCode::SUCCESS,
+    Ok(if status.is_fresh() {
+        exit_code(status.has_failures(), REJECTED)
+    } else {
+        ExitCode::from(ATTENTION)
     })
 }
 
-/// No more lines of one kind than this.
+/// Most lines of one kind that are printed.
 const MOST: usize = 10;
 
-/// The first of some names, and how many more there are.
-fn some(items: &[String]) -> String {
+/// The first items, and the number of the others.
+fn first_items(items: &[String]) -> String {
     let (first, more) = items.split_at(items.len().min(3));
     let mut unique = first.to_vec();
     unique.dedup();
@@ -140,8 +146,8 @@ fn some(items: &[String]) -> String {
     format!("{}{more}", unique.join(", "))
 }
 
-/// Tells a maneuver's story.
-#[expect(clippy::print_stdout, reason = "what is asked for")]
+/// Prints everything about a maneuver.
+#[expect(clippy::print_stdout, reason = "the output of an explanation")]
 pub fn explain(options: &ExplainOptions) -> anyhow::Result<ExitCode> {
     let bars = bars(&options.options)?;
     print!(
@@ -151,39 +157,34 @@ pub fn explain(options: &ExplainOptions) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Says what changed since the night before.
-#[expect(clippy::print_stdout, reason = "what a comparison says")]
+/// Prints the changes since the night before.
+#[expect(clippy::print_stdout, reason = "the output of a comparison")]
 pub fn diff(options: &DiffOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let found = diff::diff(&config, options.since.as_deref(), options.to.as_deref())?;
-    let told = options.once && diff::tell_once(&config, &found.night)?;
-    if told {
+    if options.once && diff::mark_reported(&config, &found.night)? {
         if !options.options.quiet {
-            println!("night {}: told already", found.night);
+            println!("night {}: reported already", found.night);
         }
         return Ok(ExitCode::SUCCESS);
     }
     if options.json {
         println!("{}", serde_json::to_string_pretty(&found.changes)?);
     } else if !options.options.quiet || found.changes.alert {
-        say(&found.night, &found.changes);
+        print_changes(&found.night, &found.changes);
     }
-    Ok(if found.changes.alert {
-        ExitCode::from(LOOK)
-    } else {
-        ExitCode::SUCCESS
-    })
+    Ok(exit_code(found.changes.alert, ATTENTION))
 }
 
-#[expect(clippy::print_stdout, reason = "what a comparison says")]
-fn say(night: &str, changes: &Changes) {
+#[expect(clippy::print_stdout, reason = "the output of a comparison")]
+fn print_changes(night: &str, changes: &Changes) {
     let Some(since) = &changes.since else {
-        println!("night {night} is the first complete one: there is nothing to hold it against");
+        println!("night {night} is the first complete one: there is none to compare it with");
         return;
     };
     println!("night {night} since night {since}");
-    list("because", &changes.causes, |c| c.words.clone());
-    list("maneuvers", &changes.maneuvers, |m| {
+    print_list("because", &changes.causes, |c| c.words.clone());
+    print_list("maneuvers", &changes.maneuvers, |m| {
         let words = if m.words.is_empty() {
             String::new()
         } else {
@@ -191,7 +192,10 @@ fn say(night: &str, changes: &Changes) {
         };
         format!(
             "{} {} ({}){words} [{}]",
-            m.what, m.maneuver_id, m.class, m.because
+            m.what.name(),
+            m.maneuver_id,
+            m.class,
+            m.because
         )
     });
     let moved = |m: &Moved| {
@@ -201,19 +205,19 @@ fn say(night: &str, changes: &Changes) {
             m.derivative, m.before, m.now, m.uncertainty
         )
     };
-    list(
+    print_list(
         "estimates that moved by more than their uncertainty",
         &changes.estimates,
         moved,
     );
-    list(
+    print_list(
         "trends that moved by more than their uncertainty",
         &changes.trends,
         moved,
     );
-    list("new trends", &changes.new_trends, Clone::clone);
-    list("trends gone", &changes.gone_trends, Clone::clone);
-    list("verdicts", &changes.verdicts, |v| {
+    print_list("new trends", &changes.new_trends, Clone::clone);
+    print_list("trends gone", &changes.gone_trends, Clone::clone);
+    print_list("verdicts", &changes.verdicts, |v| {
         format!(
             "{} at {} deg: {} became {} [{}]",
             v.derivative, v.alpha_deg, v.before, v.now, v.because
@@ -224,8 +228,8 @@ fn say(night: &str, changes: &Changes) {
     }
 }
 
-#[expect(clippy::print_stdout, reason = "what a comparison says")]
-fn list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
+#[expect(clippy::print_stdout, reason = "the output of a comparison")]
+fn print_list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
     if items.is_empty() {
         return;
     }
@@ -238,8 +242,8 @@ fn list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
     }
 }
 
-/// Says whether what is published still holds.
-#[expect(clippy::print_stdout, reason = "what a verification says")]
+/// Prints the findings about a published night.
+#[expect(clippy::print_stdout, reason = "the output of a verification")]
 pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
     let (config, bars) = (options.options.load()?, bars(&options.options)?);
     let found = verify::verify(&config, options.night.as_deref(), &options.tables, &bars)?;
@@ -267,36 +271,32 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
         }
         println!(
             "{}",
-            if found.holds() {
+            if found.is_valid() {
                 "All of it holds."
             } else {
                 "It does not hold."
             }
         );
     }
-    Ok(if found.holds() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(2)
-    })
+    Ok(exit_code(!found.is_valid(), REJECTED))
 }
 
-/// Shows what no published night needs, and removes it where that is asked for.
-#[expect(clippy::print_stdout, reason = "what housekeeping says")]
+/// Prints what no published night needs, and removes it if asked for.
+#[expect(clippy::print_stdout, reason = "the output of a removal")]
 pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
-    let litter = gc::gc(&config, options.yes, options.patience.wait())?;
+    let unneeded = gc::gc(&config, options.yes, options.patience.wait())?;
     if !options.options.quiet {
-        for name in litter
+        for name in unneeded
             .nights
             .iter()
             .map(|n| format!("night {n}"))
-            .chain(litter.artefacts.keys().cloned())
+            .chain(unneeded.artefacts.keys().map(ToString::to_string))
         {
             println!("  {name}");
         }
-        let bytes: u64 = litter.artefacts.values().sum();
-        let (count, kept) = (litter.artefacts.len(), litter.kept);
+        let bytes: u64 = unneeded.artefacts.values().sum();
+        let (count, kept) = (unneeded.artefacts.len(), unneeded.kept);
         let verb = if options.yes {
             "removed"
         } else {
@@ -305,7 +305,7 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
         println!(
             "{count} artefacts ({} MB) and {} nights {verb}, {kept} artefacts stay",
             bytes / 1_000_000,
-            litter.nights.len()
+            unneeded.nights.len()
         );
         if let Some(shared) = &config.shared_store {
             println!(
@@ -315,7 +315,7 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
                 shared.display()
             );
         }
-        if !options.yes && (count > 0 || !litter.nights.is_empty()) {
+        if !options.yes && (count > 0 || !unneeded.nights.is_empty()) {
             println!("harvest gc --yes removes them");
         }
     }

@@ -1,0 +1,58 @@
+//! The command `export`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::bars::Bars;
+use super::options::{Options, Patience, REJECTED, exit_code, start_threads};
+use crate::night::{has_rejections, model_export};
+
+/// Help below the options.
+pub const EXPORT_HELP: &str = "\
+What is needed is brought up to date first, as far as `compare`. Each derivative is the trend where flight has data and \
+the tunnel elsewhere; every value is marked with its source.
+
+  flight_updated.csv, .parquet   rows that `wind_tunnel:` reads as a database again
+  flight_updated.dml             DAVE-ML (ANSI/AIAA S-119): tables, and the coefficients as their sums
+  flight_updated_jsbsim.xml      JSBSim's <aerodynamics>: name it in the aircraft as <aerodynamics file=\"...\"/>
+
+Examples:
+  harvest export                                 into reports/harv/export
+  harvest export mine --out model                of the pipeline pipelines/mine, into the folder model
+
+Exit codes: 0 written; 1 not written, the message says why; 2 written, and something of the campaign was rejected.";
+
+#[derive(Args, Debug)]
+pub struct ExportOptions {
+    #[command(flatten)]
+    options: Options,
+    #[command(flatten)]
+    patience: Patience,
+    /// The folder to write into [default: export in the folder of the reports]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the derivatives for simulators and prints the files.
+#[expect(clippy::print_stdout, reason = "the output of an export")]
+pub fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
+    start_threads(options.options.threads)?;
+    let config = options.options.load()?;
+    let bars = Bars::new(options.options.quiet, None);
+    let default = || config.reports.join("export");
+    let folder = options.out.clone().unwrap_or_else(default);
+    let exported = model_export::export(&config, &folder, options.patience.wait(), &bars)?;
+    if !options.options.quiet {
+        let (values, from_flight) = (exported.values, exported.from_flight);
+        println!("{values} values, {from_flight} of them from flight");
+        if !exported.missing.is_empty() {
+            println!("without any value: {}", exported.missing.join(" "));
+        }
+        for file in &exported.files {
+            println!("{}", file.display());
+        }
+    }
+    Ok(exit_code(has_rejections(&exported.problems), REJECTED))
+}

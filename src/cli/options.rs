@@ -1,0 +1,146 @@
+//! Options that several commands share, and exit codes.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::Args;
+
+use crate::config::{Config, Overrides};
+
+/// Exit code of a run that rejected something, and of a night that is no longer valid.
+pub const REJECTED: u8 = 2;
+
+/// Exit code of something that moved, is stale or missing.
+pub const ATTENTION: u8 = 3;
+
+/// Exit code of work that another try may complete (`EX_TEMPFAIL`).
+pub const TRY_AGAIN: u8 = 75;
+
+/// Returns 0, or `code` if `is_so`.
+pub fn exit_code(is_so: bool, code: u8) -> ExitCode {
+    ExitCode::from(if is_so { code } else { 0 })
+}
+
+#[derive(Args, Debug)]
+pub struct Patience {
+    /// Wait so long for another run to leave the store, instead of leaving at once
+    #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0)]
+    pub seconds: u64,
+}
+
+impl Patience {
+    pub fn wait(&self) -> Duration {
+        Duration::from_secs(self.seconds)
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct Options {
+    /// The pipeline: a folder with pipeline.yaml, aircraft.yaml, model.yaml and maneuvers/, or its
+    /// name under pipelines/
+    #[arg(default_value = "harv")]
+    pub pipeline: PathBuf,
+    /// Flight archive instead of the pipeline's: a folder or a glob of Parquet files, also
+    /// partitioned as flight=…/; or the same in an object store, s3://bucket/prefix
+    #[arg(long)]
+    pub archive: Option<String>,
+    /// Wind-tunnel database instead of the pipeline's: DAVE-ML (.dml, .xml), or CSV or Parquet with
+    /// derivative, alpha_deg, value, unit[, mach, uncertainty, source]
+    #[arg(long, value_name = "FILE")]
+    pub wind_tunnel: Option<PathBuf>,
+    /// The analyst's events instead of the pipeline's: CSV with flight_id, class, start_s, end_s
+    #[arg(long, value_name = "FILE")]
+    pub events: Option<PathBuf>,
+    /// Folder with the tables of an earlier campaign or night to compare with, besides the tunnel;
+    /// may be given again
+    #[arg(long, value_name = "FOLDER")]
+    pub against: Vec<PathBuf>,
+    /// Folder of the intermediate artefacts, or a place in an object store, s3://bucket/prefix
+    /// [default: data/store/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    pub store: Option<PathBuf>,
+    /// Of a store in an object store: the folder that keeps what was fetched or made here [default:
+    /// data/store/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    pub store_cache: Option<PathBuf>,
+    /// Folder of the tables and the report [default: reports/<pipeline>]
+    #[arg(long, value_name = "FOLDER")]
+    pub reports: Option<PathBuf>,
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
+    pub threads: Option<usize>,
+    /// What reading flights may hold in memory at once, over all of them, instead of the
+    /// pipeline's; results do not depend on it
+    #[arg(long, value_name = "MB")]
+    pub memory_mb: Option<f64>,
+    /// No progress bars and no summary
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl Options {
+    /// Pipeline and options as typed, without those of the terminal, for a script that does the
+    /// same.
+    pub fn typed(&self) -> Vec<String> {
+        let path = |path: &Path| path.display().to_string();
+        let options = [
+            ("--archive", self.archive.clone()),
+            ("--wind-tunnel", self.wind_tunnel.as_deref().map(path)),
+            ("--events", self.events.as_deref().map(path)),
+            ("--store", self.store.as_deref().map(path)),
+            ("--store-cache", self.store_cache.as_deref().map(path)),
+            ("--reports", self.reports.as_deref().map(path)),
+            ("--memory-mb", self.memory_mb.map(|mb| mb.to_string())),
+        ];
+        let against = self
+            .against
+            .iter()
+            .map(|folder| ("--against", Some(path(folder))));
+        let given = options
+            .into_iter()
+            .chain(against)
+            .filter_map(|(name, value)| Some([name.to_owned(), value?]));
+        std::iter::once(path(&self.pipeline))
+            .chain(given.flatten())
+            .collect()
+    }
+
+    /// Loads the configuration with the options of the command line.
+    pub fn load(&self) -> anyhow::Result<Config> {
+        let folder = if self.pipeline.is_dir() {
+            self.pipeline.clone()
+        } else {
+            Path::new("pipelines").join(&self.pipeline)
+        };
+        anyhow::ensure!(
+            folder.is_dir(),
+            "there is no pipeline {}: give a folder, or the name of one under pipelines/",
+            self.pipeline.display()
+        );
+        let overrides = Overrides {
+            archive: self.archive.clone(),
+            wind_tunnel: self.wind_tunnel.clone(),
+            store: self.store.clone(),
+            store_cache: self.store_cache.clone(),
+            reports: self.reports.clone(),
+            events: self.events.clone(),
+            against: self.against.clone(),
+            memory_mb: self.memory_mb,
+        };
+        Ok(Config::load(&folder, overrides)?)
+    }
+}
+
+/// Starts so many threads, by default one a core.
+pub fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
+    if let Some(threads) = threads {
+        anyhow::ensure!(threads > 0, "--threads must be at least 1");
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .context("cannot start the threads")?;
+    }
+    Ok(())
+}

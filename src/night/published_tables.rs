@@ -1,0 +1,86 @@
+//! Publishing of a campaign's tables.
+
+use std::path::Path;
+
+use super::table_metadata::shelf_of_stage;
+use crate::error::Result;
+use crate::lineage::{Lineage, Stage};
+use crate::pipeline::Campaign;
+use crate::store::table::{self, Shelf};
+use crate::tables::{EstimateRow, FitRow, JointRow, PredictedRow};
+
+/// Writes the tables of all stages as far as `until` into a folder.
+///
+/// # Errors
+/// [`crate::error::Error::Io`] naming the file that cannot be written.
+pub fn publish_tables(
+    campaign: &Campaign,
+    until: Stage,
+    folder: &Path,
+    lineage: &Lineage,
+) -> Result<()> {
+    let shelf = |stage| shelf_of_stage(folder, lineage, stage);
+    publish_ingest(&shelf(Stage::Ingest), campaign)?;
+    if until >= Stage::Segment {
+        publish_segment(&shelf(Stage::Segment), campaign)?;
+    }
+    if until >= Stage::Estimate {
+        publish_estimate(&shelf(Stage::Estimate), campaign)?;
+    }
+    if until >= Stage::Trend {
+        publish_trend(&shelf(Stage::Trend), campaign)?;
+    }
+    if until >= Stage::Compare {
+        publish_compare(&shelf(Stage::Compare), campaign)?;
+    }
+    table::publish(&shelf(until), &campaign.problems)
+}
+
+fn publish_ingest(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    table::publish(shelf, &campaign.channels)?;
+    table::publish(shelf, &campaign.checks)?;
+    table::publish(shelf, &campaign.instruments)
+}
+
+fn publish_segment(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    table::publish(shelf, &campaign.maneuvers)?;
+    table::publish(shelf, &campaign.unknown)?;
+    table::publish(shelf, &campaign.events)
+}
+
+/// Publishes the rows of the maneuvers, then those of joint estimates.
+fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    let joined = || campaign.joined.iter().map(|j| &j.estimated);
+    let joint_fits = joined().map(|e| &e.fit);
+    let fits: Vec<FitRow> = campaign.fits.iter().chain(joint_fits).cloned().collect();
+    let joint_estimates = joined().flat_map(|e| &e.estimates);
+    let estimates = campaign.estimates.iter().chain(joint_estimates);
+    let estimates: Vec<EstimateRow> = estimates.cloned().collect();
+    let joint_sums = joined().flat_map(|e| &e.combined);
+    let sums = campaign.combined.iter().chain(joint_sums);
+    let sums: Vec<EstimateRow> = sums.cloned().collect();
+    let predicted = campaign.predicted.iter().map(|p| p.summary.clone());
+    let predicted: Vec<PredictedRow> = predicted.collect();
+    let members = campaign.joined.iter().flat_map(|j| &j.members);
+    let members: Vec<JointRow> = members.cloned().collect();
+    table::publish(shelf, &campaign.correlations)?;
+    table::publish_fits(shelf, &fits, &predicted)?;
+    table::publish(shelf, &estimates)?;
+    table::publish_as(shelf, "combined", &sums)?;
+    table::publish(shelf, &members)?;
+    table::publish(shelf, &campaign.predictions())
+}
+
+fn publish_trend(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    table::publish(shelf, &campaign.outliers)?;
+    table::publish(shelf, &campaign.trends)
+}
+
+fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    table::publish(shelf, &campaign.comparison)?;
+    table::publish(shelf, &campaign.maneuver_comparison)?;
+    table::publish(shelf, &campaign.verdicts)?;
+    table::publish(shelf, &campaign.disagreements)?;
+    table::publish(shelf, &campaign.changes)?;
+    table::publish(shelf, &campaign.beyond_tunnel)
+}

@@ -1,0 +1,131 @@
+//! A campaign as far as it has been brought: the rows of its tables, and the state of each stage.
+
+use std::collections::BTreeMap;
+
+use super::ingested::Flight;
+use crate::error::Problem;
+use crate::estimate::joint::Joined;
+use crate::estimate::prediction::Predicted;
+use crate::lineage::Stage;
+use crate::maneuver::{Maneuver, Unknown};
+use crate::output_error::Outcome;
+use crate::store::ArtefactName;
+use crate::tables::{
+    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow,
+    EstimateRow, EventRow, FitRow, InstrumentRow, ManeuverComparisonRow, OutlierRow, PredictionRow,
+    TrendRow, VerdictRow,
+};
+
+/// A flight, maneuver or group whose artefact the store lacks.
+#[derive(Clone, Debug)]
+pub struct MissingArtefact {
+    /// Flight, maneuver or group.
+    pub item: String,
+    /// Flight of the item; empty for a group.
+    pub flight_id: String,
+    /// Class of a maneuver or group.
+    pub class: Option<String>,
+}
+
+/// A flight or maneuver that was rejected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    pub item: String,
+    pub reason: String,
+}
+
+/// State of one stage's artefacts.
+#[derive(Clone, Debug, Default)]
+pub struct StageState {
+    /// Number of flights or maneuvers whose artefact the store has.
+    pub fresh: usize,
+    pub missing: Vec<MissingArtefact>,
+    pub failed: Vec<Failure>,
+}
+
+/// Rows that an earlier flight has, too.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepeatedRows {
+    /// Id of the later flight.
+    pub flight_id: String,
+    pub start_s: f64,
+    pub end_s: f64,
+}
+
+/// A campaign as far as it has been brought.
+#[derive(Clone, Debug, Default)]
+pub struct Campaign {
+    /// State of the stages whose artefacts the store keeps.
+    pub states: BTreeMap<Stage, StageState>,
+    pub flights: Vec<Flight>,
+    /// Flights that could not be read this time, with the reason.
+    pub unread: BTreeMap<String, String>,
+    pub repeated_rows: Vec<RepeatedRows>,
+    pub channels: Vec<ChannelRow>,
+    pub checks: Vec<CheckRow>,
+    pub instruments: Vec<InstrumentRow>,
+    pub maneuvers: Vec<Maneuver>,
+    /// Excitation that fits no class.
+    pub unknown: Vec<Unknown>,
+    pub events: Vec<EventRow>,
+    /// Names of the maneuvers' estimates, in the order of the maneuvers.
+    pub estimate_names: Vec<ArtefactName>,
+    pub fits: Vec<FitRow>,
+    pub estimates: Vec<EstimateRow>,
+    /// Sums of derivatives that the tunnel tabulates, with the variance of the sum.
+    pub combined: Vec<EstimateRow>,
+    pub correlations: Vec<CorrelationRow>,
+    /// Joint estimates. Their rows are published, but enter no trend, which would count the same
+    /// data twice.
+    pub joined: Vec<Joined>,
+    /// Prediction of each maneuver from others, in the order of the maneuvers; empty if switched
+    /// off.
+    pub predicted: Vec<Predicted>,
+    pub trends: Vec<TrendRow>,
+    /// Maneuvers far from their trend.
+    pub outliers: Vec<OutlierRow>,
+    pub comparison: Vec<ComparisonRow>,
+    pub maneuver_comparison: Vec<ManeuverComparisonRow>,
+    /// Tunnel values that estimates needed beyond the tabulated range.
+    pub beyond_tunnel: Vec<BeyondRow>,
+    /// Comparison in words, with the tunnel and with earlier campaigns.
+    pub verdicts: Vec<VerdictRow>,
+    pub disagreements: Vec<DisagreementRow>,
+    /// Differences from earlier campaigns.
+    pub changes: Vec<ChangeRow>,
+    pub problems: Vec<Problem>,
+}
+
+impl Campaign {
+    /// State of a stage, empty until the stage is brought.
+    pub fn state(&mut self, stage: Stage) -> &mut StageState {
+        self.states.entry(stage).or_default()
+    }
+
+    /// Number of flights that ingest rejected.
+    #[must_use]
+    pub fn rejected_flights(&self) -> usize {
+        self.flights.iter().filter(|f| !f.is_accepted()).count()
+    }
+
+    /// Number of maneuvers whose fit converged.
+    #[must_use]
+    pub fn converged(&self) -> usize {
+        self.fits
+            .iter()
+            .filter(|f| f.outcome == Outcome::Converged)
+            .count()
+    }
+
+    /// Estimates and combined sums of all maneuvers.
+    pub fn estimates_and_sums(&self) -> impl Iterator<Item = &EstimateRow> {
+        self.estimates.iter().chain(&self.combined)
+    }
+
+    /// Predicted outputs of all maneuvers.
+    #[must_use]
+    pub fn predictions(&self) -> Vec<PredictionRow> {
+        let outputs = self.predicted.iter().flat_map(|p| &p.outputs);
+        outputs.cloned().collect()
+    }
+}

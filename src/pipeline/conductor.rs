@@ -1,0 +1,210 @@
+//! The conductor: the stages of a campaign in order.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::campaign::Campaign;
+use super::estimate_step::{self, EstimateStep};
+use super::flight_contents::{FlightContents, source_file};
+use super::group_steps::{self, JointStep, PredictStep};
+use super::ingest_step::{self, IngestStep};
+use super::progress::Progress;
+use super::segment_step::{self, SegmentStep};
+use super::step::Step;
+use super::step_runner::{Absent, StepRunner};
+use super::trend_stage::{self, COMPARE_VERSION, TREND_VERSION};
+use crate::compare::against::Earlier;
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::lineage::Stage;
+use crate::store::archive::{self, FlightFiles};
+use crate::store::{Contents, Store};
+
+/// Name and version of each method whose artefacts the store keeps.
+#[must_use]
+pub fn step_versions() -> [(&'static str, u32); 5] {
+    [
+        version_of::<IngestStep>(),
+        version_of::<SegmentStep>(),
+        version_of::<EstimateStep>(),
+        version_of::<JointStep>(),
+        version_of::<PredictStep>(),
+    ]
+}
+
+fn version_of<S: Step>() -> (&'static str, u32) {
+    (S::KIND.name(), S::VERSION)
+}
+
+/// Versions of all methods, by name.
+#[must_use]
+pub fn method_versions() -> BTreeMap<String, u32> {
+    let made_anew = [
+        (Stage::Trend.name(), TREND_VERSION),
+        (Stage::Compare.name(), COMPARE_VERSION),
+    ];
+    step_versions()
+        .into_iter()
+        .chain(made_anew)
+        .map(|(name, version)| (name.to_owned(), version))
+        .collect()
+}
+
+/// A campaign's configuration, archive and store, opened.
+pub struct Conductor<'a> {
+    pub runner: StepRunner<'a>,
+    pub archive: Vec<FlightFiles>,
+    pub flight_contents: FlightContents,
+    /// Tables of earlier campaigns to compare with.
+    pub earlier: Vec<Earlier>,
+}
+
+impl<'a> Conductor<'a> {
+    /// Opens the campaign for one run alone, waiting up to `wait` for another run to leave the
+    /// store.
+    ///
+    /// # Errors
+    /// No archive, a store in use, a disk that fails.
+    pub fn open(
+        config: &'a Config,
+        wait: Duration,
+        progress: &'a dyn Progress,
+    ) -> Result<Conductor<'a>> {
+        let archive = archive::find(&config.archive)?;
+        let store = Store::open(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
+        let contents = store.contents();
+        let conductor = Conductor::new(config, store, contents, archive, Absent::Make, progress)?;
+        conductor.remember_contents()?;
+        Ok(conductor)
+    }
+
+    /// Opens the campaign of these flights as one of several processes that add to the store and
+    /// publish nothing.
+    ///
+    /// # Errors
+    /// As [`Conductor::open`].
+    pub fn join(
+        config: &'a Config,
+        archive: Vec<FlightFiles>,
+        absent: Absent,
+        wait: Duration,
+        progress: &'a dyn Progress,
+    ) -> Result<Conductor<'a>> {
+        let store = Store::join(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
+        let contents = store.contents();
+        Conductor::new(config, store, contents, archive, absent, progress)
+    }
+
+    /// Opens the campaign to look at; nothing is made or changed.
+    ///
+    /// # Errors
+    /// No archive.
+    pub fn look(config: &'a Config, progress: &'a dyn Progress) -> Result<Conductor<'a>> {
+        let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+        let contents = store.contents();
+        Conductor::looking(config, store, contents, progress)
+    }
+
+    /// Opens the campaign to look at, with every input file digested anew.
+    ///
+    /// # Errors
+    /// No archive.
+    pub fn look_at_every_byte(
+        config: &'a Config,
+        progress: &'a dyn Progress,
+    ) -> Result<Conductor<'a>> {
+        let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+        Conductor::looking(config, store, Contents::forgetful(), progress)
+    }
+
+    fn looking(
+        config: &'a Config,
+        store: Store,
+        contents: Contents,
+        progress: &'a dyn Progress,
+    ) -> Result<Conductor<'a>> {
+        let archive = archive::find(&config.archive)?;
+        Conductor::new(config, store, contents, archive, Absent::Report, progress)
+    }
+
+    fn new(
+        config: &'a Config,
+        store: Store,
+        contents: Contents,
+        archive: Vec<FlightFiles>,
+        absent: Absent,
+        progress: &'a dyn Progress,
+    ) -> Result<Conductor<'a>> {
+        let earlier = trend_stage::read_earlier(config)?;
+        let mut flight_contents = FlightContents::gather(&archive, &contents, progress);
+        let tunnel = contents
+            .of(&config.wind_tunnel)
+            .map_err(|why| Error::config(&config.wind_tunnel, None, why))?;
+        flight_contents
+            .sources
+            .push(source_file(&config.wind_tunnel, &tunnel));
+        Ok(Conductor {
+            runner: StepRunner::new(config, store, contents, absent, progress),
+            archive,
+            flight_contents,
+            earlier,
+        })
+    }
+
+    /// Saves the digests of input files for the next run.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Store`] naming the file.
+    pub fn remember_contents(&self) -> Result<()> {
+        self.runner.store.remember(&self.runner.contents)
+    }
+
+    /// Brings the campaign as far as `until`; the report is no part of it.
+    ///
+    /// A conductor that only looks stops before the first stage that needs a missing artefact.
+    ///
+    /// # Errors
+    /// What stops a run; what spoils a flight or maneuver is among the problems.
+    pub fn campaign(&self, until: Stage) -> Result<Campaign> {
+        self.campaign_of(&self.archive, until)
+    }
+
+    /// Brings the campaign of some flights as far as `until`.
+    ///
+    /// # Errors
+    /// As [`Conductor::campaign`].
+    pub fn campaign_of(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
+        let (runner, config) = (&self.runner, self.runner.config);
+        let mut campaign = Campaign::default();
+        ingest_step::ingest(runner, files, &self.flight_contents, &mut campaign)?;
+        if until >= Stage::Segment {
+            segment_step::segment(runner, &mut campaign)?;
+        }
+        if until >= Stage::Estimate && !self.estimate(&mut campaign)? {
+            return Ok(campaign);
+        }
+        if until >= Stage::Trend {
+            trend_stage::fit_trends(config, &mut campaign);
+        }
+        if until >= Stage::Compare {
+            trend_stage::compare(config, &self.earlier, &mut campaign);
+        }
+        Ok(campaign)
+    }
+
+    /// Brings the estimates of all maneuvers and groups of a segmented campaign; `false` if some are
+    /// missing.
+    ///
+    /// # Errors
+    /// As [`Conductor::campaign`].
+    pub fn estimate(&self, campaign: &mut Campaign) -> Result<bool> {
+        let runner = &self.runner;
+        let Some(estimates) = estimate_step::estimate(runner, campaign)? else {
+            return Ok(false);
+        };
+        group_steps::join(runner, campaign)?;
+        group_steps::predict(runner, campaign, &estimates)?;
+        estimate_step::collect_rows(campaign, estimates);
+        Ok(campaign.state(Stage::Estimate).missing.is_empty())
+    }
+}

@@ -1,0 +1,229 @@
+//! Estimate of the campaign: one artefact a maneuver, with the history of its fit beside it.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::campaign::{Campaign, Failure, MissingArtefact};
+use super::ingested::Flight;
+use super::problems::problem;
+use super::step::{Brought, Companion, Made, Step};
+use super::step_runner::StepRunner;
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::config::Config;
+use crate::error::{ProblemStage, Result};
+use crate::estimate::{self, Context, Estimated};
+use crate::flight::Record;
+use crate::lineage::Stage;
+use crate::maneuver::{Class, Maneuver};
+use crate::output_error::Outcome;
+use crate::report;
+use crate::store::record_file::RecordFile;
+use crate::store::{ArtefactName, Kind, Store};
+
+/// Everything that decides the derivatives of a maneuver.
+#[derive(Serialize)]
+pub struct EstimateKey<'a> {
+    /// Fingerprint of the flight's ingest.
+    ingest: &'a str,
+    maneuver: &'a Maneuver,
+    class: Option<&'a Class>,
+    aircraft: &'a Aircraft,
+    model: &'a Buildup,
+    tunnel: &'a WindTunnel,
+    estimate: &'a estimate::Settings,
+}
+
+/// Record of a flight, opened by the first maneuver that reads it.
+pub struct LazyRecord<'a> {
+    pub flight: &'a Flight,
+    store: &'a Store,
+    record: Mutex<Option<Arc<RecordFile>>>,
+}
+
+impl<'a> LazyRecord<'a> {
+    pub fn new(flight: &'a Flight, store: &'a Store) -> LazyRecord<'a> {
+        LazyRecord {
+            flight,
+            store,
+            record: Mutex::default(),
+        }
+    }
+
+    /// Reads the part of the record that holds a maneuver.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`] or [`crate::error::Error::Store`] naming the record.
+    pub fn part(&self, maneuver: &Maneuver) -> Result<Record> {
+        self.open()?.part(None, maneuver.start_s, maneuver.end_s)
+    }
+
+    fn open(&self) -> Result<Arc<RecordFile>> {
+        let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(record) = &*record {
+            return Ok(Arc::clone(record));
+        }
+        let opened = Arc::new(self.flight.open(self.store)?);
+        *record = Some(Arc::clone(&opened));
+        Ok(opened)
+    }
+}
+
+/// Estimation of one maneuver.
+pub struct EstimateStep<'a> {
+    pub config: &'a Config,
+    pub store: &'a Store,
+    pub record: &'a LazyRecord<'a>,
+    pub maneuver: &'a Maneuver,
+}
+
+impl<'a> Step for EstimateStep<'a> {
+    type Key = EstimateKey<'a>;
+    type Artefact = Estimated;
+
+    const KIND: Kind = Kind::Estimate;
+    const VERSION: u32 = 10;
+
+    fn item(&self) -> &str {
+        &self.maneuver.maneuver_id
+    }
+
+    fn key(&self) -> EstimateKey<'a> {
+        let config = self.config;
+        EstimateKey {
+            ingest: &self.record.flight.fingerprint,
+            maneuver: self.maneuver,
+            class: config.class(&self.maneuver.class),
+            aircraft: &config.aircraft,
+            model: &config.buildup,
+            tunnel: &config.tunnel,
+            estimate: &config.estimate,
+        }
+    }
+
+    fn make(&self, name: &ArtefactName) -> Result<Made<Estimated>> {
+        let record = self.record.part(self.maneuver)?;
+        let mut estimated = estimate_maneuver(self.config, &record, self.maneuver);
+        let history = estimated.history.take().map(|h| report::thinned(&h));
+        self.store.save(&name.sibling(Kind::History), &history)?;
+        Ok(Made::Settled(estimated))
+    }
+
+    fn companions(&self, name: &ArtefactName, _: &Estimated) -> Vec<Companion> {
+        vec![Companion {
+            name: name.sibling(Kind::History),
+            digest: None,
+        }]
+    }
+}
+
+/// Estimates a maneuver from the part of its record.
+pub fn estimate_maneuver(config: &Config, record: &Record, maneuver: &Maneuver) -> Estimated {
+    match config.class(&maneuver.class) {
+        Some(class) => estimate::maneuver(record, maneuver, class, &context(config)),
+        None => Estimated::unknown_class(maneuver),
+    }
+}
+
+/// Model, aircraft and settings of every estimate.
+pub fn context(config: &Config) -> Context<'_> {
+    Context::new(
+        &config.aircraft,
+        &config.buildup,
+        &config.tunnel,
+        &config.estimate,
+    )
+}
+
+/// Brings the estimates of all maneuvers, in their order. `None` if some are missing where nothing
+/// is made.
+///
+/// # Errors
+/// What stops a run.
+pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<Vec<Estimated>>> {
+    let all: Vec<&Maneuver> = campaign.maneuvers.iter().collect();
+    let brought = bring_maneuvers(runner, &campaign.flights, &all)?;
+    let mut missing = Vec::new();
+    let mut estimates = Vec::new();
+    for (maneuver, estimate) in campaign.maneuvers.iter().zip(brought) {
+        match estimate {
+            Some(estimate) => estimates.push(estimate),
+            None => missing.push(missing_estimate(maneuver)),
+        }
+    }
+    let is_whole = missing.is_empty();
+    let state = campaign.state(Stage::Estimate);
+    state.fresh = estimates.len();
+    state.missing = missing;
+    let failed = estimates.iter().filter_map(|e| failure(&e.artefact));
+    state.failed.extend(failed);
+    let (names, estimated): (Vec<_>, Vec<_>) =
+        estimates.into_iter().map(|e| (e.name, e.artefact)).unzip();
+    campaign.estimate_names = names;
+    Ok(is_whole.then_some(estimated))
+}
+
+fn missing_estimate(maneuver: &Maneuver) -> MissingArtefact {
+    MissingArtefact {
+        item: maneuver.maneuver_id.clone(),
+        flight_id: maneuver.flight_id.clone(),
+        class: Some(maneuver.class.clone()),
+    }
+}
+
+/// Failure of a fit that did not converge.
+fn failure(estimated: &Estimated) -> Option<Failure> {
+    let fit = &estimated.fit;
+    (fit.outcome != Outcome::Converged).then(|| Failure {
+        item: fit.maneuver_id.clone(),
+        reason: format!("{}: {}", fit.outcome, fit.reason),
+    })
+}
+
+/// Brings the estimates of some maneuvers, flight by flight in the order of the flights.
+///
+/// # Errors
+/// What stops a run.
+pub fn bring_maneuvers(
+    runner: &StepRunner,
+    flights: &[Flight],
+    maneuvers: &[&Maneuver],
+) -> Result<Vec<Option<Brought<Estimated>>>> {
+    let of_flight = |flight: &Flight| {
+        let record = LazyRecord::new(flight, &runner.store);
+        let of_flight = maneuvers.iter().filter(|m| m.flight_id == flight.id());
+        let steps: Vec<EstimateStep> = of_flight
+            .map(|maneuver| EstimateStep {
+                config: runner.config,
+                store: &runner.store,
+                record: &record,
+                maneuver,
+            })
+            .collect();
+        runner.bring_all(&steps)
+    };
+    let brought: Result<Vec<Vec<_>>> = runner.with_progress("estimate", maneuvers.len(), || {
+        flights.par_iter().map(of_flight).collect()
+    });
+    Ok(brought?.into_iter().flatten().collect())
+}
+
+/// Collects the rows of all estimates.
+pub fn collect_rows(campaign: &mut Campaign, estimates: Vec<Estimated>) {
+    for (maneuver, estimated) in campaign.maneuvers.iter().zip(estimates) {
+        if let Some(failure) = failure(&estimated) {
+            campaign.problems.push(problem(
+                ProblemStage::Estimate,
+                &maneuver.flight_id,
+                &maneuver.maneuver_id,
+                &failure.reason,
+            ));
+        }
+        campaign.fits.push(estimated.fit);
+        campaign.estimates.extend(estimated.estimates);
+        campaign.combined.extend(estimated.combined);
+        campaign.correlations.extend(estimated.correlations);
+    }
+}

@@ -1,0 +1,274 @@
+//! Steps over several maneuvers: joint estimates, and the prediction of each maneuver from others.
+//!
+//! Their keys name the estimates of the maneuvers, whose names carry the fingerprints of everything
+//! that decides them. Records are read only for an artefact that is made.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::campaign::{Campaign, MissingArtefact};
+use super::estimate_step::{LazyRecord, context};
+use super::ingested::Flight;
+use super::problems::problem;
+use super::step::{Made, Step};
+use super::step_runner::StepRunner;
+use crate::config::Config;
+use crate::error::{Error, ProblemStage, Result};
+use crate::estimate::Estimated;
+use crate::estimate::joint::{self, Bin, Joined};
+use crate::estimate::prediction::{self, Predicted};
+use crate::flight::Record;
+use crate::lineage::Stage;
+use crate::maneuver::Maneuver;
+use crate::output_error::Outcome;
+use crate::store::{ArtefactName, Kind, Store};
+use crate::tables::{FitRow, JOINT_FLIGHT};
+
+/// A maneuver with its flight and the name of its estimate.
+#[derive(Clone, Copy)]
+struct Member<'a> {
+    flight: &'a Flight,
+    maneuver: &'a Maneuver,
+    estimate: &'a ArtefactName,
+}
+
+impl<'a> Member<'a> {
+    /// The maneuver of this index.
+    fn of(campaign: &'a Campaign, index: usize) -> Option<Member<'a>> {
+        let maneuver = campaign.maneuvers.get(index)?;
+        let mut flights = campaign.flights.iter();
+        Some(Member {
+            flight: flights.find(|f| f.id() == maneuver.flight_id)?,
+            maneuver,
+            estimate: campaign.estimate_names.get(index)?,
+        })
+    }
+
+    fn record(&self, store: &Store) -> Result<Record> {
+        LazyRecord::new(self.flight, store).part(self.maneuver)
+    }
+}
+
+/// Everything that decides a joint estimate.
+#[derive(Serialize)]
+pub struct JointKey<'a> {
+    joint_id: &'a str,
+    class: &'a str,
+    settings: &'a joint::Settings,
+    estimates: Vec<&'a str>,
+}
+
+/// Joint estimation of the maneuvers of one class and angle of attack.
+pub struct JointStep<'a> {
+    config: &'a Config,
+    store: &'a Store,
+    settings: &'a joint::Settings,
+    bin: &'a Bin,
+    members: Vec<Member<'a>>,
+}
+
+impl<'a> Step for JointStep<'a> {
+    type Key = JointKey<'a>;
+    type Artefact = Joined;
+
+    const KIND: Kind = Kind::Joint;
+    const VERSION: u32 = 6;
+
+    fn item(&self) -> &str {
+        &self.bin.joint_id
+    }
+
+    fn key(&self) -> JointKey<'a> {
+        JointKey {
+            joint_id: &self.bin.joint_id,
+            class: &self.bin.class,
+            settings: self.settings,
+            estimates: self.members.iter().map(|m| m.estimate.as_str()).collect(),
+        }
+    }
+
+    fn make(&self, name: &ArtefactName) -> Result<Made<Joined>> {
+        let class = self
+            .config
+            .class(&self.bin.class)
+            .ok_or_else(|| Error::store(&self.store.path(name), &"its class is not configured"))?;
+        let records: Result<Vec<Record>> =
+            self.members.iter().map(|m| m.record(self.store)).collect();
+        let records = records?;
+        let maneuvers = self.members.iter().map(|m| m.maneuver);
+        let members: Vec<(&Record, &Maneuver)> = records.iter().zip(maneuvers).collect();
+        let joint_id = &self.bin.joint_id;
+        Ok(Made::Settled(joint::estimate(
+            joint_id,
+            &members,
+            class,
+            &context(self.config),
+        )))
+    }
+}
+
+/// Estimates maneuvers of one class and angle of attack together, if the analyst asks for it.
+///
+/// # Errors
+/// What stops a run.
+pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
+    let Some(settings) = &runner.config.estimate.joint else {
+        return Ok(());
+    };
+    let bins = joint::bins(&campaign.maneuvers, settings);
+    let members = |bin: &Bin| {
+        let indices = bin.members.iter();
+        indices
+            .filter_map(|&i| Member::of(campaign, i))
+            .collect::<Vec<_>>()
+    };
+    let steps: Vec<JointStep> = bins
+        .iter()
+        .map(|bin| JointStep {
+            config: runner.config,
+            store: &runner.store,
+            settings,
+            bin,
+            members: members(bin),
+        })
+        .collect();
+    let brought: Result<Vec<_>> = steps.par_iter().map(|step| runner.bring(step)).collect();
+    for (bin, joined) in bins.iter().zip(brought?) {
+        match joined {
+            Some(joined) => add_joined(campaign, joined.artefact),
+            None => {
+                let missing = MissingArtefact {
+                    item: bin.joint_id.clone(),
+                    flight_id: String::new(),
+                    class: Some(bin.class.clone()),
+                };
+                campaign.state(Stage::Estimate).missing.push(missing);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn add_joined(campaign: &mut Campaign, joined: Joined) {
+    let fit = &joined.estimated.fit;
+    if fit.outcome != Outcome::Converged {
+        let reason = format!("{}: {}", fit.outcome, fit.reason);
+        campaign.problems.push(problem(
+            ProblemStage::Estimate,
+            JOINT_FLIGHT,
+            &fit.maneuver_id,
+            &reason,
+        ));
+    }
+    campaign.joined.push(joined);
+}
+
+/// Everything that decides a prediction.
+#[derive(Serialize)]
+pub struct PredictKey<'a> {
+    settings: &'a prediction::Settings,
+    /// Estimate of the predicted maneuver itself, for what else decides it.
+    estimate: &'a str,
+    from: Vec<&'a str>,
+}
+
+/// Prediction of one maneuver from the estimates of others.
+pub struct PredictStep<'a> {
+    config: &'a Config,
+    store: &'a Store,
+    settings: &'a prediction::Settings,
+    member: Member<'a>,
+    from: Vec<(&'a ArtefactName, &'a Estimated)>,
+}
+
+impl<'a> Step for PredictStep<'a> {
+    type Key = PredictKey<'a>;
+    type Artefact = Predicted;
+
+    const KIND: Kind = Kind::Predict;
+    const VERSION: u32 = 4;
+
+    fn item(&self) -> &str {
+        &self.member.maneuver.maneuver_id
+    }
+
+    fn key(&self) -> PredictKey<'a> {
+        PredictKey {
+            settings: self.settings,
+            estimate: self.member.estimate.as_str(),
+            from: self.from.iter().map(|(name, _)| name.as_str()).collect(),
+        }
+    }
+
+    fn make(&self, _: &ArtefactName) -> Result<Made<Predicted>> {
+        let maneuver = self.member.maneuver;
+        let from: Vec<&Estimated> = self.from.iter().map(|(_, estimated)| *estimated).collect();
+        let predicted = match self.config.class(&maneuver.class) {
+            Some(class) => {
+                let record = self.member.record(self.store)?;
+                prediction::maneuver(&record, maneuver, class, &context(self.config), &from)
+            }
+            None => Predicted::none("the configuration has no such class", from.len()),
+        };
+        Ok(Made::Settled(predicted))
+    }
+}
+
+/// Predicts each maneuver from others of its class and angle of attack, unless that is switched
+/// off.
+///
+/// # Errors
+/// What stops a run.
+pub fn predict(
+    runner: &StepRunner,
+    campaign: &mut Campaign,
+    estimates: &[Estimated],
+) -> Result<()> {
+    let Some(settings) = &runner.config.estimate.prediction else {
+        return Ok(());
+    };
+    let fits: Vec<FitRow> = estimates.iter().map(|e| e.fit.clone()).collect();
+    let sources = prediction::others(&campaign.maneuvers, &fits, settings);
+    let bring = |(i, sources): (usize, &Option<Vec<usize>>)| {
+        let Some(sources) = sources else {
+            let predicted = Predicted::none("its own fit did not converge", 0);
+            return Ok(Some(predicted));
+        };
+        let from = sources.iter().filter_map(|&j| {
+            let name = campaign.estimate_names.get(j)?;
+            Some((name, estimates.get(j)?))
+        });
+        let from: Vec<_> = from.collect();
+        match Member::of(campaign, i).filter(|_| !from.is_empty()) {
+            Some(member) => {
+                let step = PredictStep {
+                    config: runner.config,
+                    store: &runner.store,
+                    settings,
+                    member,
+                    from,
+                };
+                Ok(runner.bring(&step)?.map(|brought| brought.artefact))
+            }
+            None => Ok(Some(Predicted::none(
+                "no other maneuver of its class and angle of attack",
+                0,
+            ))),
+        }
+    };
+    let brought: Result<Vec<Option<Predicted>>> =
+        sources.par_iter().enumerate().map(bring).collect();
+    let brought = brought?;
+    let lacking = campaign.maneuvers.iter().zip(&brought);
+    let missing: Vec<MissingArtefact> = lacking
+        .filter(|(_, predicted)| predicted.is_none())
+        .map(|(maneuver, _)| MissingArtefact {
+            item: maneuver.maneuver_id.clone(),
+            flight_id: maneuver.flight_id.clone(),
+            class: Some(maneuver.class.clone()),
+        })
+        .collect();
+    campaign.state(Stage::Estimate).missing.extend(missing);
+    campaign.predicted = brought.into_iter().flatten().collect();
+    Ok(())
+}

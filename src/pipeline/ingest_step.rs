@@ -1,0 +1,231 @@
+//! Ingest of the campaign: one artefact a flight, with the records of its stretches.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::campaign::{Campaign, Failure, MissingArtefact};
+use super::flight_contents::FlightContents;
+use super::ingested::{Flight, IngestedFlight};
+use super::memory_shares::{MemoryShares, map_with_workers};
+use super::problems::problem;
+use super::record_writing::RecordWriting;
+use super::repeated_rows;
+use super::step::{Brought, Companion, Made, Step};
+use super::step_runner::StepRunner;
+use crate::aircraft::Aircraft;
+use crate::error::{Error, Problem, ProblemStage, Result};
+use crate::flight::Channel;
+use crate::ingest;
+use crate::lineage::Stage;
+use crate::store::archive::FlightFiles;
+use crate::store::{ArtefactName, Kind, object};
+
+/// Everything that decides the records of a flight.
+///
+/// The flight id comes from the file's name and is part of the records and of every id in the
+/// tables, so a renamed file is ingested again.
+#[derive(Serialize)]
+pub struct IngestKey<'a> {
+    flight_id: &'a str,
+    content: &'a str,
+    channels: &'a BTreeMap<String, Channel>,
+    constants: &'a BTreeMap<String, f64>,
+    aircraft: &'a Aircraft,
+    ingest: &'a ingest::Settings,
+}
+
+/// Ingest of one flight.
+pub struct IngestStep<'a> {
+    runner: &'a StepRunner<'a>,
+    shares: MemoryShares,
+    files: &'a FlightFiles,
+    /// Fingerprint of the files' content.
+    content: &'a str,
+}
+
+impl<'a> Step for IngestStep<'a> {
+    type Key = IngestKey<'a>;
+    type Artefact = IngestedFlight;
+
+    const KIND: Kind = Kind::Ingest;
+    const VERSION: u32 = 7;
+
+    fn item(&self) -> &str {
+        &self.files.flight_id
+    }
+
+    fn key(&self) -> IngestKey<'a> {
+        let config = self.runner.config;
+        IngestKey {
+            flight_id: &self.files.flight_id,
+            content: self.content,
+            channels: &config.channels,
+            constants: &config.constants,
+            aircraft: &config.aircraft,
+            ingest: &config.ingest,
+        }
+    }
+
+    fn make(&self, name: &ArtefactName) -> Result<Made<IngestedFlight>> {
+        let writing = RecordWriting {
+            config: self.runner.config,
+            store: &self.runner.store,
+            shares: self.shares,
+            fingerprint: name.fingerprint(),
+        };
+        let ingested = writing.ingest(self.files)?;
+        Ok(match self.passing_fault() {
+            None => Made::Settled(ingested),
+            Some(fault) => Made::Passing(IngestedFlight::rejected(self.item(), fault)),
+        })
+    }
+
+    fn companions(&self, _: &ArtefactName, flight: &IngestedFlight) -> Vec<Companion> {
+        let companion = |record: &super::ingested::StoredRecord| Companion {
+            name: record.name.clone(),
+            digest: Some(record.digest.clone()),
+        };
+        flight.records().map(companion).collect()
+    }
+}
+
+impl IngestStep<'_> {
+    /// Fault of the network or of a file that changed while it was read. The bytes that were read
+    /// may then differ from those of the key.
+    fn passing_fault(&self) -> Option<Problem> {
+        let fault = |place: &std::path::Path, reason: &str| {
+            let place = place.display().to_string();
+            problem(ProblemStage::Ingest, self.item(), &place, reason)
+        };
+        let mut files = self.files.files.iter();
+        if let Some((file, reason)) = files.find_map(|f| Some((f, object::failed(f)?))) {
+            return Some(fault(file, &reason));
+        }
+        let changed = |file: &&std::path::PathBuf| !self.runner.contents.is_unchanged(file);
+        let file = self.files.files.iter().find(changed)?;
+        let reason = "changed or vanished while it was read: is it still being copied? The next run will read it";
+        Some(fault(file, reason))
+    }
+}
+
+/// Brings the records of these flights.
+///
+/// # Errors
+/// What stops a run; what spoils a flight is among its problems.
+pub fn ingest(
+    runner: &StepRunner,
+    files: &[FlightFiles],
+    contents: &FlightContents,
+    campaign: &mut Campaign,
+) -> Result<()> {
+    let config = runner.config;
+    let threads = rayon::current_num_threads();
+    let shares = MemoryShares::of(config.ingest.memory_mb, config.channels.len(), threads);
+    let bring = |files: &FlightFiles| {
+        let flight = bring_flight(runner, shares, files, contents);
+        runner.advance(&files.flight_id);
+        flight
+    };
+    let flights = runner.with_progress("ingest", files.len(), || {
+        map_with_workers(shares.flights, files, bring)
+    });
+    campaign.problems.extend_from_slice(&contents.problems);
+    for (files, flight) in files.iter().zip(flights) {
+        let lost = || Error::store(&config.store, &"a flight was not ingested; run again");
+        match flight.ok_or_else(lost)?? {
+            Some(flight) => add_flight(campaign, &files.flight_id, flight),
+            None => campaign
+                .state(Stage::Ingest)
+                .missing
+                .push(missing(&files.flight_id)),
+        }
+    }
+    repeated_rows::reject_copies(campaign);
+    collect_rows(campaign);
+    Ok(())
+}
+
+fn missing(flight_id: &str) -> MissingArtefact {
+    MissingArtefact {
+        item: flight_id.to_owned(),
+        flight_id: flight_id.to_owned(),
+        class: None,
+    }
+}
+
+/// Brings a flight. One whose files cannot be read is rejected, but not kept so.
+fn bring_flight(
+    runner: &StepRunner,
+    shares: MemoryShares,
+    files: &FlightFiles,
+    contents: &FlightContents,
+) -> Result<Option<Brought<IngestedFlight>>> {
+    let id = &files.flight_id;
+    match contents.fingerprint(id) {
+        Ok(content) => runner.bring(&IngestStep {
+            runner,
+            shares,
+            files,
+            content,
+        }),
+        Err(reason) => {
+            let problem = problem(ProblemStage::Ingest, id, &first_file(files), reason);
+            Ok(Some(Brought {
+                name: ArtefactName::new(Kind::Ingest, id, "unread"),
+                artefact: IngestedFlight::rejected(id, problem),
+                is_stored: false,
+            }))
+        }
+    }
+}
+
+/// File of a flight that a problem of the whole flight names.
+fn first_file(flight: &FlightFiles) -> String {
+    let first = flight.files.first();
+    first.map_or_else(String::new, |file| file.display().to_string())
+}
+
+fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: Brought<IngestedFlight>) {
+    let IngestedFlight {
+        problems,
+        stretches,
+    } = flight.artefact;
+    if flight.is_stored {
+        campaign.state(Stage::Ingest).fresh += 1;
+    } else {
+        let reasons = stretches.iter().flat_map(|s| &s.problems);
+        let reasons: Vec<&str> = reasons.map(|p| p.reason.as_str()).collect();
+        let reasons = reasons.join("; ");
+        campaign.unread.insert(flight_id.to_owned(), reasons);
+    }
+    campaign.problems.extend(problems);
+    let fingerprint = flight.name.fingerprint();
+    campaign
+        .flights
+        .extend(stretches.into_iter().map(|ingested| Flight {
+            fingerprint: fingerprint.to_owned(),
+            ingested,
+        }));
+}
+
+/// Collects the rows of all flights, and the rejected flights.
+fn collect_rows(campaign: &mut Campaign) {
+    let mut failed = Vec::new();
+    for flight in &campaign.flights {
+        let ingested = &flight.ingested;
+        campaign.channels.extend_from_slice(&ingested.channels);
+        campaign.checks.extend_from_slice(&ingested.checks);
+        campaign
+            .instruments
+            .extend_from_slice(&ingested.instruments);
+        campaign.problems.extend_from_slice(&ingested.problems);
+        if !flight.is_accepted() {
+            failed.push(Failure {
+                item: flight.id().to_owned(),
+                reason: flight.reasons(),
+            });
+        }
+    }
+    campaign.state(Stage::Ingest).failed = failed;
+}

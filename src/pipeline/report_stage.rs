@@ -1,0 +1,121 @@
+//! The report of the campaign: the page and its printed form.
+
+use super::campaign::Campaign;
+use super::conductor::{Conductor, step_versions};
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::lineage::Changes;
+use crate::pdf;
+use crate::report;
+use crate::store::Kind;
+use crate::tables::{EstimateRow, History};
+
+/// Published file of the page.
+pub const PAGE: &str = "report.html";
+
+/// Published file of the printed page.
+pub const PRINTED_PAGE: &str = "report.pdf";
+
+/// The report, in both forms.
+#[derive(Clone, Debug)]
+pub struct Report {
+    pub html: String,
+    /// The reason instead, if the page of the analyst's template cannot be printed.
+    pub pdf: Result<Vec<u8>, String>,
+}
+
+/// Makes the report of a compared campaign.
+///
+/// # Errors
+/// [`Error::Store`] naming the report: the analyst's template is faulty.
+pub fn make_report(
+    conductor: &Conductor,
+    campaign: &Campaign,
+    changes: &Changes,
+) -> Result<Report> {
+    let config = conductor.runner.config;
+    let alpha_deg = config.report.histories_at_alpha_deg;
+    let pages = report::maneuvers_with_page(
+        &campaign.maneuvers,
+        &campaign.fits,
+        changes,
+        alpha_deg,
+        config.report.maneuver_pages,
+    );
+    let with_page = campaign
+        .maneuvers
+        .iter()
+        .zip(&campaign.estimate_names)
+        .filter(|(m, _)| pages.contains(&m.maneuver_id));
+    let store = &conductor.runner.store;
+    let histories: Vec<History> = with_page
+        .filter_map(|(_, name)| store.load::<Option<History>>(&name.sibling(Kind::History))?)
+        .collect();
+    let classes = config.classes.iter();
+    let classes: Vec<_> = classes
+        .map(|c| (c.name.clone(), c.title.clone(), c.axis))
+        .collect();
+    let estimates: Vec<EstimateRow> = campaign.estimates_and_sums().cloned().collect();
+    let contents = report::Contents {
+        title: &config.title,
+        aircraft: &config.aircraft.name,
+        archive: &config.archive,
+        wind_tunnel: &tunnel_and_sources(config),
+        maneuvers: &campaign.maneuvers,
+        fits: &campaign.fits,
+        estimates: &estimates,
+        predictions: &campaign.predictions(),
+        correlations: &campaign.correlations,
+        limits: &config.estimate.identifiability,
+        trends: &campaign.trends,
+        comparison: &campaign.comparison,
+        channels: &campaign.channels,
+        checks: &campaign.checks,
+        instruments: &campaign.instruments,
+        events: &campaign.events,
+        problems: &campaign.problems,
+        pages: &pages,
+        histories: &histories,
+        typical_alpha_deg: alpha_deg,
+        provenance: &provenance(conductor),
+        order: &config.derivative_names(),
+        classes: &classes,
+        overnight: changes,
+    };
+    let html = report::html(&contents, config.template.as_deref())
+        .map_err(|e| Error::store(&config.reports.join(PAGE), &e))?;
+    let pdf = pdf::pdf(&html);
+    Ok(Report { html, pdf })
+}
+
+/// Everything that decided the results, so that anyone can make them again.
+fn provenance(conductor: &Conductor) -> report::Provenance {
+    let config = conductor.runner.config;
+    let methods = step_versions().map(|(name, version)| format!("{name} {version}"));
+    report::Provenance {
+        program: format!(
+            "harvest {} (sources {}), methods: {}",
+            env!("CARGO_PKG_VERSION"),
+            env!("HARVEST_SOURCE"),
+            methods.join(", ")
+        ),
+        command: format!(
+            "harvest run {} --archive '{}' --wind-tunnel '{}'",
+            config.name,
+            config.archive,
+            config.wind_tunnel.display()
+        ),
+        data: conductor.flight_contents.sources.clone(),
+        configuration: config.files.clone(),
+    }
+}
+
+/// Name of the tunnel database, with the stated sources of its values.
+fn tunnel_and_sources(config: &Config) -> String {
+    let (name, sources) = (config.wind_tunnel.display(), config.tunnel.sources());
+    if sources.is_empty() {
+        format!("{name} (no sources stated)")
+    } else {
+        format!("{name} (sources: {})", sources.join("; "))
+    }
+}

@@ -1,0 +1,168 @@
+//! Loading or making, saving and requiring of artefacts, for every kind of step.
+
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::progress::Progress;
+use super::step::{Brought, Companion, Made, Step};
+use crate::config::Config;
+use crate::error::Result;
+use crate::store::{ArtefactName, Contents, Store};
+
+/// Treatment of an artefact that the store lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Absent {
+    /// It is made and saved.
+    Make,
+    /// It is reported missing; nothing is written.
+    Report,
+}
+
+/// Brings artefacts from the store, and makes those that it lacks unless told to only look.
+pub struct StepRunner<'a> {
+    pub config: &'a Config,
+    pub store: Store,
+    /// Digests of input files.
+    pub contents: Contents,
+    pub absent: Absent,
+    progress: &'a dyn Progress,
+    /// Artefacts that were found missing.
+    missing: Mutex<BTreeSet<ArtefactName>>,
+}
+
+impl<'a> StepRunner<'a> {
+    pub fn new(
+        config: &'a Config,
+        store: Store,
+        contents: Contents,
+        absent: Absent,
+        progress: &'a dyn Progress,
+    ) -> StepRunner<'a> {
+        StepRunner {
+            config,
+            store,
+            contents,
+            absent,
+            progress,
+            missing: Mutex::default(),
+        }
+    }
+
+    /// Returns a step's artefact, made if need be; `None` for one that is missing where nothing is
+    /// made.
+    ///
+    /// # Errors
+    /// As [`Step::make`]; an artefact that cannot be saved.
+    pub fn bring<S: Step>(&self, step: &S) -> Result<Option<Brought<S::Artefact>>> {
+        let brought = match (self.load(step), self.absent) {
+            (Some(brought), _) => brought,
+            (None, Absent::Report) => {
+                self.note_missing(step.name());
+                return Ok(None);
+            }
+            (None, Absent::Make) => self.make(step)?,
+        };
+        if brought.is_stored {
+            self.store.require(&brought.name);
+            for companion in step.companions(&brought.name, &brought.artefact) {
+                self.store.require(&companion.name);
+            }
+        }
+        Ok(Some(brought))
+    }
+
+    /// Loads a step's artefact; `None` unless it and its companions are as they were written.
+    pub fn load<S: Step>(&self, step: &S) -> Option<Brought<S::Artefact>> {
+        let name = step.name();
+        let artefact = self.store.load(&name)?;
+        step.companions(&name, &artefact)
+            .iter()
+            .all(|companion| self.has(companion))
+            .then_some(Brought {
+                name,
+                artefact,
+                is_stored: true,
+            })
+    }
+
+    fn make<S: Step>(&self, step: &S) -> Result<Brought<S::Artefact>> {
+        let name = step.name();
+        let (artefact, is_stored) = match step.make(&name)? {
+            Made::Settled(artefact) => {
+                self.store.save(&name, &artefact)?;
+                (artefact, true)
+            }
+            Made::Passing(artefact) => (artefact, false),
+        };
+        Ok(Brought {
+            name,
+            artefact,
+            is_stored,
+        })
+    }
+
+    fn note_missing(&self, name: ArtefactName) {
+        if let Ok(mut missing) = self.missing.lock() {
+            missing.insert(name);
+        }
+    }
+
+    /// Names of the artefacts that were found missing.
+    pub fn missing(&self) -> BTreeSet<ArtefactName> {
+        self.missing
+            .lock()
+            .map(|missing| missing.clone())
+            .unwrap_or_default()
+    }
+
+    /// `true` if the store has a companion as it was written. A record that only the object store
+    /// has is checked by its size here, by its digest when it is fetched.
+    fn has(&self, companion: &Companion) -> bool {
+        let Some(digest) = &companion.digest else {
+            return self.store.has_sealed(&companion.name);
+        };
+        let path = self.store.path(&companion.name);
+        let is_in_folder = self.contents.of(&path).is_ok_and(|found| found == *digest);
+        if is_in_folder {
+            self.store.note_present(&companion.name);
+        }
+        is_in_folder || !path.exists() && self.store.is_shared(&companion.name, digest.bytes)
+    }
+
+    /// Brings the artefacts of several steps in parallel, in their order.
+    ///
+    /// # Errors
+    /// As [`StepRunner::bring`].
+    pub fn bring_all<S: Step>(&self, steps: &[S]) -> Result<Vec<Option<Brought<S::Artefact>>>>
+    where
+        S::Artefact: Send,
+    {
+        steps
+            .par_iter()
+            .map(|step| {
+                let brought = self.bring(step);
+                self.advance(step.item());
+                brought
+            })
+            .collect()
+    }
+
+    /// Does `work` with a progress display of so many items, unless nothing is made.
+    pub fn with_progress<T>(&self, stage: &str, items: usize, work: impl FnOnce() -> T) -> T {
+        if self.absent == Absent::Report {
+            return work();
+        }
+        self.progress.begin(stage, items);
+        let result = work();
+        self.progress.end();
+        result
+    }
+
+    pub fn advance(&self, item: &str) {
+        if self.absent == Absent::Make {
+            self.progress.advance(item);
+        }
+    }
+}
