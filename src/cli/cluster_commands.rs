@@ -21,11 +21,10 @@ use crate::store::atomic;
 pub struct PlanOptions {
     #[command(flatten)]
     options: Options,
-    /// What to deal: flights, to be ingested and segmented; or the maneuvers found in them, to be
-    /// estimated
+    /// Deal flights, to be ingested and segmented; or the maneuvers found in them, to be estimated
     #[arg(long, value_enum)]
     of: DealtArgument,
-    /// To how many shards [default: the pipeline's `cluster: shards:`]
+    /// Number of shards [default: the pipeline's `cluster: shards:`]
     #[arg(long, value_name = "N")]
     shards: Option<usize>,
     /// The file to write [default: flights.plan.json or maneuvers.plan.json in the store]
@@ -46,7 +45,7 @@ pub struct ShareOptions {
     /// may complete it
     #[arg(long, value_name = "FILE", requires = "shard")]
     plan: Option<PathBuf>,
-    /// Which shard of how many: 3/24
+    /// The shard and the number of shards: 3/24
     #[arg(long, value_name = "I/N", requires = "plan")]
     shard: Option<Shard>,
 }

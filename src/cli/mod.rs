@@ -91,7 +91,7 @@ enum Command {
     Status(night_commands::StatusOptions),
     /// Explain a maneuver: origin, samples, fit, derivatives, dependencies
     Explain(night_commands::ExplainOptions),
-    /// Say the changes since the night before, with their causes
+    /// List the changes since the night before, with their causes
     Diff(night_commands::DiffOptions),
     /// Check that a published night is still valid: bytes, input, configuration, code
     Verify(night_commands::VerifyOptions),

@@ -18,14 +18,14 @@ pub const ATTENTION: u8 = 3;
 /// Exit code of work that another try may complete (`EX_TEMPFAIL`).
 pub const TRY_AGAIN: u8 = 75;
 
-/// Returns 0, or `code` if `is_so`.
-pub fn exit_code(is_so: bool, code: u8) -> ExitCode {
-    ExitCode::from(if is_so { code } else { 0 })
+/// Returns `code` if the condition holds, else 0.
+pub fn exit_code(condition: bool, code: u8) -> ExitCode {
+    ExitCode::from(if condition { code } else { 0 })
 }
 
 #[derive(Args, Debug)]
 pub struct Patience {
-    /// Wait so long for another run to leave the store, instead of leaving at once
+    /// Longest wait for another run to leave the store and the reports
     #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0)]
     pub seconds: u64,
 }
@@ -61,8 +61,7 @@ pub struct Options {
     /// [default: data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     pub store: Option<PathBuf>,
-    /// Of a store in an object store: the folder that keeps what was fetched or made here [default:
-    /// data/store/<pipeline>]
+    /// Local cache of a store in an object store [default: data/store/<pipeline>]
     #[arg(long, value_name = "FOLDER")]
     pub store_cache: Option<PathBuf>,
     /// Folder of the tables and the report [default: reports/<pipeline>]
@@ -71,8 +70,8 @@ pub struct Options {
     /// Number of threads; results do not depend on it [default: all cores]
     #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
     pub threads: Option<usize>,
-    /// What reading flights may hold in memory at once, over all of them, instead of the
-    /// pipeline's; results do not depend on it
+    /// Memory for reading flights, over all of them, instead of the pipeline's; results do not depend
+    /// on it
     #[arg(long, value_name = "MB")]
     pub memory_mb: Option<f64>,
     /// No progress bars and no summary

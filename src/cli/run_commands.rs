@@ -21,7 +21,8 @@ pub struct RunOptions {
     options: Options,
     #[command(flatten)]
     patience: Patience,
-    /// Append what happens to a file, one JSON object per line, with the time of day
+    /// Append stages, problems and the result to a file, one JSON object per line with the time of
+    /// day (UTC)
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
 }

@@ -1,6 +1,6 @@
 //! The differences between two lineages, in words.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::parts::{Code, Lineage, method_stage};
 use super::stage::Stage;
 
-/// What kind of thing made a difference.
+/// Kind of a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
@@ -20,130 +20,150 @@ pub enum Origin {
 /// One difference between two lineages.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Cause {
-    /// The first stage that it reaches.
+    /// The first stage that reads what differs.
     pub stage: Stage,
     pub origin: Origin,
     /// The flight, the path in the configuration, or the method.
     pub subject: String,
-    /// In words: `new flight flight_007`.
+    /// The difference in words: `new flight flight_007`.
     pub words: String,
 }
 
-/// No more differences of one part than this are spelled out.
-const SPELLED_OUT: usize = 5;
+/// Most differences of one part of the configuration that are listed, so that a report stays
+/// readable.
+const MOST_DIFFERENCES: usize = 5;
+
+/// Longest value that is quoted whole, characters.
+const LONGEST_VALUE: usize = 40;
 
 impl Lineage {
-    /// What became different since `before`, in the order of the stages; empty when nothing did.
+    /// Differences since `before`, in the order of the stages.
     #[must_use]
     pub fn differences(&self, before: &Lineage) -> Vec<Cause> {
-        let mut causes = flights(&before.flights, &self.flights);
-        let empty = BTreeMap::new();
+        let mut causes = flight_differences(&before.flights, &self.flights);
         for stage in Stage::ALL {
-            let [a, b] = [before, self].map(|l| l.tables.get(&stage).unwrap_or(&empty));
-            for name in union(a, b)
-                .into_iter()
-                .filter(|name| a.get(*name) != b.get(*name))
-            {
-                let words = format!("the {name} changed");
-                causes.push(Cause {
-                    stage,
-                    origin: Origin::Configuration,
-                    subject: name.clone(),
-                    words,
-                });
-            }
+            let tables = (before.tables.get(&stage), self.tables.get(&stage));
+            causes.extend(table_differences(stage, tables.0, tables.1));
+            let settings = (
+                before.configuration.get(&stage),
+                self.configuration.get(&stage),
+            );
+            causes.extend(setting_differences(stage, settings.0, settings.1));
         }
-        let empty = BTreeMap::new();
-        for stage in Stage::ALL {
-            let [a, b] = [before, self].map(|l| l.configuration.get(&stage).unwrap_or(&empty));
-            for name in union(a, b) {
-                let mut paths = Vec::new();
-                compare(name, a.get(name), b.get(name), &mut paths);
-                let more = paths.len().saturating_sub(SPELLED_OUT);
-                paths.truncate(SPELLED_OUT);
-                if more > 0 {
-                    paths.push((
-                        name.clone(),
-                        format!("{more} more settings of `{name}` changed"),
-                    ));
-                }
-                let cause = |(subject, words)| Cause {
-                    stage,
-                    origin: Origin::Configuration,
-                    subject,
-                    words,
-                };
-                causes.extend(paths.into_iter().map(cause));
-            }
-        }
-        causes.extend(code(&before.code, &self.code));
+        causes.extend(method_differences(&before.code, &self.code));
+        causes.extend(program_difference(&before.code, &self.code));
         causes.sort();
         causes
     }
 }
 
-fn union<'a, V>(a: &'a BTreeMap<String, V>, b: &'a BTreeMap<String, V>) -> Vec<&'a String> {
-    let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
-    names.sort();
-    names.dedup();
-    names
+/// Keys of two maps in order, each once.
+fn union<'a, V>(a: &'a BTreeMap<String, V>, b: &'a BTreeMap<String, V>) -> BTreeSet<&'a String> {
+    a.keys().chain(b.keys()).collect()
 }
 
-fn flights(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<Cause> {
+fn flight_differences(
+    before: &BTreeMap<String, String>,
+    now: &BTreeMap<String, String>,
+) -> Vec<Cause> {
     let cause = |flight: &String| {
         let words = match (before.get(flight), now.get(flight)) {
+            (a, b) if a == b => return None,
             (None, _) => format!("new flight {flight}"),
             (_, None) => format!("flight {flight} is gone from the archive"),
             _ => format!("the file of flight {flight} changed"),
         };
-        Cause {
+        Some(Cause {
             stage: Stage::Ingest,
             origin: Origin::Flight,
             subject: flight.clone(),
             words,
-        }
+        })
     };
-    union(before, now)
-        .into_iter()
-        .filter(|f| before.get(*f) != now.get(*f))
-        .map(cause)
+    union(before, now).into_iter().filter_map(cause).collect()
+}
+
+fn table_differences(
+    stage: Stage,
+    before: Option<&BTreeMap<String, String>>,
+    now: Option<&BTreeMap<String, String>>,
+) -> Vec<Cause> {
+    let empty = BTreeMap::new();
+    let (before, now) = (before.unwrap_or(&empty), now.unwrap_or(&empty));
+    let names = union(before, now).into_iter();
+    names
+        .filter(|name| before.get(*name) != now.get(*name))
+        .map(|name| Cause {
+            stage,
+            origin: Origin::Configuration,
+            subject: name.clone(),
+            words: format!("the {name} changed"),
+        })
         .collect()
 }
 
-fn code(before: &Code, now: &Code) -> Vec<Cause> {
-    let mut causes = Vec::new();
-    for method in union(&before.methods, &now.methods) {
-        let [a, b] = [before, now].map(|c| c.methods.get(method).copied().unwrap_or_default());
-        if a != b {
-            let (stage, words) = (
-                method_stage(method),
-                format!("method `{method}`: version {a} became {b}"),
-            );
-            causes.push(Cause {
-                stage,
-                origin: Origin::Code,
-                subject: method.clone(),
-                words,
-            });
+fn setting_differences(
+    stage: Stage,
+    before: Option<&BTreeMap<String, Value>>,
+    now: Option<&BTreeMap<String, Value>>,
+) -> Vec<Cause> {
+    let empty = BTreeMap::new();
+    let (before, now) = (before.unwrap_or(&empty), now.unwrap_or(&empty));
+    let of_part = |name: &String| {
+        let mut paths = Vec::new();
+        compare_values(name, before.get(name), now.get(name), &mut paths);
+        let more = paths.len().saturating_sub(MOST_DIFFERENCES);
+        paths.truncate(MOST_DIFFERENCES);
+        if more > 0 {
+            let words = format!("{more} more settings of `{name}` changed");
+            paths.push((name.clone(), words));
         }
-    }
-    if (&before.version, &before.source) != (&now.version, &now.source) {
-        let name = |c: &Code| format!("{} ({})", c.version, c.source);
-        let words = format!("the program changed from {} to {}", name(before), name(now));
-        // Stages with artefacts state their methods' versions; what is made anew each time may
-        // differ by any change.
-        causes.push(Cause {
-            stage: Stage::Trend,
-            origin: Origin::Code,
-            subject: "harvest".to_owned(),
+        paths
+    };
+    let paths = union(before, now).into_iter().flat_map(of_part);
+    paths
+        .map(|(subject, words)| Cause {
+            stage,
+            origin: Origin::Configuration,
+            subject,
             words,
-        });
-    }
-    causes
+        })
+        .collect()
 }
 
-/// Collects the paths at which two values differ, with what they were and are.
-fn compare(
+fn method_differences(before: &Code, now: &Code) -> Vec<Cause> {
+    let version = |code: &Code, method: &String| code.methods.get(method).copied();
+    let cause = |method: &String| {
+        let (a, b) = (version(before, method), version(now, method));
+        let (a, b) = (a.unwrap_or_default(), b.unwrap_or_default());
+        (a != b).then(|| Cause {
+            stage: method_stage(method),
+            origin: Origin::Code,
+            subject: method.clone(),
+            words: format!("method `{method}`: version {a} became {b}"),
+        })
+    };
+    let methods = union(&before.methods, &now.methods);
+    methods.into_iter().filter_map(cause).collect()
+}
+
+/// Difference of the program. Any change of code may reach the stages that are made anew each time;
+/// the stages before them have versions of their methods.
+fn program_difference(before: &Code, now: &Code) -> Option<Cause> {
+    if (&before.version, &before.source) == (&now.version, &now.source) {
+        return None;
+    }
+    let name = |code: &Code| format!("{} ({})", code.version, code.source);
+    Some(Cause {
+        stage: Stage::Trend,
+        origin: Origin::Code,
+        subject: "harvest".to_owned(),
+        words: format!("the program changed from {} to {}", name(before), name(now)),
+    })
+}
+
+/// Collects the paths at which two values differ, with the difference in words.
+fn compare_values(
     path: &str,
     before: Option<&Value>,
     now: Option<&Value>,
@@ -152,36 +172,30 @@ fn compare(
     match (before, now) {
         (a, b) if a == b => {}
         (Some(Value::Object(a)), Some(Value::Object(b))) => {
-            let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
-            keys.sort();
-            keys.dedup();
+            let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
             for key in keys {
-                compare(&format!("{path}.{key}"), a.get(key), b.get(key), found);
+                compare_values(&format!("{path}.{key}"), a.get(key), b.get(key), found);
             }
         }
         (a, b) => {
-            let (a, b) = (short(a), short(b));
-            found.push((
-                path.to_owned(),
-                format!("configuration {path}: {a} became {b}"),
-            ));
+            let (a, b) = (quote(a), quote(b));
+            let words = format!("configuration {path}: {a} became {b}");
+            found.push((path.to_owned(), words));
         }
     }
 }
 
-/// A value in a few words.
-fn short(value: Option<&Value>) -> String {
-    const LONGEST: usize = 40;
-    match value {
-        None => "nothing".to_owned(),
-        Some(value) => {
-            let text = value.to_string();
-            if text.chars().count() <= LONGEST {
-                return text;
-            }
-            format!("{}…", text.chars().take(LONGEST).collect::<String>())
-        }
+/// A value as text; a long one is cut.
+fn quote(value: Option<&Value>) -> String {
+    let Some(value) = value else {
+        return "nothing".to_owned();
+    };
+    let text = value.to_string();
+    if text.chars().count() <= LONGEST_VALUE {
+        return text;
     }
+    let beginning: String = text.chars().take(LONGEST_VALUE).collect();
+    format!("{beginning}…")
 }
 
 #[cfg(test)]

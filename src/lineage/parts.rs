@@ -8,29 +8,29 @@ use serde_json::Value;
 
 use super::stage::Stage;
 
-/// The code: the program's version, a fingerprint of its sources, and the version of each method.
+/// Code behind a night: version and fingerprint of the program, and versions of its methods.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Code {
     pub version: String,
     pub source: String,
-    /// By method, e.g. `estimate`; one goes up when its numbers change for the same input.
+    /// Versions by method; one goes up when its numbers change for the same input.
     pub methods: BTreeMap<String, u32>,
 }
 
-/// What decides the results of a stage and of all before it.
+/// Everything that decides the results of a night, or of its stages as far as one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lineage {
     pub code: Code,
-    /// Per stage and part, e.g. `segment` → `recognition`, the configuration as it was checked.
+    /// Checked configuration by stage and part, e.g. `segment`, `recognition`.
     pub configuration: BTreeMap<Stage, BTreeMap<String, Value>>,
-    /// Fingerprint of the content of each flight's files, or why it could not be read.
+    /// Fingerprint of each flight's content, or the reason that it was rejected.
     pub flights: BTreeMap<String, String>,
-    /// Fingerprints of the other files that are read, per stage: events, wind-tunnel table.
+    /// Fingerprints of the other input files by stage: events, wind-tunnel table, earlier trends.
     pub tables: BTreeMap<Stage, BTreeMap<String, String>>,
 }
 
 impl Lineage {
-    /// The part of it that decides a stage: what only later stages read is left out.
+    /// Lineage as far as a stage, without the parts that only later stages read.
     #[must_use]
     pub fn until(&self, stage: Stage) -> Lineage {
         let mut part = self.clone();
@@ -43,7 +43,7 @@ impl Lineage {
     }
 }
 
-/// The stage of a method: joint estimates and predictions belong to `estimate`.
+/// Stage of a method. Joint estimates and predictions belong to `estimate`.
 pub(super) fn method_stage(method: &str) -> Stage {
     Stage::from_word(method).unwrap_or(Stage::Estimate)
 }

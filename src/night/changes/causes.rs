@@ -11,6 +11,8 @@ use crate::night::published_night::NightTables;
 pub(super) struct Causes {
     /// All differences between the lineages of the two nights.
     pub all: Vec<Cause>,
+    /// Flights that only the earlier night has.
+    gone_flights: BTreeSet<String>,
     /// Causes of changed maneuvers, by the derivatives that they estimate and by class.
     of_derivatives: BTreeMap<String, BTreeMap<String, BTreeSet<String>>>,
     /// Classes that were flown. A trend's group that is no class has maneuvers of several.
@@ -19,47 +21,46 @@ pub(super) struct Causes {
 
 impl Causes {
     pub fn new(before: &NightTables, now: &NightTables) -> Causes {
-        let classes = before
-            .maneuvers
-            .iter()
-            .chain(now.maneuvers)
-            .map(|m| m.class.clone())
-            .collect();
+        let maneuvers = before.maneuvers.iter().chain(now.maneuvers);
+        let (flights_before, flights_now) = (&before.lineage.flights, &now.lineage.flights);
+        let gone = flights_before
+            .keys()
+            .filter(|flight| !flights_now.contains_key(*flight));
         Causes {
             all: now.lineage.differences(before.lineage),
+            gone_flights: gone.cloned().collect(),
             of_derivatives: BTreeMap::new(),
-            classes,
+            classes: maneuvers.map(|m| m.class.clone()).collect(),
         }
     }
 
+    fn of_origin(&self, is_flight: bool) -> impl Iterator<Item = &Cause> {
+        let causes = self.all.iter();
+        causes.filter(move |c| (c.origin == Origin::Flight) == is_flight)
+    }
+
     /// Causes of a maneuver's change: its flight, or else the settings and methods of its stages.
-    /// Settings of other classes do not count.
     pub fn of_maneuver(&self, flight_id: &str, class: &str) -> String {
-        let other_class = |c: &Cause| {
-            let mut path = c.subject.split('.');
-            matches!(path.next(), Some("classes" | "recognition"))
-                && path.next().is_some_and(|name| name != class)
-        };
-        let of_flight = self
-            .all
-            .iter()
-            .filter(|c| c.origin == Origin::Flight && is_stretch(flight_id, &c.subject))
-            .collect::<Vec<_>>();
-        let of_settings = || {
-            let reaches = |c: &&Cause| c.origin != Origin::Flight && c.stage <= Stage::Estimate;
-            let (others, own): (Vec<&Cause>, Vec<&Cause>) = self
-                .all
-                .iter()
-                .filter(reaches)
-                .partition(|c| other_class(c) && c.stage > Stage::Segment);
-            if own.is_empty() { others } else { own }
-        };
+        let of_flight: Vec<&Cause> = self
+            .of_origin(true)
+            .filter(|c| is_stretch(flight_id, &c.subject))
+            .collect();
         let causes = if of_flight.is_empty() {
-            of_settings()
+            self.of_settings(class)
         } else {
             of_flight
         };
         phrase(causes.iter().map(|c| c.words.as_str()))
+    }
+
+    /// Settings and methods as far as the estimate; those of other classes only if there are no
+    /// others.
+    fn of_settings(&self, class: &str) -> Vec<&Cause> {
+        let (of_others, own): (Vec<&Cause>, Vec<&Cause>) = self
+            .of_origin(false)
+            .filter(|c| c.stage <= Stage::Estimate)
+            .partition(|c| is_of_other_class(c, class) && c.stage > Stage::Segment);
+        if own.is_empty() { of_others } else { own }
     }
 
     /// Adds the causes of changed maneuvers to the derivatives that they estimate.
@@ -69,75 +70,65 @@ impl Causes {
         moved: &[Moved],
         now: &NightTables,
     ) -> Causes {
-        let why: BTreeMap<&str, &str> = changed
+        let causes: BTreeMap<&str, &str> = changed
             .iter()
             .map(|m| (m.maneuver_id.as_str(), m.because.as_str()))
             .collect();
-        let mut add = |derivative: &str, class: &str, because: &str| {
-            let of_derivative = self
-                .of_derivatives
-                .entry(derivative.to_owned())
-                .or_default();
-            of_derivative
-                .entry(class.to_owned())
-                .or_default()
-                .insert(because.to_owned());
-        };
-        for row in now
-            .estimates
-            .iter()
-            .filter(|e| e.status == Status::Estimated)
-        {
-            if let Some(because) = why.get(row.maneuver_id.as_str()) {
-                add(&row.derivative, &row.class, because);
+        let estimated = now.estimates.iter();
+        for row in estimated.filter(|e| e.status == Status::Estimated) {
+            if let Some(because) = causes.get(row.maneuver_id.as_str()) {
+                self.add(&row.derivative, &row.class, because);
             }
         }
-        let class: BTreeMap<&str, &str> = now
-            .maneuvers
-            .iter()
+        let maneuvers = now.maneuvers.iter();
+        let classes: BTreeMap<&str, &str> = maneuvers
             .map(|m| (m.maneuver_id.as_str(), m.class.as_str()))
             .collect();
         for row in moved {
-            add(
-                &row.derivative,
-                class.get(row.of.as_str()).copied().unwrap_or_default(),
-                &row.because,
-            );
+            let class = classes.get(row.of.as_str()).copied().unwrap_or_default();
+            self.add(&row.derivative, class, &row.because);
         }
         self
+    }
+
+    fn add(&mut self, derivative: &str, class: &str, because: &str) {
+        let by_class = self.of_derivatives.entry(derivative.to_owned());
+        let causes = by_class.or_default().entry(class.to_owned()).or_default();
+        causes.insert(because.to_owned());
     }
 
     /// Causes of a trend's change: its maneuvers, and the settings and methods as far as `until`.
     /// The group may be a class.
     pub fn of_trend(&self, derivative: &str, group: &str, until: Stage) -> String {
-        let counts = |class: &str| class == group || !self.classes.contains(group);
-        let behind = self
-            .of_derivatives
-            .get(derivative)
-            .into_iter()
-            .flatten()
-            .filter(|(class, _)| counts(class));
-        let own: BTreeSet<&str> = behind
-            .flat_map(|(_, because)| because)
+        let is_in_group = |class: &str| class == group || !self.classes.contains(group);
+        let by_class = self.of_derivatives.get(derivative).into_iter().flatten();
+        let of_maneuvers: BTreeSet<&str> = by_class
+            .filter(|(class, _)| is_in_group(class))
+            .flat_map(|(_, causes)| causes)
             .map(String::as_str)
             .collect();
+        let gone = self
+            .of_origin(true)
+            .filter(|c| self.gone_flights.contains(&c.subject));
+        let settings = self.of_origin(false).filter(|c| c.stage == Stage::Estimate);
         let later = self
             .all
             .iter()
             .filter(|c| (Stage::Trend..=until).contains(&c.stage));
-        let gone = self
-            .all
-            .iter()
-            .filter(|c| c.origin == Origin::Flight && c.words.contains("gone"));
-        let settings = self
-            .all
-            .iter()
-            .filter(|c| c.origin != Origin::Flight && c.stage == Stage::Estimate);
+        let others = gone.chain(settings).chain(later);
         phrase(
-            own.into_iter()
-                .chain(gone.chain(settings).chain(later).map(|c| c.words.as_str())),
+            of_maneuvers
+                .into_iter()
+                .chain(others.map(|c| c.words.as_str())),
         )
     }
+}
+
+/// `true` for a setting of another class than this.
+fn is_of_other_class(cause: &Cause, class: &str) -> bool {
+    let mut path = cause.subject.split('.');
+    matches!(path.next(), Some("classes" | "recognition"))
+        && path.next().is_some_and(|name| name != class)
 }
 
 /// Joins causes to one phrase; a long list is cut, [`crate::lineage::Changes::causes`] has all.
