@@ -15,7 +15,7 @@ use crate::cluster::shard;
 use crate::config::Config;
 use crate::error::Error;
 use crate::lineage::Stage;
-use crate::store::atomic;
+use crate::store::{atomic, files};
 
 #[derive(Args, Debug)]
 pub struct PlanOptions {
@@ -249,14 +249,14 @@ pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
 pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
-    let folder = std::env::current_dir().context("there is no current folder")?;
+    let folder = files::working_folder()?;
     let out = options
         .out
         .clone()
         .unwrap_or_else(|| config.store.join("cluster"));
     let shown = |path: &Path| path.display().to_string();
     let campaign = Campaign {
-        program: shown(&std::env::current_exe().context("cannot find the program's own file")?),
+        program: shown(&files::program()?),
         arguments: options.options.typed(),
         folder: shown(&folder),
         flights: shown(&plan_file(&config, Dealt::Flights)),

@@ -11,7 +11,7 @@ use super::options::start_threads;
 use crate::error::Problem;
 use crate::lab::campaign::{self, SimulatedCampaign};
 use crate::lab::{bounds_study, standard_case};
-use crate::store::atomic;
+use crate::store::{atomic, files};
 use crate::tables;
 
 /// Exit code when part of the work was rejected.
@@ -160,7 +160,7 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
 fn bench(options: &BenchOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let (case, repetitions) = (&options.case, options.repetitions);
-    let text = if case.is_dir() {
+    let text = if files::is_folder(case) {
         serde_json::to_string_pretty(&standard_case::batch(case, repetitions)?)?
     } else {
         let case = standard_case::load(case)?;

@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::Args;
 
 use crate::config::{Config, Overrides};
+use crate::store::files;
 
 /// Exit code of a run that rejected something, and of a night that is no longer valid.
 pub const REJECTED: u8 = 2;
@@ -108,13 +109,13 @@ impl Options {
 
     /// Loads the configuration with the options of the command line.
     pub fn load(&self) -> anyhow::Result<Config> {
-        let folder = if self.pipeline.is_dir() {
+        let folder = if files::is_folder(&self.pipeline) {
             self.pipeline.clone()
         } else {
             Path::new("pipelines").join(&self.pipeline)
         };
         anyhow::ensure!(
-            folder.is_dir(),
+            files::is_folder(&folder),
             "there is no pipeline {}: give a folder, or the name of one under pipelines/",
             self.pipeline.display()
         );

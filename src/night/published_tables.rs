@@ -82,5 +82,5 @@ fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.verdicts)?;
     table::publish(shelf, &campaign.disagreements)?;
     table::publish(shelf, &campaign.changes)?;
-    table::publish(shelf, &campaign.beyond_tunnel)
+    table::publish(shelf, &campaign.extrapolations)
 }

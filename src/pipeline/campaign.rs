@@ -11,9 +11,9 @@ use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::store::ArtefactName;
 use crate::tables::{
-    BeyondRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow,
-    EstimateRow, EventRow, FitRow, InstrumentRow, ManeuverComparisonRow, OutlierRow, PredictionRow,
-    TrendRow, VerdictRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
+    EventRow, ExtrapolationRow, FitRow, InstrumentRow, ManeuverComparisonRow, OutlierRow,
+    PredictionRow, TrendRow, VerdictRow,
 };
 
 /// A flight, maneuver or group whose artefact the store lacks.
@@ -86,8 +86,8 @@ pub struct Campaign {
     pub outliers: Vec<OutlierRow>,
     pub comparison: Vec<ComparisonRow>,
     pub maneuver_comparison: Vec<ManeuverComparisonRow>,
-    /// Tunnel values that estimates needed beyond the tabulated range.
-    pub beyond_tunnel: Vec<BeyondRow>,
+    /// Readings of the tunnel beyond its tables.
+    pub extrapolations: Vec<ExtrapolationRow>,
     /// Comparison in words, with the tunnel and with earlier campaigns.
     pub verdicts: Vec<VerdictRow>,
     pub disagreements: Vec<DisagreementRow>,

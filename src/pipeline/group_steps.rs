@@ -14,9 +14,9 @@ use super::step::{Made, Step};
 use super::step_runner::StepRunner;
 use crate::config::Config;
 use crate::error::{Error, ProblemStage, Result};
-use crate::estimate::Estimated;
 use crate::estimate::joint::{self, Bin, Joined};
 use crate::estimate::prediction::{self, Predicted};
+use crate::estimate::{Estimated, JointSettings, PredictionSettings};
 use crate::flight::Record;
 use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
@@ -54,7 +54,7 @@ impl<'a> Member<'a> {
 pub struct JointKey<'a> {
     joint_id: &'a str,
     class: &'a str,
-    settings: &'a joint::Settings,
+    settings: &'a JointSettings,
     estimates: Vec<&'a str>,
 }
 
@@ -62,7 +62,7 @@ pub struct JointKey<'a> {
 pub struct JointStep<'a> {
     config: &'a Config,
     store: &'a Store,
-    settings: &'a joint::Settings,
+    settings: &'a JointSettings,
     bin: &'a Bin,
     members: Vec<Member<'a>>,
 }
@@ -166,7 +166,7 @@ fn add_joined(campaign: &mut Campaign, joined: Joined) {
 /// Everything that decides a prediction.
 #[derive(Serialize)]
 pub struct PredictKey<'a> {
-    settings: &'a prediction::Settings,
+    settings: &'a PredictionSettings,
     /// Estimate of the predicted maneuver itself, for what else decides it.
     estimate: &'a str,
     from: Vec<&'a str>,
@@ -176,7 +176,7 @@ pub struct PredictKey<'a> {
 pub struct PredictStep<'a> {
     config: &'a Config,
     store: &'a Store,
-    settings: &'a prediction::Settings,
+    settings: &'a PredictionSettings,
     member: Member<'a>,
     from: Vec<(&'a ArtefactName, &'a Estimated)>,
 }

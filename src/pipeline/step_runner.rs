@@ -128,7 +128,9 @@ impl<'a> StepRunner<'a> {
         if is_in_folder {
             self.store.note_present(&companion.name);
         }
-        is_in_folder || !path.exists() && self.store.is_shared(&companion.name, digest.bytes)
+        is_in_folder
+            || !self.store.has_file(&companion.name)
+                && self.store.is_shared(&companion.name, digest.bytes)
     }
 
     /// Brings the artefacts of several steps in parallel, in their order.

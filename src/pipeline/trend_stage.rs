@@ -68,7 +68,7 @@ pub fn compare(config: &Config, earlier: &[Earlier], campaign: &mut Campaign) {
         compare::comparison(&campaign.trends, maneuvers, tunnel, &config.trend, settings);
     let converged = converged_estimates(config, campaign);
     let maneuver_comparison = compare::of_maneuvers(&converged, maneuvers, tunnel, settings);
-    let beyond_tunnel = beyond::beyond(&campaign.estimates, maneuvers, &comparison, tunnel);
+    let extrapolations = beyond::beyond(&campaign.estimates, maneuvers, &comparison, tunnel);
     let (mut verdicts, mut disagreements) = ranges::of_tunnel(&comparison, tunnel, settings);
     let mut changes = Vec::new();
     for campaign_before in earlier {
@@ -80,7 +80,7 @@ pub fn compare(config: &Config, earlier: &[Earlier], campaign: &mut Campaign) {
     }
     campaign.comparison = comparison;
     campaign.maneuver_comparison = maneuver_comparison;
-    campaign.beyond_tunnel = beyond_tunnel;
+    campaign.extrapolations = extrapolations;
     campaign.verdicts = verdicts;
     campaign.disagreements = disagreements;
     campaign.changes = changes;

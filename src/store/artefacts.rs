@@ -141,6 +141,12 @@ impl Store {
         self.folder.join(name.as_str())
     }
 
+    /// `true` if the folder has a file of this name, whole or damaged.
+    #[must_use]
+    pub fn has_file(&self, name: &ArtefactName) -> bool {
+        self.path(name).exists()
+    }
+
     /// Reads an artefact. A damaged one counts as absent and is made again.
     #[must_use]
     pub fn load<T: DeserializeOwned>(&self, name: &ArtefactName) -> Option<T> {

@@ -48,6 +48,22 @@ pub fn is_file(path: &Path) -> bool {
     path.is_file()
 }
 
+/// Absolute path of the working folder.
+///
+/// # Errors
+/// [`Error::Io`]: it was removed, or may not be read.
+pub fn working_folder() -> Result<std::path::PathBuf> {
+    std::env::current_dir().map_err(Error::io(Path::new("."), "there is no current folder"))
+}
+
+/// Path of the running program.
+///
+/// # Errors
+/// [`Error::Io`]: the system does not report it.
+pub fn program() -> Result<std::path::PathBuf> {
+    std::env::current_exe().map_err(Error::io(Path::new("harvest"), "cannot find the program"))
+}
+
 /// Absolute path without links; `None` if there is no such file or folder.
 #[must_use]
 pub fn canonical(path: &Path) -> Option<std::path::PathBuf> {
