@@ -1,6 +1,6 @@
 //! Removal of artefacts that no published night is made of, and of nights beyond those to keep.
 //!
-//! Of a store in an object store only this machine's cache is cleaned: the nights of other machines
+//! Only this machine's cache of a store in an object store is cleaned: the nights of other machines
 //! are unknown here.
 
 use std::collections::{BTreeMap, BTreeSet};

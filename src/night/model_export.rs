@@ -31,7 +31,7 @@ pub struct Exported {
 /// (`_jsbsim.xml`) into a folder. The published night stays as it is.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn export(
     config: &Config,
     folder: &Path,

@@ -55,8 +55,8 @@ pub fn has_rejections(problems: &[Problem]) -> bool {
 /// for another run to leave store and reports.
 ///
 /// # Errors
-/// What stops the whole run: no archive, a store in use, a disk that fails. What spoils a flight or
-/// a maneuver is among the problems of the night's summary.
+/// A fault that stops the run: no archive, a store in use, a disk that fails. A fault of one flight
+/// or maneuver is a problem of the night's summary.
 pub fn run(
     config: &Config,
     until: Stage,

@@ -114,7 +114,7 @@ impl<'a> Conductor<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
         let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-        Conductor::looking(config, store, Contents::forgetful(), progress)
+        Conductor::looking(config, store, Contents::empty(), progress)
     }
 
     fn looking(
@@ -164,7 +164,7 @@ impl<'a> Conductor<'a> {
     /// A conductor that only looks stops before the first stage that needs a missing artefact.
     ///
     /// # Errors
-    /// What stops a run; what spoils a flight or maneuver is among the problems.
+    /// A fault that stops the run. A fault of one flight or maneuver is a problem.
     pub fn campaign(&self, until: Stage) -> Result<Campaign> {
         self.campaign_of(&self.archive, until)
     }

@@ -141,7 +141,7 @@ pub fn context(config: &Config) -> Context<'_> {
 /// is made.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<Vec<Estimated>>> {
     let all: Vec<&Maneuver> = campaign.maneuvers.iter().collect();
     let brought = bring_maneuvers(runner, &campaign.flights, &all)?;
@@ -185,7 +185,7 @@ fn failure(estimated: &Estimated) -> Option<Failure> {
 /// Brings the estimates of some maneuvers, flight by flight in the order of the flights.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn bring_maneuvers(
     runner: &StepRunner,
     flights: &[Flight],

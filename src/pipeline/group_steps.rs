@@ -110,7 +110,7 @@ impl<'a> Step for JointStep<'a> {
 /// Estimates maneuvers of one class and angle of attack together, if the analyst asks for it.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     let Some(settings) = &runner.config.estimate.joint else {
         return Ok(());
@@ -218,7 +218,7 @@ impl<'a> Step for PredictStep<'a> {
 /// off.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn predict(
     runner: &StepRunner,
     campaign: &mut Campaign,

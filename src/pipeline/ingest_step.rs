@@ -112,7 +112,7 @@ impl IngestStep<'_> {
 /// Brings the records of these flights.
 ///
 /// # Errors
-/// What stops a run; what spoils a flight is among its problems.
+/// A fault that stops the run. A fault of one flight is a problem.
 pub fn ingest(
     runner: &StepRunner,
     files: &[FlightFiles],

@@ -1,5 +1,6 @@
 //! Segment of the campaign: one artefact a stretch, with its maneuvers.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::campaign::{Campaign, Failure, MissingArtefact};
@@ -94,7 +95,7 @@ impl<'a> Step for SegmentStep<'a> {
 /// Brings the maneuvers of all accepted flights.
 ///
 /// # Errors
-/// What stops a run.
+/// A fault that stops the run.
 pub fn segment(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     let flights: Vec<&Flight> = campaign
         .flights
@@ -126,7 +127,6 @@ fn bring_flights(
     runner: &StepRunner,
     flights: &[&Flight],
 ) -> Result<Vec<Option<Brought<FoundManeuvers>>>> {
-    use rayon::prelude::*;
     flights
         .par_iter()
         .map(|flight| {

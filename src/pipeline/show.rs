@@ -46,7 +46,7 @@ pub struct Picture {
 /// the folder `show` of the reports. No table is published.
 ///
 /// # Errors
-/// What stops a run; a flight or maneuver that does not exist or was rejected, with the likely
+/// A fault that stops the run; a flight or maneuver that does not exist or was rejected, with the likely
 /// name.
 pub fn show(
     config: &Config,

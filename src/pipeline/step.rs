@@ -28,7 +28,7 @@ pub trait Step: Sync {
     /// Computes the artefact that will be saved as `name`.
     ///
     /// # Errors
-    /// What stops the whole run; a fault of the flight or maneuver is part of the artefact.
+    /// A fault that stops the run. A fault of the flight or maneuver is part of the artefact.
     fn make(&self, name: &ArtefactName) -> Result<Made<Self::Artefact>>;
 
     /// Further files of the store that belong to the artefact saved as `name`.

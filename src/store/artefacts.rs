@@ -245,7 +245,7 @@ impl Store {
     /// Returns the first failure to read from the object store.
     ///
     /// # Errors
-    /// That failure.
+    /// The first failure.
     pub fn check_transfers(&self) -> Result<()> {
         locked(&self.transfer_error).take().map_or(Ok(()), Err)
     }

@@ -39,7 +39,7 @@ struct Remembered {
 #[derive(Debug)]
 pub struct Contents {
     path: PathBuf,
-    known: BTreeMap<PathBuf, Remembered>,
+    remembered: BTreeMap<PathBuf, Remembered>,
     /// Files of this run: their state when read, and the digest to remember, if any.
     seen: Mutex<BTreeMap<PathBuf, (Stamp, Option<Remembered>)>>,
 }
@@ -48,23 +48,23 @@ impl Contents {
     /// Loads the digests saved at `path`; none from a missing or damaged file.
     #[must_use]
     pub fn load(path: &Path) -> Contents {
-        let known = std::fs::read(path)
+        let remembered = std::fs::read(path)
             .ok()
             .and_then(|bytes| serde_json::from_slice(unsealed(&bytes)?).ok());
-        let known = known.unwrap_or_default();
+        let remembered = remembered.unwrap_or_default();
         Contents {
             path: path.to_owned(),
-            known,
+            remembered,
             seen: Mutex::default(),
         }
     }
 
     /// No remembered digests: every file is read.
     #[must_use]
-    pub fn forgetful() -> Contents {
+    pub fn empty() -> Contents {
         Contents {
             path: PathBuf::new(),
-            known: BTreeMap::new(),
+            remembered: BTreeMap::new(),
             seen: Mutex::default(),
         }
     }
@@ -73,20 +73,20 @@ impl Contents {
     /// damaged text.
     #[must_use]
     pub fn with_objects(mut self, text: &[u8]) -> Contents {
-        let theirs = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
-        let theirs: BTreeMap<PathBuf, Remembered> = theirs.unwrap_or_default();
-        let unknown = theirs
+        let shared = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
+        let shared: BTreeMap<PathBuf, Remembered> = shared.unwrap_or_default();
+        let unknown = shared
             .into_iter()
-            .filter(|(path, _)| object::is_object(path) && !self.known.contains_key(path));
+            .filter(|(path, _)| object::is_object(path) && !self.remembered.contains_key(path));
         let unknown: Vec<(PathBuf, Remembered)> = unknown.collect();
-        self.known.extend(unknown);
+        self.remembered.extend(unknown);
         self
     }
 
     /// Digests of objects as text for other machines; `None` if none of them is new.
     #[must_use]
     pub fn objects(&self) -> Option<Vec<u8>> {
-        let now = self.remembered();
+        let now = self.to_remember();
         let objects = |known: &BTreeMap<PathBuf, Remembered>| -> BTreeMap<PathBuf, Remembered> {
             known
                 .iter()
@@ -94,7 +94,7 @@ impl Contents {
                 .map(|(p, k)| (p.clone(), k.clone()))
                 .collect()
         };
-        let (now, before) = (objects(&now), objects(&self.known));
+        let (now, before) = (objects(&now), objects(&self.remembered));
         (now != before).then(|| sealed(serde_json::to_vec(&now).unwrap_or_default()))
     }
 
@@ -102,15 +102,19 @@ impl Contents {
     fn of_object(&self, path: &Path) -> Result<Digest, String> {
         let about = object::listed(path).map_err(|e| e.to_string())?;
         let stamp = stamp_of(&about.ok_or("is no more")?);
-        if let Some(known) = self.known.get(path).filter(|known| known.stamp == stamp) {
-            self.see(path, &stamp, Some(known.clone()));
+        if let Some(known) = self
+            .remembered
+            .get(path)
+            .filter(|known| known.stamp == stamp)
+        {
+            self.note(path, &stamp, Some(known.clone()));
             return Ok(known.content.clone());
         }
         let mut reader = object::Reader::open(path).map_err(|e| e.to_string())?;
         let content = Digest::of(&mut reader).map_err(|e| e.to_string())?;
         let stamp = stamp_of(reader.about());
         let is_marked = reader.about().tag.is_some();
-        self.see(
+        self.note(
             path,
             &stamp,
             is_marked.then(|| Remembered {
@@ -142,10 +146,10 @@ impl Contents {
             });
         }
         let before = stamp(&metadata);
-        if let (Some(stamp), Some(known)) = (&before, self.known.get(path))
+        if let (Some(stamp), Some(known)) = (&before, self.remembered.get(path))
             && known.stamp == *stamp
         {
-            self.see(path, stamp, Some(known.clone()));
+            self.note(path, stamp, Some(known.clone()));
             return Ok(known.content.clone());
         }
         let begun = SystemTime::now();
@@ -163,7 +167,7 @@ impl Contents {
                 stamp: stamp.clone(),
                 content: content.clone(),
             };
-            self.see(path, &stamp, is_settled(&after, begun).then_some(known));
+            self.note(path, &stamp, is_settled(&after, begun).then_some(known));
         }
         Ok(content)
     }
@@ -201,8 +205,8 @@ impl Contents {
     /// # Errors
     /// [`crate::error::Error::Io`] naming the file.
     pub fn save(&self) -> Result<()> {
-        let known = self.remembered();
-        if known == self.known {
+        let known = self.to_remember();
+        if known == self.remembered {
             return Ok(());
         }
         atomic::place(
@@ -211,7 +215,7 @@ impl Contents {
         )
     }
 
-    fn remembered(&self) -> BTreeMap<PathBuf, Remembered> {
+    fn to_remember(&self) -> BTreeMap<PathBuf, Remembered> {
         let seen = self
             .seen
             .lock()
@@ -220,7 +224,7 @@ impl Contents {
         // To ask whether an unused object still exists would be a request each.
         let is_there = |path: &Path| object::is_object(path) || path.exists();
         let unasked = self
-            .known
+            .remembered
             .iter()
             .filter(|(path, _)| !seen.contains_key(*path) && is_there(path));
         let mut known: BTreeMap<PathBuf, Remembered> = unasked
@@ -233,7 +237,7 @@ impl Contents {
         known
     }
 
-    fn see(&self, path: &Path, stamp: &str, known: Option<Remembered>) {
+    fn note(&self, path: &Path, stamp: &str, known: Option<Remembered>) {
         if let Ok(mut seen) = self.seen.lock() {
             seen.insert(path.to_owned(), (stamp.to_owned(), known));
         }
@@ -288,7 +292,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_has_just_been_written_is_read_again() {
+    fn a_file_just_written_is_read_again() {
         let folder = tempfile::tempdir().unwrap();
         let (file, cache) = (folder.path().join("f"), folder.path().join("contents.json"));
         std::fs::write(&file, "one").unwrap();
@@ -297,7 +301,7 @@ mod tests {
         assert!(contents.is_unchanged(&file));
         contents.save().unwrap();
         assert!(
-            Contents::load(&cache).known.is_empty(),
+            Contents::load(&cache).remembered.is_empty(),
             "it has not settled"
         );
         std::fs::write(&file, "two").unwrap();
@@ -307,7 +311,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_is_remembered_counts_only_while_nothing_about_the_file_changed() {
+    fn a_remembered_digest_counts_only_while_the_file_is_unchanged() {
         let folder = tempfile::tempdir().unwrap();
         let (file, cache) = (folder.path().join("f"), folder.path().join("contents.json"));
         std::fs::write(&file, "one").unwrap();
@@ -343,9 +347,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_file_is_not_opened() {
+    fn a_path_that_is_no_file_is_not_opened() {
         let folder = tempfile::tempdir().unwrap();
-        let contents = Contents::forgetful();
+        let contents = Contents::empty();
         assert!(
             contents
                 .of(folder.path())

@@ -34,12 +34,12 @@ impl Lock {
     /// # Errors
     /// [`Error::Busy`] naming the holder, [`Error::Io`] when the disk fails.
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
-        let mut lock = Lock::get(path, what, wait, File::try_lock)?;
+        let mut lock = Lock::acquire(path, what, wait, File::try_lock)?;
         // The note is a courtesy: a disk too full for it stops no run.
         let note = format!(
             "pid {} on {} since {}\n",
             std::process::id(),
-            host(),
+            host_name(),
             timestamp(SystemTime::now())
         );
         let file = &mut lock.file;
@@ -55,10 +55,10 @@ impl Lock {
     /// # Errors
     /// As [`Lock::take`].
     pub fn share(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
-        Lock::get(path, what, wait, File::try_lock_shared)
+        Lock::acquire(path, what, wait, File::try_lock_shared)
     }
 
-    fn get(
+    fn acquire(
         path: &Path,
         what: &str,
         wait: Duration,
@@ -83,10 +83,10 @@ impl Lock {
                 Err(TryLockError::WouldBlock) => {
                     return Err(Error::Busy {
                         path: folder.to_owned(),
-                        what: busy(&mut file, what),
+                        what: holder_message(&mut file, what),
                     });
                 }
-                Err(TryLockError::Error(e)) if has_none(&e) => break,
+                Err(TryLockError::Error(e)) if lacks_locks(&e) => break,
                 Err(TryLockError::Error(e)) => return Err(Error::io(path, "cannot lock it")(e)),
             }
         }
@@ -96,12 +96,12 @@ impl Lock {
 
 /// `true` for the error of a file system without locks: not supported, or no lock manager (Linux's
 /// `ENOLCK`).
-fn has_none(error: &std::io::Error) -> bool {
+fn lacks_locks(error: &std::io::Error) -> bool {
     error.kind() == std::io::ErrorKind::Unsupported
         || cfg!(target_os = "linux") && error.raw_os_error() == Some(37)
 }
 
-fn busy(file: &mut File, what: &str) -> String {
+fn holder_message(file: &mut File, what: &str) -> String {
     let mut note = String::new();
     let read = file
         .rewind()
@@ -118,7 +118,7 @@ fn busy(file: &mut File, what: &str) -> String {
 }
 
 /// Name of the machine.
-fn host() -> String {
+fn host_name() -> String {
     let name = ["/proc/sys/kernel/hostname", "/etc/hostname"]
         .into_iter()
         .find_map(|f| std::fs::read_to_string(f).ok());
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_second_is_told_who_is_first_and_the_lock_ends_with_its_holder() {
+    fn a_second_run_is_refused_with_the_holder_s_name_until_the_lock_is_dropped() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lock");
         std::fs::write(&path, "pid 1 on a machine that is no more\n").unwrap();
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_bear_each_other_and_no_whole() {
+    fn shares_exclude_only_a_whole_lock() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lock");
         let shares = [(); 3].map(|()| Lock::share(&path, "store", Duration::ZERO).unwrap());
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_gets_it() {
+    fn a_waiting_run_gets_the_lock() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lock");
         let first = Lock::take(&path, "store", Duration::ZERO).unwrap();

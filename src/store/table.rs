@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::schema::{Cells, Column, Row, Table};
 use crate::tables::{ExportRow, FitRow, PredictedRow};
 
-/// Where tables are published, and what their Parquet files say about where they come from.
+/// Folder of published tables, with the metadata of their Parquet files.
 #[derive(Clone, Debug, Default)]
 pub struct Shelf {
     /// None: what is published there goes nowhere.
