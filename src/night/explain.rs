@@ -13,7 +13,7 @@ use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
 use crate::pipeline::{Campaign, Conductor, EstimateStep, Flight, LazyRecord, Progress};
 use crate::pipeline::{SegmentStep, Step};
 use crate::store::archive::FlightFiles;
-use crate::tables::{EstimateRow, StartingValues};
+use crate::tables::{ChannelRow, EstimateRow, StartingValues};
 
 /// Explains the maneuver of this id, as text.
 ///
@@ -60,86 +60,86 @@ fn explain_maneuver(
         maneuver,
     };
     let mut text = String::new();
-    origin(&mut text, config, maneuver);
-    record(&mut text, flight, maneuver);
+    write_origin(&mut text, config, maneuver);
+    write_record(&mut text, flight, maneuver);
     match runner.load(&step) {
         Some(estimate) => {
             let limit = config.estimate.identifiability.correlation;
-            fitted(&mut text, &estimate.artefact);
-            derivatives(&mut text, &estimate.artefact);
-            correlations(&mut text, &estimate.artefact, limit);
+            write_fit(&mut text, &estimate.artefact);
+            write_derivatives(&mut text, &estimate.artefact);
+            write_correlations(&mut text, &estimate.artefact, limit);
         }
-        None => line(
+        None => write_line(
             &mut text,
             "Estimate",
             "not made yet, or stale: `harvest status` gives the reason",
         ),
     }
-    input(&mut text, conductor, maneuver);
+    write_input(&mut text, conductor, maneuver);
     let record = flight.ingested.record.as_ref();
     let segment = SegmentStep::new(config, &runner.store, flight)?.name();
-    line(
+    write_line(
         &mut text,
         "record",
         record.map_or("-", |record| record.name.file_name()),
     );
-    line(&mut text, "segment", segment.file_name());
-    line(&mut text, "estimate", step.name().file_name());
-    method(&mut text, conductor);
+    write_line(&mut text, "segment", segment.file_name());
+    write_line(&mut text, "estimate", step.name().file_name());
+    write_method(&mut text, conductor);
     Ok(text)
 }
 
 /// Writes the files of the maneuver's flight and the fingerprint of their content.
-fn input(text: &mut String, conductor: &Conductor, maneuver: &Maneuver) {
-    heading(text, "Depends on");
+fn write_input(text: &mut String, conductor: &Conductor, maneuver: &Maneuver) {
+    write_heading(text, "Depends on");
     let mut archive = conductor.archive.iter();
     let Some(files) = archive.find(|f| is_stretch(&maneuver.flight_id, &f.flight_id)) else {
         return;
     };
     for file in &files.files {
-        line(text, "file", &file.display().to_string());
+        write_line(text, "file", &file.display().to_string());
     }
     let content = conductor.flight_contents.fingerprint(&files.flight_id);
-    line(text, "content", content.unwrap_or("-"));
+    write_line(text, "content", content.unwrap_or("-"));
 }
 
 /// Writes program, methods and configuration behind the estimate.
-fn method(text: &mut String, conductor: &Conductor) {
+fn write_method(text: &mut String, conductor: &Conductor) {
     let lineage = campaign_lineage(conductor).until(Stage::Estimate);
     let code = &lineage.code;
     let program = format!("harvest {} ({})", code.version, code.source);
-    line(text, "code", &program);
+    write_line(text, "code", &program);
     let methods = ["ingest", "segment", "estimate"].map(|name| {
         let version = code.methods.get(name).copied().unwrap_or_default();
         format!("{name} {version}")
     });
-    line(text, "methods", &methods.join(", "));
+    write_line(text, "methods", &methods.join(", "));
     let parts = lineage.configuration.values().flat_map(|p| p.keys());
     let parts: Vec<&str> = parts.map(String::as_str).collect();
-    line(text, "configuration", &parts.join(", "));
+    write_line(text, "configuration", &parts.join(", "));
 }
 
-fn heading(text: &mut String, title: &str) {
+fn write_heading(text: &mut String, title: &str) {
     let _ = writeln!(text, "\n{title}");
 }
 
-fn line(text: &mut String, name: &str, value: &str) {
+fn write_line(text: &mut String, name: &str, value: &str) {
     let _ = writeln!(text, "  {name:<16} {value}");
 }
 
-fn origin(text: &mut String, config: &Config, m: &Maneuver) {
+fn write_origin(text: &mut String, config: &Config, m: &Maneuver) {
     let title = config
         .class(&m.class)
         .map_or("a class that is no longer configured", |c| c.title.as_str());
     let _ = writeln!(text, "{}: {}, {title}", m.maneuver_id, m.class);
-    line(text, "flight", &m.flight_id);
+    write_line(text, "flight", &m.flight_id);
     let origin = if m.origin == ManeuverOrigin::Given {
         "given in the analyst's list of events"
     } else {
         "found in the record"
     };
-    line(text, "where from", origin);
-    line(
+    write_line(text, "where from", origin);
+    write_line(
         text,
         "samples",
         &format!(
@@ -148,7 +148,7 @@ fn origin(text: &mut String, config: &Config, m: &Maneuver) {
         ),
     );
     let (alpha, mach, qbar, altitude) = (m.alpha_deg, m.mach, m.qbar_psf, m.altitude_ft);
-    line(
+    write_line(
         text,
         "flown at",
         &format!("alpha {alpha:.2} deg, Mach {mach:.3}, qbar {qbar:.1} psf, {altitude:.0} ft"),
@@ -156,145 +156,127 @@ fn origin(text: &mut String, config: &Config, m: &Maneuver) {
 }
 
 /// Writes the repairs and failed checks of the flight's channels.
-fn record(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
-    heading(text, &format!("The record of {}", maneuver.flight_id));
-    let repaired = flight
-        .ingested
-        .channels
-        .iter()
-        .filter(|c| c.bridged + c.despiked + c.missing > 0);
-    let words = |c: &crate::tables::ChannelRow| {
-        format!(
-            "{} ({} bridged, {} despiked, {} missing)",
-            c.channel, c.bridged, c.despiked, c.missing
-        )
-    };
-    let repaired: Vec<String> = repaired.map(words).collect();
-    line(
-        text,
-        "repaired",
-        &if repaired.is_empty() {
-            "nothing".to_owned()
-        } else {
-            repaired.join(", ")
-        },
-    );
-    let failed = flight
-        .ingested
-        .checks
-        .iter()
-        .filter(|c| !c.verdict.passed());
-    let failed: Vec<String> = failed
+fn write_record(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
+    write_heading(text, &format!("The record of {}", maneuver.flight_id));
+    let channels = flight.ingested.channels.iter();
+    let repaired = channels.filter(|c| c.bridged + c.despiked + c.missing > 0);
+    let repaired: Vec<String> = repaired.map(repairs).collect();
+    write_line(text, "repaired", &joined_or(&repaired, ", ", "nothing"));
+    let checks = flight.ingested.checks.iter();
+    let failed: Vec<String> = checks
+        .filter(|c| !c.verdict.passed())
         .map(|c| format!("{}: {}", c.relation, c.verdict))
         .collect();
-    line(
-        text,
-        "checks",
-        &if failed.is_empty() {
-            "none failed".to_owned()
-        } else {
-            failed.join("; ")
-        },
-    );
+    write_line(text, "checks", &joined_or(&failed, "; ", "none failed"));
 }
 
-fn fitted(text: &mut String, estimated: &Estimated) {
+/// Repairs of a channel: `alpha (3 bridged, 1 despiked, 0 missing)`.
+fn repairs(c: &ChannelRow) -> String {
+    format!(
+        "{} ({} bridged, {} despiked, {} missing)",
+        c.channel, c.bridged, c.despiked, c.missing
+    )
+}
+
+/// Joins texts; `none` for an empty list.
+fn joined_or(texts: &[String], separator: &str, none: &str) -> String {
+    if texts.is_empty() {
+        none.to_owned()
+    } else {
+        texts.join(separator)
+    }
+}
+
+fn write_fit(text: &mut String, estimated: &Estimated) {
     let fit = &estimated.fit;
-    heading(text, "Fit");
-    line(text, "outcome", &format!("{}: {}", fit.outcome, fit.reason));
-    line(text, "start", fit.start.map_or("-", StartingValues::name));
-    line(text, "iterations", &fit.iterations.to_string());
-    line(
+    write_heading(text, "Fit");
+    write_line(text, "outcome", &format!("{}: {}", fit.outcome, fit.reason));
+    write_line(text, "start", fit.start.map_or("-", StartingValues::name));
+    write_line(text, "iterations", &fit.iterations.to_string());
+    write_line(
         text,
         "cost",
         &format!(
             "{} at the start, {} at the end",
-            number(fit.initial_cost),
-            number(fit.final_cost)
+            format_number(fit.initial_cost),
+            format_number(fit.final_cost)
         ),
     );
-    line(text, "condition number", &number(fit.condition_number));
+    write_line(
+        text,
+        "condition number",
+        &format_number(fit.condition_number),
+    );
     let share = fit.left_out.map_or_else(
         || "-".to_owned(),
         |share| format!("{:.2} % of the output samples", 100.0 * share),
     );
-    line(text, "left out", &share);
-    line(
+    write_line(text, "left out", &share);
+    write_line(
         text,
         "confounded",
         fit.confounded.as_deref().unwrap_or("nothing"),
     );
 }
 
-fn derivatives(text: &mut String, estimated: &Estimated) {
-    heading(text, "Derivatives");
+fn write_derivatives(text: &mut String, estimated: &Estimated) {
+    write_heading(text, "Derivatives");
     let _ = writeln!(
         text,
         "  {:<10} {:<9} {:>12} {:>12} {:>12} {:>12} {:>9}  unit",
         "", "", "value", "bound", "corrected", "tunnel", "inflation"
     );
-    let row = |text: &mut String, e: &EstimateRow| {
-        let because = e
-            .held_because
-            .as_deref()
-            .map_or_else(String::new, |why| format!("  {why}"));
-        let cells = [e.value, e.bound, e.bound_corrected, e.wind_tunnel].map(number);
-        let _ = writeln!(
-            text,
-            "  {:<10} {:<9} {:>12} {:>12} {:>12} {:>12} {:>9}  {}{because}",
-            e.derivative,
-            e.status,
-            cells[0],
-            cells[1],
-            cells[2],
-            cells[3],
-            number(e.variance_inflation),
-            e.unit
-        );
-    };
-    estimated
-        .estimates
-        .iter()
-        .filter(|e| e.status != Status::Inactive)
-        .for_each(|e| row(text, e));
-    estimated.combined.iter().for_each(|e| row(text, e));
-    let inactive = estimated
-        .estimates
-        .iter()
-        .filter(|e| e.status == Status::Inactive);
-    let inactive: Vec<&str> = inactive.map(|e| e.derivative.as_str()).collect();
-    line(
+    let is_inactive = |e: &&EstimateRow| e.status == Status::Inactive;
+    let estimates = estimated.estimates.iter();
+    let active = estimates.clone().filter(|e| !is_inactive(e));
+    for row in active.chain(&estimated.combined) {
+        write_derivative(text, row);
+    }
+    let inactive: Vec<String> = estimates
+        .filter(is_inactive)
+        .map(|e| e.derivative.clone())
+        .collect();
+    write_line(text, "inactive", &joined_or(&inactive, " ", "none"));
+}
+
+fn write_derivative(text: &mut String, e: &EstimateRow) {
+    let because = e
+        .held_because
+        .as_deref()
+        .map_or_else(String::new, |why| format!("  {why}"));
+    let [value, bound, corrected, tunnel] =
+        [e.value, e.bound, e.bound_corrected, e.wind_tunnel].map(format_number);
+    let inflation = format_number(e.variance_inflation);
+    let _ = writeln!(
         text,
-        "inactive",
-        &if inactive.is_empty() {
-            "none".to_owned()
-        } else {
-            inactive.join(" ")
-        },
+        "  {:<10} {:<9} {value:>12} {bound:>12} {corrected:>12} {tunnel:>12} {inflation:>9}  {}{because}",
+        e.derivative,
+        e.status.name(),
+        e.unit
     );
 }
 
-fn correlations(text: &mut String, estimated: &Estimated, limit: f64) {
-    heading(text, &format!("Correlations beyond {limit}"));
+fn write_correlations(text: &mut String, estimated: &Estimated, limit: f64) {
+    write_heading(text, &format!("Correlations beyond {limit}"));
     let strong: Vec<_> = estimated
         .correlations
         .iter()
         .filter(|c| c.correlation.abs() > limit)
         .collect();
     for c in &strong {
-        line(
+        write_line(
             text,
             c.kind.name(),
             &format!("{} {} {:.3}", c.first, c.second, c.correlation),
         );
     }
     if strong.is_empty() {
-        line(text, "none", "");
+        write_line(text, "none", "");
     }
 }
 
-/// A number with five digits.
-fn number(value: Option<f64>) -> String {
+/// Formats a number with about five digits.
+fn format_number(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
         Some(v) if v == 0.0 || (1e-3..1e5).contains(&v.abs()) => format!("{v:.5}"),
