@@ -10,7 +10,7 @@ use super::bars::Bars;
 use super::options::{ATTENTION, Options, Patience, REJECTED, TRY_AGAIN, exit_code, start_threads};
 use super::run_summary::print_summary;
 use crate::cluster::plan::{Dealt, Plan, Shard, array};
-use crate::cluster::scripts::{self, Campaign, Engine, LARGEST_ARRAY};
+use crate::cluster::scripts::{self, CampaignCommands, Engine, LARGEST_ARRAY};
 use crate::cluster::shard;
 use crate::config::Config;
 use crate::error::Error;
@@ -255,7 +255,7 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         .clone()
         .unwrap_or_else(|| config.store.join("cluster"));
     let shown = |path: &Path| path.display().to_string();
-    let campaign = Campaign {
+    let campaign = CampaignCommands {
         program: shown(&files::program()?),
         arguments: options.options.typed(),
         folder: shown(&folder),

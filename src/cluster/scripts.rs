@@ -5,7 +5,7 @@
 //! task that needs another try therefore requeues itself (`scontrol requeue`), which the dependency
 //! survives. PBS has no such command: there the task repeats its command within its own time.
 
-use crate::config::ClusterSettings as Settings;
+use crate::config::ClusterSettings;
 
 /// Batch scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum Engine {
 
 /// The campaign that the scripts compute.
 #[derive(Clone, Debug)]
-pub struct Campaign {
+pub struct CampaignCommands {
     /// Path of the program.
     pub program: String,
     /// Pipeline and options, as typed after a command.
@@ -33,12 +33,40 @@ pub struct Campaign {
 /// One script of the chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Script {
-    pub name: &'static str,
+    pub name: String,
     pub text: String,
 }
 
-/// Jobs of the chain in order.
-const JOBS: [&str; 4] = ["flights", "plan", "maneuvers", "merge"];
+/// Job of the chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Job {
+    /// Array over the shards of flights.
+    Flights,
+    /// Plan of the maneuvers found in the flights.
+    Plan,
+    /// Array over the shards of maneuvers.
+    Maneuvers,
+    /// Merge of all shards.
+    Merge,
+}
+
+impl Job {
+    /// The jobs in order.
+    const ALL: [Job; 4] = [Job::Flights, Job::Plan, Job::Maneuvers, Job::Merge];
+
+    fn name(self) -> &'static str {
+        match self {
+            Job::Flights => "flights",
+            Job::Plan => "plan",
+            Job::Maneuvers => "maneuvers",
+            Job::Merge => "merge",
+        }
+    }
+
+    fn is_array(self) -> bool {
+        matches!(self, Job::Flights | Job::Maneuvers)
+    }
+}
 
 /// Largest array under Slurm's default `MaxArraySize` of 1001, which is exclusive.
 pub const LARGEST_ARRAY: usize = 1000;
@@ -54,22 +82,55 @@ fn quoted(word: &str) -> String {
 
 /// Writes all scripts; the last submits the others.
 #[must_use]
-pub fn scripts(engine: Engine, settings: &Settings, campaign: &Campaign) -> Vec<Script> {
-    let names = ["flights.sh", "plan.sh", "maneuvers.sh", "merge.sh"];
-    let job = |(name, job): (&'static str, &&str)| Script {
-        name,
-        text: script(engine, settings, campaign, job),
-    };
-    let mut scripts: Vec<Script> = names.into_iter().zip(&JOBS).map(job).collect();
+pub fn scripts(
+    engine: Engine,
+    settings: &ClusterSettings,
+    campaign: &CampaignCommands,
+) -> Vec<Script> {
+    let jobs = Job::ALL.into_iter();
+    let mut scripts: Vec<Script> = jobs
+        .map(|job| Script {
+            name: format!("{}.sh", job.name()),
+            text: script(engine, settings, campaign, job),
+        })
+        .collect();
     scripts.push(Script {
-        name: "submit.sh",
+        name: "submit.sh".to_owned(),
         text: submit(engine, campaign),
     });
     scripts
 }
 
-fn script(engine: Engine, settings: &Settings, campaign: &Campaign, job: &str) -> String {
-    let is_array = job == "flights" || job == "maneuvers";
+fn script(
+    engine: Engine,
+    settings: &ClusterSettings,
+    campaign: &CampaignCommands,
+    job: Job,
+) -> String {
+    let mut lines = vec!["#!/bin/bash".to_owned()];
+    lines.extend(directives(engine, settings, campaign, job));
+    lines.push(format!("cd {} || exit 1", quoted(&campaign.folder)));
+    let program = quoted(&campaign.program);
+    lines.push(format!("harvest=${{HARVEST:-{program}}}"));
+    let command = command(engine, settings, campaign, job);
+    lines.push(retried(engine, settings, job, &command));
+    if job == Job::Merge {
+        let comment =
+            "# Something was rejected, and the rest is published: see the table problems.";
+        lines.push(comment.to_owned());
+        lines.push("[ $code -eq 2 ] && code=0".to_owned());
+    }
+    lines.push("exit $code\n".to_owned());
+    lines.join("\n")
+}
+
+/// The command of a job, without the program.
+fn command(
+    engine: Engine,
+    settings: &ClusterSettings,
+    campaign: &CampaignCommands,
+    job: Job,
+) -> String {
     let (shards, threads) = (settings.shards, settings.processors);
     let arguments: Vec<String> = campaign.arguments.iter().map(|a| quoted(a)).collect();
     let arguments = arguments.join(" ");
@@ -79,96 +140,71 @@ fn script(engine: Engine, settings: &Settings, campaign: &Campaign, job: &str) -
         Engine::Pbs => "$PBS_ARRAY_INDEX",
     };
     let shard = format!("--shard \"{task}/{shards}\" --threads {threads}");
-    let command = match job {
-        "flights" => format!("segment {arguments} --plan {flights} {shard}"),
-        "plan" => format!("plan {arguments} --of maneuvers --shards {shards} --out {maneuvers}"),
-        "maneuvers" => format!("estimate {arguments} --plan {maneuvers} {shard}"),
-        _ => format!("merge {arguments} --plan {maneuvers} --threads {threads}"),
-    };
-    let mut lines = vec!["#!/bin/bash".to_owned()];
-    lines.extend(directives(engine, settings, campaign, job, is_array));
-    lines.push(format!("cd {} || exit 1", quoted(&campaign.folder)));
-    lines.push(format!(
-        "harvest=${{HARVEST:-{}}}",
-        quoted(&campaign.program)
-    ));
-    lines.push(retried(engine, settings, is_array, &command));
-    if job == "merge" {
-        lines.push(
-            "# Something was rejected, and the rest is published: the table problems says what."
-                .to_owned(),
-        );
-        lines.push("[ $code -eq 2 ] && code=0".to_owned());
+    match job {
+        Job::Flights => format!("segment {arguments} --plan {flights} {shard}"),
+        Job::Plan => format!("plan {arguments} --of maneuvers --shards {shards} --out {maneuvers}"),
+        Job::Maneuvers => format!("estimate {arguments} --plan {maneuvers} {shard}"),
+        Job::Merge => format!("merge {arguments} --plan {maneuvers} --threads {threads}"),
     }
-    lines.push("exit $code\n".to_owned());
-    lines.join("\n")
 }
 
 /// Directives for the scheduler.
 fn directives(
     engine: Engine,
-    s: &Settings,
-    campaign: &Campaign,
-    job: &str,
-    is_array: bool,
+    settings: &ClusterSettings,
+    campaign: &CampaignCommands,
+    job: Job,
 ) -> Vec<String> {
-    let (name, log) = (format!("harvest-{job}"), format!("{}/{job}", campaign.out));
-    let mut lines = match engine {
-        Engine::Slurm => {
-            let output = if is_array {
-                format!("{log}-%a.log")
-            } else {
-                format!("{log}.log")
-            };
-            let mut lines = vec![
-                format!("--job-name={name}"),
-                format!("--output={output}"),
-                // A repeated task appends to its log; the tasks of a dead node start again.
-                "--open-mode=append".to_owned(),
-                "--requeue".to_owned(),
-                format!("--time={}", s.time),
-                format!("--mem={}M", s.memory_mb),
-                "--ntasks=1".to_owned(),
-                format!("--cpus-per-task={}", s.processors),
-            ];
-            lines.extend(is_array.then(|| format!("--array=1-{}", s.shards)));
-            lines.extend(s.partition.iter().map(|p| format!("--partition={p}")));
-            lines.extend(s.account.iter().map(|a| format!("--account={a}")));
-            lines
-        }
-        Engine::Pbs => {
-            let mut lines = vec![
-                format!("-N {name}"),
-                "-j oe".to_owned(),
-                format!("-o {}/", campaign.out),
-                "-r y".to_owned(),
-                format!("-l select=1:ncpus={}:mem={}mb", s.processors, s.memory_mb),
-                format!("-l walltime={}", s.time),
-            ];
-            lines.extend(is_array.then(|| format!("-J 1-{}", s.shards)));
-            lines.extend(s.partition.iter().map(|p| format!("-q {p}")));
-            lines.extend(s.account.iter().map(|a| format!("-A {a}")));
-            lines
-        }
+    let (mark, mut options) = match engine {
+        Engine::Slurm => ("#SBATCH", slurm_options(settings, campaign, job)),
+        Engine::Pbs => ("#PBS", pbs_options(settings, campaign, job)),
     };
-    lines.extend(s.options.iter().cloned());
-    let mark = if engine == Engine::Slurm {
-        "#SBATCH"
-    } else {
-        "#PBS"
-    };
-    lines
-        .into_iter()
-        .map(|line| format!("{mark} {line}"))
-        .collect()
+    options.extend(settings.options.iter().cloned());
+    let lines = options.into_iter();
+    lines.map(|option| format!("{mark} {option}")).collect()
+}
+
+fn slurm_options(s: &ClusterSettings, campaign: &CampaignCommands, job: Job) -> Vec<String> {
+    let log = format!("{}/{}", campaign.out, job.name());
+    let task = if job.is_array() { "-%a" } else { "" };
+    let mut options = vec![
+        format!("--job-name=harvest-{}", job.name()),
+        format!("--output={log}{task}.log"),
+        // A repeated task appends to its log; the tasks of a dead node start again.
+        "--open-mode=append".to_owned(),
+        "--requeue".to_owned(),
+        format!("--time={}", s.time),
+        format!("--mem={}M", s.memory_mb),
+        "--ntasks=1".to_owned(),
+        format!("--cpus-per-task={}", s.processors),
+    ];
+    options.extend(job.is_array().then(|| format!("--array=1-{}", s.shards)));
+    options.extend(s.partition.iter().map(|p| format!("--partition={p}")));
+    options.extend(s.account.iter().map(|a| format!("--account={a}")));
+    options
+}
+
+fn pbs_options(s: &ClusterSettings, campaign: &CampaignCommands, job: Job) -> Vec<String> {
+    let mut options = vec![
+        format!("-N harvest-{}", job.name()),
+        "-j oe".to_owned(),
+        format!("-o {}/", campaign.out),
+        "-r y".to_owned(),
+        format!("-l select=1:ncpus={}:mem={}mb", s.processors, s.memory_mb),
+        format!("-l walltime={}", s.time),
+    ];
+    options.extend(job.is_array().then(|| format!("-J 1-{}", s.shards)));
+    options.extend(s.partition.iter().map(|p| format!("-q {p}")));
+    options.extend(s.account.iter().map(|a| format!("-A {a}")));
+    options
 }
 
 /// The command, repeated after exit code 75.
-fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -> String {
+fn retried(engine: Engine, settings: &ClusterSettings, job: Job, command: &str) -> String {
     let retries = settings.retries;
     match engine {
         Engine::Slurm => {
-            let task = if is_array {
+            let task = if job.is_array() {
                 "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}"
             } else {
                 "$SLURM_JOB_ID"
@@ -188,7 +224,7 @@ fn retried(engine: Engine, settings: &Settings, is_array: bool, command: &str) -
 }
 
 /// Script that submits the jobs, each after the one before, and prints their numbers.
-fn submit(engine: Engine, campaign: &Campaign) -> String {
+fn submit(engine: Engine, campaign: &CampaignCommands) -> String {
     let out = quoted(&campaign.out);
     let (first, next) = match engine {
         Engine::Slurm => (
@@ -197,11 +233,12 @@ fn submit(engine: Engine, campaign: &Campaign) -> String {
         ),
         Engine::Pbs => ("qsub", "qsub -W depend=afterok:$job"),
     };
-    let line = |(i, job): (usize, &&str)| {
-        let command = if i == 0 { first } else { next };
+    let line = |job: Job| {
+        let command = if job == Job::Flights { first } else { next };
+        let job = job.name();
         format!("job=$({command} {out}/{job}.sh) || exit 1\necho \"{job} $job\"")
     };
-    let jobs: Vec<String> = JOBS.iter().enumerate().map(line).collect();
+    let jobs: Vec<String> = Job::ALL.into_iter().map(line).collect();
     format!("#!/bin/bash\n{}\n", jobs.join("\n"))
 }
 
@@ -209,8 +246,8 @@ fn submit(engine: Engine, campaign: &Campaign) -> String {
 mod tests {
     use super::*;
 
-    fn campaign() -> Campaign {
-        Campaign {
+    fn campaign() -> CampaignCommands {
+        CampaignCommands {
             program: "/opt/harvest".into(),
             arguments: vec![
                 "harv".into(),
@@ -225,10 +262,10 @@ mod tests {
     }
 
     fn text(engine: Engine, name: &str) -> String {
-        let settings = Settings {
+        let settings = ClusterSettings {
             shards: 7,
             partition: Some("flight".into()),
-            ..Settings::default()
+            ..ClusterSettings::default()
         };
         let script = scripts(engine, &settings, &campaign())
             .into_iter()
@@ -264,9 +301,13 @@ mod tests {
     fn each_job_waits_for_the_one_before() {
         let submit = text(Engine::Slurm, "submit.sh");
         assert_eq!(submit.matches("--dependency=afterok:$job").count(), 3);
-        let places: Vec<usize> = JOBS
+        let places: Vec<usize> = Job::ALL
             .iter()
-            .map(|job| submit.find(&format!("/{job}.sh")).expect("the job"))
+            .map(|job| {
+                submit
+                    .find(&format!("/{}.sh", job.name()))
+                    .expect("the job")
+            })
             .collect();
         assert!(places.is_sorted());
         assert_eq!(
