@@ -82,15 +82,6 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
             estimate.add_stale("it is gone from the store", name.as_str());
         }
     }
-    for flight in stages[0]
-        .stale
-        .values()
-        .flatten()
-        .cloned()
-        .collect::<Vec<_>>()
-    {
-        stages[1].add_stale("its flight is stale", &flight);
-    }
     for stage in [Stage::Trend, Stage::Compare, Stage::Report] {
         let is_upstream_stale = stages.iter().any(|s| !s.stale.is_empty());
         stages.push(comparison.whole_stage(stage, &config.name, is_upstream_stale));
