@@ -18,16 +18,18 @@ mod in_memory;
 mod refusal;
 mod sample_count;
 mod settings;
-mod source;
+mod column_source;
 
 #[cfg(test)]
 mod tests;
 
 pub use assessment::{Assessment, assess};
-pub use channel::{ChannelPlan, ChannelReader, ConditionedChannel, Signature, plan_channels};
+pub use channel::{
+    ChannelPlan, ChannelReader, ConditionedChannel, Overlap, Signature, plan_channels,
+};
 pub use clock::{Clock, Stretch, Survey, survey};
+pub use column_source::ColumnSource;
 pub use context::Context;
 pub use in_memory::{Ingested, record, records};
 pub use refusal::Refusal;
 pub use settings::{Checks, Excitation, OnFailedCheck, Settings, Spikes, Stuck};
-pub use source::Source;

@@ -43,13 +43,13 @@ enum Shared {
 
 fn shared_rows(flight: &Flight, earlier: &Flight) -> Shared {
     let signature = &flight.ingested.signature;
-    match signature.common(&earlier.ingested.signature) {
+    match signature.overlap(&earlier.ingested.signature) {
         None => Shared::None,
-        Some((_, _, share)) if share >= COPY_SHARE => Shared::All,
-        Some((start_s, end_s, _)) => Shared::Part(RepeatedRows {
+        Some(overlap) if overlap.share >= COPY_SHARE => Shared::All,
+        Some(overlap) => Shared::Part(RepeatedRows {
             flight_id: flight.id().to_owned(),
-            start_s,
-            end_s,
+            start_s: overlap.from_s,
+            end_s: overlap.to_s,
         }),
     }
 }

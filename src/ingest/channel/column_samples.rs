@@ -4,9 +4,9 @@
 use std::ops::Range;
 
 use crate::ingest::clock::{Clock, Run};
+use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
 use crate::ingest::sample_count::nearest;
-use crate::ingest::source::Source;
 
 /// Gap between two runs, in rows, from which they are read one after the other; the rows of a
 /// smaller gap are read and dropped. A column's page holds some ten thousand rows.
@@ -17,12 +17,12 @@ const SEPARATE_ROWS: usize = 1 << 16;
 const BEYOND_ENDS: f64 = 2.0;
 
 /// One column of a flight's files.
-pub struct ColumnSamples<'a, S: Source + ?Sized> {
+pub struct ColumnSamples<'a, S: ColumnSource + ?Sized> {
     pub source: &'a S,
     pub name: &'a str,
 }
 
-impl<S: Source + ?Sized> ColumnSamples<'_, S> {
+impl<S: ColumnSource + ?Sized> ColumnSamples<'_, S> {
     /// `true` where a file of the clock has the column.
     pub fn is_on(&self, clock: &Clock) -> bool {
         let mut runs = clock.runs.iter();

@@ -1,141 +1,50 @@
-//! One channel on its way from the recorder's numbers to a signal: converted, made continuous where
-//! it wraps around, cleaned of stuck values and spikes, its gaps bridged or left missing, every
-//! sample marked.
+//! One channel on its way from the recorder's numbers to a signal: converted, unwrapped, cleaned of
+//! stuck values and spikes, its gaps bridged or left missing, every sample marked.
 //!
-//! Samples come in pieces of any length and leave as soon as those after them cannot change them
-//! any more. What is decided about a sample depends on its surroundings and on the character of its
-//! spell, never on the pieces.
+//! Samples come in pieces of any length and leave as soon as later samples cannot change them. What
+//! is decided about a sample depends on its surroundings and on the character of its spell, never
+//! on the pieces.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use super::character::{Character, LONGEST_PERIOD, Rate, SPELL, long_runs, recorded};
-use super::{gaps, spikes};
+use super::character::{Character, SPELL};
+use super::gaps::{Bridge, bridge_gaps};
+use super::repeats::long_runs;
+use super::spikes;
+use super::unwrap::Unwrapper;
+use super::update_rate::{LONGEST_PERIOD, UpdateRate};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Settings;
-use crate::units::{Quantity, Unit};
 
-/// The unit of a flag: engaged or not, nothing between.
-const FLAG: &str = "0/1";
+/// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
+const FLAG_UNIT: &str = "0/1";
 
-/// The surroundings that decide about a sample, on either side: longer than any stand-still that
-/// must be recognised.
+/// Surroundings that decide about a sample, on either side, in samples: longer than any stand-still
+/// that must be recognised.
 const MARGIN: usize = SPELL / 4;
 
-/// Without a `wraps_at`, only a jump of nearly the whole circle from one sample to the next is a
-/// wrap.
-const WHOLE_TURN: f64 = 0.9;
+/// Samples that are unwrapped at once: they stay in the processor's cache.
+const UNWRAPPED_AT_ONCE: usize = 1 << 10;
 
-/// Samples that are looked at for a wrap at once.
-const SOME: usize = 1 << 10;
+/// Number of kinds of [`Mark`].
+const MARKS: usize = 6;
 
-/// Makes a value that wraps around continuous.
-#[derive(Clone, Debug)]
-struct Unwrap {
-    period: f64,
-    /// A jump by more than this share of the period is a wrap.
-    share: f64,
-    /// Whether it is an attitude or a flow angle, which begins within half a turn of zero, and not
-    /// a heading.
-    about_zero: bool,
-    /// After more missing samples than this it begins anew: how far it has turned meanwhile nobody
-    /// knows.
-    longest: usize,
-    missing: usize,
-    turns: f64,
-    before: f64,
-    wraps: usize,
-}
-
-impl Unwrap {
-    fn of(channel: &Channel, step_s: f64, settings: &Settings) -> Option<Unwrap> {
-        let unit = Unit::parse(&channel.unit)
-            .ok()
-            .filter(|u| u.quantity == Quantity::Angle);
-        let circle = unit
-            .and_then(|u| Unit::of_signal("_deg").factor_to(u))
-            .map(|f| 360.0 * f);
-        let stated = channel.wraps_at.map(|period| (period, 0.5));
-        let (period, share) = stated.or_else(|| circle.map(|c| (c, WHOLE_TURN)))?;
-        let longest = whole_steps(settings.longest_bridge_s, step_s).max(LONGEST_PERIOD);
-        let about_zero = channel.wraps_at.is_none();
-        Some(Unwrap {
-            period,
-            share,
-            about_zero,
-            longest,
-            missing: 0,
-            turns: 0.0,
-            before: f64::NAN,
-            wraps: 0,
-        })
-    }
-
-    /// Whether nothing before the next value says how many turns it is on.
-    fn begins(&self) -> bool {
-        self.about_zero && (self.before.is_nan() || self.missing > self.longest)
-    }
-
-    fn next(&mut self, value: f64) -> f64 {
-        if !value.is_finite() {
-            self.missing += 1;
-            return value;
-        }
-        if self.begins() {
-            // What is beyond a whole turn is no angle that wraps around.
-            self.turns = if value.abs() <= self.period {
-                0.0 - (value / self.period).round()
-            } else {
-                0.0
-            };
-            self.before = value + self.turns * self.period;
-            self.wraps += usize::from(self.turns != 0.0);
-        }
-        self.missing = 0;
-        let jump = value + self.turns * self.period - self.before;
-        if jump.abs() > self.share * self.period {
-            self.turns -= (jump / self.period).round();
-            self.wraps += 1;
-        }
-        self.before = value + self.turns * self.period;
-        self.before
-    }
-
-    /// What all of these samples are moved by, where none of them is missing or wraps: nearly
-    /// always.
-    fn common(&mut self, recorded: &[f64]) -> Option<f64> {
-        if self.begins() {
-            return None;
-        }
-        let moved = self.turns * self.period;
-        let jumps = |before: f64, value: f64| (value - before).abs() > self.share * self.period;
-        let (first, last) = (recorded.first()?, recorded.last()?);
-        let known = recorded.iter().fold(true, |all, v| all & v.is_finite());
-        let goes_on = recorded
-            .windows(2)
-            .fold(true, |all, pair| all & !jumps(pair[0], pair[1]));
-        if !known || !goes_on || jumps(self.before - moved, *first) {
-            return None;
-        }
-        self.before = last + moved;
-        self.missing = 0;
-        Some(moved)
-    }
-}
-
-/// What was done to a channel.
+/// Repairs and properties of a channel over a whole stretch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelStatistics {
-    /// How many samples have each mark, by its number.
-    pub marks: [usize; 6],
+    /// Number of samples with each mark, by the mark's code.
+    pub marks: [usize; MARKS],
     pub wraps: usize,
+    /// Finest quantisation step of all spells.
     pub quantisation: Option<f64>,
+    /// Median of the spells' noise, in the signal's unit.
     pub noise: Option<f64>,
-    /// Samples of the record from one recorded value to the next.
+    /// Samples of the record from one recorded value to the next: the median of the spells.
     pub period: usize,
-    /// From sample to sample where the channel was stuck.
+    /// Intervals of samples in which the channel is stuck.
     pub stuck: Vec<(usize, usize)>,
 }
 
@@ -144,32 +53,115 @@ impl ChannelStatistics {
     pub fn count(&self, mark: Mark) -> usize {
         self.marks[mark as usize]
     }
+
+    /// Counts the marks of the samples from `first` on.
+    fn add(&mut self, first: usize, marks: &[Mark]) {
+        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
+        if measured == marks.len() {
+            self.marks[Mark::Measured as usize] += measured;
+            return;
+        }
+        for (k, mark) in marks.iter().enumerate() {
+            self.marks[*mark as usize] += 1;
+            if *mark == Mark::Stuck {
+                self.add_stuck(first + k);
+            }
+        }
+    }
+
+    fn add_stuck(&mut self, sample: usize) {
+        match self.stuck.last_mut() {
+            Some((_, end)) if *end == sample => *end = sample + 1,
+            _ => self.stuck.push((sample, sample + 1)),
+        }
+    }
 }
 
-/// The state of one channel between its pieces.
+/// Conditioning state of one channel between its pieces.
 #[derive(Clone, Debug)]
 pub struct Conditioner {
     settings: Settings,
     step_s: f64,
+    /// Samples of the stretch.
     samples: usize,
+    /// Factor from the recorder's numbers to the signal's unit.
     factor: f64,
-    flag: bool,
-    unwrap: Option<Unwrap>,
+    is_flag: bool,
+    unwrapper: Option<Unwrapper>,
     /// Converted values from sample `first` on.
     values: Vec<f64>,
     first: usize,
+    /// Samples before this one have left.
     settled: usize,
-    /// The characters of the spells from `first`'s on.
-    characters: VecDeque<Character>,
-    first_spell: usize,
-    latest: Character,
-    noises: Vec<f64>,
-    periods: Vec<usize>,
+    characters: Characters,
     statistics: ChannelStatistics,
 }
 
+/// Characters of the spells that samples still depend on.
+#[derive(Clone, Debug)]
+struct Characters {
+    /// Characters from spell `first_spell` on.
+    kept: VecDeque<Character>,
+    first_spell: usize,
+    latest: Character,
+    /// Noises and periods of all spells, for the statistics.
+    noises: Vec<f64>,
+    periods: Vec<usize>,
+}
+
+impl Characters {
+    fn none() -> Characters {
+        Characters {
+            kept: VecDeque::new(),
+            first_spell: 0,
+            latest: Character::UNKNOWN,
+            noises: Vec::new(),
+            periods: Vec::new(),
+        }
+    }
+
+    /// Number of the next spell to be characterised.
+    fn next_spell(&self) -> usize {
+        self.first_spell + self.kept.len()
+    }
+
+    fn push(&mut self, character: Character) {
+        if character.noise.is_finite() {
+            self.noises.push(character.noise);
+        }
+        self.periods.push(character.rate.period);
+        self.latest = character;
+        self.kept.push_back(character);
+    }
+
+    /// Character of the spell of a sample.
+    fn at(&self, sample: usize) -> &Character {
+        let spell = (sample / SPELL).saturating_sub(self.first_spell);
+        self.kept.get(spell).unwrap_or(&Character::UNKNOWN)
+    }
+
+    /// Parts of a range of samples that have one character, as offsets from `from`.
+    fn parts(&self, from: usize, length: usize) -> Vec<(Range<usize>, Character)> {
+        let to = from + length;
+        let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
+        let spells = from / SPELL..to.div_ceil(SPELL);
+        spells
+            .map(|spell| (cut(spell)..cut(spell + 1), *self.at(spell * SPELL)))
+            .collect()
+    }
+
+    /// Drops the spells before a sample's.
+    fn drop_before(&mut self, sample: usize) {
+        while self.first_spell < sample / SPELL && !self.kept.is_empty() {
+            self.kept.pop_front();
+            self.first_spell += 1;
+        }
+    }
+}
+
 impl Conditioner {
-    /// For a channel whose values times `factor` are in the signal's unit, over so many samples.
+    /// Conditioner of a channel whose values times `factor` are in the signal's unit, over
+    /// `samples` samples.
     #[must_use]
     pub fn new(
         channel: &Channel,
@@ -183,76 +175,49 @@ impl Conditioner {
             step_s,
             samples,
             factor: factor * channel.sign * channel.scale,
-            flag: channel.unit == FLAG,
-            unwrap: Unwrap::of(channel, step_s, settings),
+            is_flag: channel.unit == FLAG_UNIT,
+            unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
             first: 0,
             settled: 0,
-            characters: VecDeque::new(),
-            first_spell: 0,
-            latest: Character::UNKNOWN,
-            noises: Vec::new(),
-            periods: Vec::new(),
+            characters: Characters::none(),
             statistics: ChannelStatistics::default(),
         }
     }
 
-    /// How many samples have been pushed.
+    /// Number of samples that have been pushed.
     #[must_use]
     pub fn pushed(&self) -> usize {
         self.first + self.values.len()
     }
 
-    /// How many samples must be pushed before those up to `until` can leave.
+    /// Number of samples that must be pushed before those up to `until` can leave.
     #[must_use]
     pub fn wanted(&self, until: usize) -> usize {
         ((until + MARGIN).div_ceil(SPELL) * SPELL).min(self.samples)
     }
 
-    /// The samples up to here could leave.
+    /// Number of samples that could leave now.
     #[must_use]
     pub fn ready(&self) -> usize {
-        let complete = if self.pushed() == self.samples {
+        if self.pushed() == self.samples {
             return self.samples;
-        } else {
-            self.pushed() / SPELL * SPELL
-        };
+        }
+        let complete = self.pushed() / SPELL * SPELL;
         complete.saturating_sub(MARGIN)
     }
 
-    /// The samples up to here have left.
+    /// Number of samples that have left.
     #[must_use]
     pub fn settled(&self) -> usize {
         self.settled
     }
 
-    /// The next samples as recorded, NaN where there is none.
+    /// Takes the next samples as recorded, NaN where there is none.
     pub fn push(&mut self, recorded: &[f64]) {
-        let factor = self.factor;
-        let converted = |value: f64| {
-            if value.is_finite() {
-                value * factor
-            } else {
-                f64::NAN
-            }
-        };
-        match &mut self.unwrap {
-            Some(unwrap) => {
-                for some in recorded.chunks(SOME) {
-                    match unwrap.common(some) {
-                        Some(moved) => self
-                            .values
-                            .extend(some.iter().map(|v| (v + moved) * factor)),
-                        None => self
-                            .values
-                            .extend(some.iter().map(|v| converted(unwrap.next(*v)))),
-                    }
-                }
-            }
-            None => self.values.extend(recorded.iter().map(|v| converted(*v))),
-        }
+        self.convert(recorded);
         loop {
-            let spell = self.first_spell + self.characters.len();
+            let spell = self.characters.next_spell();
             let (from, to) = (spell * SPELL, ((spell + 1) * SPELL).min(self.samples));
             if from >= to || to > self.pushed() {
                 return;
@@ -261,38 +226,58 @@ impl Conditioner {
         }
     }
 
+    /// Appends recorded values, unwrapped and in the signal's unit.
+    fn convert(&mut self, recorded: &[f64]) {
+        let factor = self.factor;
+        let converted = |value: f64| {
+            if value.is_finite() {
+                value * factor
+            } else {
+                f64::NAN
+            }
+        };
+        let Some(unwrapper) = &mut self.unwrapper else {
+            self.values.extend(recorded.iter().map(|v| converted(*v)));
+            return;
+        };
+        for part in recorded.chunks(UNWRAPPED_AT_ONCE) {
+            match unwrapper.common_offset(part) {
+                Some(offset) => {
+                    let moved = part.iter().map(|v| (v + offset) * factor);
+                    self.values.extend(moved);
+                }
+                None => {
+                    let unwrapped = part.iter().map(|v| unwrapper.unwrap_value(*v));
+                    self.values.extend(unwrapped.map(converted));
+                }
+            }
+        }
+    }
+
     fn characterise(&mut self, from: usize, to: usize) {
         let spell = &self.values[from - self.first..to - self.first];
-        let mut character =
-            Character::of(spell, from, self.step_s, &self.latest, &self.settings.stuck);
-        if self.flag {
-            (character.stuck, character.rate.held) = (None, None);
+        let before = &self.characters.latest;
+        let mut character = Character::of(spell, from, self.step_s, before, &self.settings.stuck);
+        if self.is_flag {
+            character.stuck_run = None;
+            character.rate.held_phase = None;
         }
-        self.noises
-            .extend(character.noise.is_finite().then_some(character.noise));
-        self.periods.push(character.rate.period);
-        let finer = |a: f64| self.statistics.quantisation.map_or(a, |b: f64| b.min(a));
-        self.statistics.quantisation = character
-            .quantisation
-            .map(finer)
-            .or(self.statistics.quantisation);
-        self.latest = character;
-        self.characters.push_back(character);
+        if let Some(step) = character.quantisation {
+            let finest = self.statistics.quantisation.map_or(step, |q| q.min(step));
+            self.statistics.quantisation = Some(finest);
+        }
+        self.characters.push(character);
     }
 
-    fn character(&self, sample: usize) -> &Character {
-        let spell = (sample / SPELL).saturating_sub(self.first_spell);
-        self.characters.get(spell).unwrap_or(&Character::UNKNOWN)
-    }
-
-    /// The samples up to `until`, which must have been `wanted` and pushed.
+    /// Returns the samples up to `until`, which must have been `wanted` and pushed.
     pub fn settle(&mut self, until: usize) -> Series {
         let until = until.min(self.samples);
         let from = self.settled.saturating_sub(MARGIN).max(self.first);
         let to = (until + MARGIN).min(self.pushed());
         let mut values = self.values[from - self.first..to - self.first].to_vec();
-        let stuck = self.leave_out(&mut values, from);
-        let despiked = if self.flag {
+        self.blank_repeats(&mut values, from);
+        let stuck = self.blank_stuck(&mut values, from);
+        let despiked = if self.is_flag {
             Vec::new()
         } else {
             self.despike(&mut values, from)
@@ -305,172 +290,145 @@ impl Conditioner {
             marks[k] = Mark::Despiked;
         }
         let core = self.settled - from..until - from;
-        self.count(&marks[core.clone()]);
+        self.statistics.add(self.settled, &marks[core.clone()]);
         self.settled = until;
         self.forget();
         Series {
-            values: only(values, &core),
-            marks: only(marks, &core),
+            values: cut(values, &core),
+            marks: cut(marks, &core),
         }
     }
 
-    fn count(&mut self, marks: &[Mark]) {
-        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
-        if measured == marks.len() {
-            self.statistics.marks[Mark::Measured as usize] += measured;
-            return;
-        }
-        for (k, mark) in marks.iter().enumerate() {
-            self.statistics.marks[*mark as usize] += 1;
-            if *mark == Mark::Stuck {
-                let sample = self.settled + k;
-                match self.statistics.stuck.last_mut().filter(|s| s.1 == sample) {
-                    Some(run) => run.1 = sample + 1,
-                    None => self.statistics.stuck.push((sample, sample + 1)),
-                }
-            }
-        }
-    }
-
-    /// Drops what no later sample depends on.
+    /// Drops values and characters on which no later sample depends.
     fn forget(&mut self) {
         let keep = self.settled.saturating_sub(MARGIN);
-        self.values
-            .drain(..keep.saturating_sub(self.first).min(self.values.len()));
+        let dropped = keep.saturating_sub(self.first).min(self.values.len());
+        self.values.drain(..dropped);
         self.first = self.first.max(keep);
-        while self.first_spell < self.first / SPELL && !self.characters.is_empty() {
-            self.characters.pop_front();
-            self.first_spell += 1;
-        }
+        self.characters.drop_before(self.first);
     }
 
-    /// The parts of a range of samples that have one character, as offsets.
-    fn parts(&self, from: usize, length: usize) -> Vec<(Range<usize>, Character)> {
-        let to = from + length;
-        let spells = from / SPELL..to.div_ceil(SPELL);
-        let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
-        spells
-            .map(|s| (cut(s)..cut(s + 1), *self.character(s * SPELL)))
-            .collect()
-    }
-
-    /// Repeated values of a slow channel and stuck values become NaN; returns where it is stuck.
-    fn leave_out(&self, values: &mut [f64], from: usize) -> Vec<Range<usize>> {
-        let parts = self.parts(from, values.len());
-        for (range, character) in &parts {
-            let Rate {
+    /// Sets the repeated values of a slow channel to NaN.
+    fn blank_repeats(&self, values: &mut [f64], from: usize) {
+        for (range, character) in self.characters.parts(from, values.len()) {
+            let UpdateRate {
                 period,
-                held: Some(phase),
+                held_phase: Some(phase),
             } = character.rate
             else {
                 continue;
             };
-            for k in range.clone() {
+            for k in range {
                 if (from + k) % period != phase {
                     values[k] = f64::NAN;
                 }
             }
         }
-        let Some(fewest) = parts.iter().filter_map(|(_, c)| c.stuck).min() else {
+    }
+
+    /// Sets stuck values to NaN and returns their ranges.
+    fn blank_stuck(&self, values: &mut [f64], from: usize) -> Vec<Range<usize>> {
+        let parts = self.characters.parts(from, values.len());
+        let Some(least) = parts.iter().filter_map(|(_, c)| c.stuck_run).min() else {
             return Vec::new();
         };
-        let is_stuck = |run: &Range<usize>, count: usize| {
-            let least = self
-                .character(from + run.start)
-                .stuck
-                .or(self.character(from + run.end - 1).stuck);
-            least.is_some_and(|least| count >= least)
-        };
-        let stuck: Vec<Range<usize>> = if values.iter().all(|v| v.is_finite()) {
-            long_runs(values, fewest)
-                .into_iter()
-                .filter(|run| is_stuck(run, run.len()))
-                .collect()
-        } else {
-            // What is missing between two values that are the same counts for nothing.
-            let (places, own) = known(values);
-            let runs = long_runs(&own, fewest)
-                .into_iter()
-                .map(|run| (places[run.start]..places[run.end - 1] + 1, run.len()));
-            runs.filter(|(run, count)| is_stuck(run, *count))
-                .map(|(run, _)| run)
-                .collect()
-        };
+        let stuck: Vec<Range<usize>> = equal_runs(values, least)
+            .into_iter()
+            .filter(|(range, count)| self.is_stuck(range, *count, from))
+            .map(|(range, _)| range)
+            .collect();
         for range in &stuck {
             values[range.clone()].fill(f64::NAN);
         }
         stuck
     }
 
-    /// Replaces spikes; of a slow channel among its own samples.
+    /// `true` where `count` equal values in a range are a stuck channel, by the character at either
+    /// end.
+    fn is_stuck(&self, range: &Range<usize>, count: usize, from: usize) -> bool {
+        let at_start = self.characters.at(from + range.start).stuck_run;
+        let at_end = self.characters.at(from + range.end - 1).stuck_run;
+        at_start.or(at_end).is_some_and(|least| count >= least)
+    }
+
+    /// Replaces spikes and returns their places. Those of a slow channel are found among its own
+    /// samples.
     fn despike(&self, values: &mut [f64], from: usize) -> Vec<usize> {
-        let parts = self.parts(from, values.len());
-        if parts.iter().all(|(_, c)| c.rate.period == 1) {
+        let parts = self.characters.parts(from, values.len());
+        let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
+        let settings = &self.settings.spikes;
+        if period == 1 {
             let floors: Vec<_> = parts
                 .into_iter()
-                .map(|(range, c)| (range, c.floor))
+                .map(|(range, c)| (range, c.noise_floor))
                 .collect();
-            return spikes::remove(values, self.step_s, &floors, &self.settings.spikes);
+            return spikes::remove(values, self.step_s, &floors, settings);
         }
-        let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
-        let (places, mut own) = known(values);
-        let place = |sample: usize| places.partition_point(|k| *k < sample);
+        let (places, mut own) = finite_values(values);
+        let own_index = |sample: usize| places.partition_point(|k| *k < sample);
         let floors: Vec<_> = parts
             .iter()
-            .map(|(r, c)| (place(r.start)..place(r.end), c.floor))
+            .map(|(r, c)| (own_index(r.start)..own_index(r.end), c.noise_floor))
             .collect();
         let step_s = self.step_s * period as f64;
-        let spikes = spikes::remove(&mut own, step_s, &floors, &self.settings.spikes);
-        let spikes: Vec<(usize, f64)> = spikes
-            .into_iter()
-            .filter_map(|i| Some((*places.get(i)?, *own.get(i)?)))
-            .collect();
-        for (k, value) in &spikes {
-            values[*k] = *value;
+        let despiked = spikes::remove(&mut own, step_s, &floors, settings);
+        for i in &despiked {
+            values[places[*i]] = own[*i];
         }
-        spikes.into_iter().map(|(k, _)| k).collect()
+        despiked.into_iter().map(|i| places[i]).collect()
     }
 
     fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
         let longest = whole_steps(self.settings.longest_bridge_s, self.step_s);
-        let bridge = if self.flag {
-            gaps::Bridge::Held
+        let bridge = if self.is_flag {
+            Bridge::Held
         } else {
-            gaps::Bridge::Line
+            Bridge::Line
         };
-        let period = |k: usize| self.character(from + k).rate.period;
-        gaps::fill(values, longest, bridge, period)
+        let period = |k: usize| self.characters.at(from + k).rate.period;
+        bridge_gaps(values, longest, bridge, period)
     }
 
-    /// What was done; the channel is over.
+    /// Ends the channel and returns its statistics.
     #[must_use]
     pub fn finish(mut self) -> ChannelStatistics {
-        let middle = |n: usize| n / 2;
-        self.noises.sort_by(f64::total_cmp);
-        self.periods.sort_unstable();
-        self.statistics.noise = self
-            .noises
-            .get(middle(self.noises.len()))
-            .copied()
-            .filter(|_| !self.flag);
-        self.statistics.quantisation = self.statistics.quantisation.filter(|_| !self.flag);
-        self.statistics.period = self
-            .periods
-            .get(middle(self.periods.len()))
-            .copied()
-            .unwrap_or(1);
-        self.statistics.wraps = self.unwrap.map_or(0, |u| u.wraps);
-        self.statistics
+        let Characters {
+            noises, periods, ..
+        } = &mut self.characters;
+        noises.sort_by(f64::total_cmp);
+        periods.sort_unstable();
+        let mut statistics = self.statistics;
+        if self.is_flag {
+            statistics.quantisation = None;
+        } else {
+            statistics.noise = noises.get(noises.len() / 2).copied();
+        }
+        statistics.period = periods.get(periods.len() / 2).copied().unwrap_or(1);
+        statistics.wraps = self.unwrapper.map_or(0, |u| u.wraps());
+        statistics
     }
 }
 
-/// The recorded values and their places.
-fn known(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
-    recorded(values, 0, Rate::FULL).unzip()
+/// The finite values and their places.
+fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
+    UpdateRate::FULL.recorded(values, 0).unzip()
+}
+
+/// Ranges in which at least `least` values are equal, with the number of these values: missing
+/// samples between equal values do not count.
+fn equal_runs(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
+    if values.iter().all(|v| v.is_finite()) {
+        let runs = long_runs(values, least).into_iter();
+        return runs.map(|run| (run.clone(), run.len())).collect();
+    }
+    let (places, finite) = finite_values(values);
+    let place = |run: &Range<usize>| places[run.start]..places[run.end - 1] + 1;
+    let runs = long_runs(&finite, least).into_iter();
+    runs.map(|run| (place(&run), run.len())).collect()
 }
 
 /// A range of the values alone.
-fn only<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
+fn cut<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
     values.truncate(range.end);
     values.drain(..range.start);
     values

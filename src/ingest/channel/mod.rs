@@ -1,16 +1,20 @@
 //! Second pass over a flight: each channel by itself becomes a conditioned signal.
 
+mod channel_plan;
+mod channel_reader;
 mod character;
 mod column_samples;
 mod conditioner;
 mod gaps;
-mod plan;
-mod reader;
+mod quantisation;
+mod repeats;
 mod signature;
 mod spikes;
+mod unwrap;
+mod update_rate;
 
+pub use channel_plan::{ChannelPlan, plan_channels};
+pub(in crate::ingest) use channel_plan::{empty_channel, stuck_channel};
+pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use conditioner::ChannelStatistics;
-pub use plan::{ChannelPlan, plan_channels};
-pub(in crate::ingest) use plan::{empty_channel, stuck_channel};
-pub use reader::{ChannelReader, ConditionedChannel};
-pub use signature::Signature;
+pub use signature::{Overlap, Signature};

@@ -1,6 +1,6 @@
-//! The signature of a record: what was measured at every full ten seconds of its clock. Two records
-//! that have some of it in common hold the same rows, whatever their files are called and wherever
-//! they begin.
+//! Signature of a record: the values measured at every full ten seconds of its clock. Two records
+//! that share some of it hold the same rows, whatever their files are called and wherever they
+//! begin.
 
 use std::collections::BTreeMap;
 
@@ -11,20 +11,31 @@ use crate::flight::record::Series;
 use crate::ingest::clock::Clock;
 use crate::ingest::sample_count::nearest;
 
-/// From one time to the next, s.
-const EVERY_S: f64 = 10.0;
+/// Interval between the times of a signature, s: a flight has some hundreds of them.
+const INTERVAL_S: f64 = 10.0;
 
-/// Fewer times in common than this are chance, or two aircraft that stand still.
-const FEWEST: usize = 3;
+/// Fewest different times that two records of the same rows share. Fewer are chance, or two
+/// aircraft that stand still.
+const LEAST_COMMON: usize = 3;
 
-/// The bits of one signal at the times of the signature.
+/// Odd multiplier of the hash: 2⁶⁴ divided by the golden ratio (Knuth's multiplicative hashing).
+const HASH_MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// Rotation of the hash before the next signal's bits: coprime to 64, so that no two signals meet
+/// in place.
+const HASH_ROTATION: u32 = 7;
+
+/// Bits of one signal at the times of the signature.
 #[derive(Clone, Debug)]
 pub struct SignatureSamples {
     start_s: f64,
     step_s: f64,
+    /// The sample of the next time.
     next: usize,
-    at: usize,
-    found: BTreeMap<i64, u64>,
+    /// Samples seen.
+    seen: usize,
+    /// Bits by time, in intervals.
+    bits: BTreeMap<i64, u64>,
 }
 
 impl SignatureSamples {
@@ -34,78 +45,84 @@ impl SignatureSamples {
             start_s: clock.start_s,
             step_s: clock.step_s,
             next: 0,
-            at: 0,
-            found: BTreeMap::new(),
+            seen: 0,
+            bits: BTreeMap::new(),
         }
     }
 
-    /// The time that sample `next` is the first of.
-    fn time(&self) -> i64 {
+    /// Time of sample `next`, in intervals.
+    fn next_time(&self) -> i64 {
         let time_s = self.start_s + self.next as f64 * self.step_s;
         #[expect(
             clippy::cast_possible_truncation,
             reason = "tens of seconds of a flight"
         )]
-        let time = (time_s / EVERY_S).round() as i64;
+        let time = (time_s / INTERVAL_S).round() as i64;
         time
     }
 
-    /// The next settled samples.
+    /// Takes the next conditioned samples.
     pub fn push(&mut self, series: &Series) {
-        if self.at == 0 && self.next == 0 {
-            let first_s = (self.start_s / EVERY_S).ceil() * EVERY_S;
+        if self.seen == 0 && self.next == 0 {
+            let first_s = (self.start_s / INTERVAL_S).ceil() * INTERVAL_S;
             self.next = nearest((first_s - self.start_s) / self.step_s);
         }
-        while let Some(k) = self
-            .next
-            .checked_sub(self.at)
-            .filter(|k| *k < series.values.len())
-        {
-            let time = self.time();
+        let end = self.seen + series.values.len();
+        while (self.seen..end).contains(&self.next) {
+            let (k, time) = (self.next - self.seen, self.next_time());
             if series.marks[k] == Mark::Measured {
-                self.found.insert(time, series.values[k].to_bits());
+                self.bits.insert(time, series.values[k].to_bits());
             }
-            let then_s = (time + 1) as f64 * EVERY_S;
-            self.next = nearest((then_s - self.start_s) / self.step_s).max(self.next + 1);
+            let then_s = (time + 1) as f64 * INTERVAL_S;
+            let then = nearest((then_s - self.start_s) / self.step_s);
+            self.next = then.max(self.next + 1);
         }
-        self.at += series.values.len();
+        self.seen = end;
     }
 }
 
-/// For each time, in tens of seconds, what all signals were.
+/// Hash of all signals at each time, in intervals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Signature(Vec<(i64, u64)>);
 
+/// Rows that two records share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overlap {
+    pub from_s: f64,
+    pub to_s: f64,
+    /// Share of the first record's times.
+    pub share: f64,
+}
+
 impl Signature {
-    /// Of all signals but those whose value depends on where the record begins.
+    /// Signature of the signals whose values do not depend on where the record begins.
     pub fn of(signals: impl Iterator<Item = SignatureSamples>) -> Signature {
-        let mut all: BTreeMap<i64, u64> = BTreeMap::new();
+        let mut hashes: BTreeMap<i64, u64> = BTreeMap::new();
         for signal in signals {
-            for (time, bits) in signal.found {
-                let sum = all.entry(time).or_default();
-                *sum = (sum.rotate_left(7) ^ bits).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            for (time, bits) in signal.bits {
+                let hash = hashes.entry(time).or_default();
+                *hash = (hash.rotate_left(HASH_ROTATION) ^ bits).wrapping_mul(HASH_MULTIPLIER);
             }
         }
-        Signature(all.into_iter().collect())
+        Signature(hashes.into_iter().collect())
     }
 
-    /// From when to when (s) two records hold the same rows, and the share of this one's times that
-    /// is; none where they do not.
+    /// The rows that two records share; `None` where they share none.
     #[must_use]
-    pub fn common(&self, other: &Signature) -> Option<(f64, f64, f64)> {
-        let others: BTreeMap<i64, u64> = other.0.iter().copied().collect();
-        let mut same: Vec<(i64, u64)> = self
-            .0
-            .iter()
-            .filter(|(t, v)| others.get(t) == Some(v))
-            .copied()
-            .collect();
-        let (first, last) = (same.first()?.0, same.last()?.0);
-        let share = same.len() as f64 / self.0.len() as f64;
-        same.sort_by_key(|(_, v)| *v);
-        same.dedup_by_key(|(_, v)| *v);
-        // Rows that are the same all the time tell nothing.
-        (same.len() >= FEWEST).then_some((first as f64 * EVERY_S, last as f64 * EVERY_S, share))
+    pub fn overlap(&self, other: &Signature) -> Option<Overlap> {
+        let other: BTreeMap<i64, u64> = other.0.iter().copied().collect();
+        let is_equal = |(time, hash): &&(i64, u64)| other.get(time) == Some(hash);
+        let mut common: Vec<(i64, u64)> = self.0.iter().filter(is_equal).copied().collect();
+        let (first, last) = (common.first()?.0, common.last()?.0);
+        let share = common.len() as f64 / self.0.len() as f64;
+        // Rows that never change are no evidence.
+        common.sort_by_key(|(_, hash)| *hash);
+        common.dedup_by_key(|(_, hash)| *hash);
+        (common.len() >= LEAST_COMMON).then_some(Overlap {
+            from_s: first as f64 * INTERVAL_S,
+            to_s: last as f64 * INTERVAL_S,
+            share,
+        })
     }
 }
 
@@ -135,20 +152,23 @@ mod tests {
     }
 
     #[test]
-    fn records_that_overlap_have_the_overlap_in_common() {
+    fn records_that_overlap_share_the_overlap() {
         let (a, b) = (signature(0.0, 200, 0.0), signature(100.0, 200, 0.0));
-        assert_eq!(a.common(&b).map(|c| (c.0, c.1)), Some((100.0, 190.0)));
-        assert_eq!(a.common(&a).map(|c| c.2), Some(1.0));
+        assert_eq!(
+            a.overlap(&b).map(|o| (o.from_s, o.to_s)),
+            Some((100.0, 190.0))
+        );
+        assert_eq!(a.overlap(&a).map(|o| o.share), Some(1.0));
     }
 
     #[test]
-    fn records_of_other_values_have_nothing_in_common() {
+    fn records_of_other_values_share_nothing() {
         assert_eq!(
-            signature(0.0, 200, 0.0).common(&signature(0.0, 200, 0.1)),
+            signature(0.0, 200, 0.0).overlap(&signature(0.0, 200, 0.1)),
             None
         );
         assert_eq!(
-            signature(0.0, 20, 0.0).common(&signature(0.0, 20, 0.0)),
+            signature(0.0, 20, 0.0).overlap(&signature(0.0, 20, 0.0)),
             None
         );
     }

@@ -1,10 +1,10 @@
-//! Single-sample spikes: a sample that stands off its neighbours by far more than the noise, while
-//! the samples before it and those after it agree about what should be there.
+//! Single-sample spikes: a sample far off its neighbours, measured by the noise, while the samples
+//! before it and those after it agree about the value between them.
 //!
-//! With `x` the sample, the line through the two samples before it says `2 x₋₁ − x₋₂`, the line
-//! through the two after it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike stands
-//! off all three in the same sense. A step, the reversal of a surface at its full rate, or a stick
-//! pulse of two samples stands off at most two of them.
+//! With `x` the sample, the line through the two samples before it predicts `2 x₋₁ − x₋₂`, the line
+//! through the two after it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike is off
+//! all three in the same sense. A step, the reversal of a surface at its full rate, or a stick pulse
+//! of two samples is off at most two of them.
 
 use std::ops::Range;
 
@@ -12,44 +12,57 @@ use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Spikes;
 
 /// Standard deviations of a normal distribution in its median absolute deviation.
-const MAD: f64 = 1.482_602_218_505_602;
+const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 
-/// Variance of a sample minus its neighbours' mean, in variances of the noise: 1 + 1/4 + 1/4.
+/// Variance of a sample minus its neighbours' mean, in variances of white noise: 1 + 1/4 + 1/4.
 const MEAN_VARIANCE: f64 = 1.5;
 
-/// Relative differences below this are the arithmetic's.
-const EXACT: f64 = 1e-12;
+/// Relative difference below which a sample is its neighbours' mean: rounding of the arithmetic.
+const SAME_VALUE: f64 = 1e-12;
 
-/// Fewer samples off their neighbours' mean than this do not tell the quantisation.
-const FEW_STEPS: usize = 20;
+/// Fewest samples off their neighbours' mean from which the rounding is inferred.
+const LEAST_ROUNDED: usize = 20;
 
-/// The share of its height off the mean that a spike must stand off each line: the lines are twice
-/// as noisy as the mean.
+/// Quantile of the deviations that is the rounding: low, and above the few samples that a repair or
+/// a conversion put off the grid.
+const ROUNDING_QUANTILE: f64 = 0.05;
+
+/// Share of its height off the mean by which a spike must be off each line: the lines are twice as
+/// noisy as the mean.
 const LINES: f64 = 0.75;
 
-/// How far the two lines may miss each other by noise alone, in its standard deviations (the
-/// difference has √10).
+/// Distance of the two lines' predictions that noise alone may cause, in standard deviations of the
+/// noise. The difference has √10 of them.
 const LINES_NOISE: f64 = 3.0;
 
-/// Every so many samples are enough to tell the noise of thousands.
-const EVERY: usize = 4;
+/// Stride of the samples from which the noise of a spell is estimated: a quarter of thousands is
+/// enough.
+const STRIDE: usize = 4;
 
-/// What a spike is measured against, and the noise's standard deviation alone.
-pub fn floors(values: &[f64]) -> (f64, f64) {
-    let mut roughness: Vec<f64> = (1..values.len())
-        .step_by(EVERY)
+/// Least reach of a sample's surroundings, in samples: below it the local noise has no median.
+const LEAST_REACH: usize = 4;
+
+/// Estimates the level with which a spike is compared, and the standard deviation of the noise.
+pub fn noise_levels(values: &[f64]) -> (f64, f64) {
+    let mut deviations: Vec<f64> = (1..values.len())
+        .step_by(STRIDE)
         .map(|k| off_mean(values, k).abs())
         .filter(|r| r.is_finite())
         .collect();
-    if roughness.is_empty() {
+    if deviations.is_empty() {
         return (0.0, f64::NAN);
     }
-    let noise = MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5);
-    (noise.max(rounding(values, roughness)), noise)
+    let noise = noise_of(&mut deviations);
+    (noise.max(rounding(values, deviations)), noise)
 }
 
-/// Replaces single-sample spikes by their neighbours' mean and returns where they were. `floors`
-/// says for ranges of samples what a spike is measured against.
+/// Standard deviation of white noise from deviations of samples off their neighbours' mean.
+fn noise_of(deviations: &mut [f64]) -> f64 {
+    MAD_TO_SD / MEAN_VARIANCE.sqrt() * quantile(deviations, 0.5)
+}
+
+/// Replaces single-sample spikes by their neighbours' mean and returns their places. `floors` gives
+/// the noise level for ranges of samples.
 pub fn remove(
     values: &mut [f64],
     step_s: f64,
@@ -59,25 +72,18 @@ pub fn remove(
     if !settings.remove {
         return Vec::new();
     }
-    let window = whole_steps(settings.window_s, step_s).max(4);
+    let reach = whole_steps(settings.window_s, step_s).max(LEAST_REACH);
     let mut spikes = Vec::new();
     for (range, floor) in floors {
-        let (from, to) = (
-            range.start.max(1),
-            range.end.min(values.len().saturating_sub(1)),
-        );
-        let around = values.get(from.saturating_sub(1)..=to).unwrap_or_default();
-        for (k, three) in around
-            .windows(3)
-            .enumerate()
-            .map(|(i, three)| (from + i, three))
-        {
+        let from = range.start.max(1);
+        let to = range.end.min(values.len().saturating_sub(1));
+        let around = values.get(from - 1..=to).unwrap_or_default();
+        for (i, three) in around.windows(3).enumerate() {
             let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
             // Also false beside a gap.
-            if off_mean > settings.deviations * floor
-                && stands_off(values, k, *floor, window, settings)
-            {
-                spikes.push(k);
+            let is_candidate = off_mean > settings.deviations * floor;
+            if is_candidate && is_spike(values, from + i, *floor, reach, settings) {
+                spikes.push(from + i);
             }
         }
     }
@@ -91,26 +97,18 @@ pub fn remove(
     spikes
 }
 
-/// Whether a sample that stands off the floor stands off its neighbours as nothing but a spike
-/// does.
-fn stands_off(values: &[f64], k: usize, floor: f64, window: usize, settings: &Spikes) -> bool {
-    let Some(height) = height(values, k) else {
+/// `true` where a sample that exceeds the spell's noise is off its surroundings as only a spike is.
+fn is_spike(values: &[f64], k: usize, floor: f64, reach: usize, settings: &Spikes) -> bool {
+    let Some(height) = Height::of(values, k) else {
         return false;
     };
-    let stands_off = |noise: f64| {
-        height.off_mean > settings.deviations * noise
-            && height.off_lines > LINES * settings.deviations * noise
-    };
-    let lines_meet = |noise: f64| {
-        height.lines_miss <= settings.agreement * height.off_mean + LINES_NOISE * noise
-    };
-    // The noise around a sample takes long to find; of most samples the least and the largest that
-    // it could be tell enough.
-    if !stands_off(floor) || !lines_meet(height.off_mean / settings.deviations) {
+    // The local noise is expensive. The least and the largest that it could be decide most samples.
+    let most = height.off_mean / settings.deviations;
+    if !height.exceeds(floor, settings) || !height.lines_meet(most, settings) {
         return false;
     }
-    let noise = floor.max(local(values, k, window));
-    stands_off(noise) && lines_meet(noise)
+    let noise = floor.max(local_noise(values, k, reach));
+    height.exceeds(noise, settings) && height.lines_meet(noise, settings)
 }
 
 /// A sample minus the mean of its neighbours; NaN at the ends and beside a gap.
@@ -125,61 +123,70 @@ fn off_mean(values: &[f64], k: usize) -> f64 {
     }
 }
 
+/// Height of a sample over its neighbours.
 struct Height {
-    /// How far the sample stands off the neighbours' mean.
+    /// Distance from the neighbours' mean.
     off_mean: f64,
-    /// The lesser of how far it stands off the two lines, in the sense that it stands off the mean.
+    /// The lesser of the distances from the two lines, positive in the sense of the distance from
+    /// the mean.
     off_lines: f64,
-    /// How far the two lines miss each other.
-    lines_miss: f64,
+    /// Distance between the two lines' predictions.
+    lines_apart: f64,
 }
 
-/// How a sample stands off; none beside a gap. Where only one sample is left on a side, its line is
-/// level.
-fn height(values: &[f64], k: usize) -> Option<Height> {
-    let at = |i: Option<usize>| {
-        i.and_then(|i| values.get(i))
-            .copied()
-            .filter(|v| v.is_finite())
-    };
-    let (x, before, after) = (at(Some(k))?, at(k.checked_sub(1))?, at(Some(k + 1))?);
-    let left = 2.0 * before - at(k.checked_sub(2)).unwrap_or(before);
-    let right = 2.0 * after - at(Some(k + 2)).unwrap_or(after);
-    let off_mean = x - 0.5 * (before + after);
-    let off_lines = ((x - left) * off_mean.signum()).min((x - right) * off_mean.signum());
-    Some(Height {
-        off_mean: off_mean.abs(),
-        off_lines,
-        lines_miss: (left - right).abs(),
-    })
+impl Height {
+    /// Height of a sample; `None` beside a gap. With one sample on a side the line is level.
+    fn of(values: &[f64], k: usize) -> Option<Height> {
+        let at = |i: Option<usize>| {
+            let value = i.and_then(|i| values.get(i)).copied();
+            value.filter(|v| v.is_finite())
+        };
+        let (x, before, after) = (at(Some(k))?, at(k.checked_sub(1))?, at(Some(k + 1))?);
+        let left = 2.0 * before - at(k.checked_sub(2)).unwrap_or(before);
+        let right = 2.0 * after - at(Some(k + 2)).unwrap_or(after);
+        let off_mean = x - 0.5 * (before + after);
+        let sense = off_mean.signum();
+        Some(Height {
+            off_mean: off_mean.abs(),
+            off_lines: ((x - left) * sense).min((x - right) * sense),
+            lines_apart: (left - right).abs(),
+        })
+    }
+
+    fn exceeds(&self, noise: f64, settings: &Spikes) -> bool {
+        self.off_mean > settings.deviations * noise
+            && self.off_lines > LINES * settings.deviations * noise
+    }
+
+    fn lines_meet(&self, noise: f64, settings: &Spikes) -> bool {
+        self.lines_apart <= settings.agreement * self.off_mean + LINES_NOISE * noise
+    }
 }
 
-/// The noise around a sample: the sample itself and its neighbours, which a spike spoils, are left
-/// out.
-fn local(values: &[f64], k: usize, window: usize) -> f64 {
-    let around = k.saturating_sub(window)..(k + window + 1).min(values.len());
-    let mut roughness: Vec<f64> = around
+/// Noise around a sample, without the sample and its neighbours, which a spike spoils.
+fn local_noise(values: &[f64], k: usize, reach: usize) -> f64 {
+    let around = k.saturating_sub(reach)..(k + reach + 1).min(values.len());
+    let mut deviations: Vec<f64> = around
         .filter(|i| i.abs_diff(k) > 1)
         .map(|i| off_mean(values, i).abs())
         .filter(|r| r.is_finite())
         .collect();
-    MAD / MEAN_VARIANCE.sqrt() * quantile(&mut roughness, 0.5)
+    noise_of(&mut deviations)
 }
 
-/// What rounding alone puts a sample off its neighbours' mean: half the recorder's quantisation
-/// step, the least that is not nothing. A low quantile, as a repaired or converted sample may lie
-/// off the grid; a channel that hardly ever changes has too few of them to say.
-fn rounding(values: &[f64], mut roughness: Vec<f64>) -> f64 {
+/// Deviation off the neighbours' mean that rounding alone causes: half the quantisation step, the
+/// least that is not zero. Zero for a channel that hardly ever changes.
+fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
     let largest = values
         .iter()
-        .step_by(EVERY)
+        .step_by(STRIDE)
         .map(|v| v.abs())
         .fold(0.0, f64::max);
-    roughness.retain(|r| *r > EXACT * largest);
-    if roughness.len() < FEW_STEPS {
+    deviations.retain(|r| *r > SAME_VALUE * largest);
+    if deviations.len() < LEAST_ROUNDED {
         0.0
     } else {
-        quantile(&mut roughness, 0.05)
+        quantile(&mut deviations, ROUNDING_QUANTILE)
     }
 }
 
@@ -201,7 +208,7 @@ mod tests {
     use super::*;
 
     fn despike(values: &mut [f64]) -> Vec<usize> {
-        let floor = floors(values).0;
+        let floor = noise_levels(values).0;
         let all = 0..values.len();
         remove(values, 0.025, &[(all, floor)], &Spikes::default())
     }

@@ -8,7 +8,7 @@ use crate::ingest::atmosphere::atmosphere;
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
 
-/// The signals that the relations use.
+/// Signals that the relations use.
 const USED: &[&str] = &[
     signal::ALPHA_VANE,
     signal::BETA_VANE,
@@ -30,55 +30,35 @@ const USED: &[&str] = &[
     signal::Z_CG,
 ];
 
-/// Averages a signal over short blocks as its samples come by; a block with fewer than half of its
-/// samples is NaN.
+/// Relative difference below which two means are equal: rounding of sums of one value.
+const SAME_MEAN: f64 = 1e-9;
+
+/// Running mean of a signal over short blocks. A block with fewer than half of its samples is NaN.
 #[derive(Clone, Debug)]
 pub struct BlockAverager {
+    /// Samples of a block.
     length: usize,
+    /// Sum and count of the finite samples of the open block, and count of all its samples.
     sum: f64,
-    known: usize,
-    seen: usize,
+    finite: usize,
+    count: usize,
     means: Vec<f64>,
 }
 
 impl BlockAverager {
-    /// For a signal that a relation uses; none for the others.
+    /// Averager of a signal; `None` where no relation uses it.
     #[must_use]
     pub fn of(signal: &str, step_s: f64, settings: &Checks) -> Option<BlockAverager> {
-        let length = block_length(step_s, settings);
         USED.contains(&signal).then(|| BlockAverager {
-            length,
+            length: block_length(step_s, settings),
             sum: 0.0,
-            known: 0,
-            seen: 0,
+            finite: 0,
+            count: 0,
             means: Vec::new(),
         })
     }
 
-    /// The next samples.
-    pub fn push(&mut self, values: &[f64]) {
-        let mut values = values;
-        while !values.is_empty() {
-            let (now, later) = values.split_at(values.len().min(self.length - self.seen));
-            for value in now.iter().filter(|v| v.is_finite()) {
-                self.sum += value;
-                self.known += 1;
-            }
-            self.seen += now.len();
-            values = later;
-            if self.seen == self.length {
-                let mean = if 2 * self.known >= self.length {
-                    self.sum / self.known as f64
-                } else {
-                    f64::NAN
-                };
-                self.means.push(mean);
-                (self.sum, self.known, self.seen) = (0.0, 0, 0);
-            }
-        }
-    }
-
-    /// The same for a signal that is one value throughout.
+    /// Averager of a signal that has one value throughout.
     #[must_use]
     pub fn constant(
         signal: &str,
@@ -87,9 +67,36 @@ impl BlockAverager {
         step_s: f64,
         settings: &Checks,
     ) -> Option<BlockAverager> {
-        let mut averaging = BlockAverager::of(signal, step_s, settings)?;
-        averaging.means = vec![value; samples / averaging.length];
-        Some(averaging)
+        let mut averager = BlockAverager::of(signal, step_s, settings)?;
+        averager.means = vec![value; samples / averager.length];
+        Some(averager)
+    }
+
+    /// Takes the next samples.
+    pub fn push(&mut self, values: &[f64]) {
+        let mut values = values;
+        while !values.is_empty() {
+            let (now, later) = values.split_at(values.len().min(self.length - self.count));
+            for value in now.iter().filter(|v| v.is_finite()) {
+                self.sum += value;
+                self.finite += 1;
+            }
+            self.count += now.len();
+            values = later;
+            if self.count == self.length {
+                self.close_block();
+            }
+        }
+    }
+
+    fn close_block(&mut self) {
+        let mean = if 2 * self.finite >= self.length {
+            self.sum / self.finite as f64
+        } else {
+            f64::NAN
+        };
+        self.means.push(mean);
+        (self.sum, self.finite, self.count) = (0.0, 0, 0);
     }
 }
 
@@ -97,98 +104,107 @@ fn block_length(step_s: f64, settings: &Checks) -> usize {
     whole_steps(settings.block_s, step_s).max(1)
 }
 
-/// The signals averaged over short blocks.
+/// Block means of the signals that the relations use.
 #[derive(Clone, Debug)]
 pub struct BlockMeans {
     pub block_s: f64,
     pub count: usize,
-    /// With the factor that a trial multiplies a signal by.
-    values: BTreeMap<&'static str, (Arc<Vec<f64>>, f64)>,
+    means: BTreeMap<&'static str, ScaledMeans>,
+}
+
+/// Block means of one signal, with the factor by which a trial correction multiplies them.
+#[derive(Clone, Debug)]
+struct ScaledMeans {
+    /// Shared between the trials of a flight.
+    means: Arc<Vec<f64>>,
+    factor: f64,
 }
 
 impl BlockMeans {
-    /// Of signals averaged over all samples of a record.
+    /// Block means of signals averaged over all samples of a record.
     #[must_use]
     pub fn of(
-        averaged: BTreeMap<String, BlockAverager>,
+        mut averaged: BTreeMap<String, BlockAverager>,
         samples: usize,
         step_s: f64,
         settings: &Checks,
     ) -> BlockMeans {
         let length = block_length(step_s, settings);
-        let mut averaged = averaged;
-        let mut value =
-            |name: &&'static str| Some((*name, (Arc::new(averaged.remove(*name)?.means), 1.0)));
-        let values = USED.iter().filter_map(&mut value).collect();
+        let mut means = BTreeMap::new();
+        for signal in USED {
+            if let Some(averager) = averaged.remove(*signal) {
+                let means_of_signal = ScaledMeans {
+                    means: Arc::new(averager.means),
+                    factor: 1.0,
+                };
+                means.insert(*signal, means_of_signal);
+            }
+        }
         BlockMeans {
             block_s: length as f64 * step_s,
             count: samples / length,
-            values,
+            means,
         }
     }
 
     pub fn has(&self, signal: &str) -> bool {
-        self.values.contains_key(signal)
+        self.means.contains_key(signal)
     }
 
-    /// Whether a signal never changes: a dead sensor's does not, noise makes every other's.
-    pub fn still(&self, signal: &str) -> bool {
-        let means = self.values.get(signal).map(|(means, _)| means.iter());
-        let mut known = means.into_iter().flatten().filter(|v| v.is_finite());
-        known
-            .next()
-            .is_none_or(|first| known.all(|v| (v - first).abs() <= 1e-9 * first.abs()))
-    }
-
-    /// Whether airspeed, dynamic pressure or Mach number say for most of the record that the
-    /// aircraft is faster than this, ft/s. One of them may be dead.
-    pub fn flies(&self, faster_ft_s: f64) -> bool {
-        // Of this velocity at sea level: higher up it takes more of it.
-        let (density, sound) = atmosphere(0.0);
-        let pressure = 0.5 * density * faster_ft_s * faster_ft_s;
-        let levels = [
-            (signal::VELOCITY, faster_ft_s),
-            (signal::QBAR, pressure),
-            (signal::MACH, faster_ft_s / sound),
-        ];
-        let mostly = |(signal, level): (&str, f64)| {
-            let known = || {
-                (0..self.count)
-                    .map(|k| self.at(signal, k))
-                    .filter(|v| v.is_finite())
-            };
-            2 * known().filter(|v| v.abs() > level).count() > known().count()
+    /// `true` where a signal never changes: a dead sensor's does not, noise changes every other's.
+    pub fn is_constant(&self, signal: &str) -> bool {
+        let Some(own) = self.means.get(signal) else {
+            return true;
         };
-        levels.into_iter().any(mostly)
+        let mut finite = own.means.iter().filter(|v| v.is_finite());
+        let Some(first) = finite.next() else {
+            return true;
+        };
+        finite.all(|v| (v - first).abs() <= SAME_MEAN * first.abs())
     }
 
-    /// These blocks with one signal multiplied: what the record would say if that channel were
-    /// wrong by the factor.
+    /// `true` where airspeed, dynamic pressure or Mach number exceed those of a velocity (ft/s) in
+    /// most of the record. One of them may be dead.
+    pub fn is_flying_faster_than(&self, velocity_ft_s: f64) -> bool {
+        // At sea level: higher up the same pressure takes a higher velocity.
+        let (density, sound) = atmosphere(0.0);
+        let pressure = 0.5 * density * velocity_ft_s * velocity_ft_s;
+        self.mostly_exceeds(signal::VELOCITY, velocity_ft_s)
+            || self.mostly_exceeds(signal::QBAR, pressure)
+            || self.mostly_exceeds(signal::MACH, velocity_ft_s / sound)
+    }
+
+    fn mostly_exceeds(&self, signal: &str, level: f64) -> bool {
+        let means = (0..self.count).map(|block| self.mean(signal, block));
+        let finite: Vec<f64> = means.filter(|v| v.is_finite()).collect();
+        2 * finite.iter().filter(|v| v.abs() > level).count() > finite.len()
+    }
+
+    /// These means with one signal multiplied by a factor: a trial correction of its channel.
     pub fn with(&self, signal: &str, factor: f64) -> BlockMeans {
         let mut changed = self.clone();
-        if let Some((_, own)) = changed.values.get_mut(signal) {
-            *own *= factor;
+        if let Some(own) = changed.means.get_mut(signal) {
+            own.factor *= factor;
         }
         changed
     }
 
-    /// These blocks with signals corrected.
+    /// These means with instrument errors removed.
     pub fn corrected(&self, corrections: &[Correction]) -> BlockMeans {
         let mut changed = self.clone();
         for correction in corrections {
-            if let Some((means, _)) = changed.values.get_mut(correction.signal.as_str()) {
-                *means = Arc::new(correction.of_values(means, self.block_s));
+            if let Some(own) = changed.means.get_mut(correction.signal.as_str()) {
+                own.means = Arc::new(correction.of_values(&own.means, self.block_s));
             }
         }
         changed
     }
 
-    pub fn at(&self, signal: &str, block: usize) -> f64 {
-        let value = self
-            .values
-            .get(signal)
-            .and_then(|(means, factor)| Some(means.get(block)? * factor));
-        value.unwrap_or(f64::NAN)
+    /// Mean of a signal over a block; NaN where there is none.
+    pub fn mean(&self, signal: &str, block: usize) -> f64 {
+        let own = self.means.get(signal);
+        let mean = own.and_then(|own| Some(own.means.get(block)? * own.factor));
+        mean.unwrap_or(f64::NAN)
     }
 }
 
@@ -203,11 +219,11 @@ mod tests {
             block_s: 0.1,
             ..Checks::default()
         };
-        let mut averaging = BlockAverager::of(signal::Q, 0.025, &settings).unwrap();
-        averaging.push(&[1.0, f64::NAN, f64::NAN]);
-        averaging.push(&[f64::NAN, 1.0, f64::NAN, 3.0, f64::NAN, 7.0]);
-        assert!(averaging.means[0].is_nan());
-        assert_relative_eq!(averaging.means[1], 2.0);
-        assert_eq!(averaging.means.len(), 2);
+        let mut averager = BlockAverager::of(signal::Q, 0.025, &settings).unwrap();
+        averager.push(&[1.0, f64::NAN, f64::NAN]);
+        averager.push(&[f64::NAN, 1.0, f64::NAN, 3.0, f64::NAN, 7.0]);
+        assert!(averager.means[0].is_nan());
+        assert_relative_eq!(averager.means[1], 2.0);
+        assert_eq!(averager.means.len(), 2);
     }
 }

@@ -1,5 +1,5 @@
-//! The motion that the channels of a record describe, block by block: what the kinematic relations
-//! tie together.
+//! Motion of the aircraft in one block, as its channels describe it: the terms of the kinematic
+//! relations.
 //!
 //! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the
 //! angles at the c.g.
@@ -12,7 +12,7 @@ use crate::ingest::atmosphere::atmosphere;
 use crate::ingest::settings::Checks;
 use crate::units::{DEG, G0_FT_S2};
 
-/// The motion in one block.
+/// Motion in one block.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockMotion {
     /// p, q, r, rad/s.
@@ -23,11 +23,11 @@ pub struct BlockMotion {
     pub psi: f64,
     /// True airspeed and its components u, v, w at the c.g., ft/s.
     pub velocity: f64,
-    pub along: [f64; 3],
+    pub uvw: [f64; 3],
     pub altitude: f64,
     /// Gravity in body axes, ft/s².
     pub gravity: [f64; 3],
-    /// Sensor readings, g.
+    /// Readings of the accelerometers, g.
     pub an: f64,
     pub ax: f64,
     pub ay: f64,
@@ -36,100 +36,115 @@ pub struct BlockMotion {
     /// Standard atmosphere at the altitude: slug/ft³ and ft/s.
     pub density: f64,
     pub sound: f64,
-    /// From the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and down.
+    /// Arms from the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and
+    /// down.
     pub arms: [[f64; 3]; 3],
 }
 
 impl BlockMotion {
-    /// The motion in a block; none where the aircraft is not flying.
+    /// Motion in a block; `None` where the aircraft is not flying.
     pub fn of(
         blocks: &BlockMeans,
-        k: usize,
+        block: usize,
         aircraft: &Aircraft,
         settings: &Checks,
     ) -> Option<BlockMotion> {
-        let at = |signal| blocks.at(signal, k);
-        let angle = |signal| at(signal) / DEG;
-        let velocity = at(signal::VELOCITY);
+        let mean = |signal| blocks.mean(signal, block);
+        let angle = |signal| mean(signal) / DEG;
+        let velocity = mean(signal::VELOCITY);
         if velocity.abs() < settings.least_velocity_ft_s {
             return None;
         }
         let rates = [angle(signal::P), angle(signal::Q), angle(signal::R)];
         let cg = Position {
-            x_ft: at(signal::X_CG),
-            y_ft: at(signal::Y_CG),
-            z_ft: at(signal::Z_CG),
+            x_ft: mean(signal::X_CG),
+            y_ft: mean(signal::Y_CG),
+            z_ft: mean(signal::Z_CG),
         };
-        let read = Flow {
+        let at_vanes = Flow {
             alpha: angle(signal::ALPHA_VANE),
             beta: angle(signal::BETA_VANE),
             velocity,
             rates,
         };
-        let flow = aircraft.sensors.flow_at_cg(&read, cg);
-        let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
-        let (theta, phi, altitude) = (
-            angle(signal::THETA),
-            angle(signal::PHI),
-            at(signal::ALTITUDE),
-        );
-        let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
-        let g = gravity_ft_s2(aircraft.latitude_deg, altitude);
+        let sensors = &aircraft.sensors;
+        let flow = sensors.flow_at_cg(&at_vanes, cg);
+        let (sin_alpha, cos_alpha) = flow.alpha.sin_cos();
+        let (sin_beta, cos_beta) = flow.beta.sin_cos();
+        let (theta, phi) = (angle(signal::THETA), angle(signal::PHI));
+        let altitude = mean(signal::ALTITUDE);
         let (density, sound) = atmosphere(altitude);
-        let s = &aircraft.sensors;
         Some(BlockMotion {
             rates,
             theta,
             phi,
             psi: angle(signal::PSI),
             velocity,
-            along: [velocity * ca * cb, velocity * sb, velocity * sa * cb],
+            uvw: [
+                velocity * cos_alpha * cos_beta,
+                velocity * sin_beta,
+                velocity * sin_alpha * cos_beta,
+            ],
             altitude,
-            gravity: [-g * st, g * ct * sp, g * ct * cp],
-            an: at(signal::AN),
-            ax: at(signal::AX),
-            ay: at(signal::AY),
-            mach: at(signal::MACH),
-            qbar: at(signal::QBAR),
+            gravity: body_gravity(gravity_ft_s2(aircraft.latitude_deg, altitude), theta, phi),
+            an: mean(signal::AN),
+            ax: mean(signal::AX),
+            ay: mean(signal::AY),
+            mach: mean(signal::MACH),
+            qbar: mean(signal::QBAR),
             density,
             sound,
-            arms: [s.an.arm(cg), s.ax.arm(cg), s.ay.arm(cg)],
+            arms: [sensors.an.arm(cg), sensors.ax.arm(cg), sensors.ay.arm(cg)],
         })
     }
 
-    /// The specific force at the c.g. that the accelerometers stand for, ft/s², without their arms.
-    pub fn force(&self) -> [f64; 3] {
+    /// Specific force forward, right and down as the accelerometers read it, ft/s², without the
+    /// effect of their arms.
+    pub fn specific_force(&self) -> [f64; 3] {
         [self.ax * G0_FT_S2, self.ay * G0_FT_S2, -self.an * G0_FT_S2]
     }
 
-    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance beside the change of
+    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance besides the change of
     /// the velocity.
-    pub fn turning(&self) -> [f64; 3] {
-        let turned = cross(self.rates, self.along);
-        [
-            turned[0] - self.gravity[0],
-            turned[1] - self.gravity[1],
-            turned[2] - self.gravity[2],
-        ]
+    pub fn turning_acceleration(&self) -> [f64; 3] {
+        let turning = cross(self.rates, self.uvw);
+        std::array::from_fn(|i| turning[i] - self.gravity[i])
     }
 
     /// ω × (ω × arm), ft/s².
     pub fn centripetal(&self, arm: [f64; 3]) -> [f64; 3] {
-        cross(self.rates, cross(self.rates, arm))
+        cross(self.rates, self.arm_velocity(arm))
     }
 
-    /// ω × arm, ft/s: the velocity of a sensor relative to the c.g.; its change is the sensor's own
+    /// ω × arm, ft/s: the velocity of a sensor relative to the c.g. Its change is the sensor's own
     /// acceleration.
-    pub fn swing(&self, arm: [f64; 3]) -> [f64; 3] {
+    pub fn arm_velocity(&self, arm: [f64; 3]) -> [f64; 3] {
         cross(self.rates, arm)
     }
 
-    /// The rate of climb, ft/s.
-    pub fn climb(&self) -> f64 {
-        let [u, v, w] = self.along;
-        let ((st, ct), (sp, cp)) = (self.theta.sin_cos(), self.phi.sin_cos());
-        u * st - v * sp * ct - w * cp * ct
+    /// q sin φ + r cos φ, rad/s: the body rate about the axis of the heading.
+    pub fn turn_rate(&self) -> f64 {
+        self.rates[1] * self.phi.sin() + self.rates[2] * self.phi.cos()
     }
+
+    /// Rate of climb, ft/s.
+    pub fn climb_rate(&self) -> f64 {
+        let [u, v, w] = self.uvw;
+        let (sin_theta, cos_theta) = self.theta.sin_cos();
+        let (sin_phi, cos_phi) = self.phi.sin_cos();
+        u * sin_theta - v * sin_phi * cos_theta - w * cos_phi * cos_theta
+    }
+}
+
+/// Gravity in body axes.
+fn body_gravity(gravity: f64, theta: f64, phi: f64) -> [f64; 3] {
+    let (sin_theta, cos_theta) = theta.sin_cos();
+    let (sin_phi, cos_phi) = phi.sin_cos();
+    [
+        -gravity * sin_theta,
+        gravity * cos_theta * sin_phi,
+        gravity * cos_theta * cos_phi,
+    ]
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -1,11 +1,11 @@
-//! Which channel is wrong when relations fail: the one whose correction by a sign or a unit makes
-//! all of them hold.
+//! Fault isolation: the channel whose correction by a sign or a unit makes all failed relations
+//! hold.
 //!
-//! A wrong channel spoils every relation it is in, so the failed relations alone name too many.
-//! Each channel in them is tried with a reversed sign, with each unit that it could have been
-//! recorded in, and with a conversion done twice; the trial after which every relation holds names
-//! the channel and the cause. Where none does, the channels common to the failed relations and
-//! confirmed by no other are named without a cause.
+//! A faulty channel fails every relation that it is in, so the failed relations alone name too many
+//! channels. Each channel in them is tried with a reversed sign, with each unit that it could have
+//! been recorded in, and with a conversion done twice. The trial after which every relation holds
+//! names the channel and the cause. Where there is no such trial, the channels that the failed
+//! relations share and no other relation confirms are named without a cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,32 +18,43 @@ use crate::ingest::settings::Checks;
 use crate::tables::CheckVerdict;
 use crate::units::Unit;
 
+/// Ratio of squared misfits within which another channel's trial explains the failure as well as
+/// the best trial: residual noise differs by less between equally good explanations.
+const EQUAL_MISFIT: f64 = 3.0;
+
+/// Most independent faults that are looked for in one flight; each costs a round of trials.
+const MOST_FAULTS: usize = 3;
+
+/// Relative difference below which two units are the same for a trial: no conversion is so close
+/// to one.
+const SAME_UNIT: f64 = 1e-6;
+
 /// A channel that fails its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultyChannel {
     pub channel: String,
     pub signal: String,
-    /// What is probably wrong with it, where a correction makes the relations hold.
+    /// Probable cause, where a correction makes the relations hold.
     pub cause: Option<String>,
-    /// What the signal is to be multiplied by to set it right.
+    /// Factor by which the signal is corrected.
     pub factor: Option<f64>,
-    /// Whether others explain the failed relations as well.
-    pub alone: bool,
+    /// `false` where other channels explain the failed relations as well.
+    pub is_unique: bool,
 }
 
 impl FaultyChannel {
     /// `true` where this channel alone explains the failed relations and a factor corrects it.
     pub fn is_correctable(&self) -> bool {
-        self.alone && self.factor.is_some()
+        self.is_unique && self.factor.is_some()
     }
 
-    /// CheckVerdict for the table `channels`.
+    /// Verdict for the table `channels`.
     pub fn verdict(&self) -> String {
         let cause = self
             .cause
             .as_deref()
             .unwrap_or("does not agree with the other channels");
-        if self.alone {
+        if self.is_unique {
             cause.to_owned()
         } else {
             format!("suspect: {cause}")
@@ -51,99 +62,196 @@ impl FaultyChannel {
     }
 }
 
-/// The accused channels of a flight in words.
+/// Failed checks and faulty channels of a flight in words.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultReport {
     pub place: String,
     pub reason: String,
-    /// Whether an accused channel is one that the equations cannot do without.
+    /// `true` where a faulty channel is one that the equations of motion need.
     pub required: bool,
 }
 
-/// Trials whose squared misfit is within this factor of the best explain the failure as well as it
-/// does.
-const AS_GOOD: f64 = 3.0;
-
-/// More independent faults than this are not looked for in one flight.
-const FAULTS: usize = 3;
-
-/// The channels that make relations fail; `recorded` are the signals that come from channels.
+/// Finds the channels that make relations fail; `recorded` are the signals that come from channels.
 pub fn find_faulty_channels(
     blocks: &BlockMeans,
-    found: &[Check],
+    checks: &[Check],
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
     aircraft: &Aircraft,
     settings: &Checks,
 ) -> Vec<FaultyChannel> {
-    let still = still(blocks, recorded, settings);
-    let dead = |s: &str| {
-        still.contains(&s)
-            || found.iter().any(|c| {
-                !c.verdict.passed() && c.relation.dominant().contains(&s) && is_dead(s, c, blocks)
-            })
+    let isolation = Isolation {
+        channels,
+        recorded,
+        aircraft,
+        settings,
     };
-    let mut guilty = accused(channels, recorded, blocks, &dead);
-    if !guilty.is_empty() {
-        return guilty;
+    let dead = isolation.dead_channels(blocks, checks);
+    if dead.is_empty() {
+        isolation.find_by_trial(blocks.clone(), checks.to_vec())
+    } else {
+        dead
     }
-    let (mut blocks, mut found) = (blocks.clone(), found.to_vec());
-    for _ in 0..FAULTS {
-        if !found.iter().any(|c| !c.verdict.passed()) {
-            return guilty;
+}
+
+/// Inputs of fault isolation that no trial changes.
+struct Isolation<'a> {
+    channels: &'a BTreeMap<String, Channel>,
+    /// Signals that come from channels.
+    recorded: &'a [String],
+    aircraft: &'a Aircraft,
+    settings: &'a Checks,
+}
+
+impl<'a> Isolation<'a> {
+    /// Channels that never change: throughout the flight, or in a failed relation that they
+    /// dominate.
+    fn dead_channels(&self, blocks: &BlockMeans, checks: &[Check]) -> Vec<FaultyChannel> {
+        let constant = self.constant_instruments(blocks);
+        let is_dead = |signal: &str| {
+            constant.contains(&signal)
+                || failed(checks).any(|check| {
+                    check.relation.dominant().contains(&signal)
+                        && blocks.is_constant(signal)
+                        && check
+                            .relation
+                            .signals
+                            .iter()
+                            .any(|s| !blocks.is_constant(s))
+                })
+        };
+        self.faulty_where(blocks, is_dead)
+    }
+
+    /// Instruments that never change while the aircraft flies and most of the others do. The
+    /// relations that need them may not be excited without them.
+    fn constant_instruments(&self, blocks: &BlockMeans) -> Vec<&'static str> {
+        let instruments: BTreeSet<&'static str> = relations::all(self.settings)
+            .iter()
+            .flat_map(|r| r.dominant().iter().copied())
+            .collect();
+        let (constant, changing): (Vec<&str>, Vec<&str>) = instruments
+            .iter()
+            .filter(|signal| self.is_recorded(signal))
+            .partition(|signal| blocks.is_constant(signal));
+        let is_long = blocks.count as f64 * blocks.block_s >= self.settings.dead_s;
+        let is_evidence = is_long
+            && changing.len() > constant.len()
+            && blocks.is_flying_faster_than(self.settings.least_velocity_ft_s);
+        if is_evidence { constant } else { Vec::new() }
+    }
+
+    /// Corrects one channel after another by the trial that leaves the fewest relations failed,
+    /// until all hold.
+    fn find_by_trial(&self, mut blocks: BlockMeans, mut checks: Vec<Check>) -> Vec<FaultyChannel> {
+        let mut faulty = Vec::new();
+        for _ in 0..MOST_FAULTS {
+            if failed(&checks).next().is_none() {
+                return faulty;
+            }
+            let trials = self.trials(&blocks, &checks);
+            let best = trials.first();
+            let Some(best) = best.filter(|t| t.failures < failures(&checks, &checks)) else {
+                break;
+            };
+            if best.failures == 0 {
+                faulty.extend(equally_good(best, &trials));
+                return faulty;
+            }
+            faulty.push(best.faulty_channel(true));
+            blocks = blocks.with(&best.channel.signal, best.factor);
+            checks.clone_from(&best.checks);
         }
+        faulty.extend(self.common_channels(&checks, &blocks));
+        faulty
+    }
+
+    /// Tries every correction of every suspect channel; the best trial first.
+    fn trials(&self, blocks: &BlockMeans, before: &[Check]) -> Vec<Trial<'a>> {
         let mut trials = Vec::new();
-        for (name, channel) in suspects(&found, channels, recorded) {
+        for (name, channel) in self.suspects(before) {
             for (factor, cause) in corrections(channel) {
-                let checks =
-                    check_relations(&blocks.with(&channel.signal, factor), aircraft, settings);
+                let corrected = blocks.with(&channel.signal, factor);
+                let checks = check_relations(&corrected, self.aircraft, self.settings);
                 trials.push(Trial {
                     name,
                     channel,
                     factor,
                     cause,
-                    bad: bad(&checks, &found),
-                    misfit: misfit(&checks),
+                    failures: failures(&checks, before),
+                    misfit: squared_misfit(&checks),
                     checks,
                 });
             }
         }
-        trials.sort_by(|a, b| a.bad.cmp(&b.bad).then(a.misfit.total_cmp(&b.misfit)));
-        let Some(best) = trials.first().filter(|t| t.bad < bad(&found, &found)) else {
-            break;
-        };
-        if best.bad == 0 {
-            guilty.extend(as_good_as(best, &trials));
-            return guilty;
-        }
-        guilty.push(best.guilty(true));
-        blocks = blocks.with(&best.channel.signal, best.factor);
-        found.clone_from(&best.checks);
+        trials.sort_by(|a, b| {
+            let by_failures = a.failures.cmp(&b.failures);
+            by_failures.then(a.misfit.total_cmp(&b.misfit))
+        });
+        trials
     }
-    guilty.extend(common(&found, &blocks, channels, recorded));
-    guilty
+
+    /// Recorded channels in a failed relation.
+    fn suspects(&self, checks: &[Check]) -> Vec<(&'a str, &'a Channel)> {
+        let is_suspect = |signal: &str| {
+            self.is_recorded(signal)
+                && failed(checks).any(|check| check.relation.signals.contains(&signal))
+        };
+        let suspects = self.channels.iter().filter(|(_, c)| is_suspect(&c.signal));
+        suspects.map(|(name, c)| (name.as_str(), c)).collect()
+    }
+
+    /// Channels that all failed relations share, without those that another relation confirms.
+    /// Where the failed relations share none, every unconfirmed channel that dominates one of them.
+    fn common_channels(&self, checks: &[Check], blocks: &BlockMeans) -> Vec<FaultyChannel> {
+        let confirmed = confirmed_signals(checks);
+        let is_unconfirmed = |s: &str| !confirmed.contains(&s);
+        let is_shared = |s: &str| failed(checks).all(|c| c.relation.signals.contains(&s));
+        let dominates = |s: &str| failed(checks).any(|c| c.relation.dominant().contains(&s));
+        let criteria: [&dyn Fn(&str) -> bool; 4] = [
+            &|s| is_shared(s) && dominates(s) && is_unconfirmed(s),
+            &|s| is_shared(s) && is_unconfirmed(s),
+            &|s| dominates(s) && is_unconfirmed(s),
+            &|s| dominates(s),
+        ];
+        criteria
+            .iter()
+            .map(|criterion| self.faulty_where(blocks, criterion))
+            .find(|faulty| !faulty.is_empty())
+            .unwrap_or_default()
+    }
+
+    /// Recorded channels whose signals meet a criterion, named together.
+    fn faulty_where(
+        &self,
+        blocks: &BlockMeans,
+        criterion: impl Fn(&str) -> bool,
+    ) -> Vec<FaultyChannel> {
+        let found: Vec<(&String, &Channel)> = self
+            .channels
+            .iter()
+            .filter(|(_, c)| self.is_recorded(&c.signal) && criterion(&c.signal))
+            .collect();
+        let is_unique = found.len() == 1;
+        let faulty = found.into_iter().map(|(name, channel)| FaultyChannel {
+            channel: name.clone(),
+            signal: channel.signal.clone(),
+            cause: blocks
+                .is_constant(&channel.signal)
+                .then(|| "it never changes".to_owned()),
+            factor: None,
+            is_unique,
+        });
+        faulty.collect()
+    }
+
+    fn is_recorded(&self, signal: &str) -> bool {
+        self.recorded.iter().any(|s| s == signal)
+    }
 }
 
-/// The instruments that never change while the aircraft flies and most of the others do change:
-/// whatever relation they are in, it may say nothing for want of them.
-fn still(blocks: &BlockMeans, recorded: &[String], settings: &Checks) -> Vec<&'static str> {
-    let instruments: BTreeSet<&'static str> = relations::all(settings)
-        .iter()
-        .flat_map(|r| r.dominant().iter().copied())
-        .collect();
-    let recorded = |s: &&&str| recorded.iter().any(|r| r == *s);
-    let (still, changing): (Vec<&str>, Vec<&str>) = instruments
-        .iter()
-        .filter(recorded)
-        .partition(|s| blocks.still(s));
-    let long = blocks.count as f64 * blocks.block_s >= settings.dead_s;
-    let tells = long && changing.len() > still.len() && blocks.flies(settings.least_velocity_ft_s);
-    if tells { still } else { Vec::new() }
-}
-
-/// A signal that never changes, in a relation whose other signals do.
-fn is_dead(signal: &str, check: &Check, blocks: &BlockMeans) -> bool {
-    blocks.still(signal) && check.relation.signals.iter().any(|s| !blocks.still(s))
+fn failed(checks: &[Check]) -> impl Iterator<Item = &Check> {
+    checks.iter().filter(|check| !check.verdict.passed())
 }
 
 /// One channel corrected in one way.
@@ -152,50 +260,37 @@ struct Trial<'a> {
     channel: &'a Channel,
     factor: f64,
     cause: String,
-    bad: usize,
+    failures: usize,
     misfit: f64,
     checks: Vec<Check>,
 }
 
 impl Trial<'_> {
-    fn guilty(&self, alone: bool) -> FaultyChannel {
+    fn faulty_channel(&self, is_unique: bool) -> FaultyChannel {
         FaultyChannel {
             channel: self.name.to_owned(),
             signal: self.channel.signal.clone(),
             cause: Some(self.cause.clone()),
             factor: Some(self.factor),
-            alone,
+            is_unique,
         }
+    }
+
+    /// Number of windows in which the record would have to jump.
+    fn jumps(&self) -> usize {
+        self.checks.iter().map(|c| c.jumps).sum()
     }
 }
 
-/// Channels in a failed relation.
-fn suspects<'a>(
-    found: &[Check],
-    channels: &'a BTreeMap<String, Channel>,
-    recorded: &[String],
-) -> Vec<(&'a str, &'a Channel)> {
-    let failed = |signal: &str| {
-        found
-            .iter()
-            .any(|c| !c.verdict.passed() && c.relation.signals.contains(&signal))
-    };
-    let suspect = |c: &Channel| recorded.contains(&c.signal) && failed(&c.signal);
-    channels
-        .iter()
-        .filter(|(_, c)| suspect(c))
-        .map(|(name, c)| (name.as_str(), c))
-        .collect()
-}
-
-/// The factors that would correct a channel, each with what it would mean.
+/// Factors that could correct a channel, each with the cause that it would have.
 fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     let mut corrections = vec![(-1.0, "its sign is reversed".to_owned())];
     let Ok(mapped) = Unit::parse(&channel.unit) else {
         return corrections;
     };
     for other in mapped.alike() {
-        let Some(factor) = other.factor_to(mapped).filter(|f| (f - 1.0).abs() > 1e-6) else {
+        let factor = other.factor_to(mapped);
+        let Some(factor) = factor.filter(|f| (f - 1.0).abs() > SAME_UNIT) else {
             continue;
         };
         let (was, is) = (other.name, mapped.name);
@@ -209,20 +304,20 @@ fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     corrections
 }
 
-/// Relations that fail, or that say nothing any more though they did before.
-fn bad(checks: &[Check], before: &[Check]) -> usize {
-    let silenced = |c: &Check, b: &Check| {
+/// Number of relations that fail, or that are no longer excited though they were before.
+fn failures(checks: &[Check], before: &[Check]) -> usize {
+    let is_silenced = |c: &Check, b: &Check| {
         c.verdict == CheckVerdict::NotExcited && b.verdict != CheckVerdict::NotExcited
     };
     checks
         .iter()
         .zip(before)
-        .filter(|(c, b)| !c.verdict.passed() || silenced(c, b))
+        .filter(|(c, b)| !c.verdict.passed() || is_silenced(c, b))
         .count()
 }
 
-/// The sum of the squared misfits of the relations that say something.
-fn misfit(checks: &[Check]) -> f64 {
+/// Sum of the squared misfits of the excited relations.
+fn squared_misfit(checks: &[Check]) -> f64 {
     let excited = checks
         .iter()
         .filter(|c| c.verdict != CheckVerdict::NotExcited);
@@ -232,148 +327,74 @@ fn misfit(checks: &[Check]) -> f64 {
         .sum()
 }
 
-/// The best trial and the best ones of other channels that explain the failure as well: with as
+/// The best trial, and the best ones of other channels that explain the failure as well: with as
 /// small a misfit, and with as few windows in which the record would have to jump.
-fn as_good_as(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
+fn equally_good(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
     let mut chosen: Vec<&Trial> = Vec::new();
-    let jumps = |t: &Trial| t.checks.iter().map(|c| c.jumps).sum::<usize>();
-    let as_few = |t: &&Trial| jumps(t) <= jumps(best);
-    for trial in trials
-        .iter()
-        .filter(|t| t.bad == 0 && t.misfit <= AS_GOOD * best.misfit)
-        .filter(as_few)
-    {
-        if !chosen.iter().any(|c| c.name == trial.name) {
+    for trial in trials {
+        let is_as_good = trial.failures == 0
+            && trial.misfit <= EQUAL_MISFIT * best.misfit
+            && trial.jumps() <= best.jumps();
+        if is_as_good && !chosen.iter().any(|c| c.name == trial.name) {
             chosen.push(trial);
         }
     }
-    let alone = chosen.len() == 1;
-    chosen.into_iter().map(|t| t.guilty(alone)).collect()
-}
-
-/// The channels that all failed relations share, without those that another relation confirms;
-/// where the failed relations share none, every unconfirmed channel that dominates one of them.
-fn common(
-    found: &[Check],
-    blocks: &BlockMeans,
-    channels: &BTreeMap<String, Channel>,
-    recorded: &[String],
-) -> Vec<FaultyChannel> {
-    let cleared = confirmed_signals(found);
-    let failed: Vec<&Check> = found.iter().filter(|c| !c.verdict.passed()).collect();
-    let shared = |s: &str| failed.iter().all(|c| c.relation.signals.contains(&s));
-    let dominates = |s: &str| failed.iter().any(|c| c.relation.dominant().contains(&s));
-    let unconfirmed = |s: &str| !cleared.contains(&s);
-    let attempts: [&dyn Fn(&str) -> bool; 4] = [
-        &|s| shared(s) && dominates(s) && unconfirmed(s),
-        &|s| shared(s) && unconfirmed(s),
-        &|s| dominates(s) && unconfirmed(s),
-        &|s| dominates(s),
-    ];
-    let attempts = attempts
-        .iter()
-        .map(|test| accused(channels, recorded, blocks, test));
-    attempts
+    let is_unique = chosen.len() == 1;
+    chosen
         .into_iter()
-        .find(|guilty| !guilty.is_empty())
-        .unwrap_or_default()
+        .map(|t| t.faulty_channel(is_unique))
+        .collect()
 }
 
-/// The recorded channels whose signals pass a test, accused together.
-fn accused(
-    channels: &BTreeMap<String, Channel>,
-    recorded: &[String],
-    blocks: &BlockMeans,
-    test: &dyn Fn(&str) -> bool,
-) -> Vec<FaultyChannel> {
-    let suspects = channels
-        .iter()
-        .filter(|(_, c)| recorded.contains(&c.signal) && test(&c.signal));
-    let mut guilty: Vec<FaultyChannel> = suspects
-        .map(|(name, channel)| FaultyChannel {
-            channel: name.clone(),
-            signal: channel.signal.clone(),
-            cause: blocks
-                .still(&channel.signal)
-                .then(|| "it never changes".to_owned()),
-            factor: None,
-            alone: true,
-        })
-        .collect();
-    let alone = guilty.len() == 1;
-    for g in &mut guilty {
-        g.alone = alone;
-    }
-    guilty
-}
-
-/// What the failed checks and the guilty channels amount to; none where nothing failed and none is
-/// dead.
-pub fn report(guilty: &[FaultyChannel], found: &[Check]) -> Option<FaultReport> {
-    let failed: Vec<String> = found
-        .iter()
-        .filter(|c| !c.verdict.passed())
-        .map(described)
-        .collect();
-    if failed.is_empty() && guilty.is_empty() {
+/// Reports the failed checks and the faulty channels in words; `None` where there are neither.
+pub fn report(faulty: &[FaultyChannel], checks: &[Check]) -> Option<FaultReport> {
+    let failures: Vec<String> = failed(checks).map(describe).collect();
+    if failures.is_empty() && faulty.is_empty() {
         return None;
     }
-    let named = |g: &FaultyChannel| format!("`{}`", g.channel);
-    let causes: Vec<String> = guilty
-        .iter()
-        .filter_map(|g| Some(format!("`{}`: {}", g.channel, g.cause.as_ref()?)))
-        .collect();
-    let names: Vec<String> = guilty.iter().map(named).collect();
-    let several = if guilty.iter().any(|g| !g.alone) {
+    let names: Vec<String> = faulty.iter().map(|f| format!("`{}`", f.channel)).collect();
+    let is_one = names.len() == 1;
+    let names = names.join(", ");
+    let several = if faulty.iter().any(|f| !f.is_unique) {
         "one of these is wrong: "
     } else {
         ""
     };
-    let likely = if causes.is_empty() {
-        "no sign and no unit would set it right".to_owned()
+    let disagreement = if failures.is_empty() {
+        let have = if is_one { "has" } else { "have" };
+        format!("{names} {have} one value throughout, while the aircraft flies")
     } else {
-        format!("likely {}", causes.join(", or "))
+        let do_not = if is_one { "does not" } else { "do not" };
+        let failures = failures.join("; ");
+        format!("{names} {do_not} agree with the other channels ({failures})")
     };
-    let disagreement = if failed.is_empty() {
-        format!(
-            "{} {} one value throughout, while the aircraft flies",
-            names.join(", "),
-            one(&names, "has", "have")
-        )
-    } else {
-        let (names, do_not) = (names.join(", "), one(&names, "does not", "do not"));
-        format!(
-            "{names} {do_not} agree with the other channels ({})",
-            failed.join("; ")
-        )
-    };
-    let reason = format!(
-        "{several}{disagreement}; {likely}. Correct the channel map, or leave the flight out"
-    );
-    let place = if names.len() == 1 {
-        "channel"
-    } else {
-        "channels"
-    };
-    let required = guilty.is_empty()
-        || guilty
-            .iter()
-            .any(|g| signal::REQUIRED.contains(&g.signal.as_str()));
+    let cause = likely_cause(faulty);
+    let is_required = |f: &FaultyChannel| signal::REQUIRED.contains(&f.signal.as_str());
     Some(FaultReport {
-        place: format!("{place} {}", names.join(", ")),
-        reason,
-        required,
+        place: format!("{} {names}", if is_one { "channel" } else { "channels" }),
+        reason: format!(
+            "{several}{disagreement}; {cause}. Correct the channel map, or leave the flight out"
+        ),
+        required: faulty.is_empty() || faulty.iter().any(is_required),
     })
 }
 
-fn one<'a>(names: &[String], singular: &'a str, plural: &'a str) -> &'a str {
-    if names.len() == 1 { singular } else { plural }
+fn likely_cause(faulty: &[FaultyChannel]) -> String {
+    let causes: Vec<String> = faulty
+        .iter()
+        .filter_map(|f| Some(format!("`{}`: {}", f.channel, f.cause.as_ref()?)))
+        .collect();
+    if causes.is_empty() {
+        "no sign and no unit would set it right".to_owned()
+    } else {
+        format!("likely {}", causes.join(", or "))
+    }
 }
 
-fn described(check: &Check) -> String {
-    let words = check.verdict;
+fn describe(check: &Check) -> String {
+    let (name, verdict) = (check.relation.name, check.verdict);
     match check.fit {
-        Some(fit) => format!("{}: slope {:.3}, {words}", check.relation.name, fit.slope),
-        None => format!("{}: {words}", check.relation.name),
+        Some(fit) => format!("{name}: slope {:.3}, {verdict}", fit.slope),
+        None => format!("{name}: {verdict}"),
     }
 }

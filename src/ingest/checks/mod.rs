@@ -5,6 +5,7 @@ mod block_means;
 mod block_motion;
 mod fault_isolation;
 mod relations;
+mod windows;
 
 pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
 pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};

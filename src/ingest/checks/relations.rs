@@ -1,9 +1,9 @@
-//! The kinematic relations between channels, each as two sides that are equal whatever the
+//! Kinematic relations between channels: each has two sides that are equal whatever the
 //! aerodynamics.
 //!
-//! They are compared in integrated form over windows, so that no noise is differentiated: a side is
-//! the change of a state plus the integral of a rate over the window, per second. With `v = (u, v,
-//! w)` and `f` the specific force,
+//! The sides are compared in integrated form over windows, so that no noise is differentiated. A
+//! side is the change of a state plus the integral of a rate over the window, per second. With `v =
+//! (u, v, w)` and `f` the specific force,
 //!
 //! - θ̇ = q cos φ − r sin φ, φ̇ = p + tan θ (q sin φ + r cos φ), ψ̇ = (q sin φ + r cos φ)/cos θ
 //! - v̇ + ω × v − g = f at the c.g.; a sensor adds the acceleration of its arm
@@ -14,53 +14,54 @@ use crate::flight::signal as s;
 use crate::ingest::settings::Checks;
 use crate::units::{DEG, G0_FT_S2};
 
-/// Which windows say something.
+/// Selection of the windows in which a relation is excited.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Choice {
-    /// Those in which either side is larger than this.
+pub enum Selection {
+    /// Windows in which either side exceeds this level.
     Above(f64),
-    /// This share of the windows, those with the largest deviation of the predicting side from its
-    /// median; noise reaches the level.
+    /// This share of the windows, those with the largest deviation of the predicted side from its
+    /// median. For relations whose noise reaches the level.
     Largest { share: f64, level: f64 },
 }
 
-impl Choice {
+impl Selection {
+    /// Level from which a window counts as excited.
     pub fn level(self) -> f64 {
         match self {
-            Choice::Above(level) | Choice::Largest { level, .. } => level,
+            Selection::Above(level) | Selection::Largest { level, .. } => level,
         }
     }
 }
 
+/// A quantity of the motion in one block.
 type Term = fn(&BlockMotion) -> f64;
 
-/// One side of a relation: the change of `state` plus the integral of `rate`, per second, times
-/// `unit`.
+/// One side of a relation: the change of `state` plus the integral of `rate`, per second.
 #[derive(Clone, Copy, Debug)]
 pub struct Side {
     pub state: Option<Term>,
     pub rate: Option<Term>,
 }
 
-/// One relation: `measured` equals `predicted`.
+/// A relation: `measured` equals `predicted`.
 #[derive(Clone, Copy, Debug)]
 pub struct Relation {
     pub name: &'static str,
-    /// Every signal in it, the ones that dominate it first.
+    /// Every signal in the relation, the dominant ones first.
     pub signals: &'static [&'static str],
-    /// How many of the signals dominate it: a fault in one of them cannot hide.
+    /// Number of dominant signals: a fault in one of them shows.
     pub dominant: usize,
     pub measured: Side,
     pub predicted: Side,
-    /// From the sides' own unit to the one that the choice is in.
+    /// Factor from the sides' own unit to that of the selection's level.
     pub unit: f64,
-    pub choice: Choice,
-    /// The least correlation that counts as agreement.
+    pub selection: Selection,
+    /// Least correlation that counts as agreement.
     pub correlation: f64,
 }
 
 impl Relation {
-    /// The signals that the relation clears when it holds.
+    /// Signals that the relation confirms when it holds.
     pub fn dominant(&self) -> &'static [&'static str] {
         self.signals.get(..self.dominant).unwrap_or(self.signals)
     }
@@ -87,7 +88,7 @@ const fn both(state: Term, rate: Term) -> Side {
     }
 }
 
-/// All relations, attitudes first.
+/// Returns all relations, attitudes first.
 pub fn all(settings: &Checks) -> Vec<Relation> {
     let mut relations = attitudes(settings);
     relations.extend(accelerations(settings));
@@ -97,7 +98,7 @@ pub fn all(settings: &Checks) -> Vec<Relation> {
 }
 
 fn attitudes(settings: &Checks) -> Vec<Relation> {
-    let choice = Choice::Above(settings.excitation.attitude_deg_s);
+    let selection = Selection::Above(settings.excitation.attitude_deg_s);
     let relation = |name, signals, measured, predicted| Relation {
         name,
         signals,
@@ -105,7 +106,7 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
         measured,
         predicted,
         unit: DEG,
-        choice,
+        selection,
         correlation: settings.least_attitude_correlation,
     };
     vec![
@@ -119,28 +120,26 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
             "phi rate against p, q and r",
             &[s::PHI, s::P, s::Q, s::R, s::THETA],
             change(|m| m.phi),
-            integral(|m| {
-                m.rates[0] + m.theta.tan() * (m.rates[1] * m.phi.sin() + m.rates[2] * m.phi.cos())
-            }),
+            integral(|m| m.rates[0] + m.theta.tan() * m.turn_rate()),
         ),
         relation(
             "psi rate against q and r",
             &[s::PSI, s::R, s::Q, s::PHI, s::THETA],
             change(|m| m.psi),
-            integral(|m| (m.rates[1] * m.phi.sin() + m.rates[2] * m.phi.cos()) / m.theta.cos()),
+            integral(|m| m.turn_rate() / m.theta.cos()),
         ),
     ]
 }
 
 fn accelerations(settings: &Checks) -> Vec<Relation> {
-    let relation = |name, signals, measured, predicted, choice| Relation {
+    let relation = |name, signals, measured, predicted, selection| Relation {
         name,
         signals,
         dominant: 1,
         measured,
         predicted,
         unit: 1.0,
-        choice,
+        selection,
         correlation: settings.least_correlation,
     };
     vec![
@@ -158,10 +157,10 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
             ],
             integral(|m| m.an),
             both(
-                |m| -(m.along[2] + m.swing(m.arms[0])[2]) / G0_FT_S2,
-                |m| -(m.turning()[2] + m.centripetal(m.arms[0])[2]) / G0_FT_S2,
+                |m| -(m.uvw[2] + m.arm_velocity(m.arms[0])[2]) / G0_FT_S2,
+                |m| -(m.turning_acceleration()[2] + m.centripetal(m.arms[0])[2]) / G0_FT_S2,
             ),
-            Choice::Above(settings.excitation.normal_g),
+            Selection::Above(settings.excitation.normal_g),
         ),
         relation(
             "axial acceleration against the motion",
@@ -176,12 +175,12 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
             ],
             integral(|m| m.ax),
             both(
-                |m| (m.along[0] + m.swing(m.arms[1])[0]) / G0_FT_S2,
-                |m| (m.turning()[0] + m.centripetal(m.arms[1])[0]) / G0_FT_S2,
+                |m| (m.uvw[0] + m.arm_velocity(m.arms[1])[0]) / G0_FT_S2,
+                |m| (m.turning_acceleration()[0] + m.centripetal(m.arms[1])[0]) / G0_FT_S2,
             ),
-            Choice::Above(settings.excitation.axial_g),
+            Selection::Above(settings.excitation.axial_g),
         ),
-        // The sensor is far less noisy than the motion here, so it is the predicting side.
+        // The sensor is far less noisy than the motion here, so it is the predicted side.
         relation(
             "lateral acceleration of the motion against ay",
             &[
@@ -195,11 +194,11 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
                 s::VELOCITY,
             ],
             both(
-                |m| (m.along[1] + m.swing(m.arms[2])[1]) / G0_FT_S2,
-                |m| (m.turning()[1] + m.centripetal(m.arms[2])[1]) / G0_FT_S2,
+                |m| (m.uvw[1] + m.arm_velocity(m.arms[2])[1]) / G0_FT_S2,
+                |m| (m.turning_acceleration()[1] + m.centripetal(m.arms[2])[1]) / G0_FT_S2,
             ),
             integral(|m| m.ay),
-            Choice::Largest {
+            Selection::Largest {
                 share: settings.excitation.lateral_share,
                 level: settings.excitation.lateral_g,
             },
@@ -208,7 +207,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
 }
 
 fn velocities(settings: &Checks) -> Vec<Relation> {
-    let choice = Choice::Above(settings.excitation.velocity_ft_s2);
+    let selection = Selection::Above(settings.excitation.velocity_ft_s2);
     let relation = |name, signals, dominant, measured, predicted| Relation {
         name,
         signals,
@@ -216,7 +215,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         measured,
         predicted,
         unit: 1.0,
-        choice,
+        selection,
         correlation: settings.least_correlation,
     };
     vec![
@@ -232,8 +231,8 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
                 s::BETA_VANE,
             ],
             3,
-            change(|m| m.along[0]),
-            integral(|m| m.force()[0] - m.turning()[0]),
+            change(|m| m.uvw[0]),
+            integral(|m| m.specific_force()[0] - m.turning_acceleration()[0]),
         ),
         relation(
             "side velocity against r, p and phi",
@@ -248,8 +247,8 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
                 s::ALPHA_VANE,
             ],
             2,
-            change(|m| m.along[1]),
-            integral(|m| m.force()[1] - m.turning()[1]),
+            change(|m| m.uvw[1]),
+            integral(|m| m.specific_force()[1] - m.turning_acceleration()[1]),
         ),
         relation(
             "downward velocity against q and an",
@@ -264,21 +263,21 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
                 s::BETA_VANE,
             ],
             2,
-            change(|m| m.along[2]),
-            integral(|m| m.force()[2] - m.turning()[2]),
+            change(|m| m.uvw[2]),
+            integral(|m| m.specific_force()[2] - m.turning_acceleration()[2]),
         ),
     ]
 }
 
 fn air_data(settings: &Checks) -> Vec<Relation> {
-    let relation = |name, signals, dominant, measured, predicted, choice| Relation {
+    let relation = |name, signals, dominant, measured, predicted, selection| Relation {
         name,
         signals,
         dominant,
         measured,
         predicted,
         unit: 1.0,
-        choice,
+        selection,
         correlation: settings.least_correlation,
     };
     vec![
@@ -294,8 +293,8 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             ],
             4,
             change(|m| m.altitude),
-            integral(BlockMotion::climb),
-            Choice::Above(settings.excitation.climb_ft_s),
+            integral(BlockMotion::climb_rate),
+            Selection::Above(settings.excitation.climb_ft_s),
         ),
         relation(
             "dynamic pressure against velocity and altitude",
@@ -303,7 +302,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             2,
             integral(|m| m.qbar),
             integral(|m| 0.5 * m.density * m.velocity * m.velocity),
-            Choice::Above(settings.excitation.qbar_psf),
+            Selection::Above(settings.excitation.qbar_psf),
         ),
         relation(
             "Mach against velocity and altitude",
@@ -311,7 +310,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             2,
             integral(|m| m.mach),
             integral(|m| m.velocity / m.sound),
-            Choice::Above(settings.excitation.mach),
+            Selection::Above(settings.excitation.mach),
         ),
     ]
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use super::pieces::Piece;
 use super::time_channels::TimeChannels;
-use crate::ingest::source::Source;
+use crate::ingest::column_source::ColumnSource;
 
 /// Rows of either piece that are compared: some seconds of a usual recorder.
 const COMPARED_ROWS: usize = 256;
@@ -25,7 +25,7 @@ const SAME_TIME: f64 = 1e-9;
 ///
 /// # Errors
 /// The reason for which a file cannot be read.
-pub fn are_same_rows<S: Source + ?Sized>(
+pub fn are_same_rows<S: ColumnSource + ?Sized>(
     times: &TimeChannels<S>,
     columns: &BTreeSet<String>,
     first: &Piece,
@@ -66,7 +66,7 @@ struct Rows {
 
 impl Rows {
     /// The first rows of a piece at or after a time.
-    fn from_time<S: Source + ?Sized>(
+    fn from_time<S: ColumnSource + ?Sized>(
         times: &TimeChannels<S>,
         piece: &Piece,
         from_s: f64,
@@ -95,7 +95,7 @@ impl Rows {
     }
 
     /// Values of a column in these rows.
-    fn values<S: Source + ?Sized>(
+    fn values<S: ColumnSource + ?Sized>(
         &self,
         source: &S,
         file: usize,

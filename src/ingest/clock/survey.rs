@@ -16,9 +16,9 @@ use super::sample_clock::{Clock, ClockBuilder};
 use super::time_channels::TimeChannels;
 use crate::error::Problem;
 use crate::flight::{Channel, signal::TIME};
+use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
 use crate::ingest::settings::Settings;
-use crate::ingest::source::Source;
 
 /// Share of rows without a usable time above which a clock is refused: the remaining times would
 /// leave gaps in most maneuvers.
@@ -47,7 +47,7 @@ pub struct Survey {
 /// # Errors
 /// A problem that refuses the flight: no time channel, or one that cannot be followed.
 pub fn survey(
-    source: &(impl Source + ?Sized),
+    source: &(impl ColumnSource + ?Sized),
     channels: &BTreeMap<String, Channel>,
     settings: &Settings,
 ) -> Result<Survey, Problem> {
@@ -62,7 +62,7 @@ pub fn survey(
         .map_err(|refusal| refusal.into_problem(source.flight_id()))
 }
 
-struct Surveyor<'a, S: Source + ?Sized> {
+struct Surveyor<'a, S: ColumnSource + ?Sized> {
     times: TimeChannels<'a, S>,
     channels: &'a BTreeMap<String, Channel>,
     settings: &'a Settings,
@@ -121,7 +121,7 @@ impl Stream {
     }
 }
 
-impl<S: Source + ?Sized> Surveyor<'_, S> {
+impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
     fn survey(mut self) -> Result<Survey, Refusal> {
         let mut streams = self.streams()?;
         for stream in &mut streams {

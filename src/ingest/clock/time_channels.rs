@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::flight::{Channel, signal::TIME};
+use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
-use crate::ingest::source::Source;
 use crate::units::Unit;
 
 /// The time channels of a flight's files.
-pub struct TimeChannels<'a, S: Source + ?Sized> {
+pub struct TimeChannels<'a, S: ColumnSource + ?Sized> {
     pub source: &'a S,
     channels: Vec<(&'a str, &'a Channel)>,
 }
 
-impl<'a, S: Source + ?Sized> TimeChannels<'a, S> {
+impl<'a, S: ColumnSource + ?Sized> TimeChannels<'a, S> {
     /// Time channels of a channel map; a flight whose files have clocks of their own has several.
     pub fn of(source: &'a S, channel_map: &'a BTreeMap<String, Channel>) -> Self {
         let channels = channel_map

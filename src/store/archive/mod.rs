@@ -25,7 +25,7 @@ use parquet::file::reader::ChunkReader;
 use crate::error::{Error, Problem, ProblemStage};
 use crate::flight::channel::RawColumn;
 use crate::flight::{Channel, RawFlight};
-use crate::ingest::Source;
+use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
 use super::object;
@@ -293,7 +293,7 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
     })
 }
 
-impl Source for Opened {
+impl ColumnSource for Opened {
     fn flight_id(&self) -> &str {
         &self.flight_id
     }

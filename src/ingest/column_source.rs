@@ -1,14 +1,14 @@
-//! Where the columns of a flight come from, file by file: the archive's files, or values at hand.
+//! Source of a flight's columns, file by file: files of the archive, or values in memory.
 
 use std::ops::Range;
 
 use crate::flight::RawFlight;
 
 /// The files of one flight as columns of numbers. Columns are read in parallel, each in order.
-pub trait Source: Sync {
+pub trait ColumnSource: Sync {
     fn flight_id(&self) -> &str;
 
-    /// How many files there are; they are known by their number.
+    /// Number of files; a file is named by its index.
     fn files(&self) -> usize;
 
     fn name(&self, file: usize) -> String;
@@ -17,13 +17,13 @@ pub trait Source: Sync {
 
     fn has(&self, file: usize, column: &str) -> bool;
 
-    /// The unit that a file states for a column, where it states one.
+    /// Unit that a file states for a column, where it states one.
     fn unit(&self, file: usize, column: &str) -> Option<&str>;
 
-    /// Hands over the values of some rows in order, in pieces; a null is a NaN.
+    /// Passes the values of some rows to `sink` in order and in pieces; a null is a NaN.
     ///
     /// # Errors
-    /// Why they cannot be read, in words.
+    /// The reason for which they cannot be read, in words.
     fn read(
         &self,
         file: usize,
@@ -34,7 +34,7 @@ pub trait Source: Sync {
 }
 
 /// Several files in memory.
-impl Source for [RawFlight] {
+impl ColumnSource for [RawFlight] {
     fn flight_id(&self) -> &str {
         self.first().map_or("", |f| f.flight_id.as_str())
     }

@@ -1,16 +1,16 @@
 //! One channel read from its files as a conditioned signal, piece by piece.
 
+use super::channel_plan::ChannelPlan;
 use super::column_samples::ColumnSamples;
 use super::conditioner::{ChannelStatistics, Conditioner};
-use super::plan::ChannelPlan;
 use super::signature::SignatureSamples;
 use crate::flight::Channel;
 use crate::flight::record::Series;
 use crate::ingest::checks::BlockAverager;
 use crate::ingest::clock::{Clock, Stretch};
+use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
 use crate::ingest::settings::Settings;
-use crate::ingest::source::Source;
 
 /// Reader of one channel over a stretch; its samples leave in order.
 #[derive(Clone, Debug)]
@@ -71,7 +71,7 @@ impl<'a> ChannelReader<'a> {
     /// A file that cannot be read, or an error of `sink`.
     pub fn read_until(
         &mut self,
-        source: &(impl Source + ?Sized),
+        source: &(impl ColumnSource + ?Sized),
         until: usize,
         piece: usize,
         sink: &mut dyn FnMut(&Series) -> Result<(), String>,

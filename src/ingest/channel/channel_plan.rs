@@ -7,9 +7,9 @@ use super::conditioner::ChannelStatistics;
 use crate::error::Problem;
 use crate::flight::{Channel, signal};
 use crate::ingest::clock::Clock;
+use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
 use crate::ingest::refusal::Refusal;
-use crate::ingest::source::Source;
 use crate::units::Unit;
 
 /// Relative difference below which two factors are the same unit: rounding of the factors.
@@ -33,7 +33,7 @@ pub struct ChannelPlan<'a> {
 /// A problem that refuses the flight: a unit in a file that is not the channel map's, a required
 /// channel that is in no file, a signal with two channels, or a required signal without a source.
 pub fn plan_channels<'a>(
-    source: &(impl Source + ?Sized),
+    source: &(impl ColumnSource + ?Sized),
     context: &Context<'a>,
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Problem> {
     let flight_id = source.flight_id();
@@ -41,7 +41,7 @@ pub fn plan_channels<'a>(
 }
 
 fn plan<'a>(
-    source: &(impl Source + ?Sized),
+    source: &(impl ColumnSource + ?Sized),
     context: &Context<'a>,
     flight_id: &str,
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
@@ -77,7 +77,7 @@ fn plan<'a>(
 
 /// Checks that every unit that a file states is the channel map's.
 fn check_units(
-    source: &(impl Source + ?Sized),
+    source: &(impl ColumnSource + ?Sized),
     channels: &BTreeMap<String, Channel>,
 ) -> Result<(), Refusal> {
     for (name, channel) in channels {
@@ -106,7 +106,7 @@ fn same_unit(stated: &str, mapped: &str) -> bool {
 
 /// Factor from a channel's unit into its signal's.
 fn unit_factor(
-    source: &(impl Source + ?Sized),
+    source: &(impl ColumnSource + ?Sized),
     name: &str,
     channel: &Channel,
 ) -> Result<f64, Refusal> {

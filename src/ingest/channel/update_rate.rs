@@ -1,0 +1,151 @@
+//! Update rate of a channel: how many samples of the record lie between two recorded values.
+
+/// Longest period of a slow channel, in samples of the record: a channel at 1 Hz in a record at
+/// 40 Hz.
+pub const LONGEST_PERIOD: usize = 40;
+
+/// Shortest period of a slow channel, in samples of the record.
+const SHORTEST_PERIOD: usize = 2;
+
+/// Share of the distances between recorded samples, or of the changes of a held value, that must
+/// fit a period: frames are lost and clocks slip now and then.
+const FITTING_SHARE: f64 = 0.95;
+
+/// Fewest changes of value, or distances, from which a period is inferred.
+pub const LEAST_CHANGES: usize = 20;
+
+/// Least share of its chances, as one in so many, at which a held channel changes. One that changes
+/// less often is as well a coarse channel at full rate.
+const CHANCES_PER_CHANGE: usize = 4;
+
+/// Update rate of a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UpdateRate {
+    /// Samples of the record from one recorded value to the next.
+    pub period: usize,
+    /// For a channel that repeats its value until the next one: the sample, modulo the period, in
+    /// which it is new.
+    pub held_phase: Option<usize>,
+}
+
+impl UpdateRate {
+    /// A value in every sample.
+    pub const FULL: UpdateRate = UpdateRate {
+        period: 1,
+        held_phase: None,
+    };
+
+    /// Infers the rate of a channel from its samples, the first of which is sample `first` of the
+    /// record. `None` where there are too few values or changes.
+    pub fn infer(values: &[f64], first: usize) -> Option<UpdateRate> {
+        let finite = values.iter().filter(|v| v.is_finite()).count();
+        if finite < LEAST_CHANGES {
+            return None;
+        }
+        if finite == values.len() {
+            // Most channels change so often that no period fits: these need no list of changes.
+            let changed = neighbours(values)
+                .filter(|(before, value)| before.to_bits() != value.to_bits())
+                .count();
+            if changed < LEAST_CHANGES {
+                return None;
+            }
+            if !has_room(changed, values.len(), SHORTEST_PERIOD) {
+                return Some(UpdateRate::FULL);
+            }
+        } else if let Some(period) = period_between_nulls(&distances(values)) {
+            return Some(UpdateRate {
+                period,
+                held_phase: None,
+            });
+        }
+        let changes = changes(values, first);
+        if changes.len() < LEAST_CHANGES {
+            return None;
+        }
+        let mut periods = (SHORTEST_PERIOD..=LONGEST_PERIOD).rev();
+        let held = periods.find_map(|period| held_with_period(period, &changes));
+        Some(held.unwrap_or(UpdateRate::FULL))
+    }
+
+    /// The recorded values with their places, without the repeated ones of a held channel. The
+    /// first value is sample `first` of the record.
+    pub fn recorded(self, values: &[f64], first: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let is_new = move |k: usize| {
+            self.held_phase
+                .is_none_or(|phase| (first + k) % self.period == phase)
+        };
+        values
+            .iter()
+            .enumerate()
+            .filter(move |(k, v)| v.is_finite() && is_new(*k))
+            .map(|(k, v)| (k, *v))
+    }
+}
+
+/// Each value with the one after it.
+pub fn neighbours(values: &[f64]) -> impl Iterator<Item = (&f64, &f64)> {
+    values.iter().zip(values.get(1..).unwrap_or_default())
+}
+
+/// Histogram of the distances between finite values.
+fn distances(values: &[f64]) -> [usize; LONGEST_PERIOD + 1] {
+    let mut distances = [0_usize; LONGEST_PERIOD + 1];
+    let mut last = None;
+    for (k, _) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if let Some(count) = last.and_then(|last| distances.get_mut(k - last)) {
+            *count += 1;
+        }
+        last = Some(k);
+    }
+    distances
+}
+
+/// Samples of the record whose value differs from the finite one before.
+fn changes(values: &[f64], first: usize) -> Vec<usize> {
+    let mut changes = Vec::new();
+    let mut before = f64::NAN;
+    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+        if before.is_finite() && value.to_bits() != before.to_bits() {
+            changes.push(first + k);
+        }
+        before = *value;
+    }
+    changes
+}
+
+/// The distance that nearly all finite values have, where it is more than one. A clock of the
+/// channel's own makes it one more or less now and then.
+fn period_between_nulls(distances: &[usize]) -> Option<usize> {
+    let total: usize = distances.iter().sum();
+    let (period, _) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
+    let near = distances.iter().skip(period.saturating_sub(1)).take(3);
+    let near: usize = near.sum();
+    let fits = near as f64 >= FITTING_SHARE * total as f64 && total >= LEAST_CHANGES;
+    // Beside a full-rate channel's distance of one, two is a lost sample.
+    let is_full_rate = 2 * distances.get(1).copied().unwrap_or_default() >= total;
+    (period > 1 && fits && !is_full_rate).then_some(period)
+}
+
+/// `true` where a span of samples has room for so many changes in one phase of a period.
+fn has_room(changes: usize, span: usize, period: usize) -> bool {
+    (FITTING_SHARE * changes as f64 - 1.0) * period as f64 <= span as f64
+}
+
+/// The rate of a held channel where nearly all changes keep one phase of a period.
+fn held_with_period(period: usize, changes: &[usize]) -> Option<UpdateRate> {
+    let span = changes.last()? - changes.first()?;
+    let are_too_few = CHANCES_PER_CHANGE * changes.len() * period < span;
+    if are_too_few || !has_room(changes.len(), span, period) {
+        return None;
+    }
+    let mut phases = vec![0_usize; period];
+    for change in changes {
+        phases[change % period] += 1;
+    }
+    let (phase, most) = phases.iter().enumerate().max_by_key(|(_, n)| **n)?;
+    (*most as f64 >= FITTING_SHARE * changes.len() as f64).then_some(UpdateRate {
+        period,
+        held_phase: Some(phase),
+    })
+}
