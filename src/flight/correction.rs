@@ -1,11 +1,11 @@
-//! What a signal is corrected by when its record is read.
+//! Correction of a signal for the error of its instrument, applied when the record is read.
 
 use serde::{Deserialize, Serialize};
 
+use super::interpolation_kernel::InterpolationKernel;
 use super::record::{Mark, Record, Series};
-use super::taps::Taps;
 
-/// The error of an instrument: it reads `(1 + scale) truth(t − delay) + bias`.
+/// Error of an instrument: it reads `(1 + scale) truth(t − delay) + bias`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
     pub signal: String,
@@ -15,17 +15,23 @@ pub struct Correction {
     pub delay_s: f64,
 }
 
+/// Samples beyond a delay that the interpolation kernel reaches.
+const KERNEL_REACH: usize = 2;
+
 impl Correction {
     /// Samples on either side of a sample that its corrected value depends on.
     #[must_use]
     pub fn reach(&self, step_s: f64) -> usize {
+        if self.delay_s == 0.0 {
+            return 0;
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a length of time, not negative"
         )]
         let delay = (self.delay_s.abs() / step_s).ceil() as usize;
-        if self.delay_s == 0.0 { 0 } else { delay + 2 }
+        delay + KERNEL_REACH
     }
 
     /// Corrects the signal, where the record has it.
@@ -40,68 +46,74 @@ impl Correction {
         }
     }
 
-    /// Without a delay every sample is its own.
+    /// Corrects bias and scale, sample by sample.
     fn correct_in_place(&self, series: &mut Series) {
         for (value, mark) in series.values.iter_mut().zip(&mut series.marks) {
             *value = self.truth(*value);
-            *mark = if value.is_finite() {
-                *mark
-            } else {
-                Mark::Missing
-            };
+            if !value.is_finite() {
+                *mark = Mark::Missing;
+            }
         }
     }
 
-    /// Evenly spaced values corrected; they lie `step_s` apart.
+    /// Corrects values that lie `step_s` apart.
     #[must_use]
     pub fn of_values(&self, values: &[f64], step_s: f64) -> Vec<f64> {
-        let taps = Taps::at(self.delay_s / step_s);
+        let kernel = InterpolationKernel::at(self.delay_s / step_s);
         (0..values.len())
-            .map(|k| self.value(&taps, values, k))
+            .map(|k| self.value(&kernel, values, k))
             .collect()
     }
 
-    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples; a mark travels with its sample,
-    /// and a fault outweighs none.
+    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples. The worst mark of the samples
+    /// that a value depends on is its own.
     fn corrected(&self, old: &Series, delay: f64) -> Series {
-        let (taps, count) = (Taps::at(delay), old.values.len());
-        let mark = |k: usize, value: f64| {
-            let weighty = taps.each(k, count).filter(|(_, weight, _)| *weight != 0.0);
-            let worst = weighty
-                .map(|(sample, ..)| old.marks[sample])
-                .max_by_key(|m| (m.is_fault(), *m as u8));
+        let kernel = InterpolationKernel::at(delay);
+        let values: Vec<f64> = (0..old.values.len())
+            .map(|k| self.value(&kernel, &old.values, k))
+            .collect();
+        let mark = |(k, value): (usize, &f64)| {
             if value.is_finite() {
-                worst.unwrap_or(Mark::Measured)
+                worst_mark(&kernel, &old.marks, k)
             } else {
                 Mark::Missing
             }
         };
-        let values: Vec<f64> = (0..count)
-            .map(|k| self.value(&taps, &old.values, k))
-            .collect();
-        let marks = values
-            .iter()
-            .enumerate()
-            .map(|(k, v)| mark(k, *v))
-            .collect();
+        let marks = values.iter().enumerate().map(mark).collect();
         Series { values, marks }
     }
 
-    fn value(&self, taps: &Taps, values: &[f64], k: usize) -> f64 {
-        let weighty = taps
-            .each(k, values.len())
-            .filter(|(_, weight, _)| *weight != 0.0);
-        self.truth(
-            weighty
-                .map(|(sample, weight, _)| weight * values[sample])
-                .sum(),
-        )
+    fn value(&self, kernel: &InterpolationKernel, values: &[f64], k: usize) -> f64 {
+        let reading = weighted_samples(kernel, k, values.len())
+            .map(|(sample, weight)| weight * values[sample])
+            .sum();
+        self.truth(reading)
     }
 
-    /// What is true when the instrument reads this.
+    /// True value behind a reading.
     fn truth(&self, reading: f64) -> f64 {
         (reading - self.bias) / (1.0 + self.scale)
     }
+}
+
+/// Samples with a weight other than zero: a missing sample without weight must not spoil a value.
+fn weighted_samples(
+    kernel: &InterpolationKernel,
+    k: usize,
+    samples: usize,
+) -> impl Iterator<Item = (usize, f64)> {
+    kernel
+        .weights_at(k, samples)
+        .filter(|(_, weight, _)| *weight != 0.0)
+        .map(|(sample, weight, _)| (sample, weight))
+}
+
+/// The worst of the marks that a value depends on: a fault outweighs none.
+fn worst_mark(kernel: &InterpolationKernel, marks: &[Mark], k: usize) -> Mark {
+    weighted_samples(kernel, k, marks.len())
+        .map(|(sample, _)| marks[sample])
+        .max_by_key(|mark| (mark.is_fault(), *mark as u8))
+        .unwrap_or(Mark::Measured)
 }
 
 #[cfg(test)]
@@ -109,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mark_travels_with_its_sample_and_a_fault_outweighs_none() {
+    fn a_mark_moves_with_its_sample_and_a_fault_outweighs_none() {
         let marks = [
             Mark::Measured,
             Mark::Between,

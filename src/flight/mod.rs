@@ -1,16 +1,16 @@
-//! A flight as recorded (channels) and as meant (signals on one clock).
+//! A flight as recorded (channels) and as conditioned (signals on one clock).
 
 pub mod channel;
 pub mod correction;
+pub mod interpolation_kernel;
 pub mod record;
 pub mod signal;
-pub mod taps;
 
 pub use channel::{Channel, RawFlight};
 pub use correction::Correction;
 pub use record::{Mark, Record};
 
-/// Whether an id is a flight's own or that of one of its stretches.
+/// `true` where an id is a flight's own or that of one of its stretches.
 #[must_use]
 pub fn is_stretch(id: &str, flight_id: &str) -> bool {
     let rest = id.strip_prefix(flight_id);

@@ -1,12 +1,12 @@
-//! A record: the signals of one flight on one uniform clock, each sample marked where it is not
-//! what the recorder wrote.
+//! A record: the signals of one flight on one uniform clock, with a mark on each sample that is not
+//! as the recorder wrote it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-/// What happened to one sample of one signal.
+/// Repair or fault of one sample of one signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Mark {
@@ -16,17 +16,17 @@ pub enum Mark {
     Bridged = 1,
     /// A single-sample spike, replaced by the line between its neighbours.
     Despiked = 2,
-    /// Nothing to bridge it with: the value is NaN.
+    /// In a gap too long to bridge, or at an end: the value is NaN.
     Missing = 3,
-    /// The channel stood still where it should have moved: the value is NaN.
+    /// In an interval in which the channel is stuck: the value is NaN.
     Stuck = 4,
-    /// Between two samples of a channel that is recorded more slowly than the record: on the line
+    /// Between two values of a channel that is recorded more slowly than the record: on the line
     /// through them.
     Between = 5,
 }
 
 impl Mark {
-    /// The mark stored as this number; anything unknown counts as missing.
+    /// Mark with this code; an unknown code counts as missing.
     #[must_use]
     pub fn from_u8(code: u8) -> Mark {
         match code {
@@ -39,22 +39,22 @@ impl Mark {
         }
     }
 
-    /// Whether something went wrong with the sample. A slow channel's in-between samples are no
-    /// measurements, but nothing is wrong with them.
+    /// `true` where the sample was repaired or is missing. The samples between two values of a slow
+    /// channel are no measurements, but they are no faults.
     #[must_use]
     pub fn is_fault(self) -> bool {
         !matches!(self, Mark::Measured | Mark::Between)
     }
 }
 
-/// One signal: its values in the unit of its name, and the marks of its samples.
+/// One signal: values in the unit of its name, and the marks of its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub values: Vec<f64>,
     pub marks: Vec<Mark>,
 }
 
-/// The signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's
+/// Signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's
 /// own time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
@@ -65,15 +65,18 @@ pub struct Record {
     pub signals: BTreeMap<String, Series>,
 }
 
+/// Samples beyond either end of a part: as far as a numerical slope or an interpolation reaches.
+const MARGIN: usize = 10;
+
 impl Record {
-    /// The time of a sample, s.
+    /// Time of a sample, s.
     #[must_use]
     pub fn time_s(&self, sample: usize) -> f64 {
         let k = sample as f64;
         self.start_s + k * self.step_s
     }
 
-    /// The sample nearest to a time, kept inside the record.
+    /// Sample nearest to a time, inside the record.
     #[must_use]
     pub fn sample_at(&self, time_s: f64) -> usize {
         let k = ((time_s - self.start_s) / self.step_s).round().max(0.0);
@@ -86,14 +89,14 @@ impl Record {
         k.min(self.samples.saturating_sub(1))
     }
 
-    /// The values of a signal, where the record has it.
+    /// Values of a signal, where the record has it.
     #[must_use]
     pub fn values(&self, signal: &str) -> Option<&[f64]> {
         self.signals.get(signal).map(|s| s.values.as_slice())
     }
 
-    /// The share of samples, among all of these signals from one time to another, with which
-    /// something went wrong; a signal that the record does not have counts as missing throughout.
+    /// Share of samples with a fault among some signals from one time to another. A signal that the
+    /// record does not have counts as missing throughout.
     #[must_use]
     pub fn marked_share<'a>(
         &self,
@@ -117,8 +120,8 @@ impl Record {
         faults as f64 / all.max(1) as f64
     }
 
-    /// A range of samples of some signals, or of all; signals that the record does not have are
-    /// left out.
+    /// Copies a range of samples of some signals, or of all. Signals that the record does not have
+    /// are left out.
     #[must_use]
     pub fn cut(&self, signals: Option<&BTreeSet<String>>, samples: Range<usize>) -> Record {
         let cut = |s: &Series| Series {
@@ -140,12 +143,10 @@ impl Record {
         }
     }
 
-    /// The part of the record from one time to another, with a few samples more on each side:
-    /// slopes of signals at the ends of the part are those of the whole. Sample times are
-    /// unchanged.
+    /// Copies the part of the record from one time to another, with a margin on each side: slopes
+    /// of signals at the ends of the part are those of the whole. Sample times are unchanged.
     #[must_use]
     pub fn part(&self, start_s: f64, end_s: f64) -> Record {
-        const MARGIN: usize = 10;
         let from = self.sample_at(start_s).saturating_sub(MARGIN);
         let to = (self.sample_at(end_s) + MARGIN + 1).min(self.samples);
         self.cut(None, from..to)

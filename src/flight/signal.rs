@@ -1,7 +1,6 @@
-//! The signals that the equations of motion name. Surfaces and pilot controls have whatever names
-//! the analyst gives them.
+//! Signals in the equations of motion. The analyst names surfaces and pilot controls.
 //!
-//! Signs (the paper's, and design of every formula here): rates and attitudes as usual in body
+//! Signs (the paper's, and those of every formula of the program): rates and attitudes as usual in body
 //! axes, normal acceleration positive up, axial forward, lateral right; c.g. positions positive
 //! aft, right and above of the reference point.
 
@@ -17,15 +16,15 @@ pub const Q: &str = "q_deg_s";
 pub const R: &str = "r_deg_s";
 pub const THETA: &str = "theta_deg";
 pub const PHI: &str = "phi_deg";
-/// True heading; only checked against r, and only where recorded.
+/// True heading; optional. The checks of units and signs compare it with r, and flight-path
+/// reconstruction uses it.
 pub const PSI: &str = "psi_deg";
 pub const AN: &str = "an_g";
 pub const AX: &str = "ax_g";
 pub const AY: &str = "ay_g";
 pub const QBAR: &str = "qbar_psf";
 pub const THRUST: &str = "thrust_lbf";
-/// Sum of the engines' speeds is what the gyroscopic moment needs: one signal per engine, left and
-/// right.
+/// Speeds of the left and the right engine; the gyroscopic moment needs their sum.
 pub const RPM_LEFT: &str = "left_rpm";
 pub const RPM_RIGHT: &str = "right_rpm";
 pub const MASS: &str = "mass_slug";
@@ -38,8 +37,7 @@ pub const IZ: &str = "iz_slug_ft2";
 /// +∫ x z dm in body axes.
 pub const IXZ: &str = "ixz_slug_ft2";
 
-/// Every signal without which the equations cannot be written down: each must be a channel or a
-/// constant.
+/// Signals that the equations of motion need: each must be a channel or a constant.
 pub const REQUIRED: &[&str] = &[
     ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST,
     RPM_LEFT, RPM_RIGHT, MASS, X_CG, Y_CG, Z_CG, IX, IY, IZ, IXZ,

@@ -70,7 +70,7 @@ pub fn assess(
         problems.push(problem);
     }
     let faults = findings.problems(flight_id);
-    if context.settings.compatibility.fault == OnFault::Refuse && findings.required_faulty() {
+    if context.settings.compatibility.fault == OnFault::Refuse && findings.has_required_fault() {
         return Err(joined(&faults, flight_id));
     }
     problems.extend(faults);
@@ -174,7 +174,7 @@ impl Examination<'_> {
         let faulty = &relations.faulty;
         if !faulty.is_empty() && faulty.iter().all(FaultyChannel::is_correctable) {
             let findings = self.reconstruct(|record| correct_by_factors(record, faulty));
-            return (relations, findings.reported());
+            return (relations, findings.without_corrections());
         }
         // With a dead channel or with one fault among several there is nothing to go by.
         if faulty.iter().any(|f| f.cause.is_some()) {
@@ -184,8 +184,8 @@ impl Examination<'_> {
         if relations.report.is_none() {
             return (relations, findings);
         }
-        if findings.faulty() {
-            let corrected = blocks.corrected(&findings.freed().corrections());
+        if findings.has_fault() {
+            let corrected = blocks.corrected(&findings.with_faults_corrected().corrections());
             let again = self.check(&corrected);
             if again.report.is_none() {
                 return (again, findings);

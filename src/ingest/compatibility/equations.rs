@@ -1,5 +1,4 @@
-//! The kinematic equations of flight and what the instruments read of them, with exact slopes; no
-//! aerodynamics.
+//! Kinematic equations of flight and the instruments' readings, with exact slopes; no aerodynamics.
 //!
 //! Over the turning earth, with ω the inertial body rates, Ω the earth's, n the navigation frame's
 //! and f the specific force:
@@ -8,9 +7,9 @@
 //! - φ̇ = p' + tan θ (q' sin φ + r' cos φ), θ̇ = q' cos φ − r' sin φ, ψ̇ = (q' sin φ + r' cos φ)/cos θ, with ω' = ω − n
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ
 //!
-//! An accelerometer on an arm r feels ω̇ × r besides. So that no rate is differentiated the state
-//! is, component by component, the velocity at the sensor of that component, `s_i` = (v + ω ×
-//! `r_i`)_i: its rate has no ω̇.
+//! An accelerometer on an arm r also feels ω̇ × r. So that no rate is differentiated, each velocity
+//! component of the state is that at the sensor of the component, `s_i` = (v + ω × `r_i`)_i, whose
+//! rate has no ω̇.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
@@ -28,33 +27,34 @@ pub const STATES: usize = 7;
 
 pub type State = SVector<f64, STATES>;
 
-/// What is known at a sample and enters so weakly that the measured motion is good enough for it.
+/// Terms of the equations that are computed from the measured motion at a sample: they enter so
+/// weakly that the measurement is good enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct MeasuredTerms {
     /// ft/s².
     pub gravity: f64,
-    /// From the c.g. to the axial, lateral and normal accelerometer, ft forward, right, down.
+    /// Arms from the c.g. to the axial, lateral and normal accelerometer, ft forward, right, down.
     pub arms: [[f64; 3]; 3],
     pub cg: Position,
     /// The earth's rotation, and that of the local horizon, in body axes, rad/s.
     pub earth: Vector3<f64>,
     pub horizon: Vector3<f64>,
-    /// From north, east, down to body axes.
+    /// Rotation from north, east, down to body axes.
     pub to_body: Matrix3<f64>,
 }
 
 /// p, q, r (rad/s) and specific force forward, right, down at the sensors (ft/s²).
-pub type Driven = [f64; INPUTS];
+pub type Inputs = [f64; INPUTS];
 
 /// Rates of the states with their slopes along states and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct StateRates {
     pub rates: State,
     pub by_state: SMatrix<f64, STATES, STATES>,
     pub by_input: SMatrix<f64, STATES, INPUTS>,
 }
 
-/// What the output instruments read, in the units of their signals, with slopes along states and
+/// Readings of the output instruments, in the units of their signals, with slopes along states and
 /// body rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readings {
@@ -63,8 +63,7 @@ pub struct Readings {
     pub by_rates: SMatrix<f64, OUTPUTS, 3>,
 }
 
-/// Where the slopes of the rates of each state can be other than zero: along which states, along
-/// which inputs.
+/// States along which the rate of each state can have a slope.
 pub const RATES_BY_STATE: [&[usize]; STATES] = [
     &[1, 2, 4],
     &[0, 2, 3, 4],
@@ -74,6 +73,7 @@ pub const RATES_BY_STATE: [&[usize]; STATES] = [
     &[3, 4],
     &[0, 1, 2, 3, 4],
 ];
+/// Inputs along which the rate of each state can have a slope.
 pub const RATES_BY_INPUT: [&[usize]; STATES] = [
     &[0, 1, 2, 3],
     &[0, 1, 2, 4],
@@ -83,7 +83,7 @@ pub const RATES_BY_INPUT: [&[usize]; STATES] = [
     &[1, 2],
     &[0, 1, 2],
 ];
-/// The same of each reading: along which states, along which body rates.
+/// States along which each reading can have a slope.
 pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] = [
     &[0, 1, 2],
     &[0, 1, 2],
@@ -95,6 +95,7 @@ pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] = [
     &[0, 1, 2, 6],
     &[0, 1, 2, 6],
 ];
+/// Body rates along which each reading can have a slope.
 pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] = [
     &[0, 1, 2],
     &[0, 1, 2],
@@ -108,18 +109,22 @@ pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] = [
 ];
 
 #[inline(always)]
-fn vector(omega: &Driven) -> Vector3<f64> {
-    Vector3::new(omega[0], omega[1], omega[2])
+fn body_rates(input: &Inputs) -> Vector3<f64> {
+    Vector3::new(input[0], input[1], input[2])
 }
 
-/// The velocity at the c.g. and its slopes along ω.
+/// Velocity at the c.g. and its slopes along ω.
 #[inline(always)]
-fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix3<f64>) {
+fn velocity_at_cg(
+    x: &State,
+    omega: Vector3<f64>,
+    terms: &MeasuredTerms,
+) -> (Vector3<f64>, Matrix3<f64>) {
     let mut velocity = Vector3::new(x[0], x[1], x[2]);
     let mut by_rates = Matrix3::zeros();
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let arm = known.arms[i];
+        let arm = terms.arms[i];
         velocity[i] -= omega[j] * arm[k] - omega[k] * arm[j];
         by_rates[(i, j)] = -arm[k];
         by_rates[(i, k)] = arm[j];
@@ -127,15 +132,15 @@ fn at_cg(x: &State, omega: Vector3<f64>, known: &Known) -> (Vector3<f64>, Matrix
     (velocity, by_rates)
 }
 
-/// The rates of the states.
+/// Computes the rates of the states.
 #[inline(always)]
-pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
-    let omega = vector(input);
-    let (velocity, velocity_by_rates) = at_cg(x, omega, known);
+pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> StateRates {
+    let omega = body_rates(input);
+    let (velocity, velocity_by_rates) = velocity_at_cg(x, omega, terms);
     let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
-    let g = known.gravity;
-    let turning = omega + known.earth;
-    let mut out = Motion {
+    let g = terms.gravity;
+    let turning = omega + terms.earth;
+    let mut out = StateRates {
         rates: State::zeros(),
         by_state: SMatrix::zeros(),
         by_input: SMatrix::zeros(),
@@ -145,7 +150,7 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
     let cross = turning.cross_matrix();
     let mut by_rates = velocity.cross_matrix() - cross * velocity_by_rates;
     for i in 0..3 {
-        let swing = lever(i, known.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
+        let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
         out.rates[i] = input[3 + i] - swing.value + gravity[i] - turned[i];
         for j in 0..3 {
             by_rates[(i, j)] -= swing.by_rates[j];
@@ -162,14 +167,19 @@ pub fn rates(x: &State, input: &Driven, known: &Known) -> Motion {
     out.by_state
         .fixed_view_mut::<3, 1>(0, 4)
         .copy_from(&by_theta);
-    attitude(&mut out, omega - known.horizon, (sp, cp), (st, ct));
-    climb(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
+    add_attitude_rates(&mut out, omega - terms.horizon, (sp, cp), (st, ct));
+    add_climb_rate(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
     out
 }
 
-/// Rates of φ, θ, ψ for body rates relative to the horizon.
+/// Adds the rates of φ, θ, ψ for body rates relative to the horizon.
 #[inline(always)]
-fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (f64, f64)) {
+fn add_attitude_rates(
+    out: &mut StateRates,
+    w: Vector3<f64>,
+    (sp, cp): (f64, f64),
+    (st, ct): (f64, f64),
+) {
     let tan = st / ct;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
     out.rates[3] = w.x + tan * along;
@@ -195,10 +205,10 @@ fn attitude(out: &mut Motion, w: Vector3<f64>, (sp, cp): (f64, f64), (st, ct): (
         ));
 }
 
-/// Rate of climb.
+/// Adds the rate of climb.
 #[inline(always)]
-fn climb(
-    out: &mut Motion,
+fn add_climb_rate(
+    out: &mut StateRates,
     v: Vector3<f64>,
     v_by_rates: Matrix3<f64>,
     (sp, cp): (f64, f64),
@@ -214,12 +224,12 @@ fn climb(
     out.by_state[(6, 4)] = v.x * ct + v.y * sp * st + v.z * cp * st;
 }
 
-/// What the output instruments read: α and β vanes, V, θ, φ, ψ, altitude, q̄ and Mach, in deg,
-/// ft/s, ft, lbf/ft².
+/// Computes the readings of the output instruments: α and β vanes, V, θ, φ, ψ, altitude, q̄ and
+/// Mach, in deg, ft/s, ft, lbf/ft².
 #[inline(always)]
-pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -> Readings {
-    let omega = vector(input);
-    let (v, v_by_rates) = at_cg(x, omega, known);
+pub fn readings(aircraft: &Aircraft, x: &State, input: &Inputs, terms: &MeasuredTerms) -> Readings {
+    let omega = body_rates(input);
+    let (v, v_by_rates) = velocity_at_cg(x, omega, terms);
     let speed = v.norm();
     let across2 = v.x * v.x + v.z * v.z;
     let unit = v / speed;
@@ -232,18 +242,18 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -
         velocity: speed,
         rates: [omega.x, omega.y, omega.z],
     };
-    let air = Air::at(x[6]);
+    let air = AirWithSlopes::at(x[6]);
     let mut values = [0.0; OUTPUTS];
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let vanes = [
-        aircraft.sensors.alpha_reading(&flow, known.cg),
-        aircraft.sensors.beta_reading(&flow, known.cg),
+        aircraft.sensors.alpha_reading(&flow, terms.cg),
+        aircraft.sensors.beta_reading(&flow, terms.cg),
     ];
     for (o, vane) in vanes.iter().enumerate() {
         values[o] = DEG * vane.angle;
-        // A reading depends on the rates over the velocity only, which gives its slope along the
-        // velocity.
+        // A reading depends on the ratio of rates and velocity, so its slope along the velocity
+        // follows from those along the rates.
         let rates: Vector3<f64> = vane.by_rates.into();
         let by =
             alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);
@@ -277,24 +287,27 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Driven, known: &Known) -
     }
 }
 
+/// Half the altitude difference over which the slopes of the atmosphere are taken, ft: short against
+/// its layers, long against rounding.
+const SLOPE_REACH_FT: f64 = 5.0;
+
 /// Standard atmosphere at an altitude with its slopes per ft.
-struct Air {
+struct AirWithSlopes {
     density: f64,
     density_slope: f64,
     sound: f64,
     sound_slope: f64,
 }
 
-impl Air {
-    fn at(altitude_ft: f64) -> Air {
-        const REACH_FT: f64 = 5.0;
+impl AirWithSlopes {
+    fn at(altitude_ft: f64) -> AirWithSlopes {
         let ((density, sound), up, down) = (
             atmosphere(altitude_ft),
-            atmosphere(altitude_ft + REACH_FT),
-            atmosphere(altitude_ft - REACH_FT),
+            atmosphere(altitude_ft + SLOPE_REACH_FT),
+            atmosphere(altitude_ft - SLOPE_REACH_FT),
         );
-        let slope = |up: f64, down: f64| (up - down) / (2.0 * REACH_FT);
-        Air {
+        let slope = |up: f64, down: f64| (up - down) / (2.0 * SLOPE_REACH_FT);
+        AirWithSlopes {
             density,
             density_slope: slope(up.0, down.0),
             sound,

@@ -1,54 +1,58 @@
-//! What was found of each instrument, in words and rows, and what the record is to be corrected by.
+//! Findings on each instrument: estimated errors, faults in words, rows of the table `instruments`,
+//! and the corrections of the record.
 
 use std::collections::BTreeMap;
 
-use super::joint_fit::{Errors, MODEL_SCALE};
-use super::parameters::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, observable, place};
+use super::error_bounds::MODEL_SCALE;
+use super::joint_fit::FittedErrors;
+use super::parameters::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, is_observable, place};
 use super::settings::{Action, Compatibility, OnFault};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
 use crate::tables::{InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
 
-/// The equations themselves are held to be no better than this, nor the clock.
-const MODEL_BIAS: f64 = 0.01; // of an ordinary bias
+/// Error of the equations in a bias, as a share of an ordinary bias.
+const MODEL_BIAS: f64 = 0.01;
+
+/// Error of the clock in a delay, s.
 const MODEL_DELAY_S: f64 = 0.001;
 
-/// A parameter is told by the flight when its bound is at most this share of what was thought
-/// before.
-const TOLD: f64 = 0.7;
+/// Largest bound of an estimated parameter, as a share of its prior. About half of the information
+/// then comes from the flight; with a larger bound the estimate is mostly the prior.
+const MOST_OF_PRIOR: f64 = 0.7;
 
-/// One parameter of an instrument.
+/// ErrorEstimate of one error of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct ErrorEstimate {
     pub value: f64,
     /// Standard deviation.
     pub bound: f64,
-    /// Many times its bound and beyond what is ordinary.
+    /// Many times its bound and larger than any ordinary error.
     pub fault: bool,
-    /// As large as a fault and not as sure: neither named nor corrected.
+    /// As large as a fault but not as sure: neither named nor corrected.
     pub doubtful: bool,
-    /// Whether the record is corrected by it.
+    /// `true` where the record is corrected by it.
     pub applied: bool,
 }
 
-/// What the flight tells of one instrument; none for what it does not tell.
+/// Estimated errors of one instrument; `None` for an error that the flight does not determine.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct InstrumentFinding {
     pub signal: &'static str,
     pub channel: String,
-    pub estimates: [Option<Estimate>; KINDS],
+    pub estimates: [Option<ErrorEstimate>; KINDS],
 }
 
-/// What the flight tells of its instruments.
+/// Findings on all recorded instruments of a flight.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings(pub Vec<Finding>);
+pub struct Findings(pub Vec<InstrumentFinding>);
 
 impl Findings {
-    /// One for each recorded instrument.
+    /// Findings for each recorded instrument from the fitted errors.
     #[must_use]
     pub fn of(
-        errors: Option<&Errors>,
+        errors: Option<&FittedErrors>,
         channels: &BTreeMap<String, Channel>,
         recorded: &[String],
         settings: &Compatibility,
@@ -59,46 +63,49 @@ impl Findings {
             let mut estimates =
                 ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
             correct_together(&mut estimates, settings);
-            recorded.iter().any(|s| s == signal).then(|| Finding {
-                signal,
-                channel: channel.clone(),
-                estimates,
-            })
+            recorded
+                .iter()
+                .any(|s| s == signal)
+                .then(|| InstrumentFinding {
+                    signal,
+                    channel: channel.clone(),
+                    estimates,
+                })
         };
         Findings((0..INSTRUMENTS).filter_map(finding).collect())
     }
 
-    /// Whether an instrument has a fault.
+    /// `true` where an instrument has a fault.
     #[must_use]
-    pub fn faulty(&self) -> bool {
+    pub fn has_fault(&self) -> bool {
         self.0.iter().any(|f| !f.faults().is_empty())
     }
 
-    /// Whether one has that the equations cannot do without.
+    /// `true` where an instrument that the equations of motion need has a fault.
     #[must_use]
-    pub fn required_faulty(&self) -> bool {
+    pub fn has_required_fault(&self) -> bool {
         self.0
             .iter()
             .any(|f| signal::REQUIRED.contains(&f.signal) && !f.faults().is_empty())
     }
 
-    /// The same with every fault applied.
+    /// These findings with every fault corrected.
     #[must_use]
-    pub fn freed(&self) -> Findings {
-        let mut freed = self.clone();
-        for estimate in freed
+    pub fn with_faults_corrected(&self) -> Findings {
+        let mut corrected = self.clone();
+        for estimate in corrected
             .0
             .iter_mut()
             .flat_map(|f| f.estimates.iter_mut().flatten())
         {
             estimate.applied |= estimate.fault;
         }
-        freed
+        corrected
     }
 
-    /// The same with nothing applied.
+    /// These findings with nothing corrected.
     #[must_use]
-    pub fn reported(mut self) -> Findings {
+    pub fn without_corrections(mut self) -> Findings {
         for estimate in self
             .0
             .iter_mut()
@@ -109,10 +116,10 @@ impl Findings {
         self
     }
 
-    /// What the record is to be corrected by.
+    /// Corrections of the record.
     #[must_use]
     pub fn corrections(&self) -> Vec<Correction> {
-        let correction = |finding: &Finding| {
+        let correction = |finding: &InstrumentFinding| {
             let of = |kind: Kind| {
                 finding.estimates[kind as usize]
                     .filter(|e| e.applied)
@@ -145,24 +152,24 @@ impl Findings {
                 stage: ProblemStage::Ingest,
                 flight_id: flight_id.to_owned(),
                 place: format!("channel `{}`", f.channel),
-                reason: format!("{}; {}", f.accusation(), f.consequence()),
+                reason: format!("{}; {}", f.fault_sentence(), f.consequence()),
             })
             .collect()
     }
 
-    /// All faults in one sentence; none where there is none.
+    /// All faults in one sentence; `None` without a fault.
     #[must_use]
     pub fn fault_summary(&self) -> Option<String> {
         let all: Vec<String> = self
             .0
             .iter()
             .filter(|f| !f.faults().is_empty())
-            .map(Finding::accusation)
+            .map(InstrumentFinding::fault_sentence)
             .collect();
         (!all.is_empty()).then(|| all.join("; "))
     }
 
-    /// What is wrong with the channel of a signal, in words.
+    /// Faults of the channel of a signal, in words.
     #[must_use]
     pub fn verdict(&self, signal: &str) -> Option<String> {
         let finding = self.0.iter().find(|f| f.signal == signal)?;
@@ -171,13 +178,13 @@ impl Findings {
     }
 }
 
-/// What the fit says of one parameter; none where the flight does not tell it.
+/// ErrorEstimate of one parameter; `None` where the flight does not determine it.
 fn estimate(
-    errors: &Errors,
+    errors: &FittedErrors,
     instrument: usize,
     kind: Kind,
     settings: &Compatibility,
-) -> Option<Estimate> {
+) -> Option<ErrorEstimate> {
     let j = place(instrument, kind);
     let (value, ordinary) = (errors.values[j], settings.ordinary.of(instrument, kind));
     let model = match kind {
@@ -185,9 +192,9 @@ fn estimate(
         Kind::Scale => MODEL_SCALE,
         Kind::Delay => MODEL_DELAY_S,
     };
-    if !observable(instrument, kind)
+    if !is_observable(instrument, kind)
         || errors.bounds[j] <= 0.0
-        || errors.bounds[j] > TOLD * errors.prior[j]
+        || errors.bounds[j] > MOST_OF_PRIOR * errors.prior[j]
     {
         return None;
     }
@@ -208,7 +215,7 @@ fn estimate(
     } else {
         action == Action::Apply && counts
     };
-    Some(Estimate {
+    Some(ErrorEstimate {
         value,
         bound,
         fault,
@@ -217,9 +224,9 @@ fn estimate(
     })
 }
 
-/// A bias and a scale error are estimated together and make sense together: where one is applied so
-/// is the other.
-fn correct_together(estimates: &mut [Option<Estimate>; KINDS], settings: &Compatibility) {
+/// Corrects a bias and a scale error together: their estimates are correlated, so where one is
+/// applied the other is too.
+fn correct_together(estimates: &mut [Option<ErrorEstimate>; KINDS], settings: &Compatibility) {
     let [bias, scale, _] = estimates;
     if let (Some(bias), Some(scale)) = (bias, scale)
         && (bias.applied || scale.applied)
@@ -229,7 +236,7 @@ fn correct_together(estimates: &mut [Option<Estimate>; KINDS], settings: &Compat
     }
 }
 
-impl Finding {
+impl InstrumentFinding {
     /// Each fault in words.
     fn faults(&self) -> Vec<String> {
         let fault = |kind: Kind| {
@@ -248,7 +255,7 @@ impl Finding {
         Unit::of_signal(self.signal).name
     }
 
-    fn accusation(&self) -> String {
+    fn fault_sentence(&self) -> String {
         let bound = |kind: Kind| {
             let e = self.estimates[kind as usize].filter(|e| e.fault)?;
             Some(match kind {
@@ -290,8 +297,8 @@ impl Finding {
             .map(name)
             .collect();
         let faults = self.faults();
-        let told = self.estimates.iter().any(Option::is_some);
-        let verdict = match (faults.is_empty(), told) {
+        let is_determined = self.estimates.iter().any(Option::is_some);
+        let verdict = match (faults.is_empty(), is_determined) {
             (false, _) => InstrumentVerdict::Fault(faults.join(", ")),
             (true, true) if of(Kind::Delay).is_none() => InstrumentVerdict::NoDelay,
             (true, true) => InstrumentVerdict::Ok,
@@ -327,10 +334,10 @@ mod tests {
     use super::super::parameters::PARAMETERS;
     use super::*;
 
-    /// What is said of the first vane's error of a kind.
-    fn said(kind: Kind, value: f64, bound: f64, fault_bound: f64) -> Estimate {
+    /// Estimate of the first vane's error of a kind.
+    fn estimated(kind: Kind, value: f64, bound: f64, fault_bound: f64) -> ErrorEstimate {
         let j = place(6, kind);
-        let mut errors = Errors {
+        let mut errors = FittedErrors {
             values: [0.0; PARAMETERS],
             bounds: [bound; PARAMETERS],
             fault_bounds: [fault_bound; PARAMETERS],
@@ -341,17 +348,17 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_ahead_of_all_others_needs_more_to_be_named_than_one_that_is_late() {
-        assert!(said(Kind::Delay, 0.1, 0.02, 0.02).fault);
-        let ahead = said(Kind::Delay, -0.1, 0.02, 0.02);
+    fn a_channel_ahead_of_all_others_needs_more_evidence_than_one_that_is_late() {
+        assert!(estimated(Kind::Delay, 0.1, 0.02, 0.02).fault);
+        let ahead = estimated(Kind::Delay, -0.1, 0.02, 0.02);
         assert!(!ahead.fault && ahead.doubtful && !ahead.applied);
-        assert!(said(Kind::Delay, -0.1, 0.01, 0.01).fault);
+        assert!(estimated(Kind::Delay, -0.1, 0.01, 0.01).fault);
     }
 
     #[test]
-    fn what_gusts_may_make_of_a_scale_is_neither_named_nor_corrected() {
-        assert!(said(Kind::Scale, -0.35, 0.05, 0.05).fault);
-        let gusts = said(Kind::Scale, -0.35, 0.05, 0.2);
+    fn a_scale_error_that_gusts_may_cause_is_neither_named_nor_corrected() {
+        assert!(estimated(Kind::Scale, -0.35, 0.05, 0.05).fault);
+        let gusts = estimated(Kind::Scale, -0.35, 0.05, 0.2);
         assert!(!gusts.fault && gusts.doubtful && !gusts.applied);
     }
 }

@@ -1,20 +1,24 @@
-//! Data compatibility by flight-path reconstruction: what is wrong with each instrument of a
-//! flight, by how much and how surely, from the kinematic equations alone, before any aerodynamics.
+//! Data compatibility by flight-path reconstruction: the error of each instrument of a flight, with
+//! its standard deviation, from the kinematic equations alone, before any aerodynamics.
 //!
-//! The rates and accelerations drive the equations of motion through windows of the flight in which
-//! much moves; what comes out is matched to the vanes, the airspeed, the attitudes, the altitude
-//! and the pressures by output error. Biases, scale errors and delays of all of them are shared by
-//! the windows. Surfaces, thrust and mass are in no kinematic equation: a fault of theirs is not
-//! found here.
+//! The rates and accelerations drive the equations of motion through the windows of the flight in
+//! which most moves. The reconstructed motion is matched to the vanes, the airspeed, the attitudes,
+//! the altitude and the pressures by output error. The windows share the biases, scale errors and
+//! delays of all instruments. Surfaces, thrust and mass are in no kinematic equation, so this check
+//! cannot find their faults.
 
 mod equations;
+mod error_bounds;
 mod error_sizes;
 mod findings;
 mod joint_fit;
+mod joint_state;
 mod parameters;
 mod reconstruction;
 mod settings;
 mod window;
+mod window_fit;
+mod window_sums;
 
 #[cfg(test)]
 mod tests;
@@ -22,14 +26,14 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub use error_sizes::{ErrorSize, ErrorSizes};
-pub use findings::{Estimate, Finding, Findings};
+pub use findings::{ErrorEstimate, Findings, InstrumentFinding};
 pub use settings::{Action, Compatibility, OnFault};
 
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, Record, signal};
-use window::Window;
+use window::{Window, choose_windows};
 
-/// The signals that are read of a record.
+/// Signals that the reconstruction reads from a record.
 #[must_use]
 pub fn signals() -> BTreeSet<String> {
     parameters::SIGNALS
@@ -39,8 +43,8 @@ pub fn signals() -> BTreeSet<String> {
         .collect()
 }
 
-/// What a record tells of its instruments; `recorded` are the signals that come from channels. A
-/// long record comes in `count` parts, each of which has its share of the windows.
+/// Examines the instruments of a record; `recorded` are the signals that come from channels. A long
+/// record comes in `count` parts, each of which has its share of the windows.
 #[must_use]
 pub fn examine(
     parts: impl Iterator<Item = Record>,
@@ -53,18 +57,12 @@ pub fn examine(
     if !settings.reconstruct {
         return Findings::default();
     }
-    let share = Compatibility {
-        windows: settings.windows.div_ceil(count.max(1)),
-        ..settings.clone()
-    };
-    let of_part = |record: Record| -> Vec<Window> {
-        let stretches = window::choose(&record, &share);
-        stretches
-            .into_iter()
-            .map(|w| Window::of(&record, w, aircraft, settings))
-            .collect()
-    };
-    let windows: Vec<Window> = parts.flat_map(of_part).collect();
+    let share = settings.windows.div_ceil(count.max(1));
+    let mut windows = Vec::new();
+    for record in parts {
+        let ranges = choose_windows(&record, share, settings).into_iter();
+        windows.extend(ranges.map(|range| Window::of(&record, range, aircraft, settings)));
+    }
     let errors = joint_fit::fit(&windows, aircraft, settings);
     Findings::of(errors.as_ref(), channels, recorded, settings)
 }

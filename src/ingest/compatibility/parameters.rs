@@ -1,20 +1,18 @@
-//! The instruments that are looked at, and what can be wrong with each: y(t) = (1 + scale) x(t −
-//! delay) + bias.
+//! Error parameters of the instruments: y(t) = (1 + scale) x(t − delay) + bias.
 //!
-//! Rate gyros and accelerometers drive the kinematic equations (inputs); vanes, airspeed,
-//! attitudes, altitude and the pressures are compared with what the equations make of them
-//! (outputs).
+//! Rate gyros and accelerometers drive the kinematic equations (inputs). Vanes, airspeed,
+//! attitudes, altitude and the pressures are compared with the reconstructed ones (outputs).
 
 use crate::flight::signal as s;
 
 pub const INPUTS: usize = 6;
 pub const OUTPUTS: usize = 9;
 pub const INSTRUMENTS: usize = INPUTS + OUTPUTS;
-/// Bias, scale and delay of each.
+/// Number of error parameters of an instrument.
 pub const KINDS: usize = 3;
 pub const PARAMETERS: usize = INSTRUMENTS * KINDS;
 
-/// What can be wrong with an instrument.
+/// Kind of an instrument's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Bias,
@@ -22,9 +20,12 @@ pub enum Kind {
     Delay,
 }
 
+/// A value for each parameter.
+pub type Parameters = [f64; PARAMETERS];
+
 pub const ALL_KINDS: [Kind; KINDS] = [Kind::Bias, Kind::Scale, Kind::Delay];
 
-/// The signals, inputs first: p, q, r, then the accelerometers forward, right, up.
+/// Signals of the instruments, inputs first: p, q, r, then the accelerometers forward, right, up.
 pub const SIGNALS: [&str; INSTRUMENTS] = [
     s::P,
     s::Q,
@@ -43,14 +44,14 @@ pub const SIGNALS: [&str; INSTRUMENTS] = [
     s::MACH,
 ];
 
-/// The place of a parameter among all.
+/// Index of a parameter among all.
 pub fn place(instrument: usize, kind: Kind) -> usize {
     instrument * KINDS + kind as usize
 }
 
-/// Whether the kinematic equations say anything of a parameter at all: they know changes of
-/// altitude and heading only, and the heading's scale is that of a full turn.
-pub fn observable(instrument: usize, kind: Kind) -> bool {
+/// `true` where the kinematic equations determine a parameter. They contain changes of altitude and
+/// heading only, and the heading's scale is that of a full turn.
+pub fn is_observable(instrument: usize, kind: Kind) -> bool {
     !matches!(
         (SIGNALS[instrument], kind),
         (s::PSI, Kind::Bias | Kind::Scale) | (s::ALTITUDE, Kind::Bias)

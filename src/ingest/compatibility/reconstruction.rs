@@ -1,10 +1,10 @@
-//! What the equations make of a window for given errors of its instruments, with exact
+//! Flight-path reconstruction of one window for given errors of its instruments, with exact
 //! sensitivities.
 //!
-//! An input is freed of its error before it drives the equations, x(t) = (y(t + delay) − bias)/(1 +
-//! scale); an output is given its error after them, y(t) = (1 + scale) h(t − delay) + bias. Outputs
-//! are handed over sample by sample as soon as all that a delay reaches is there, so that no more
-//! than that is kept.
+//! An input is corrected before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale).
+//! An output gets its error after them, y(t) = (1 + scale) h(t − delay) + bias. Outputs are passed
+//! on sample by sample as soon as the readings that a delay reaches are computed, so that no more
+//! readings are kept.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
@@ -17,139 +17,133 @@ use std::ops::Range;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{self, STATES, State};
-use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, place};
-use super::window::{Window, factor};
+use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, Parameters, place};
+use super::window::{Window, input_factor};
 use crate::aircraft::Aircraft;
-use crate::flight::taps::Taps;
+use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::simd::{load, store};
 
-/// Parameters of a window alone: its first state, and the change of the wind north, east and down,
-/// ft/s².
+/// Parameters of a window alone: its initial state, and the change of the wind north, east and
+/// down, ft/s².
 pub const LOCAL: usize = STATES + WIND;
-const WIND: usize = 3;
+pub const WIND: usize = 3;
 /// Parameters that the states depend on: the local ones, then bias, scale and delay of each input.
 const DRIVING: usize = LOCAL + INPUTS * KINDS;
-/// Parameters that one output depends on: those, then its own bias, scale and delay.
+/// Parameters that one output depends on: those of the states, then its own bias, scale and delay.
 pub const ROW: usize = DRIVING + KINDS;
-/// The same, and a place for the residual, in whole vectors.
+/// Length of a row: the parameters of an output and the residual, in whole vectors.
 pub const WIDE: usize = (ROW + 1).next_multiple_of(8);
 
 pub type Local = [f64; LOCAL];
 pub type Row = [f64; WIDE];
 
-/// What becomes of the outputs of a window.
+/// Receiver of the outputs of a window.
 pub trait Sink {
-    /// Whether an output is looked at at a sample.
-    fn looks_at(&self, sample: usize, output: usize) -> bool;
+    /// `true` where an output is wanted at a sample.
+    fn counts(&self, sample: usize, output: usize) -> bool;
 
-    /// Takes an output with its slopes along what it depends on; nobody needs the row afterwards.
+    /// Takes an output with its sensitivities. The row is the sink's to overwrite.
     fn take<S: Simd>(&mut self, simd: S, sample: usize, output: usize, value: f64, row: &mut Row);
 }
 
-/// One input freed of its error at one instant, in rad/s or ft/s², with its slopes along bias,
-/// scale and delay.
+/// One input without its error at one instant, in rad/s or ft/s², with its slopes along bias, scale
+/// and delay.
 #[derive(Clone, Copy, Debug, Default)]
-struct Freed {
+struct CorrectedInput {
     value: f64,
-    by: [f64; KINDS],
+    by_error: [f64; KINDS],
 }
 
-/// Hands the outputs of some samples of a window over; none where the integration leaves sense.
-pub fn respond(
+/// Reconstructs a window and passes the outputs of some samples to `sink`. `None` where the
+/// integration diverges.
+pub fn reconstruct(
     window: &Window,
     aircraft: &Aircraft,
     local: &Local,
-    shared: &[f64; PARAMETERS],
+    shared: &Parameters,
     samples: Range<usize>,
     sink: &mut impl Sink,
 ) -> Option<()> {
-    let points = freed(window, shared);
+    let points = corrected_inputs(window, shared);
     let own = |o: usize| std::array::from_fn(|kind| shared[(INPUTS + o) * KINDS + kind]);
     let errors: [[f64; KINDS]; OUTPUTS] = std::array::from_fn(own);
-    let taps = errors.map(|e| Taps::at(-e[Kind::Delay as usize] / window.step_s));
-    Arch::new().dispatch(Flight {
+    let kernels = errors.map(|e| InterpolationKernel::at(-e[Kind::Delay as usize] / window.step_s));
+    Arch::new().dispatch(Reconstruction {
         window,
         aircraft,
         local,
         points: &points,
         errors,
-        taps,
+        kernels,
         samples,
         sink,
     })
 }
 
-/// The integration of a window, compiled for the processor at hand.
-struct Flight<'a, K: Sink> {
+/// Integration of a window, compiled for the processor at hand.
+struct Reconstruction<'a, K: Sink> {
     window: &'a Window,
     aircraft: &'a Aircraft,
     local: &'a Local,
-    points: &'a [[Freed; INPUTS]],
+    points: &'a [[CorrectedInput; INPUTS]],
     errors: [[f64; KINDS]; OUTPUTS],
-    taps: [Taps; OUTPUTS],
+    kernels: [InterpolationKernel; OUTPUTS],
     samples: Range<usize>,
     sink: &'a mut K,
 }
 
-/// Slopes of the states along what they depend on, a row for each state.
-type Slopes = [Row; STATES];
-/// Readings without error with their slopes, and the reading itself where an output's own errors
-/// will stand.
-type Cells = [Row; OUTPUTS];
+/// Sensitivities of the states, a row for each state.
+type Sensitivities = [Row; STATES];
+/// Readings without instrument error: their sensitivities, and the reading itself in the place of
+/// the output's own bias.
+type ReadingRows = [Row; OUTPUTS];
 
-/// The states on their way with their slopes.
-struct Way {
+/// Magnitude of a state (ft, ft/s, rad) from which the integration has diverged.
+const DIVERGED: f64 = 1e7;
+
+/// States and sensitivities at the present sample.
+struct StateWithSensitivities {
     x: State,
-    s: Slopes,
-    /// Room for a step: the slopes at a stage and at the next one, and at the end of the step as
-    /// far as it is known.
-    stages: [Slopes; 2],
-    end: Slopes,
+    s: Sensitivities,
+    /// Workspace of a step: the sensitivities at a stage and at the next one, and those at the end
+    /// of the step summed so far.
+    stages: [Sensitivities; 2],
+    end: Sensitivities,
 }
 
-impl<K: Sink> WithSimd for Flight<'_, K> {
+impl<K: Sink> WithSimd for Reconstruction<'_, K> {
     type Output = Option<()>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> Option<()> {
-        const NOTHING: Slopes = [[0.0; WIDE]; STATES];
+        const ZERO: Sensitivities = [[0.0; WIDE]; STATES];
         let count = self.window.samples;
-        let mut way = Way {
+        let mut states = StateWithSensitivities {
             x: State::from_column_slice(&self.local[..STATES]),
-            s: NOTHING,
-            stages: [NOTHING; 2],
-            end: NOTHING,
+            s: ZERO,
+            stages: [ZERO; 2],
+            end: ZERO,
         };
         for i in 0..STATES {
-            way.s[i][i] = 1.0;
+            states.s[i][i] = 1.0;
         }
-        let ahead = self
-            .taps
-            .iter()
-            .map(|taps| taps.last().max(0).unsigned_abs())
-            .max()
-            .unwrap_or(0);
-        let behind = self
-            .taps
-            .iter()
-            .map(|taps| taps.first().min(0).unsigned_abs())
-            .max()
-            .unwrap_or(0);
+        let ahead = self.longest_offset(|kernel| kernel.last_offset().max(0));
+        let behind = self.longest_offset(|kernel| kernel.first_offset().min(0));
         let mut kept = vec![[[0.0; WIDE]; OUTPUTS]; (ahead + behind + 1).next_power_of_two()];
         for k in 0..count + ahead {
             if k < count {
                 let place = k & (kept.len() - 1);
-                self.read(simd, k, &way, &mut kept[place]);
+                self.read_outputs(simd, k, &states, &mut kept[place]);
             }
             if let Some(sample) = k.checked_sub(ahead)
                 && self.samples.contains(&sample)
             {
-                self.hand_over(simd, sample, &kept);
+                self.pass_outputs(simd, sample, &kept);
             }
             if k + 1 < count {
-                self.advance(simd, k, &mut way);
-                if !way.x.iter().all(|x| x.is_finite() && x.abs() < 1e7) {
+                self.advance(simd, k, &mut states);
+                if !states.x.iter().all(|x| x.is_finite() && x.abs() < DIVERGED) {
                     return None;
                 }
             }
@@ -158,13 +152,22 @@ impl<K: Sink> WithSimd for Flight<'_, K> {
     }
 }
 
-impl<K: Sink> Flight<'_, K> {
-    /// One Runge-Kutta step of the states and of their slopes.
+impl<K: Sink> Reconstruction<'_, K> {
+    /// Largest magnitude of an offset among the outputs' kernels.
+    fn longest_offset(&self, offset: impl Fn(&InterpolationKernel) -> isize) -> usize {
+        let offsets = self
+            .kernels
+            .iter()
+            .map(|kernel| offset(kernel).unsigned_abs());
+        offsets.max().unwrap_or(0)
+    }
+
+    /// One Runge-Kutta step of the states and of their sensitivities.
     #[inline(always)]
-    fn advance<S: Simd>(&self, simd: S, k: usize, way: &mut Way) {
+    fn advance<S: Simd>(&self, simd: S, k: usize, states: &mut StateWithSensitivities) {
         let h = self.window.step_s;
         let (ahead_s, part_s) = (reaches_s(h), weights_s(h));
-        let Way { x, s, stages, end } = way;
+        let StateWithSensitivities { x, s, stages, end } = states;
         let (mut at, mut x_end) = (*x, *x);
         *end = *s;
         for stage in 0..STAGES {
@@ -178,14 +181,14 @@ impl<K: Sink> Flight<'_, K> {
             let slopes = if stage == 0 { &*s } else { here };
             let point = &self.points[2 * k + POINT[stage]];
             let mut rates =
-                equations::rates(&at, &point.map(|p| p.value), &self.window.known[sample]);
-            let to_body = &self.window.known[sample].to_body;
+                equations::rates(&at, &point.map(|p| p.value), &self.window.terms[sample]);
+            let to_body = &self.window.terms[sample].to_body;
             for i in 0..WIND {
                 for j in 0..WIND {
                     rates.rates[i] -= to_body[(i, j)] * self.local[STATES + j];
                 }
             }
-            let along = along(point);
+            let error_rows = error_rows(point);
             let (part, ahead) = (
                 simd.splat_f64s(part_s[stage]),
                 simd.splat_f64s(ahead_s[stage]),
@@ -198,11 +201,11 @@ impl<K: Sink> Flight<'_, K> {
                         slope.add(simd, rates.by_state[(i, j)], &slopes[j]);
                     }
                     for &input in equations::RATES_BY_INPUT[i] {
-                        slope.add(simd, rates.by_input[(i, input)], &along[input]);
+                        slope.add(simd, rates.by_input[(i, input)], &error_rows[input]);
                     }
                     if i < WIND {
                         for j in 0..WIND {
-                            slope.add(simd, -to_body[(i, j)], &ALONG_WIND[j]);
+                            slope.add(simd, -to_body[(i, j)], &WIND_ROWS[j]);
                         }
                     }
                     slope.each(|lane, slope| {
@@ -219,28 +222,34 @@ impl<K: Sink> Flight<'_, K> {
             x_end += rates.rates * part_s[stage];
             at = *x + rates.rates * ahead_s[stage];
         }
-        (way.x, way.s) = (x_end, way.end);
+        (states.x, states.s) = (x_end, states.end);
     }
 
-    /// The outputs at a sample, without their own errors.
+    /// Computes the readings at a sample, without instrument errors.
     #[inline(always)]
-    fn read<S: Simd>(&self, simd: S, k: usize, way: &Way, cells: &mut Cells) {
+    fn read_outputs<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        states: &StateWithSensitivities,
+        cells: &mut ReadingRows,
+    ) {
         let point = &self.points[2 * k];
         let at = equations::readings(
             self.aircraft,
-            &way.x,
+            &states.x,
             &point.map(|p| p.value),
-            &self.window.known[k],
+            &self.window.terms[k],
         );
-        let along = along(point);
+        let error_rows = error_rows(point);
         for o in 0..OUTPUTS {
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
                 let mut slope = Sum::<S>::zero(simd, lane);
                 for &i in equations::READINGS_BY_STATE[o] {
-                    slope.add(simd, at.by_state[(o, i)], &way.s[i]);
+                    slope.add(simd, at.by_state[(o, i)], &states.s[i]);
                 }
                 for &rate in equations::READINGS_BY_RATES[o] {
-                    slope.add(simd, at.by_rates[(o, rate)], &along[rate]);
+                    slope.add(simd, at.by_rates[(o, rate)], &error_rows[rate]);
                 }
                 slope.each(|lane, slope| store::<S>(&mut cells[o], lane, slope));
             }
@@ -248,29 +257,29 @@ impl<K: Sink> Flight<'_, K> {
         }
     }
 
-    /// The outputs at a sample with their own errors.
+    /// Passes the outputs at a sample, with their errors, to the sink.
     #[inline(always)]
-    fn hand_over<S: Simd>(&mut self, simd: S, k: usize, kept: &[Cells]) {
+    fn pass_outputs<S: Simd>(&mut self, simd: S, k: usize, kept: &[ReadingRows]) {
         for o in 0..OUTPUTS {
-            if !self.sink.looks_at(k, o) {
+            if !self.sink.counts(k, o) {
                 continue;
             }
             let [bias, scale, _] = self.errors[o];
             let (mut value, mut by_shift, gain) = (0.0, 0.0, 1.0 + scale);
-            let mut taps = [(0.0, &kept[0][o]); 4];
-            for (tap, (sample, weight, slope)) in taps
+            let mut weighted = [(0.0, &kept[0][o]); 4];
+            for (entry, (sample, weight, slope)) in weighted
                 .iter_mut()
-                .zip(self.taps[o].each(k, self.window.samples))
+                .zip(self.kernels[o].weights_at(k, self.window.samples))
             {
                 let cell = &kept[sample & (kept.len() - 1)][o];
                 value += weight * cell[DRIVING];
                 by_shift += slope * cell[DRIVING];
-                *tap = (gain * weight, cell);
+                *entry = (gain * weight, cell);
             }
             let mut row = [0.0; WIDE];
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
                 let mut slope = Sum::<S>::zero(simd, lane);
-                for (weight, cell) in taps {
+                for (weight, cell) in weighted {
                     slope.add(simd, weight, cell);
                 }
                 slope.each(|lane, slope| store::<S>(&mut row, lane, slope));
@@ -283,8 +292,8 @@ impl<K: Sink> Flight<'_, K> {
     }
 }
 
-/// Slopes along the wind's change north, east and down, as rows.
-const ALONG_WIND: [Row; WIND] = {
+/// Unit sensitivities to the wind's change north, east and down, as rows.
+const WIND_ROWS: [Row; WIND] = {
     let mut rows = [[0.0; WIDE]; WIND];
     rows[0][STATES] = 1.0;
     rows[1][STATES + 1] = 1.0;
@@ -292,11 +301,10 @@ const ALONG_WIND: [Row; WIND] = {
     rows
 };
 
-/// Vectors of a row that are summed side by side, so that the processor has something to do while
-/// one waits.
+/// Vectors of a row that are summed side by side: independent sums hide the latency of each.
 const SIDE_BY_SIDE: usize = 4;
 
-/// Some lanes of a sum of rows, in the processor's registers.
+/// Lanes of a sum of rows, in the processor's registers.
 struct Sum<S: Simd> {
     first: usize,
     lanes: [S::f64s; SIDE_BY_SIDE],
@@ -323,7 +331,7 @@ impl<S: Simd> Sum<S> {
         }
     }
 
-    /// Gives each vector with its first lane.
+    /// Calls `give` with each vector and its first lane.
     #[inline(always)]
     fn each(self, mut give: impl FnMut(usize, S::f64s)) {
         for n in 0..SIDE_BY_SIDE {
@@ -332,19 +340,19 @@ impl<S: Simd> Sum<S> {
     }
 }
 
-/// The slopes of each input along its own errors, as rows.
+/// Slopes of each input along its own errors, as rows.
 #[inline(always)]
-fn along(point: &[Freed; INPUTS]) -> [Row; INPUTS] {
+fn error_rows(point: &[CorrectedInput; INPUTS]) -> [Row; INPUTS] {
     let mut rows = [[0.0; WIDE]; INPUTS];
-    for (input, freed) in point.iter().enumerate() {
-        rows[input][LOCAL + input * KINDS..][..KINDS].copy_from_slice(&freed.by);
+    for (input, corrected) in point.iter().enumerate() {
+        rows[input][LOCAL + input * KINDS..][..KINDS].copy_from_slice(&corrected.by_error);
     }
     rows
 }
 
-/// The inputs at samples and the halves between them.
-fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
-    let mut points = vec![[Freed::default(); INPUTS]; 2 * window.samples - 1];
+/// Corrected inputs at samples and at the halves between them.
+fn corrected_inputs(window: &Window, shared: &Parameters) -> Vec<[CorrectedInput; INPUTS]> {
+    let mut points = vec![[CorrectedInput::default(); INPUTS]; 2 * window.samples - 1];
     for i in 0..INPUTS {
         let parameter = |kind| shared[place(i, kind)];
         let (bias, gain, delay) = (
@@ -353,23 +361,23 @@ fn freed(window: &Window, shared: &[f64; PARAMETERS]) -> Vec<[Freed; INPUTS]> {
             parameter(Kind::Delay),
         );
         let values = &window.inputs[i];
-        let unit = factor(i) / gain;
-        let halves = [0.0, 0.5].map(|half| Taps::at(delay / window.step_s + half));
+        let unit = input_factor(i) / gain;
+        let halves = [0.0, 0.5].map(|half| InterpolationKernel::at(delay / window.step_s + half));
         for (j, point) in points.iter_mut().enumerate() {
             let (sum, by_shift) =
-                halves[j % 2].sum(window.margin + j / 2, values.len(), |k| values[k]);
+                halves[j % 2].interpolate(window.margin + j / 2, values.len(), |k| values[k]);
             let value = unit * (sum - bias);
-            point[i] = Freed {
+            point[i] = CorrectedInput {
                 value,
-                by: [-unit, -value / gain, unit * by_shift / window.step_s],
+                by_error: [-unit, -value / gain, unit * by_shift / window.step_s],
             };
         }
     }
     points
 }
 
-/// Where the columns of an output's row are: among the local parameters first, among the shared
-/// ones the rest.
+/// Place among the shared parameters of a column of an output's row; the columns before `LOCAL` are
+/// local parameters.
 pub fn shared_place(column: usize, o: usize) -> usize {
     if column < DRIVING {
         column - LOCAL

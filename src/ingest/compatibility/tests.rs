@@ -1,16 +1,16 @@
 //! The equations against closed forms and finite differences, and the fit against flights whose
-//! errors are known.
+//! errors are terms.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};
 use pulp::Simd;
 
-use super::equations::{self, Driven, Known, STATES, State, rates, readings};
+use super::equations::{self, Inputs, MeasuredTerms, STATES, State, rates, readings};
 use super::parameters::{
-    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, observable, place,
+    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, place,
 };
-use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, respond, shared_place};
-use super::window::{self, Window, factor};
+use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, reconstruct, shared_place};
+use super::window::{self, Window, choose_windows, input_factor};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
@@ -57,9 +57,9 @@ fn aircraft() -> Aircraft {
     }
 }
 
-fn known() -> Known {
+fn measured_terms() -> MeasuredTerms {
     let sensors = aircraft().sensors;
-    Known {
+    MeasuredTerms {
         gravity: 32.1,
         arms: [sensors.ax.arm(CG), sensors.ay.arm(CG), sensors.an.arm(CG)],
         cg: CG,
@@ -69,7 +69,7 @@ fn known() -> Known {
     }
 }
 
-const INPUT: Driven = [0.4, -0.15, 0.2, 5.0, -2.0, -30.0];
+const INPUT: Inputs = [0.4, -0.15, 0.2, 5.0, -2.0, -30.0];
 
 fn state() -> State {
     State::from([420.0, 25.0, 160.0, 0.4, 0.3, 2.0, 24_000.0])
@@ -77,14 +77,15 @@ fn state() -> State {
 
 #[test]
 fn slopes_of_the_rates_are_those_of_finite_differences() {
-    let at = rates(&state(), &INPUT, &known());
+    let at = rates(&state(), &INPUT, &measured_terms());
     for j in 0..STATES {
         let h = 1e-5 * state()[j].abs().max(1.0);
         let (mut up, mut down) = (state(), state());
         up[j] += h;
         down[j] -= h;
-        let numeric =
-            (rates(&up, &INPUT, &known()).rates - rates(&down, &INPUT, &known()).rates) / (2.0 * h);
+        let numeric = (rates(&up, &INPUT, &measured_terms()).rates
+            - rates(&down, &INPUT, &measured_terms()).rates)
+            / (2.0 * h);
         (0..STATES)
             .for_each(|i| assert_abs_diff_eq!(at.by_state[(i, j)], numeric[i], epsilon = 1e-6));
     }
@@ -92,8 +93,9 @@ fn slopes_of_the_rates_are_those_of_finite_differences() {
         let (mut up, mut down) = (INPUT, INPUT);
         up[j] += 1e-5;
         down[j] -= 1e-5;
-        let numeric =
-            (rates(&state(), &up, &known()).rates - rates(&state(), &down, &known()).rates) / 2e-5;
+        let numeric = (rates(&state(), &up, &measured_terms()).rates
+            - rates(&state(), &down, &measured_terms()).rates)
+            / 2e-5;
         (0..STATES)
             .for_each(|i| assert_abs_diff_eq!(at.by_input[(i, j)], numeric[i], epsilon = 1e-6));
     }
@@ -101,7 +103,7 @@ fn slopes_of_the_rates_are_those_of_finite_differences() {
 
 #[test]
 fn slopes_of_the_readings_are_those_of_finite_differences() {
-    let read = |x: &State, u: &Driven| readings(&aircraft(), x, u, &known());
+    let read = |x: &State, u: &Inputs| readings(&aircraft(), x, u, &measured_terms());
     let at = read(&state(), &INPUT);
     for j in 0..STATES {
         let h = 1e-5 * state()[j].abs().max(1.0);
@@ -135,8 +137,8 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
 #[test]
 fn the_patterns_name_every_slope_that_is_not_zero() {
     let (at, read) = (
-        rates(&state(), &INPUT, &known()),
-        readings(&aircraft(), &state(), &INPUT, &known()),
+        rates(&state(), &INPUT, &measured_terms()),
+        readings(&aircraft(), &state(), &INPUT, &measured_terms()),
     );
     let nonzero = |row: &dyn Fn(usize) -> f64, count: usize| {
         (0..count).filter(|j| row(*j) != 0.0).collect::<Vec<_>>()
@@ -170,19 +172,19 @@ fn the_patterns_name_every_slope_that_is_not_zero() {
 #[test]
 fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_changes() {
     let (phi, speed): (f64, f64) = (0.6, 500.0);
-    let known = Known {
+    let terms = MeasuredTerms {
         earth: Vector3::zeros(),
         horizon: Vector3::zeros(),
         arms: [[0.0; 3]; 3],
-        ..known()
+        ..measured_terms()
     };
-    let turn = known.gravity * phi.tan() / speed;
-    let lift = known.gravity / phi.cos();
+    let turn = terms.gravity * phi.tan() / speed;
+    let lift = terms.gravity / phi.cos();
     let input = [0.0, turn * phi.sin(), turn * phi.cos(), 0.0, 0.0, -lift];
     let at = rates(
         &State::from([speed, 0.0, 0.0, phi, 0.0, 0.0, 0.0]),
         &input,
-        &known,
+        &terms,
     )
     .rates;
     for (i, expected) in [0.0, 0.0, 0.0, 0.0, 0.0, turn, 0.0].into_iter().enumerate() {
@@ -193,15 +195,15 @@ fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_chang
 #[test]
 fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
     let horizon = Vector3::new(6e-5, 0.0, -4e-5);
-    let known = Known {
+    let terms = MeasuredTerms {
         earth: horizon,
         horizon,
-        ..known()
+        ..measured_terms()
     };
     let at = rates(
         &State::zeros(),
-        &[6e-5, 0.0, -4e-5, 0.0, 0.0, -known.gravity],
-        &known,
+        &[6e-5, 0.0, -4e-5, 0.0, 0.0, -terms.gravity],
+        &terms,
     )
     .rates;
     // The c.g. goes around the sensors, by a hundred-thousandth of a foot per second.
@@ -209,21 +211,21 @@ fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
 }
 
 #[test]
-fn an_accelerometer_off_the_c_g_feels_the_turning_without_any_rate_being_differentiated() {
+fn an_accelerometer_off_the_cg_needs_no_differentiated_rate() {
     // Spinning up about the vertical with the c.g. at rest: the sensor at arm x goes right with r
     // x.
-    let known = Known {
+    let terms = MeasuredTerms {
         gravity: 0.0,
         earth: Vector3::zeros(),
         horizon: Vector3::zeros(),
         arms: [[0.0; 3], [7.0, 0.0, 0.0], [0.0; 3]],
-        ..known()
+        ..measured_terms()
     };
     let (r, r_dot) = (0.3, 0.2);
     let at = rates(
         &State::from([0.0, 7.0 * r, 0.0, 0.0, 0.0, 0.0, 0.0]),
         &[0.0, 0.0, r, 0.0, 7.0 * r_dot, 0.0],
-        &known,
+        &terms,
     );
     assert_abs_diff_eq!(at.rates[1], 7.0 * r_dot, epsilon = 1e-12);
     assert_abs_diff_eq!(at.rates[6], 0.0, epsilon = 1e-12);
@@ -242,19 +244,19 @@ fn flight(seconds: f64) -> Record {
     let sensors = &aircraft.sensors;
     let arms = [sensors.ax.arm(CG), sensors.ay.arm(CG), sensors.an.arm(CG)];
     let at = |t: f64, x: &State| {
-        let known = on_the_way(&aircraft, x, arms);
-        let input = steered(t, x, &known);
-        (known, input)
+        let terms = terms_at(&aircraft, x, arms);
+        let input = pilot_inputs(t, x, &terms);
+        (terms, input)
     };
     for k in 0..samples * PARTS {
         let h = STEP_S / PARTS as f64;
         let t = k as f64 * h;
         if k % PARTS == 0 {
-            let (known, input) = at(t, &x);
+            let (terms, input) = at(t, &x);
             for i in 0..INPUTS {
-                columns[i].push(input[i] / factor(i));
+                columns[i].push(input[i] / input_factor(i));
             }
-            for (o, value) in readings(&aircraft, &x, &input, &known)
+            for (o, value) in readings(&aircraft, &x, &input, &terms)
                 .values
                 .into_iter()
                 .enumerate()
@@ -263,8 +265,8 @@ fn flight(seconds: f64) -> Record {
             }
         }
         let slope = |t: f64, x: &State| {
-            let (known, input) = at(t, x);
-            rates(x, &input, &known).rates
+            let (terms, input) = at(t, x);
+            rates(x, &input, &terms).rates
         };
         let k1 = slope(t, &x);
         let k2 = slope(t + h / 2.0, &(x + k1 * (h / 2.0)));
@@ -301,19 +303,19 @@ fn window_samples(seconds: f64) -> usize {
     (seconds / STEP_S) as usize
 }
 
-/// What is known at a state, as the window knows it from exact signals.
-fn on_the_way(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> Known {
+/// What is terms at a state, as the window knows it from exact signals.
+fn terms_at(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> MeasuredTerms {
     let along = Vector3::new(x[0], x[1], x[2]);
-    Known {
+    MeasuredTerms {
         gravity: crate::earth::gravity_ft_s2(aircraft.latitude_deg, x[6]),
         arms,
         cg: CG,
-        ..window::turning(aircraft, [x[3], x[4], x[5]], along, true)
+        ..window::rotation_terms(aircraft, [x[3], x[4], x[5]], along, true)
     }
 }
 
 /// Rates and forces that keep the aircraft flying while everything moves.
-fn steered(t: f64, x: &State, known: &Known) -> Driven {
+fn pilot_inputs(t: f64, x: &State, terms: &MeasuredTerms) -> Inputs {
     let sine = |period: f64, phase: f64| (2.0 * std::f64::consts::PI * t / period + phase).sin();
     let (phi, theta) = (x[3], x[4]);
     let p = 0.35 * sine(4.1, 0.0) + 0.1 * sine(2.3, 1.0) - 0.3 * (phi - 0.5 * sine(61.0, 0.0));
@@ -322,7 +324,7 @@ fn steered(t: f64, x: &State, known: &Known) -> Driven {
     let r = 0.06 * sine(6.7, 0.3) + 0.03 * sine(2.9, 0.0);
     // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without
     // force.
-    let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], known).rates;
+    let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], terms).rates;
     let wanted = [
         450.0 + 60.0 * sine(53.0, 0.0),
         12.0 * sine(7.3, 0.0),
@@ -343,7 +345,7 @@ fn settings() -> Compatibility {
 
 fn windows(record: &Record) -> Vec<Window> {
     let settings = settings();
-    window::choose(record, &settings)
+    choose_windows(record, settings.windows, &settings)
         .into_iter()
         .map(|w| Window::of(record, w, &aircraft(), &settings))
         .collect()
@@ -353,7 +355,7 @@ fn windows(record: &Record) -> Vec<Window> {
 struct Outputs([(f64, Row); OUTPUTS]);
 
 impl Sink for Outputs {
-    fn looks_at(&self, _: usize, _: usize) -> bool {
+    fn counts(&self, _: usize, _: usize) -> bool {
         true
     }
 
@@ -371,7 +373,7 @@ fn sensitivities_are_those_of_finite_differences() {
     };
     let window = Window::of(
         &record,
-        window::choose(&record, &short).remove(0),
+        choose_windows(&record, short.windows, &short).remove(0),
         &aircraft(),
         &short,
     );
@@ -386,7 +388,7 @@ fn sensitivities_are_those_of_finite_differences() {
     let (k, h) = (window.samples - 40, 1e-6);
     let outputs = |local: &Local, shared: &[f64; PARAMETERS]| {
         let mut outputs = Outputs([(0.0, [0.0; WIDE]); OUTPUTS]);
-        respond(&window, &aircraft(), local, shared, k..k + 1, &mut outputs).unwrap();
+        reconstruct(&window, &aircraft(), local, shared, k..k + 1, &mut outputs).unwrap();
         outputs.0
     };
     let at = outputs(&local, &shared);
@@ -504,7 +506,7 @@ fn ordinary(seed: u64) -> [f64; PARAMETERS] {
     std::array::from_fn(|j| {
         let (i, kind) = (j / 3, parameters::ALL_KINDS[j % 3]);
         let drawn = noise.normal() * errors.of(i, kind);
-        if kind == Kind::Delay || !observable(i, kind) {
+        if kind == Kind::Delay || !is_observable(i, kind) {
             0.0
         } else {
             0.5 * drawn
@@ -513,7 +515,7 @@ fn ordinary(seed: u64) -> [f64; PARAMETERS] {
 }
 
 #[test]
-fn bounds_hold_the_truth_as_often_as_they_say() {
+fn bounds_contain_the_truth_as_often_as_normal_ones() {
     let exact = flight(65.0);
     let (mut within, mut count, mut faulty) = (0_u32, 0_u32, 0);
     for seed in 0..6 {
@@ -594,7 +596,7 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
 }
 
 #[test]
-fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corrected() {
+fn an_error_as_large_as_a_fault_but_not_as_sure_is_not_corrected() {
     let exact = flight(65.0);
     let (vane, j) = (INPUTS, place(INPUTS, Kind::Scale));
     let mut errors = ordinary(60);
@@ -625,7 +627,7 @@ fn what_is_as_large_as_a_fault_but_not_as_sure_is_thought_ordinary_and_not_corre
 }
 
 #[test]
-fn of_too_short_a_flight_nothing_is_said() {
+fn a_flight_too_short_for_windows_has_no_estimates() {
     // Too short for the least number of windows.
     let findings = examined(&flight(15.0), &settings());
     assert!(findings.0.iter().all(|f| f.estimates == [None; 3]));
@@ -644,13 +646,7 @@ fn a_window_is_never_cut_across_a_gap_or_a_wrapped_angle() {
     record.signals.get_mut(s::PSI).unwrap().values[1700..]
         .iter_mut()
         .for_each(|v| *v += 360.0);
-    let chosen = window::choose(
-        &record,
-        &Compatibility {
-            windows: 50,
-            ..settings()
-        },
-    );
+    let chosen = choose_windows(&record, 50, &settings());
     assert!(chosen.len() >= 3);
     assert!(
         chosen.iter().all(|w| w.end <= 800 || w.start >= 810),
@@ -663,7 +659,7 @@ fn a_window_is_never_cut_across_a_gap_or_a_wrapped_angle() {
 }
 
 #[test]
-fn an_applied_correction_carries_the_marks_along() {
+fn marks_move_with_an_applied_correction() {
     let values: Vec<f64> = (0..8).map(f64::from).collect();
     let mut marks = vec![Mark::Measured; 8];
     marks[5] = Mark::Bridged;
@@ -677,7 +673,7 @@ fn an_applied_correction_carries_the_marks_along() {
         signals,
     };
     let fault = |value| {
-        Some(Estimate {
+        Some(ErrorEstimate {
             value,
             bound: 0.0,
             fault: true,
@@ -685,7 +681,7 @@ fn an_applied_correction_carries_the_marks_along() {
             applied: true,
         })
     };
-    let findings = Findings(vec![Finding {
+    let findings = Findings(vec![InstrumentFinding {
         signal: s::THETA,
         channel: "theta".into(),
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
@@ -704,7 +700,7 @@ fn an_applied_correction_carries_the_marks_along() {
 
 #[test]
 fn units_of_inputs_are_those_of_the_equations() {
-    assert_abs_diff_eq!(factor(0) * DEG, 1.0);
-    assert_abs_diff_eq!(factor(5), -G0_FT_S2);
+    assert_abs_diff_eq!(input_factor(0) * DEG, 1.0);
+    assert_abs_diff_eq!(input_factor(5), -G0_FT_S2);
     assert_eq!(equations::STATES, 7);
 }

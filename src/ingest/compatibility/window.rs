@@ -1,11 +1,11 @@
-//! Windows of a record: which stretches of a flight say most about its instruments, and what of
-//! them is needed.
+//! Windows of a record: the parts of a flight in which its instruments move most, with the data that
+//! the reconstruction needs.
 
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::equations::{Known, State};
+use super::equations::{MeasuredTerms, State};
 use super::parameters::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
 use super::settings::Compatibility;
 use crate::aircraft::{Aircraft, Flow, Position};
@@ -13,49 +13,55 @@ use crate::earth::gravity_ft_s2;
 use crate::flight::{Mark, Record, signal as s};
 use crate::units::{DEG, G0_FT_S2};
 
-/// The earth's rotation, rad/s, and its mean radius, ft.
+/// The earth's rotation, rad/s (WGS 84).
 const EARTH_RATE: f64 = 7.292_115e-5;
+
+/// The earth's mean radius, ft (6,371 km).
 const EARTH_RADIUS_FT: f64 = 2.090_2e7;
 
-/// Beyond this pitch attitude the Euler angles are next to their singularity, deg.
+/// Largest pitch attitude, deg: beyond it the Euler angles are next to their singularity.
 const STEEPEST_DEG: f64 = 75.0;
-/// Beyond these the vanes, and below this the airspeed, mean nothing.
+
+/// Largest readings of the vanes, deg: beyond them the flow turns away from the vane's axis.
 const LARGEST_ALPHA_DEG: f64 = 85.0;
 const LARGEST_BETA_DEG: f64 = 60.0;
+
+/// Least airspeed, ft/s: below it the vanes and the airspeed sensor do not respond.
 const SLOWEST_FT_S: f64 = 50.0;
-/// An angle that changes by more in one sample has wrapped around.
+
+/// Change of an angle in one sample beyond which it has wrapped around, deg.
 const TURN_DEG: f64 = 90.0;
 
-/// What a window holds: samples of inputs with a margin on both sides, outputs, and what is known.
+/// Data of a window: samples of inputs with a margin on both sides, outputs, and measured terms.
 #[derive(Clone, Debug)]
 pub struct Window {
     pub step_s: f64,
     pub samples: usize,
-    /// Samples before the first and after the last that the inputs have besides.
+    /// Additional samples of the inputs before the first and after the last.
     pub margin: usize,
-    pub known: Vec<Known>,
-    /// In the signals' units.
+    pub terms: Vec<MeasuredTerms>,
+    /// Values of the inputs in the signals' units.
     pub inputs: [Vec<f64>; INPUTS],
-    /// NaN where a sample does not count.
+    /// Values of the outputs in the signals' units; NaN where a sample does not count.
     pub outputs: [Vec<f64>; OUTPUTS],
     /// The state as measured at the first sample.
     pub start: State,
 }
 
-/// The stretches of a record that say most, in order of time.
-pub fn choose(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
-    let usable = stretches(record, settings);
+/// Chooses at most `most` windows of a record, in order of time. Each signal in turn proposes, of
+/// those left, the window in which it moves most.
+pub fn choose_windows(record: &Record, most: usize, settings: &Compatibility) -> Vec<Range<usize>> {
+    let usable = usable_windows(record, settings);
     let activity: Vec<Vec<f64>> = SIGNALS
         .iter()
-        .map(|name| ranked(record, name, &usable))
+        .map(|name| activity(record, name, &usable))
         .collect();
     let mut chosen = vec![false; usable.len()];
     let mut count = 0;
-    // Each signal in turn proposes the window, of those left, in which it moves most.
     'rounds: loop {
         let before = count;
         for ranks in &activity {
-            if count >= settings.windows {
+            if count >= most {
                 break 'rounds;
             }
             let left = (0..usable.len()).filter(|&i| !chosen[i] && ranks[i] > 0.0);
@@ -87,19 +93,19 @@ fn samples(seconds: f64, step_s: f64) -> usize {
     samples
 }
 
-/// Samples that a delay may reach out of a window.
+/// Samples by which a delay may reach out of a window, with those of the interpolation kernel.
 pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
     samples(settings.longest_delay_s, step_s) + 3
 }
 
-/// Stretches of a window's length, or of half of it at least, through which the equations can be
-/// driven.
-fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
-    let pace = pace(record.step_s);
-    let length = samples(settings.window_s, record.step_s).max(2 * pace);
-    let margin = pace * margin(settings, pace as f64 * record.step_s);
+/// Windows of the configured length, or at least half of it, over which the equations can be
+/// integrated.
+fn usable_windows(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
+    let decimation = decimation(record.step_s);
+    let length = samples(settings.window_s, record.step_s).max(2 * decimation);
+    let margin = decimation * margin(settings, decimation as f64 * record.step_s);
     let mut found = Vec::new();
-    for run in runs(record) {
+    for run in usable_runs(record) {
         let mut first = run.start + margin;
         while first + length / 2 + margin <= run.end {
             let end = (first + length).min(run.end - margin);
@@ -110,9 +116,8 @@ fn stretches(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     found
 }
 
-/// The longest runs of samples in which every input is known and the attitude is away from the
-/// singularity.
-fn runs(record: &Record) -> Vec<Range<usize>> {
+/// Runs of samples in which every input is finite and the attitude is away from the singularity.
+fn usable_runs(record: &Record) -> Vec<Range<usize>> {
     let values = |name: &str| record.values(name).unwrap_or_default();
     let needed = SIGNALS[..INPUTS]
         .iter()
@@ -125,7 +130,7 @@ fn runs(record: &Record) -> Vec<Range<usize>> {
     );
     let (velocity, phi, psi) = (values(s::VELOCITY), values(s::PHI), record.values(s::PSI));
     let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
-    let sound = |k: usize| {
+    let is_usable = |k: usize| {
         finite.iter().all(|values| at(values, k).is_finite())
             && at(theta, k).abs() < STEEPEST_DEG
             && at(alpha, k).abs() < LARGEST_ALPHA_DEG
@@ -136,7 +141,7 @@ fn runs(record: &Record) -> Vec<Range<usize>> {
     let jumps =
         |values: &[f64], k: usize| k > 0 && (at(values, k) - at(values, k - 1)).abs() > TURN_DEG;
     let mut runs: Vec<Range<usize>> = Vec::new();
-    for k in (0..record.samples).filter(|k| sound(*k)) {
+    for k in (0..record.samples).filter(|k| is_usable(*k)) {
         match runs.last_mut() {
             Some(run)
                 if run.end == k && !jumps(phi, k) && !psi.is_some_and(|psi| jumps(psi, k)) =>
@@ -149,8 +154,8 @@ fn runs(record: &Record) -> Vec<Range<usize>> {
     runs
 }
 
-/// How much a signal moves in each stretch: the mean square of its change over a second.
-fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
+/// Activity of a signal in each window: the mean square of its change over a second.
+fn activity(record: &Record, name: &str, windows: &[Range<usize>]) -> Vec<f64> {
     let reach = samples(1.0, record.step_s).max(1);
     let values = record.values(name).unwrap_or_default();
     let moved = |range: &Range<usize>| {
@@ -164,49 +169,54 @@ fn ranked(record: &Record, name: &str, stretches: &[Range<usize>]) -> Vec<f64> {
             .fold((0.0, 0_usize), |(s, n), c| (s + c, n + 1));
         sum / count.max(1) as f64
     };
-    stretches.iter().map(moved).collect()
+    windows.iter().map(moved).collect()
 }
 
 impl Window {
-    /// What a stretch of the record holds, at the pace of the windows.
+    /// Window over a range of the record, at the step of the windows.
     pub fn of(
         record: &Record,
         range: Range<usize>,
         aircraft: &Aircraft,
         settings: &Compatibility,
     ) -> Window {
-        let pace = pace(record.step_s);
-        let step_s = pace as f64 * record.step_s;
-        let (margin, samples) = (margin(settings, step_s), range.len() / pace);
-        let first = range.start.saturating_sub(margin * pace);
-        let wide = first..first + (samples + 2 * margin) * pace;
-        let range = range.start..range.start + samples * pace;
+        let decimation = decimation(record.step_s);
+        let step_s = decimation as f64 * record.step_s;
+        let (margin, samples) = (margin(settings, step_s), range.len() / decimation);
+        let first = range.start.saturating_sub(margin * decimation);
+        let wide = first..first + (samples + 2 * margin) * decimation;
+        let range = range.start..range.start + samples * decimation;
         let input = |i: usize| {
-            paced(
+            decimate(
                 record
                     .values(SIGNALS[i])
                     .and_then(|v| v.get(wide.clone()))
                     .unwrap_or_default(),
-                pace,
+                decimation,
             )
         };
-        let output = |o: usize| paced(&measured(record, SIGNALS[INPUTS + o], &range), pace);
-        let centres: Vec<usize> = range.clone().step_by(pace).map(|k| k + pace / 2).collect();
-        let known: Vec<Known> = centres
+        let output =
+            |o: usize| decimate(&measured(record, SIGNALS[INPUTS + o], &range), decimation);
+        let centres: Vec<usize> = range
+            .clone()
+            .step_by(decimation)
+            .map(|k| k + decimation / 2)
+            .collect();
+        let terms: Vec<MeasuredTerms> = centres
             .iter()
-            .map(|k| known(record, *k, aircraft))
+            .map(|k| measured_terms(record, *k, aircraft))
             .collect();
         Window {
             step_s,
             samples,
             margin,
-            start: start(
+            start: measured_state(
                 record,
                 centres.first().copied().unwrap_or(range.start),
                 aircraft,
-                known.first(),
+                terms.first(),
             ),
-            known,
+            terms,
             inputs: std::array::from_fn(input),
             outputs: std::array::from_fn(output),
         }
@@ -214,34 +224,34 @@ impl Window {
 
     /// ω × v as measured at a sample, ft/s².
     pub fn turning(&self, k: usize) -> Vector3<f64> {
-        let omega = Vector3::from_fn(|i, _| factor(i) * self.inputs[i][self.margin + k]);
+        let omega = Vector3::from_fn(|i, _| input_factor(i) * self.inputs[i][self.margin + k]);
         let [alpha, beta, speed] = [0, 1, 2].map(|o| self.outputs[o][k]);
         let ((sa, ca), (sb, cb)) = ((alpha / DEG).sin_cos(), (beta / DEG).sin_cos());
         omega.cross(&(Vector3::new(ca * cb, sb, sa * cb) * speed))
     }
 }
 
-/// Samples of the record that are one of a window: a faster recorder's are averaged, all channels'
-/// alike. The motion of an aircraft has no more to say than 25 samples a second tell.
-fn pace(step_s: f64) -> usize {
+/// Samples of the record that are averaged into one sample of a window, alike for all channels: 25
+/// samples a second resolve the motion of an aircraft.
+fn decimation(step_s: f64) -> usize {
     const SLOWEST_STEP_S: f64 = 0.04;
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a small positive number"
     )]
-    let pace = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
-    pace
+    let decimation = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
+    decimation
 }
 
-fn paced(values: &[f64], pace: usize) -> Vec<f64> {
+fn decimate(values: &[f64], decimation: usize) -> Vec<f64> {
     values
-        .chunks_exact(pace)
-        .map(|v| v.iter().sum::<f64>() / pace as f64)
+        .chunks_exact(decimation)
+        .map(|v| v.iter().sum::<f64>() / decimation as f64)
         .collect()
 }
 
-/// A signal over a stretch; NaN where it is marked or was not recorded.
+/// Measured values of a signal over a range; NaN where a sample was repaired or not recorded.
 fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
     let Some(series) = record.signals.get(name) else {
         return vec![f64::NAN; range.len()];
@@ -253,7 +263,7 @@ fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
     range.clone().map(sample).collect()
 }
 
-fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
+fn measured_terms(record: &Record, k: usize, aircraft: &Aircraft) -> MeasuredTerms {
     let at = |name: &str| {
         record
             .values(name)
@@ -272,11 +282,11 @@ fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
         at(s::BETA_VANE) / DEG,
         at(s::VELOCITY),
     );
-    Known {
+    MeasuredTerms {
         gravity: gravity_ft_s2(aircraft.latitude_deg, at(s::ALTITUDE)),
         arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
         cg,
-        ..turning(
+        ..rotation_terms(
             aircraft,
             [s::PHI, s::THETA, s::PSI].map(|name| at(name) / DEG),
             Vector3::new(
@@ -289,14 +299,14 @@ fn known(record: &Record, k: usize, aircraft: &Aircraft) -> Known {
     }
 }
 
-/// The turning of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s).
-/// Without a heading only that part of it is known which does not depend on it.
-pub fn turning(
+/// Rotation of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a
+/// heading only the part that does not depend on it.
+pub fn rotation_terms(
     aircraft: &Aircraft,
     [phi, theta, psi]: [f64; 3],
     along: Vector3<f64>,
     heading: bool,
-) -> Known {
+) -> MeasuredTerms {
     let to_body = to_body(phi, theta, psi);
     let latitude = aircraft.latitude_deg / DEG;
     let pole = Vector3::new(latitude.cos(), 0.0, -latitude.sin()) * EARTH_RATE;
@@ -307,7 +317,7 @@ pub fn turning(
     } else {
         Vector3::zeros()
     };
-    Known {
+    MeasuredTerms {
         gravity: 0.0,
         arms: [[0.0; 3]; 3],
         cg: Position {
@@ -321,7 +331,7 @@ pub fn turning(
     }
 }
 
-/// The rotation from north, east, down to body axes; angles in rad.
+/// Rotation from north, east, down to body axes; angles in rad.
 fn to_body(phi: f64, theta: f64, psi: f64) -> Matrix3<f64> {
     let ((sp, cp), (st, ct), (sy, cy)) = (phi.sin_cos(), theta.sin_cos(), psi.sin_cos());
     Matrix3::new(
@@ -337,8 +347,13 @@ fn to_body(phi: f64, theta: f64, psi: f64) -> Matrix3<f64> {
     )
 }
 
-/// The state that the first sample measures.
-fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) -> State {
+/// State measured at a sample.
+fn measured_state(
+    record: &Record,
+    k: usize,
+    aircraft: &Aircraft,
+    terms: Option<&MeasuredTerms>,
+) -> State {
     let at = |name: &str| {
         record
             .values(name)
@@ -346,7 +361,7 @@ fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) 
             .copied()
             .unwrap_or(0.0)
     };
-    let Some(known) = known else {
+    let Some(terms) = terms else {
         return State::zeros();
     };
     let rates = [at(s::P) / DEG, at(s::Q) / DEG, at(s::R) / DEG];
@@ -356,7 +371,7 @@ fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) 
         velocity: at(s::VELOCITY),
         rates,
     };
-    let flow = aircraft.sensors.flow_at_cg(&read, known.cg);
+    let flow = aircraft.sensors.flow_at_cg(&read, terms.cg);
     let ((sa, ca), (sb, cb)) = (flow.alpha.sin_cos(), flow.beta.sin_cos());
     let velocity = [
         flow.velocity * ca * cb,
@@ -364,7 +379,7 @@ fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) 
         flow.velocity * sa * cb,
     ];
     let omega = Vector3::from(rates);
-    let swung = |i: usize| velocity[i] + omega.cross(&Vector3::from(known.arms[i]))[i];
+    let swung = |i: usize| velocity[i] + omega.cross(&Vector3::from(terms.arms[i]))[i];
     State::from([
         swung(0),
         swung(1),
@@ -376,9 +391,8 @@ fn start(record: &Record, k: usize, aircraft: &Aircraft, known: Option<&Known>) 
     ])
 }
 
-/// The factor from an input's unit to rad/s or ft/s², in the sense of the equations (down
-/// positive).
-pub fn factor(input: usize) -> f64 {
+/// Factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).
+pub fn input_factor(input: usize) -> f64 {
     match SIGNALS[input] {
         s::AX | s::AY => G0_FT_S2,
         s::AN => -G0_FT_S2,

@@ -1,0 +1,195 @@
+//! State of the joint fit of a flight's windows: shared parameters, their prior, and a Gauss-Newton
+//! step of all parameters.
+//!
+//! The cost is J = Σ v²/(2R) + Σ θ²/(2P) over residuals v and shared parameters θ. The windows' own
+//! parameters are eliminated window by window, so the work is proportional to the number of
+//! windows. A delay common to all channels is no error: the mean of the delays, with the weights
+//! 1/P, is held at zero.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::error_sizes::ErrorSizes;
+use super::parameters::{ALL_KINDS, KINDS, Kind, PARAMETERS, Parameters};
+use super::window_fit::{FitContext, WindowFit};
+
+/// Most Gauss-Newton steps between two estimates of R: more would settle on weights that change.
+const STEPS: usize = 2;
+
+/// Most halvings of a step that raises the cost; after them the step is dropped.
+const HALVINGS: usize = 5;
+
+/// Relative rise of the cost that is rounding of its sums.
+const COST_ROUNDING: f64 = 1e-9;
+
+/// Largest move of a parameter, as a share of its bound, at which the fit is settled.
+const SETTLED: f64 = 0.05;
+
+/// Standard deviation of the delays' weighted mean, s: a tenth of the error of the equations'
+/// timing, so that the mean does not move.
+const COMMON_DELAY_S: f64 = 1e-4;
+
+/// Range of a scale error: a factor of 0.2 to 5, beyond which the relation checks have refused the
+/// channel.
+const SCALE_RANGE: (f64, f64) = (-0.8, 4.0);
+
+/// Joint fit of a flight's windows.
+pub struct JointState<'a> {
+    pub context: FitContext<'a>,
+    /// Parameters that are estimated: of recorded instruments, and observable.
+    pub estimated: [bool; PARAMETERS],
+    pub windows: Vec<WindowFit<'a>>,
+    pub shared: Parameters,
+    /// Standard deviations of the prior, √P.
+    pub prior: Parameters,
+}
+
+/// Size of a parameter in the settings.
+pub fn size_of(sizes: &ErrorSizes, parameter: usize) -> f64 {
+    sizes.of(parameter / KINDS, kind_of(parameter))
+}
+
+pub fn kind_of(parameter: usize) -> Kind {
+    ALL_KINDS[parameter % KINDS]
+}
+
+impl JointState<'_> {
+    /// Information of the data on the shared parameters.
+    pub fn information(&self) -> DMatrix<f64> {
+        let zero = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        self.windows
+            .iter()
+            .fold(zero, |sum, window| sum + &window.information)
+    }
+
+    /// Takes steps until the parameters settle, then estimates R anew. Returns the number of steps.
+    pub fn settle(&mut self) -> Option<usize> {
+        let mut steps = 0;
+        while steps < STEPS {
+            steps += 1;
+            if self.step()? < SETTLED {
+                break;
+            }
+        }
+        let context = &self.context;
+        self.windows
+            .par_iter_mut()
+            .for_each(|window| window.reweigh(context));
+        Some(steps)
+    }
+
+    /// Takes one step of all parameters. Returns the largest move of a shared one over its bound;
+    /// zero where no part of the step lowers the cost.
+    fn step(&mut self) -> Option<f64> {
+        let inverse = self.inverse(&self.information())?;
+        let step = &inverse * self.gradient();
+        let cost = self.cost(&self.windows, &self.shared);
+        let mut share = 1.0;
+        for _ in 0..=HALVINGS {
+            let trial = self.moved(&step, share);
+            // Collected in the order of the windows, so that no sum depends on the threads.
+            let moved: Option<Vec<WindowFit>> = self
+                .windows
+                .par_iter()
+                .map(|window| window.moved(&self.context, &trial, &step, share))
+                .collect();
+            if let Some(moved) = moved
+                && self.cost(&moved, &trial) <= cost * (1.0 + COST_ROUNDING)
+            {
+                let largest = self.largest_move(&trial, &inverse);
+                self.windows = moved;
+                self.shared = trial;
+                return Some(largest);
+            }
+            share *= 0.5;
+        }
+        Some(0.0)
+    }
+
+    /// Largest move of a shared parameter over its bound.
+    fn largest_move(&self, trial: &Parameters, inverse: &DMatrix<f64>) -> f64 {
+        (0..PARAMETERS)
+            .filter(|j| self.estimated[*j])
+            .map(|j| (trial[j] - self.shared[j]).abs() / inverse[(j, j)].sqrt())
+            .fold(0.0, f64::max)
+    }
+
+    /// The shared parameters after a share of a step, kept in their ranges.
+    fn moved(&self, step: &DVector<f64>, share: f64) -> Parameters {
+        let longest = self.context.settings.longest_delay_s;
+        std::array::from_fn(|j| {
+            let value = self.shared[j] + share * step[j];
+            match kind_of(j) {
+                Kind::Delay => value.clamp(-longest, longest),
+                Kind::Scale => value.clamp(SCALE_RANGE.0, SCALE_RANGE.1),
+                Kind::Bias => value,
+            }
+        })
+    }
+
+    /// Negative gradient of the cost on the shared parameters, of data and prior.
+    pub fn gradient(&self) -> DVector<f64> {
+        let common = self.common_delay_weights();
+        let mean: f64 = common.iter().zip(&self.shared).map(|(c, v)| c * v).sum();
+        let of_prior = |j: usize| {
+            if self.estimated[j] {
+                self.shared[j] / (self.prior[j] * self.prior[j])
+            } else {
+                0.0
+            }
+        };
+        let start = DVector::from_fn(PARAMETERS, |j, _| -of_prior(j) - common[j] * mean);
+        self.windows
+            .iter()
+            .fold(start, |sum, window| sum + &window.gradient)
+    }
+
+    /// Twice the cost 2J of windows at shared parameters.
+    fn cost(&self, windows: &[WindowFit], shared: &Parameters) -> f64 {
+        let of_prior: f64 = shared
+            .iter()
+            .zip(&self.prior)
+            .map(|(v, p)| (v / p).powi(2))
+            .sum();
+        let common = self.common_delay_weights();
+        let mean: f64 = common.iter().zip(shared).map(|(c, v)| c * v).sum();
+        windows.iter().map(WindowFit::cost).sum::<f64>() + of_prior + mean * mean
+    }
+
+    /// Weights of the delays in their mean, over the mean's standard deviation.
+    fn common_delay_weights(&self) -> Parameters {
+        let weight = |j: usize| {
+            if self.estimated[j] && kind_of(j) == Kind::Delay {
+                1.0 / (self.prior[j] * self.prior[j])
+            } else {
+                0.0
+            }
+        };
+        let sum: f64 = (0..PARAMETERS).map(weight).sum();
+        std::array::from_fn(|j| weight(j) / sum / COMMON_DELAY_S)
+    }
+
+    /// (H + P⁻¹)⁻¹ over the estimated parameters for information H of the data; zero elsewhere.
+    pub fn inverse(&self, information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let (common, prior) = (self.common_delay_weights(), &self.prior);
+        let both = |i: usize, j: usize| self.estimated[i] && self.estimated[j];
+        // In units of the prior, whose own information then is the unit matrix.
+        let whitened = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+            let own = f64::from(u8::from(i == j));
+            let of_data = information[(i, j)] + common[i] * common[j];
+            if both(i, j) {
+                of_data * prior[i] * prior[j] + own
+            } else {
+                own
+            }
+        });
+        let inverse = Cholesky::new(whitened)?.inverse();
+        Some(DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+            if both(i, j) {
+                inverse[(i, j)] * prior[i] * prior[j]
+            } else {
+                0.0
+            }
+        }))
+    }
+}
