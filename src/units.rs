@@ -1,25 +1,22 @@
-//! Units at the border: what a channel, a signal name or a table column is measured in, and the
-//! factors between them.
+//! Units of channels, signals and table columns, and the factors between them.
 //!
 //! Inside the equations angles are radians and everything else is foot, slug, second, pound-force.
-//! A signal's unit is the end of its name (`alpha_vane_deg`, `qbar_psf`); a channel's unit is what
-//! the recorder says.
+//! A signal's unit is the end of its name (`alpha_vane_deg`, `qbar_psf`). A channel's unit is stated
+//! in the channel map.
 
-/// Degrees in a radian, the paper's R.
+/// Degrees in a radian, R in the paper.
 pub const DEG: f64 = 180.0 / std::f64::consts::PI;
 
-/// Radians in a degree: where every sample is converted, a product is a fraction of a quotient's
-/// work.
+/// Radians in a degree. Where every sample is converted, a product is faster than a quotient.
 pub const RAD: f64 = std::f64::consts::PI / 180.0;
 
-/// The acceleration that an accelerometer calls 1 g, ft/s². A unit only: gravity at the aircraft is
-/// [`crate::earth`]'s.
+/// Unit g of an accelerometer, ft/s². Gravity at the aircraft is [`crate::earth::gravity_ft_s2`].
 pub const G0_FT_S2: f64 = 32.174_049;
 
 /// Metres in a foot, exactly (international foot of 1959).
 pub const M_PER_FT: f64 = 0.304_8;
 
-/// What a unit measures: two units convert into each other when they share it.
+/// Physical quantity of a unit. Units of one quantity convert into each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     Angle,
@@ -36,15 +33,14 @@ pub enum Quantity {
     Number,
 }
 
-/// A unit as a recorder or an analyst spells it, with its factor to the quantity's own unit here.
+/// A unit as a recorder or an analyst spells it, with its factor to the quantity's base unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     pub name: &'static str,
-    /// The end of a signal's name that stands for this unit, for the unit in which signals of the
-    /// quantity are kept.
+    /// End of a signal's name that stands for this unit; signals are kept in units that have one.
     pub suffix: Option<&'static str>,
     pub quantity: Quantity,
-    /// Multiply a value in this unit by it to get the value in the quantity's own unit.
+    /// Factor from values in this unit to values in the quantity's base unit.
     factor: f64,
 }
 
@@ -62,11 +58,14 @@ const fn unit(
     }
 }
 
+/// Feet in a metre.
 const FT: f64 = 1.0 / M_PER_FT;
+/// Pounds-force in a newton (pound of 1959, standard gravity 9.80665 m/s²).
 const LBF: f64 = 1.0 / 4.448_221_615_260_5;
+/// Slugs in a kilogram.
 const SLUG: f64 = 1.0 / 14.593_902_937_206;
 
-/// Every unit that is understood. The first of a quantity is the one signals are kept in.
+/// All units. Signals are kept in the first unit of a quantity.
 const UNITS: &[Unit] = &[
     unit("deg", Some("_deg"), Quantity::Angle, 1.0),
     unit("rad", None, Quantity::Angle, DEG),
@@ -101,11 +100,10 @@ const UNITS: &[Unit] = &[
 ];
 
 impl Unit {
-    /// The unit that a recorder or an analyst spells so; spaces, `^` and a middle dot do not
-    /// matter.
+    /// Parses a unit; spaces, `^`, `*` and a middle dot do not matter.
     ///
     /// # Errors
-    /// The names of all units, when none is spelled so.
+    /// A message with the names of all units, for an unknown unit.
     pub fn parse(text: &str) -> Result<Unit, String> {
         let plain = |s: &str| {
             s.chars()
@@ -122,7 +120,7 @@ impl Unit {
             })
     }
 
-    /// The unit in which the signal of this name is kept: the longest suffix that fits, a pure
+    /// Unit in which the signal of this name is kept: that of the longest suffix that fits, a pure
     /// number without one.
     #[must_use]
     pub fn of_signal(signal: &str) -> Unit {
@@ -136,7 +134,7 @@ impl Unit {
             .unwrap_or(number)
     }
 
-    /// Every unit that measures the same, this one among them.
+    /// All units of the same quantity, this one among them.
     pub fn alike(self) -> impl Iterator<Item = Unit> {
         UNITS
             .iter()
@@ -144,7 +142,7 @@ impl Unit {
             .filter(move |u| u.quantity == self.quantity)
     }
 
-    /// The factor from values in this unit to values in `target`, where the two measure the same.
+    /// Factor from values in this unit to values in `target`; `None` for another quantity.
     #[must_use]
     pub fn factor_to(self, target: Unit) -> Option<f64> {
         (self.quantity == target.quantity).then_some(self.factor / target.factor)

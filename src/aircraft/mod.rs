@@ -1,5 +1,5 @@
-//! The aircraft as the equations see it: reference dimensions, engines, sensor positions, and where
-//! on earth it flies.
+//! The aircraft in the equations of motion: reference dimensions, engines, sensor positions, and the
+//! latitude at which it flies.
 //!
 //! Positions are in ft, positive aft (x), right (y) and above (z) of a reference point about 5 ft
 //! ahead of the nose.
@@ -15,20 +15,20 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Aircraft {
     pub name: String,
-    /// S.
+    /// Reference area S.
     pub wing_area_ft2: f64,
-    /// b, for the rolling and yawing moments and p, r.
+    /// Reference span b, of the rolling and yawing moments and of p and r.
     pub span_ft: f64,
-    /// c̄, for the pitching moment and q.
+    /// Reference chord c̄, of the pitching moment and of q.
     pub chord_ft: f64,
-    /// `I_xe` of one engine; the gyroscopic moment takes the sum of both engines' momenta.
+    /// `I_xe` of one engine; the gyroscopic moment contains the sum of both engines' momenta.
     pub engine_inertia_slug_ft2: f64,
-    /// Where the campaign is flown; gravity depends on it.
+    /// Latitude of the campaign; gravity depends on it.
     pub latitude_deg: f64,
     pub sensors: Sensors,
 }
 
-/// Where the sensors stand and how the vanes read.
+/// Positions of the sensors and equations of the vanes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
@@ -37,17 +37,17 @@ pub struct Sensors {
     pub ay: Position,
     pub alpha_vane: Vane,
     pub beta_vane: Vane,
-    /// What the vane equations are: `exact` local velocity at the vane, or the paper's small-angle
-    /// forms 2.9 and 3.8.
+    /// Equations of the vanes: `exact` local velocity at the vane, or the paper's small-angle forms
+    /// 2.9 and 3.8.
     #[serde(default)]
     pub vane_model: VaneModel,
-    /// Whether the axial accelerometer feels thrust (it does; `false` reproduces the print of eq.
-    /// 2.8).
-    #[serde(default = "yes")]
+    /// Thrust in the axial accelerometer's equation. An accelerometer feels thrust; `false`
+    /// reproduces the print of eq. 2.8.
+    #[serde(default = "default_true")]
     pub thrust_in_ax: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
@@ -60,8 +60,8 @@ pub struct Position {
     pub z_ft: f64,
 }
 
-/// A flow vane: where it stands, and the factor by which upwash or sidewash makes it read more than
-/// the local angle.
+/// A flow vane: its position, and the factor of its reading over the local angle by upwash or
+/// sidewash.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vane {
@@ -83,19 +83,19 @@ impl Vane {
     }
 }
 
-/// How the flow vanes are modelled.
+/// Model of the flow vanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum VaneModel {
-    /// The angle of the local velocity at the vane, times its factor.
+    /// Angle of the local velocity at the vane, times its factor.
     #[default]
     Exact,
-    /// The paper's eqs. 2.9 and 3.8, linear in the rates.
+    /// Eqs. 2.9 and 3.8 of the paper, linear in the rates.
     SmallAngle,
 }
 
 impl Position {
-    /// The arm from the c.g. to this point in body axes, ft forward, right and down.
+    /// Arm from the c.g. to this point in body axes, ft forward, right and down.
     #[must_use]
     pub fn arm(self, cg: Position) -> [f64; 3] {
         [

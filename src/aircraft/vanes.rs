@@ -1,8 +1,8 @@
-//! What the flow vanes read (eqs. 2.9 and 3.8 and their exact forms), and the way back to the
+//! Readings of the flow vanes (eqs. 2.9 and 3.8 and their exact forms), and their inversion to the
 //! angles at the c.g.
 //!
-//! A vane stands away from the c.g., so rotation adds ω × arm to the velocity that it sees; upwash
-//! and sidewash make it read `k` times the local angle. Exact: the angle of the local velocity.
+//! A vane is away from the c.g., so rotation adds ω × arm to the velocity at the vane. Upwash and
+//! sidewash multiply its reading by a factor `k`. Exact: the angle of the local velocity.
 //! Small-angle, as printed in the paper: α + (x q + y p)/V and β + (z p − x r)/V, with arms aft,
 //! right and above. At tip booms the two differ by up to 0.45° at α 30° to 50°.
 #![expect(
@@ -13,7 +13,7 @@
 use super::{Position, Sensors, Vane, VaneModel};
 use crate::numerics::trig::sin_cos;
 
-/// The flow at the c.g. and the rotation: angles in rad, velocity in ft/s, body rates in rad/s.
+/// Flow at the c.g. and rotation: angles in rad, velocity in ft/s, body rates in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flow {
     pub alpha: f64,
@@ -22,7 +22,7 @@ pub struct Flow {
     pub rates: [f64; 3],
 }
 
-/// A vane's reading (rad) with its slopes along α, β and the body rates p, q, r.
+/// Reading of a vane (rad) with its slopes along α, β and the body rates p, q, r.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     pub angle: f64,
@@ -58,12 +58,14 @@ impl Flow {
     }
 }
 
-/// From an error of a reading this small, rad, one more step of Newton's leaves no more than
-/// rounding.
+/// Error of a reading, rad, from which one more step of Newton's iteration leaves rounding only.
 const CLOSE: f64 = 1e-7;
 
+/// Most steps of Newton's iteration; three are usual.
+const MOST_STEPS: usize = 8;
+
 impl Vane {
-    /// What an α vane reads, rad, with the c.g. at `cg`.
+    /// Reading of an α vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
     pub fn alpha_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
@@ -87,7 +89,7 @@ impl Vane {
         scaled(exact, self)
     }
 
-    /// How the rates add to the small angle at an α vane, s.
+    /// Slopes of the small angle at an α vane along the rates, s.
     #[inline(always)]
     #[must_use]
     pub fn alpha_by_rates(self, velocity: f64, cg: Position) -> [f64; 3] {
@@ -95,7 +97,7 @@ impl Vane {
         [arm[1] * per_speed, -arm[0] * per_speed, 0.0]
     }
 
-    /// How they do at a β vane, s.
+    /// Slopes of the small angle at a β vane along the rates, s.
     #[inline(always)]
     #[must_use]
     pub fn beta_by_rates(self, velocity: f64, cg: Position) -> [f64; 3] {
@@ -103,7 +105,7 @@ impl Vane {
         [-arm[2] * per_speed, 0.0, arm[0] * per_speed]
     }
 
-    /// The small-angle reading of an α vane.
+    /// Small-angle reading of an α vane.
     #[inline(always)]
     #[must_use]
     pub fn alpha_small(self, alpha: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
@@ -118,7 +120,7 @@ impl Vane {
         )
     }
 
-    /// The small-angle reading of a β vane.
+    /// Small-angle reading of a β vane.
     #[inline(always)]
     #[must_use]
     pub fn beta_small(self, beta: f64, by_rates: [f64; 3], rates: [f64; 3]) -> Reading {
@@ -133,7 +135,7 @@ impl Vane {
         )
     }
 
-    /// What a β vane reads, rad, with the c.g. at `cg`.
+    /// Reading of a β vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
     pub fn beta_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
@@ -161,23 +163,22 @@ impl Vane {
 }
 
 impl Sensors {
-    /// What the α vane reads, rad, with the c.g. at `cg`.
+    /// Reading of the α vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
     pub fn alpha_reading(&self, flow: &Flow, cg: Position) -> Reading {
         self.alpha_vane.alpha_reading(self.vane_model, flow, cg)
     }
 
-    /// What the β vane reads, rad, with the c.g. at `cg`.
+    /// Reading of the β vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
     pub fn beta_reading(&self, flow: &Flow, cg: Position) -> Reading {
         self.beta_vane.beta_reading(self.vane_model, flow, cg)
     }
 
-    /// The angles at the c.g., rad, from what the two vanes read (`alpha`, `beta` of `read`): the
-    /// small-angle readings solved for them, the exact ones inverted by Newton's iteration, for
-    /// which the readings are almost straight.
+    /// Flow at the c.g. from the readings of the two vanes (`alpha`, `beta` of `read`). Small-angle
+    /// readings are solved; exact ones are almost linear and inverted by Newton's iteration.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
@@ -194,7 +195,7 @@ impl Sensors {
             flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);
             return flow;
         }
-        for _ in 0..8 {
+        for _ in 0..MOST_STEPS {
             let (alpha, beta) = (self.alpha_reading(&flow, cg), self.beta_reading(&flow, cg));
             let (alpha_error, beta_error) = (read.alpha - alpha.angle, read.beta - beta.angle);
             let determinant = alpha.by_alpha * beta.by_beta - alpha.by_beta * beta.by_alpha;
@@ -376,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_back_returns_the_angles_at_the_cg() {
+    fn the_inversion_returns_the_angles_at_the_cg() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
             let read = Flow {

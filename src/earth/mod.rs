@@ -1,4 +1,4 @@
-//! The earth around the aircraft: gravity and the standard atmosphere.
+//! Gravity and the standard atmosphere.
 
 mod atmosphere;
 mod gravity;
