@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::support::files;
 
@@ -24,8 +25,13 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// All sources that are part of the program, but for the roots of its crates.
-pub fn sources() -> Vec<Source> {
+/// All sources that are part of the program, but for the roots of its crates; read once.
+pub fn sources() -> &'static [Source] {
+    static SOURCES: OnceLock<Vec<Source>> = OnceLock::new();
+    SOURCES.get_or_init(read)
+}
+
+fn read() -> Vec<Source> {
     let src = root().join("src");
     let relative = |file: &PathBuf| {
         let path = file.strip_prefix(&src).unwrap();
