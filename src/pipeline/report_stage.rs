@@ -53,7 +53,11 @@ pub fn make_report(
         .collect();
     let classes = config.classes.iter();
     let classes: Vec<_> = classes
-        .map(|c| (c.name.clone(), c.title.clone(), c.axis))
+        .map(|c| report::ConfiguredClass {
+            name: c.name.clone(),
+            title: c.title.clone(),
+            axis: c.axis,
+        })
         .collect();
     let estimates: Vec<EstimateRow> = campaign.estimates_and_sums().cloned().collect();
     let contents = report::Contents {

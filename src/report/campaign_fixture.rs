@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::contents::Contents;
+use super::contents::{ConfiguredClass, Contents};
 use super::provenance::{Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::{Problem, ProblemStage};
@@ -35,7 +35,7 @@ pub struct Campaign {
     pub histories: Vec<History>,
     pub provenance: Provenance,
     pub order: Vec<String>,
-    pub classes: Vec<(String, String, Axis)>,
+    pub classes: Vec<ConfiguredClass>,
     pub overnight: Changes,
 }
 
@@ -93,9 +93,11 @@ pub fn campaign() -> Campaign {
         ("OLAT", Axis::Lateral),
         ("PYRS", Axis::Lateral),
     ] {
-        campaign
-            .classes
-            .push((class.into(), format!("{class} steps"), axis));
+        campaign.classes.push(ConfiguredClass {
+            name: class.into(),
+            title: format!("{class} steps"),
+            axis,
+        });
         for alpha in [10.0, 20.0, 30.0, 40.0, 50.0] {
             fly(&mut campaign, class, axis, alpha);
         }

@@ -13,6 +13,14 @@ use crate::tables::{
     InstrumentRow, PredictionRow, TrendRow,
 };
 
+/// A maneuver class of the configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConfiguredClass {
+    pub name: String,
+    pub title: String,
+    pub axis: Axis,
+}
+
 /// Input of the report stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents<'a> {
@@ -46,8 +54,8 @@ pub struct Contents<'a> {
     pub provenance: &'a Provenance,
     /// Derivatives in the order of the model.
     pub order: &'a [String],
-    /// Name, title and axis of each configured class.
-    pub classes: &'a [(String, String, Axis)],
+    /// Configured maneuver classes, in the order of the report.
+    pub classes: &'a [ConfiguredClass],
     /// Differences from the previously published night.
     pub overnight: &'a Changes,
 }

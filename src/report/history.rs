@@ -62,7 +62,7 @@ pub fn representatives<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
         contents.typical_alpha_deg,
     );
     let by_class = group_by(contents.histories, |h| &h.class);
-    let configured: Vec<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
+    let configured: Vec<&str> = contents.classes.iter().map(|c| c.name.as_str()).collect();
     let unconfigured = by_class.keys().copied().filter(|c| !configured.contains(c));
     configured
         .iter()

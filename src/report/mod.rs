@@ -24,7 +24,7 @@ mod tests;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment};
 
-pub use contents::Contents;
+pub use contents::{ConfiguredClass, Contents};
 pub use history::thinned;
 use page::Page;
 pub use page_selection::maneuvers_with_page;

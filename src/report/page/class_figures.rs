@@ -263,7 +263,10 @@ pub fn rates(contents: &Contents, markers: &ClassMarkers) -> Vec<ClassFigure> {
 }
 
 fn is_of_axis(contents: &Contents, class: &str, axis: Axis) -> bool {
-    contents.classes.iter().any(|c| c.0 == class && c.2 == axis)
+    contents
+        .classes
+        .iter()
+        .any(|c| c.name == class && c.axis == axis)
 }
 
 /// Labels of the outputs that are angular rates, in the order of the outputs.

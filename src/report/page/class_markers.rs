@@ -21,8 +21,8 @@ impl<'a> ClassMarkers<'a> {
             let configured = contents
                 .classes
                 .iter()
-                .filter(|c| c.2 == axis)
-                .map(|c| c.0.as_str());
+                .filter(|c| c.axis == axis)
+                .map(|c| c.name.as_str());
             let flown: BTreeSet<&str> = contents
                 .maneuvers
                 .iter()

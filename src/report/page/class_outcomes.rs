@@ -47,8 +47,8 @@ pub fn by_class(contents: &Contents, markers: &ClassMarkers) -> Vec<ClassOutcome
     let configured = contents
         .classes
         .iter()
-        .map(|(name, title, axis)| (name.as_str(), title.as_str(), *axis));
-    let names: BTreeSet<&str> = contents.classes.iter().map(|c| c.0.as_str()).collect();
+        .map(|c| (c.name.as_str(), c.title.as_str(), c.axis));
+    let names: BTreeSet<&str> = contents.classes.iter().map(|c| c.name.as_str()).collect();
     let unconfigured: BTreeMap<&str, Axis> = contents
         .maneuvers
         .iter()

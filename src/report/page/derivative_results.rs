@@ -72,7 +72,7 @@ pub fn collect<'a>(contents: &Contents<'a>) -> Vec<DerivativeResults<'a>> {
     let axes: BTreeMap<&str, Axis> = contents
         .classes
         .iter()
-        .map(|(name, _, axis)| (name.as_str(), *axis))
+        .map(|c| (c.name.as_str(), c.axis))
         .collect();
     let mut derivatives: Vec<DerivativeResults> = names(contents)
         .into_iter()

@@ -238,7 +238,7 @@ fn class_position(contents: &Contents, class: &str) -> usize {
     contents
         .classes
         .iter()
-        .position(|(name, ..)| name == class)
+        .position(|c| c.name == class)
         .unwrap_or(contents.classes.len())
 }
 
@@ -246,7 +246,7 @@ fn class_name(contents: &Contents, position: usize) -> String {
     contents
         .classes
         .get(position)
-        .map_or_else(|| NOTHING.to_owned(), |(name, ..)| name.clone())
+        .map_or_else(|| NOTHING.to_owned(), |c| c.name.clone())
 }
 
 #[cfg(test)]

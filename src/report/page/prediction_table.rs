@@ -31,16 +31,20 @@ const HEADS: [&str; 9] = [
 #[must_use]
 pub fn table(contents: &Contents) -> Option<TableView> {
     let mut rows = Vec::new();
-    for (class, _, _) in contents.classes {
+    for class in contents.classes {
         let mut by_output: Vec<(Output, Vec<&PredictionRow>)> = Vec::new();
-        for row in contents.predictions.iter().filter(|p| p.class == *class) {
+        for row in contents
+            .predictions
+            .iter()
+            .filter(|p| p.class == class.name)
+        {
             match by_output.iter_mut().find(|o| o.0 == row.output) {
                 Some(output) => output.1.push(row),
                 None => by_output.push((row.output, vec![row])),
             }
         }
         for (output, predictions) in by_output {
-            rows.push(cells(class, output, &predictions));
+            rows.push(cells(&class.name, output, &predictions));
         }
     }
     (!rows.is_empty()).then(|| TableView::new("Class and output", NOTE, &HEADS, rows))
