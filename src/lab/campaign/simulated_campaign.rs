@@ -8,7 +8,7 @@ use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
 use crate::lab::simulator::{Card, DerivativeLookup, Program, Simulator};
-use crate::store::files::TunnelRow;
+use crate::store::files::{self, TunnelRow};
 
 /// Test cards with their pipeline and simulator, checked.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ impl SimulatedCampaign {
     pub fn load(file: &Path) -> Result<SimulatedCampaign> {
         let source = Source::read(file.to_owned())?;
         let cards: Cards = source.parse()?;
-        let folder = if cards.pipeline.is_dir() {
+        let folder = if files::is_folder(&cards.pipeline) {
             cards.pipeline.clone()
         } else {
             PathBuf::from("pipelines").join(&cards.pipeline)
