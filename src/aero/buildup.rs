@@ -3,7 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::derivative::{Axis, Derivative, DerivativeUnit, Output};
+use super::derivative::{Axis, Derivative, Output};
+use super::derivative_unit::DerivativeUnit;
 
 /// A constant error of one measured output, estimated with the derivatives: `an_bias` in g,
 /// `q_bias` in deg/s.

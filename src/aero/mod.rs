@@ -4,10 +4,12 @@
 
 pub mod buildup;
 pub mod derivative;
+mod derivative_unit;
 pub mod interpolation;
 pub mod wind_tunnel;
 
 pub use buildup::{Bias, Buildup, Combined};
-pub use derivative::{Axis, Coefficient, Derivative, DerivativeUnit, Output, Regressor};
+pub use derivative::{Axis, Coefficient, Derivative, Output, Regressor};
+pub use derivative_unit::DerivativeUnit;
 pub use interpolation::Interpolation;
 pub use wind_tunnel::{Condition, WindTunnel};

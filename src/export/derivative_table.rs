@@ -22,7 +22,7 @@ pub struct DerivativeTable {
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridCell {
     pub value: f64,
-    /// Standard uncertainty, where it is known.
+    /// Standard uncertainty, where known.
     pub uncertainty: Option<f64>,
     pub is_flight: bool,
     pub source: String,

@@ -18,13 +18,13 @@ use crate::tables::{ExportRow, FitRow, PredictedRow};
 /// Folder of published tables, with the metadata of their Parquet files.
 #[derive(Clone, Debug, Default)]
 pub struct Shelf {
-    /// None: what is published there goes nowhere.
+    /// `None` publishes nothing.
     folder: Option<PathBuf>,
     provenance: Vec<(String, String)>,
 }
 
 impl Shelf {
-    /// A folder for tables that say nothing about where they come from.
+    /// A folder for tables without provenance.
     #[must_use]
     pub fn of(folder: &Path) -> Shelf {
         Shelf {

@@ -1,0 +1,168 @@
+//! Units of derivatives and biases, and the spellings of tunnel databases.
+
+use crate::schema::words;
+use crate::units::{DEG, Unit};
+
+words! {
+    /// Unit of a derivative or bias, spelled as in the wind-tunnel tables.
+    pub enum DerivativeUnit {
+        /// A coefficient, without a unit.
+        Number = "-",
+        /// Per degree: static and control derivatives.
+        PerDeg = "per_deg",
+        /// Per radian of p b/2V, q c̄/2V or r b/2V: rate derivatives.
+        PerRad = "per_rad",
+        /// Force of a thrust-vectoring vane, lbf per degree.
+        LbfPerDeg = "lbf_per_deg",
+        /// Moment of a thrust-vectoring vane, ft·lbf per degree.
+        FtLbfPerDeg = "ftlbf_per_deg",
+        /// Bias of an accelerometer.
+        G = "g",
+        /// Bias of a rate gyro, deg/s.
+        DegPerS = "deg_s",
+        /// Bias of an attitude or a vane, deg.
+        Deg = "deg",
+    }
+}
+
+impl DerivativeUnit {
+    /// Factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`, `nd`)
+    /// to values in this one.
+    ///
+    /// Exactly one for its own name; `None` for a unit of another quantity.
+    #[must_use]
+    pub fn factor_from(self, written: &str) -> Option<f64> {
+        let (from, to) = (ParsedUnit::parse(written)?, ParsedUnit::parse(self.name())?);
+        let per_angle = match (from.per, to.per) {
+            (None, None) => 1.0,
+            (Some(a), Some(b)) if a == b => 1.0,
+            (Some(a), Some(b)) => a.per_degree() / b.per_degree(),
+            _ => return None,
+        };
+        (from.quantity == to.quantity).then_some(from.factor / to.factor * per_angle)
+    }
+}
+
+/// Quantity of a derivative, besides the angle.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Quantity {
+    Number,
+    Force,
+    Moment,
+}
+
+/// Angle that a derivative is per.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Angle {
+    Degree,
+    Radian,
+}
+
+impl Angle {
+    /// Factor from a value per this angle to a value per degree.
+    fn per_degree(self) -> f64 {
+        match self {
+            Angle::Degree => 1.0,
+            Angle::Radian => 1.0 / DEG,
+        }
+    }
+}
+
+/// A unit as a database spells it, in parts.
+struct ParsedUnit {
+    quantity: Quantity,
+    /// Factor to the quantity's own unit: lbf, ft·lbf.
+    factor: f64,
+    per: Option<Angle>,
+}
+
+impl ParsedUnit {
+    fn parse(written: &str) -> Option<ParsedUnit> {
+        let plain: String = written
+            .trim()
+            .chars()
+            .filter(|c| !matches!(c, ' ' | '*' | '·' | '^'))
+            .collect();
+        let (of, per) = split_angle(&plain);
+        let per = match per {
+            None => None,
+            Some("deg") => Some(Angle::Degree),
+            Some("rad") => Some(Angle::Radian),
+            Some(_) => return None,
+        };
+        let (quantity, factor) = quantity(of)?;
+        Some(ParsedUnit {
+            quantity,
+            factor,
+            per,
+        })
+    }
+}
+
+/// Splits `lbf_per_deg`, `lbf/deg` or `deg-1` into quantity and angle.
+fn split_angle(plain: &str) -> (&str, Option<&str>) {
+    if let Some((of, per)) = plain.split_once("per_").or_else(|| plain.split_once('/')) {
+        return (of.trim_matches('_'), Some(per));
+    }
+    let of = plain
+        .strip_suffix("deg-1")
+        .or(plain.strip_suffix("rad-1"))
+        .unwrap_or(plain);
+    let per = plain
+        .strip_suffix("-1")
+        .and_then(|p| p.get(p.len().saturating_sub(3)..));
+    (of, per)
+}
+
+/// Quantity of a unit, with the factor to the quantity's own unit.
+fn quantity(of: &str) -> Option<(Quantity, f64)> {
+    let factor = |name: &str, own: &str| Unit::parse(name).ok()?.factor_to(Unit::parse(own).ok()?);
+    match of {
+        "" | "1" | "-" | "nd" | "ND" => Some((Quantity::Number, 1.0)),
+        "lbf" => Some((Quantity::Force, 1.0)),
+        "N" => Some((Quantity::Force, factor("N", "lbf")?)),
+        "ftlbf" | "ft_lbf" | "ft-lbf" => Some((Quantity::Moment, 1.0)),
+        "Nm" | "N_m" | "N-m" => Some((Quantity::Moment, factor("N", "lbf")? * factor("m", "ft")?)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_unit_converts_into_another_of_the_same_quantity_and_into_no_other() {
+        use DerivativeUnit::{FtLbfPerDeg, LbfPerDeg, Number, PerDeg, PerRad};
+        let degree = std::f64::consts::PI / 180.0;
+        for (unit, written, factor) in [
+            (PerDeg, "per_rad", degree),
+            (PerDeg, "1/rad", degree),
+            (PerDeg, "rad^-1", degree),
+            (PerRad, "1/deg", 1.0 / degree),
+            (LbfPerDeg, "lbf_per_rad", degree),
+            (LbfPerDeg, "N/deg", 1.0 / 4.448_221_615_260_5),
+            (FtLbfPerDeg, "N_m/deg", 1.0 / 4.448_221_615_260_5 / 0.3048),
+            (Number, "nd", 1.0),
+        ] {
+            assert_relative_eq!(
+                unit.factor_from(written).expect(written),
+                factor,
+                max_relative = 1e-12
+            );
+        }
+        for unit in [Number, PerDeg, PerRad, LbfPerDeg, FtLbfPerDeg] {
+            assert_eq!(unit.factor_from(unit.name()), Some(1.0));
+        }
+        for (unit, written) in [
+            (PerDeg, "-"),
+            (Number, "per_deg"),
+            (PerDeg, "lbf_per_deg"),
+            (PerDeg, "per_ft"),
+            (PerDeg, "x"),
+        ] {
+            assert_eq!(unit.factor_from(written), None, "{written}");
+        }
+    }
+}
