@@ -36,10 +36,10 @@ lost.
 ";
 
 const COMBINED: &str = "\
-Sums that the tunnel tabulates in one number, such as `CN_ba = CN_0 + CN_alpha α` (eqs. 2.14, 2.15).
+Sums that the tunnel tabulates in one number: a constant plus a slope times α (eqs. 2.14, 2.15).
 
 The columns are those of `estimates`. `value` is the sum at the maneuver's mean α; the bounds come from
-the full covariance. A sum has a row where both parts were estimated. `CN_0` and `CN_alpha` alone are
+the full covariance. A sum has a row where both parts were estimated. Constant and slope alone are
 strongly correlated; their sum is well determined.
 ";
 
