@@ -4,6 +4,7 @@
 
 use super::{Agreement, Settings};
 use crate::aero::WindTunnel;
+use crate::numerics::order_statistics::median;
 use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
 /// One compared angle of attack, of whichever comparison.
@@ -232,16 +233,6 @@ fn by(run: &[Place]) -> String {
             })
         }
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let (low, high) = (
-        values.get(values.len().checked_sub(1)? / 2)?,
-        values.get(values.len() / 2)?,
-    );
-    Some(low.midpoint(*high))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! inverse of a symmetric matrix, one Runge-Kutta step, Student's t.
 
 pub(crate) mod matrix;
+pub mod order_statistics;
 pub(crate) mod row_products;
 pub mod runge_kutta;
 pub(crate) mod simd;

@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use crate::aero::Axis;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
+use crate::numerics::order_statistics::upper_median_in_place;
 use crate::settings::{elements, settings};
 
 settings! {
@@ -218,14 +219,11 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
             .map(second)
             .filter(|d| d.is_finite())
             .collect();
-        let middle = differences.len() / 2;
-        if middle == 0 {
+        if differences.len() < 2 {
             return None;
         }
-        // Of white noise with a deviation of one: second differences of √6, their median magnitude
-        // 1/1.4826 of that.
-        let noise =
-            1.4826 * *differences.select_nth_unstable_by(middle, f64::total_cmp).1 / 6.0_f64.sqrt();
+        // Second differences of white noise have six times its variance.
+        let noise = 1.4826 * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
         ratio(Some(mean_square(values, Fit::Line)?.sqrt()), Some(noise))
     };
     signals.iter().filter_map(of).max_by(f64::total_cmp)

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::maneuver::{Class, Recognised};
+use crate::numerics::order_statistics::trimmed_range;
 
 use super::Step;
 use super::candidates::{Kind, Scene};
@@ -161,9 +162,7 @@ impl<'a> Seen<'a> {
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
         let mut known: Vec<f64> = record.values(signal)?.get(first..=last)?.to_vec();
         known.retain(|v| v.is_finite());
-        known.sort_by(f64::total_cmp);
-        let aside = known.len() / 50;
-        let range = known.get(known.len().checked_sub(aside + 1)?)? - known.get(aside)?;
+        let range = trimmed_range(known, 0.02)?;
         let smallest = self.scene.steps.smallest.get(signal)?;
         let moves = range >= 2.0 * smallest;
         (moves || range <= 0.5 * smallest).then_some(moves)

@@ -15,6 +15,7 @@
 use std::collections::BTreeMap;
 
 use crate::flight::Record;
+use crate::numerics::order_statistics::upper_median_in_place;
 
 use super::Settings;
 
@@ -112,12 +113,10 @@ fn noise(levels: &[f64], window: Window) -> f64 {
     let mut sizes: Vec<f64> = changes(levels, window)
         .map(|change| change.size())
         .collect();
-    let middle = sizes.len() / 2;
-    if middle == 0 {
+    if sizes.len() < 2 {
         return 0.0;
     }
-    // Of the normal distribution: standard deviation over median of the magnitude.
-    1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    1.4826 * upper_median_in_place(&mut sizes).unwrap_or(0.0)
 }
 
 /// A time in whole samples, at least one.

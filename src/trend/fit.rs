@@ -35,6 +35,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::basis::Basis;
 use super::{Criterion, Settings};
+use crate::numerics::order_statistics::upper_median;
 use crate::numerics::student;
 
 /// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit
@@ -282,12 +283,12 @@ impl Fit {
 
     /// τ of the median maneuver.
     pub(super) fn scatter(&self) -> f64 {
-        median(self.scatter2.clone()).sqrt()
+        upper_median(self.scatter2.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
     /// τ and bound together of the median maneuver: how far one more lies from what is true.
     pub(super) fn one_more(&self) -> f64 {
-        median(self.variances.clone()).sqrt()
+        upper_median(self.variances.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
     /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees
@@ -357,13 +358,8 @@ fn flown(points: &[Point], step_deg: f64) -> Vec<f64> {
 
 /// Bounds squared, none smaller than the floor.
 fn floored_variances(points: &[Point]) -> Vec<f64> {
-    let floor = BOUND_FLOOR * median(points.iter().map(|p| p.bound).collect());
+    let floor = BOUND_FLOOR * upper_median(points.iter().map(|p| p.bound)).unwrap_or(0.0);
     points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The points of each scatter: of every class that has one of its own, and of all points, last,

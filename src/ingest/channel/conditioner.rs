@@ -18,6 +18,7 @@ use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Settings;
+use crate::numerics::order_statistics::{upper_median_in_place, upper_median_of_counts};
 
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
 const FLAG_UNIT: &str = "0/1";
@@ -395,15 +396,13 @@ impl Conditioner {
         let Characters {
             noises, periods, ..
         } = &mut self.characters;
-        noises.sort_by(f64::total_cmp);
-        periods.sort_unstable();
         let mut statistics = self.statistics;
         if self.is_flag {
             statistics.quantisation = None;
         } else {
-            statistics.noise = noises.get(noises.len() / 2).copied();
+            statistics.noise = upper_median_in_place(noises);
         }
-        statistics.period = periods.get(periods.len() / 2).copied().unwrap_or(1);
+        statistics.period = upper_median_of_counts(periods).unwrap_or(1);
         statistics.wraps = self.unwrapper.map_or(0, |u| u.wraps());
         statistics
     }

@@ -10,9 +10,7 @@ use std::ops::Range;
 
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Spikes;
-
-/// Standard deviations of a normal distribution in its median absolute deviation.
-const MAD_TO_SD: f64 = 1.482_602_218_505_602;
+use crate::numerics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
 
 /// Variance of a sample minus its neighbours' mean, in variances of white noise: 1 + 1/4 + 1/4.
 const MEAN_VARIANCE: f64 = 1.5;
@@ -58,7 +56,7 @@ pub fn noise_levels(values: &[f64]) -> (f64, f64) {
 
 /// Standard deviation of white noise from deviations of samples off their neighbours' mean.
 fn noise_of(deviations: &mut [f64]) -> f64 {
-    MAD_TO_SD / MEAN_VARIANCE.sqrt() * quantile(deviations, 0.5)
+    SIGMA_PER_MAD / MEAN_VARIANCE.sqrt() * lower_quantile_in_place(deviations, 0.5).unwrap_or(0.0)
 }
 
 /// Replaces single-sample spikes by their neighbours' mean and returns their places. `floors` gives
@@ -186,21 +184,8 @@ fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
     if deviations.len() < LEAST_ROUNDED {
         0.0
     } else {
-        quantile(&mut deviations, ROUNDING_QUANTILE)
+        lower_quantile_in_place(&mut deviations, ROUNDING_QUANTILE).unwrap_or(0.0)
     }
-}
-
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a share of the length"
-    )]
-    let rank = ((values.len() - 1) as f64 * share) as usize;
-    *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
 #[cfg(test)]

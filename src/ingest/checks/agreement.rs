@@ -7,6 +7,7 @@ use super::relations::{self, Relation, Selection};
 use super::windows::{WindowPair, window_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
+use crate::numerics::order_statistics::upper_median;
 use crate::tables::{CheckRow, CheckVerdict};
 
 /// Windows that are selected of a short flight where the largest are selected, in multiples of the
@@ -156,8 +157,8 @@ fn select_excited(
             pairs.retain(|p| p.predicted.abs().max(p.measured.abs()) > level);
         }
         Selection::Largest { share, .. } => {
-            let predicted = median(pairs.iter().map(|p| p.predicted).collect());
-            let measured = median(pairs.iter().map(|p| p.measured).collect());
+            let predicted = upper_median(pairs.iter().map(|p| p.predicted)).unwrap_or_default();
+            let measured = upper_median(pairs.iter().map(|p| p.measured)).unwrap_or_default();
             for pair in &mut pairs {
                 pair.predicted -= predicted;
                 pair.measured -= measured;
@@ -182,7 +183,7 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
     let slope = median_slope(pairs);
     let distance =
         |p: &WindowPair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
-    let spread = MAD_TO_SD * median(pairs.iter().map(distance).collect());
+    let spread = MAD_TO_SD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
     let limit = (JUMP_DEVIATIONS * spread).max(relation.selection.level());
     let jumps: Vec<usize> = pairs
         .iter()
@@ -200,7 +201,7 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
 /// Median of the windows' slopes, weighted with their predicted sides. No weight exceeds the median
 /// of the predicted sides: a jump of the predicted side would otherwise decide alone.
 fn median_slope(pairs: &[WindowPair]) -> f64 {
-    let most = median(pairs.iter().map(|p| p.predicted.abs()).collect());
+    let most = upper_median(pairs.iter().map(|p| p.predicted.abs())).unwrap_or_default();
     let moved = pairs.iter().filter(|p| p.predicted != 0.0);
     let mut slopes: Vec<(f64, f64)> = moved
         .map(|p| (p.measured / p.predicted, p.predicted.abs().min(most)))
@@ -215,11 +216,6 @@ fn median_slope(pairs: &[WindowPair]) -> f64 {
         }
     }
     f64::NAN
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
 /// Fits the windows without jumps; the misfit is that of `all` windows. `None` where a side is

@@ -5,6 +5,8 @@
 //! out where they stand. Where time jumps, back or far ahead, a new piece begins. [`super::merge`]
 //! decides what the jump means when all pieces are scanned.
 
+use crate::numerics::order_statistics::upper_median;
+
 /// Consecutive rows of one file, from the first time to the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
@@ -231,17 +233,8 @@ impl PieceScanner {
 
 /// Median step of times, s; zero where there are too few.
 fn median_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times
-        .windows(2)
-        .map(|p| p[1] - p[0])
-        .filter(|s| s.is_finite() && *s > 0.0)
-        .collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() {
-        0.0
-    } else {
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-    }
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
+    upper_median(steps.filter(|step| *step > 0.0)).unwrap_or(0.0)
 }
 
 #[cfg(test)]

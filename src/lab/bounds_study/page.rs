@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use crate::numerics::order_statistics::upper_median;
 use crate::tables::{CoverageRow, Residuals, StartRow, StartVariant, Weights};
 
 /// Criterion for the bias of a derivative: below this share of the scatter.
@@ -76,12 +77,6 @@ fn scenarios(coverage: &[CoverageRow]) -> Vec<(Residuals, Weights)> {
     found
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 /// Percentage of rows that satisfy a condition.
 fn share<'a>(
     rows: impl Iterator<Item = &'a CoverageRow> + Clone,
@@ -101,7 +96,7 @@ fn summary(coverage: &[CoverageRow]) -> String {
         let rows = coverage
             .iter()
             .filter(|r| r.residuals == residuals && r.weights == weights);
-        let of = |f: fn(&CoverageRow) -> f64| median(rows.clone().map(f));
+        let of = |f: fn(&CoverageRow) -> f64| upper_median(rows.clone().map(f)).unwrap_or(f64::NAN);
         let _ = writeln!(
             text,
             "| {residuals} | {weights} | {} | {:.2}, {:.1} % | {:.2}, {:.1} %, {:.1} % | {:.0} % | {:.0} % |",

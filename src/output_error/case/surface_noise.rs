@@ -7,6 +7,7 @@ use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::flight::signal;
+use crate::numerics::order_statistics::upper_median_of_magnitudes;
 
 /// Surface with noise on its measured deflection.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,18 +104,10 @@ fn samples_of(window: &Window, name: &str) -> Vec<f64> {
 /// the steps.
 fn white_variance(samples: &[f64]) -> f64 {
     const MEDIAN_OF_NORMAL: f64 = 0.674_49;
-    // Bit patterns of positive numbers have the order of the numbers and compare faster; infinity
-    // and NaN come last.
     let third_difference = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
     let mut sizes: Vec<u64> =
         Arch::new().dispatch(|| samples.windows(4).map(third_difference).collect());
-    let infinity = f64::INFINITY.to_bits();
-    let finite = sizes.iter().filter(|size| **size < infinity).count();
-    let median = if finite == 0 {
-        0.0
-    } else {
-        f64::from_bits(*sizes.select_nth_unstable(finite / 2).1)
-    };
+    let median = upper_median_of_magnitudes(&mut sizes).unwrap_or(0.0);
     (median / MEDIAN_OF_NORMAL).powi(2) / 20.0
 }
 

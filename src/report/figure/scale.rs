@@ -1,5 +1,6 @@
 //! Scale of one axis: round limits and ticks, not stretched by a few outliers.
 
+use crate::numerics::order_statistics::quantile;
 use crate::report::notation::power_of_ten;
 
 /// Limits at multiples of half a step, with ticks at the multiples of the step.
@@ -109,26 +110,10 @@ fn outlier_fence(values: &[f64]) -> Option<(f64, f64)> {
     if values.len() < LEAST_FOR_FENCE {
         return None;
     }
-    let low = quantile(values, 0.1)?;
-    let high = quantile(values, 0.9)?;
+    let low = quantile(values.iter().copied(), 0.1)?;
+    let high = quantile(values.iter().copied(), 0.9)?;
     let width = FENCE * (high - low);
     Some((low - width, high + width))
-}
-
-/// Quantile of the finite values, interpolated linearly.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a place within the list"
-)]
-#[must_use]
-pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let place = share * sorted.len().checked_sub(1)? as f64;
-    let below = *sorted.get(place.floor() as usize)?;
-    let above = *sorted.get(place.ceil() as usize)?;
-    Some(below + (above - below) * place.fract())
 }
 
 /// Smallest and largest finite value.
@@ -235,11 +220,5 @@ mod tests {
         .scale();
         assert!(scale.min.is_finite() && scale.max > scale.min);
         assert!(Scale::covering(f64::NAN, 1.0).max > 0.0);
-    }
-
-    #[test]
-    fn quantiles_are_linear_between_values() {
-        assert_relative_eq!(quantile(&[3.0, 1.0, 2.0], 0.25).expect("a quantile"), 1.5);
-        assert_eq!(quantile(&[f64::NAN], 0.5), None);
     }
 }

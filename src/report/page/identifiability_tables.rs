@@ -5,8 +5,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::maneuver::Status;
+use crate::numerics::order_statistics::quantile;
 use crate::report::contents::Contents;
-use crate::report::figure::scale::{extent, quantile};
+use crate::report::figure::scale::extent;
 use crate::report::notation::{NOTHING, fixed};
 use crate::report::table_view::TableView;
 use crate::tables::CorrelationKind;
@@ -221,7 +222,7 @@ fn rows_by_class(
 }
 
 fn median(values: &[f64]) -> String {
-    quantile(values, 0.5).map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0))
+    quantile(values.iter().copied(), 0.5).map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0))
 }
 
 /// Smallest to largest value: the sign of a correlation may differ between maneuvers.

@@ -1,8 +1,8 @@
 //! Quality of prediction by class and output: medians, and the maneuver predicted worst.
 
 use crate::aero::Output;
+use crate::numerics::order_statistics::quantile;
 use crate::report::contents::Contents;
-use crate::report::figure::scale::quantile;
 use crate::report::notation::{NOTHING, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::PredictionRow;
@@ -71,8 +71,7 @@ fn cells(class: &str, output: Output, predictions: &[&PredictionRow]) -> Vec<Str
 }
 
 fn median(predictions: &[&PredictionRow], value: fn(&PredictionRow) -> Option<f64>) -> Option<f64> {
-    let values: Vec<f64> = predictions.iter().filter_map(|p| value(p)).collect();
-    quantile(&values, 0.5)
+    quantile(predictions.iter().filter_map(|p| value(p)), 0.5)
 }
 
 fn percent(share: Option<f64>) -> String {

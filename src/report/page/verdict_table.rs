@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::derivative_results::DerivativeResults;
 use super::verdict_ranges;
 use crate::aero::Axis;
-use crate::report::figure::scale::{extent, quantile};
+use crate::numerics::order_statistics::quantile;
+use crate::report::figure::scale::extent;
 use crate::report::figure::verdict_bar;
 use crate::report::notation::{self, NOTHING, angle, number};
 
@@ -135,7 +136,7 @@ fn plus(value: f64) -> &'static str {
 fn typical_bound(derivative: &DerivativeResults) -> String {
     let bounds: Vec<f64> = derivative.points.iter().map(|p| p.bound).collect();
     let sizes: Vec<f64> = derivative.points.iter().map(|p| p.value.abs()).collect();
-    let (Some(bound), Some(size)) = (quantile(&bounds, 0.5), quantile(&sizes, 0.5)) else {
+    let (Some(bound), Some(size)) = (quantile(bounds, 0.5), quantile(sizes, 0.5)) else {
         return NOTHING.to_owned();
     };
     let percentage = 100.0 * bound / size;
