@@ -1,4 +1,4 @@
-//! The mean flight condition of a maneuver over its window, with missing samples left out.
+//! Mean flight condition of a maneuver over its window, without missing samples.
 
 use std::ops::RangeInclusive;
 
@@ -7,9 +7,10 @@ use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::units::DEG;
 
-use super::quality::{self, Limits};
+use super::quality;
+use super::settings::Limits;
 
-/// The signals that a flight condition is made of.
+/// Signals of a flight condition.
 pub(super) const SIGNALS: &[&str] = &[
     signal::ALPHA_VANE,
     signal::BETA_VANE,
@@ -26,11 +27,11 @@ pub(super) const SIGNALS: &[&str] = &[
     signal::Z_CG,
 ];
 
-/// The maneuver of a class in a window (s on the record's clock), cut at the record, with its
-/// quality. It was found if it is known by what.
+/// The maneuver of a class in a window (s on the record's clock), cut at the ends of the record,
+/// with its quality. Without `recognised` it is one that the analyst gave.
 ///
 /// # Errors
-/// What keeps its flight condition from being known, in words.
+/// The reason why the flight condition is not known, in words.
 pub(super) fn maneuver(
     record: &Record,
     aircraft: &Aircraft,
@@ -48,7 +49,7 @@ pub(super) fn maneuver(
     }
     let mean = |name: &str| mean(record, name, first..=last);
     let start_s = record.time_s(first);
-    let given = recognised.is_none();
+    let is_given = recognised.is_none();
     let mut maneuver = Maneuver {
         maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),
         flight_id: record.flight_id.clone(),
@@ -65,7 +66,7 @@ pub(super) fn maneuver(
         mass_slug: mean(signal::MASS)?,
         x_cg_ft: mean(signal::X_CG)?,
         samples: last - first + 1,
-        origin: if given {
+        origin: if is_given {
             ManeuverOrigin::Given
         } else {
             ManeuverOrigin::Found
@@ -73,7 +74,7 @@ pub(super) fn maneuver(
         recognised: recognised.unwrap_or_default(),
         quality: Quality::default(),
     };
-    maneuver.quality = quality::of(record, class, &maneuver, limits, given);
+    maneuver.quality = quality::measure(record, class, &maneuver, limits, is_given);
     Ok(maneuver)
 }
 
@@ -101,7 +102,7 @@ fn mean_alpha_deg(
 ) -> Option<f64> {
     let alpha = |k: usize| -> Option<f64> {
         let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied();
-        let read = Flow {
+        let at_vanes = Flow {
             alpha: at(signal::ALPHA_VANE)? / DEG,
             beta: at(signal::BETA_VANE)? / DEG,
             velocity: at(signal::VELOCITY)?,
@@ -116,7 +117,7 @@ fn mean_alpha_deg(
             y_ft: at(signal::Y_CG)?,
             z_ft: at(signal::Z_CG)?,
         };
-        Some(aircraft.sensors.flow_at_cg(&read, cg).alpha * DEG)
+        Some(aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG)
     };
     let alphas: Option<Vec<f64>> = window.by_ref().map(alpha).collect();
     finite_mean(alphas?.into_iter())

@@ -1,4 +1,4 @@
-//! The analyst's events: they take precedence over what was found, and are compared with it.
+//! Events that the analyst gives: they replace maneuvers found, and are compared with them.
 
 use crate::aircraft::Aircraft;
 use crate::error::did_you_mean;
@@ -6,20 +6,26 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Event, Maneuver};
 use crate::tables::{EventRow, EventVerdict};
 
-use super::quality::Limits;
-use super::{Segmented, condition, problem};
+use super::segmented::Segmented;
+use super::settings::Limits;
+use super::{condition, problems};
 
-/// Start and end of a found maneuver agree with a given event when both are within this, s.
+/// Difference up to which starts and ends of a found maneuver and an event agree, s: coarse enough
+/// for times that are read from a strip chart.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Replaces what was found by the events given for this flight where one covers more than half of
-/// the other, and says how they compare.
+/// Share of the shorter window from which an event replaces a maneuver: windows close together
+/// share what is between them, which is less than half of either.
+const REPLACING_SHARE: f64 = 0.5;
+
+/// Replaces maneuvers by the events given for this flight that cover more than half of one or lie
+/// in one by more than half; compares the two.
 ///
 /// An event of an unknown class or outside the record becomes a problem and replaces nothing.
-/// Without any event for any flight nothing is compared.
+/// Without events for any flight there is no comparison.
 #[must_use]
 pub fn with_events(
-    found: Segmented,
+    segmented: Segmented,
     record: &Record,
     events: &[Event],
     classes: &[Class],
@@ -27,48 +33,51 @@ pub fn with_events(
     limits: &Limits,
 ) -> (Segmented, Vec<EventRow>) {
     if events.is_empty() {
-        return (found, Vec::new());
+        return (segmented, Vec::new());
     }
     let Segmented {
         maneuvers: found,
         unknown,
         mut problems,
-    } = found;
+    } = segmented;
     let mut given = Vec::new();
     let mut rows = Vec::new();
     for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
-        match as_given(event, record, classes, aircraft, limits) {
+        match maneuver_of_event(event, record, classes, aircraft, limits) {
             Ok(maneuver) => {
-                rows.push(compared(Some(event), most_overlapping(event, &found)));
+                rows.push(compare(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
             }
-            Err(reason) => problems.push(problem(record, event.start_s, reason)),
+            Err(reason) => problems.push(problems::at_time(record, event.start_s, reason)),
         }
     }
-    // Windows close together share what is between them: an event replaces what it covers by more
-    // than half of either.
-    let shorter_s = |f: &Maneuver, g: &Maneuver| (f.end_s - f.start_s).min(g.end_s - g.start_s);
-    let covers =
-        |f: &Maneuver, g: &Maneuver| overlap_s(f, g.start_s, g.end_s) > 0.5 * shorter_s(f, g);
-    let is_replaced = |f: &Maneuver| given.iter().any(|g| covers(f, g));
-    let kept: Vec<Maneuver> = found.into_iter().filter(|f| !is_replaced(f)).collect();
-    rows.extend(kept.iter().map(|f| compared(None, Some(f))));
+    let kept: Vec<Maneuver> = found
+        .into_iter()
+        .filter(|f| !given.iter().any(|g| replaces(g, f)))
+        .collect();
+    rows.extend(kept.iter().map(|f| compare(None, Some(f))));
     let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();
     maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    let time = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
-    rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-    (
-        Segmented {
-            maneuvers,
-            unknown,
-            problems,
-        },
-        rows,
-    )
+    let time_s = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| time_s(a).total_cmp(&time_s(b)));
+    let segmented = Segmented {
+        maneuvers,
+        unknown,
+        problems,
+    };
+    (segmented, rows)
 }
 
-/// The maneuver that an event names, or why there is none.
-fn as_given(
+fn replaces(given: &Maneuver, found: &Maneuver) -> bool {
+    let shorter_s = (found.end_s - found.start_s).min(given.end_s - given.start_s);
+    overlap_s(found, given.start_s, given.end_s) > REPLACING_SHARE * shorter_s
+}
+
+/// The maneuver of an event.
+///
+/// # Errors
+/// The reason why there is none, in words.
+fn maneuver_of_event(
     event: &Event,
     record: &Record,
     classes: &[Class],
@@ -86,7 +95,7 @@ fn as_given(
         record.time_s(0),
         record.time_s(record.samples.saturating_sub(1)),
     );
-    // A half sample of rounding in the analyst's list is no mistake.
+    // Times in the analyst's list may be rounded by half a sample.
     let half = record.step_s / 2.0;
     let inside = first_s - half <= event.start_s
         && event.start_s < event.end_s
@@ -120,7 +129,7 @@ fn most_overlapping<'a>(event: &Event, found: &'a [Maneuver]) -> Option<&'a Mane
         .max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
 }
 
-fn compared(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
+fn compare(given: Option<&Event>, found: Option<&Maneuver>) -> EventRow {
     let verdict = match (given, found) {
         (Some(_), None) => EventVerdict::NotFound,
         (None, _) => EventVerdict::NotGiven,

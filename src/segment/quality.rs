@@ -1,66 +1,42 @@
-//! The quality of a maneuver before it is estimated: trimmed at the start, α held, one axis alone,
-//! above the noise, surfaces free of their stops, samples as recorded. What is beyond a limit is
+//! Quality of a maneuver before it is estimated: trimmed at the start, α held, one axis alone,
+//! above the noise, surfaces free of their stops, samples as recorded. A maneuver beyond a limit is
 //! rejected with the reason.
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
+use super::settings::{Actuator, Limits};
 use crate::aero::Axis;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 use crate::numerics::order_statistics::upper_median_in_place;
-use crate::settings::{elements, settings};
 
-settings! {
-    /// Stops and rate of a surface's actuator.
-    pub struct Actuator {
-        /// Lower stop, deg.
-        pub lower_deg: f64,
-        /// Upper stop, deg.
-        pub upper_deg: f64,
-        /// Highest rate, deg/s.
-        pub rate_deg_s: f64,
-    }
-}
-elements!(BTreeMap<String, Actuator>: Actuator as "<surface>");
+/// Time before the first input that is left out of the lead-in, s: the detector places a step within
+/// a few samples of the input's begin.
+const CLEAR_OF_INPUT_S: f64 = 0.1;
 
-settings! {
-    /// Limits beyond which a maneuver is not estimated.
-    pub struct Limits {
-        /// Largest motion in the lead-in over motion in the maneuver. Larger: maneuvers with
-        /// residual motion before their inputs pass, whose initial state dominates the derivatives.
-        pub lead_in_motion: f64 = 0.5,
-        /// Largest root mean square of alpha about its mean, deg. The default is the spacing of the
-        /// trends. Larger: maneuvers pass during which the derivatives are not constant.
-        pub alpha_rms_deg: f64 = 5.0,
-        /// Largest motion of the other axis over motion of the own axis. Larger: maneuvers pass that
-        /// the other axis's measured signals, with their errors, move.
-        pub other_axis: f64 = 1.0,
-        /// Smallest signal-to-noise ratio. Smaller: maneuvers pass whose response noise hides.
-        pub signal_to_noise: f64 = 5.0,
-        /// Largest share of the inputs' time that a surface is at a stop, where it excites nothing.
-        pub saturated_share: f64 = 0.5,
-        /// Largest share of the inputs' time that a surface moves at its actuator's rate, where it
-        /// follows no command. Its measured motion enters the equations, so less does no harm.
-        pub rate_limited_share: f64 = 0.8,
-        /// Largest share of flagged samples: bridged, despiked, missing or stuck. Segment applies it
-        /// to all signals of a maneuver, estimate to the outputs together and to each surface.
-        /// Larger: more maneuvers are estimated from repaired samples.
-        pub marked_share: f64 = 0.2,
-        /// Stops and rate of each surface's actuator, by signal. A surface without an entry is never
-        /// saturated or rate-limited.
-        pub actuators: BTreeMap<String, Actuator> = BTreeMap::new(),
-    }
-}
+/// Share of a surface's travel within which it counts as at its stop: larger than a sensor's error
+/// there, smaller than the margin of a commanded deflection.
+const AT_STOP: f64 = 0.01;
 
-/// The quality of a maneuver. What the analyst gave is measured, and accepted whatever the limits
-/// say: he has seen it.
-pub(super) fn of(
+/// Share of an actuator's rate from which it counts as at its full rate: it leaves room for the noise
+/// of a difference between two samples.
+const AT_FULL_RATE: f64 = 0.9;
+
+/// Fewest samples of a mean square about a line: two determine the line.
+const FEWEST_SAMPLES: f64 = 3.0;
+
+/// Standard deviation of a normal distribution over its median magnitude.
+const SIGMA_PER_MEDIAN: f64 = 1.4826;
+
+/// Measures the quality of a maneuver and judges it by the limits.
+///
+/// A maneuver that the analyst gave is accepted whatever its quality: it was inspected.
+pub(super) fn measure(
     record: &Record,
     class: &Class,
     maneuver: &Maneuver,
     limits: &Limits,
-    given: bool,
+    is_given: bool,
 ) -> Quality {
     let whole = record.sample_at(maneuver.start_s)..=record.sample_at(maneuver.end_s);
     let first_s = maneuver
@@ -71,25 +47,24 @@ pub(super) fn of(
         .recognised
         .last_input_s
         .unwrap_or(maneuver.end_s - class.recognition.decay_s);
-    // The detector places a step within a few samples; the input itself is no part of the lead-in.
-    let lead_in = *whole.start()..=record.sample_at(first_s - 0.1);
+    let lead_in = *whole.start()..=record.sample_at(first_s - CLEAR_OF_INPUT_S);
     let excited = record.sample_at(first_s)..=record.sample_at(last_s);
     let (own, other) = rates(class.axis);
-    let motion =
-        |signals: &[&str], part: &RangeInclusive<usize>, fit| motion(record, signals, part, fit);
-    let moved = motion(own, &whole, Fit::Line);
+    let moved = root_mean_square(record, own, &whole, About::Line);
+    let before = root_mean_square(record, own, &lead_in, About::Mean);
+    let other_moved = root_mean_square(record, other, &whole, About::Line);
     let measured = Quality {
-        lead_in_motion: ratio(motion(own, &lead_in, Fit::Mean), moved),
-        alpha_rms_deg: motion(&[signal::ALPHA_VANE], &whole, Fit::Mean),
-        other_axis: ratio(motion(other, &whole, Fit::Line), moved),
+        lead_in_motion: ratio(before, moved),
+        alpha_rms_deg: root_mean_square(record, &[signal::ALPHA_VANE], &whole, About::Mean),
+        other_axis: ratio(other_moved, moved),
         signal_to_noise: signal_to_noise(record, own, &whole),
-        saturated_share: worst(record, limits, &excited, at_a_stop),
-        rate_limited_share: worst(record, limits, &excited, at_full_rate),
-        marked_share: marked(record, class, maneuver),
+        saturated_share: largest_share(record, limits, &excited, is_at_stop),
+        rate_limited_share: largest_share(record, limits, &excited, is_at_full_rate),
+        marked_share: marked_share(record, class, maneuver),
         ..Quality::default()
     };
-    let reason = beyond(&measured, limits).join("; ");
-    let verdict = if reason.is_empty() || given {
+    let reason = reasons(&measured, limits).join("; ");
+    let verdict = if reason.is_empty() || is_given {
         Acceptance::Accepted
     } else {
         Acceptance::Rejected
@@ -101,7 +76,7 @@ pub(super) fn of(
     }
 }
 
-/// The angular rates of an axis, and of the other.
+/// The angular rates of an axis and of the other axis.
 fn rates(axis: Axis) -> (&'static [&'static str], &'static [&'static str]) {
     let (pitch, roll_and_yaw) = (&[signal::Q][..], &[signal::P, signal::R][..]);
     match axis {
@@ -110,55 +85,57 @@ fn rates(axis: Axis) -> (&'static [&'static str], &'static [&'static str]) {
     }
 }
 
-/// What is beyond its limit, in words.
-fn beyond(q: &Quality, limits: &Limits) -> Vec<String> {
-    let mut reasons = Vec::new();
-    let mut more = |value: Option<f64>, limit: f64, words: &dyn Fn(f64) -> String| {
-        reasons.extend(
-            value
-                .filter(|v| *v > limit)
-                .map(|v| format!("{} (limit {limit})", words(v))),
-        );
-    };
-    more(q.lead_in_motion, limits.lead_in_motion, &|v| {
-        format!(
-            "not trimmed at the start: it moves {v:.2} times as much before the first input as in the maneuver"
-        )
-    });
-    more(q.alpha_rms_deg, limits.alpha_rms_deg, &|v| {
-        format!("α strays by {v:.1} deg root mean square")
-    });
-    more(q.other_axis, limits.other_axis, &|v| {
-        format!("the other axis moves {v:.2} times as much as its own")
-    });
-    more(q.saturated_share, limits.saturated_share, &|v| {
-        format!(
-            "a surface rests at its stop for {:.0}% of the inputs",
-            100.0 * v
-        )
-    });
-    more(q.rate_limited_share, limits.rate_limited_share, &|v| {
-        format!(
-            "a surface moves at its actuator's full rate for {:.0}% of the inputs",
-            100.0 * v
-        )
-    });
-    more(q.marked_share, limits.marked_share, &|v| {
-        format!("{:.0}% of its samples are marked", 100.0 * v)
-    });
-    if let Some(v) = q.signal_to_noise.filter(|v| *v < limits.signal_to_noise) {
+/// A measure, its upper limit, and the reason for which a value beyond it rejects.
+type UpperLimit = (Option<f64>, f64, fn(f64) -> String);
+
+/// The reason for each measure beyond its limit, in words.
+fn reasons(q: &Quality, limits: &Limits) -> Vec<String> {
+    let upper: [UpperLimit; 6] = [
+        (q.lead_in_motion, limits.lead_in_motion, |v| {
+            format!(
+                "not trimmed at the start: it moves {v:.2} times as much before the first input \
+                 as in the maneuver"
+            )
+        }),
+        (q.alpha_rms_deg, limits.alpha_rms_deg, |v| {
+            format!("α strays by {v:.1} deg root mean square")
+        }),
+        (q.other_axis, limits.other_axis, |v| {
+            format!("the other axis moves {v:.2} times as much as its own")
+        }),
+        (q.saturated_share, limits.saturated_share, |v| {
+            let percent = 100.0 * v;
+            format!("a surface rests at its stop for {percent:.0}% of the inputs")
+        }),
+        (q.rate_limited_share, limits.rate_limited_share, |v| {
+            let percent = 100.0 * v;
+            format!("a surface moves at its actuator's full rate for {percent:.0}% of the inputs")
+        }),
+        (q.marked_share, limits.marked_share, |v| {
+            format!("{:.0}% of its samples are marked", 100.0 * v)
+        }),
+    ];
+    let mut reasons: Vec<String> = upper
+        .iter()
+        .filter_map(|(value, limit, words)| {
+            let value = value.filter(|v| v > limit)?;
+            Some(format!("{} (limit {limit})", words(value)))
+        })
+        .collect();
+    let limit = limits.signal_to_noise;
+    if let Some(v) = q.signal_to_noise.filter(|v| *v < limit) {
         reasons.push(format!(
-            "the response is {v:.1} times its noise (limit {})",
-            limits.signal_to_noise
+            "the response is {v:.1} times its noise (limit {limit})"
         ));
     }
     reasons
 }
 
+/// Reference of a mean square.
 #[derive(Clone, Copy)]
-enum Fit {
+enum About {
     Mean,
-    /// A slow turn or a drift is no motion.
+    /// A straight line: a slow turn or a drift is no motion.
     Line,
 }
 
@@ -166,52 +143,54 @@ fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.zip(b).filter(|(_, b)| *b > 0.0).map(|(a, b)| a / b)
 }
 
-/// Root of the sum of the mean squares of signals about their mean or a straight line.
-fn motion(
+/// Root of the sum of the mean squares of signals.
+fn root_mean_square(
     record: &Record,
     signals: &[&str],
     part: &RangeInclusive<usize>,
-    fit: Fit,
+    about: About,
 ) -> Option<f64> {
     let squares: Option<Vec<f64>> = signals
         .iter()
-        .map(|s| mean_square(record.values(s)?.get(part.clone())?, fit))
+        .map(|s| mean_square(record.values(s)?.get(part.clone())?, about))
         .collect();
     squares.map(|s| s.iter().sum::<f64>().sqrt())
 }
 
-fn mean_square(values: &[f64], fit: Fit) -> Option<f64> {
-    let known: Vec<(f64, f64)> = values
+fn mean_square(values: &[f64], about: About) -> Option<f64> {
+    let finite: Vec<(f64, f64)> = values
         .iter()
         .enumerate()
         .filter(|(_, v)| v.is_finite())
         .map(|(k, v)| (k as f64, *v))
         .collect();
-    let n = known.len() as f64;
-    if n < 3.0 {
+    let n = finite.len() as f64;
+    if n < FEWEST_SAMPLES {
         return None;
     }
     let (time, mean) = (
-        known.iter().map(|k| k.0).sum::<f64>() / n,
-        known.iter().map(|k| k.1).sum::<f64>() / n,
+        finite.iter().map(|v| v.0).sum::<f64>() / n,
+        finite.iter().map(|v| v.1).sum::<f64>() / n,
     );
-    let slope = match fit {
-        Fit::Mean => 0.0,
-        Fit::Line => {
-            let (xy, xx) = known.iter().fold((0.0, 0.0), |(xy, xx), (t, v)| {
+    let slope = match about {
+        About::Mean => 0.0,
+        About::Line => {
+            let (xy, xx) = finite.iter().fold((0.0, 0.0), |(xy, xx), (t, v)| {
                 (xy + (t - time) * (v - mean), xx + (t - time) * (t - time))
             });
             xy / xx
         }
     };
     let residual = |(t, v): &(f64, f64)| v - mean - slope * (t - time);
-    Some(known.iter().map(|k| residual(k).powi(2)).sum::<f64>() / n)
+    Some(finite.iter().map(|v| residual(v).powi(2)).sum::<f64>() / n)
 }
 
-/// The rate with the most signal over noise. Noise is what does not continue from sample to sample:
-/// the median of second differences, of which motion at the aircraft's frequencies makes nothing.
+/// The largest ratio of signal to noise among some signals.
+///
+/// Noise is taken from the median of second differences from sample to sample, to which motion at
+/// the aircraft's frequencies contributes almost nothing.
 fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usize>) -> Option<f64> {
-    let of = |name: &&str| -> Option<f64> {
+    let of_signal = |name: &&str| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
         let second = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]).abs();
         let mut differences: Vec<f64> = values
@@ -223,20 +202,20 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
             return None;
         }
         // Second differences of white noise have six times its variance.
-        let noise = 1.4826 * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
-        ratio(Some(mean_square(values, Fit::Line)?.sqrt()), Some(noise))
+        let noise = SIGMA_PER_MEDIAN * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
+        ratio(Some(mean_square(values, About::Line)?.sqrt()), Some(noise))
     };
-    signals.iter().filter_map(of).max_by(f64::total_cmp)
+    signals.iter().filter_map(of_signal).max_by(f64::total_cmp)
 }
 
-/// The largest share of samples of a surface for which something holds.
-fn worst(
+/// The largest share of samples of a surface for which a condition holds.
+fn largest_share(
     record: &Record,
     limits: &Limits,
     part: &RangeInclusive<usize>,
     holds: fn(&Actuator, &[f64], f64) -> bool,
 ) -> Option<f64> {
-    let of = |(name, actuator): (&String, &Actuator)| -> Option<f64> {
+    let of_surface = |(name, actuator): (&String, &Actuator)| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
         let pairs = values
             .windows(2)
@@ -249,28 +228,26 @@ fn worst(
     limits
         .actuators
         .iter()
-        .filter_map(of)
+        .filter_map(of_surface)
         .max_by(f64::total_cmp)
 }
 
-/// Within a hundredth of its travel of a stop.
-fn at_a_stop(actuator: &Actuator, values: &[f64], _step_s: f64) -> bool {
-    let near = 0.01 * (actuator.upper_deg - actuator.lower_deg);
+fn is_at_stop(actuator: &Actuator, values: &[f64], _step_s: f64) -> bool {
+    let near = AT_STOP * (actuator.upper_deg - actuator.lower_deg);
     values
         .iter()
         .all(|v| *v <= actuator.lower_deg + near || *v >= actuator.upper_deg - near)
 }
 
-/// At nine tenths of its rate or more.
-fn at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
+fn is_at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
     values
         .windows(2)
-        .all(|w| (w[1] - w[0]).abs() >= 0.9 * actuator.rate_deg_s * step_s)
+        .all(|w| (w[1] - w[0]).abs() >= AT_FULL_RATE * actuator.rate_deg_s * step_s)
 }
 
-/// Share of samples with which something went wrong, among those of the axis's outputs and the
-/// class's inputs that are recorded.
-fn marked(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
+/// Share of marked samples among those of the axis's outputs and the class's inputs that are
+/// recorded.
+fn marked_share(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
     let outputs = class.axis.outputs();
     let names = outputs
         .iter()

@@ -1,5 +1,7 @@
 //! Segment on synthetic records: each kind of maneuver, what is none, and the analyst's events.
 
+use std::collections::BTreeMap;
+
 use approx::assert_abs_diff_eq;
 
 use super::*;
@@ -8,7 +10,7 @@ use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
 use crate::maneuver::Quality;
-use crate::maneuver::{Acceptance, Event, Pulses, Recognition, StepCount, Sweep};
+use crate::maneuver::{Acceptance, Event, Maneuver, Pulses, Recognition, StepCount, Sweep};
 use crate::tables::EventVerdict;
 
 const STEP_S: f64 = 0.025;
@@ -275,7 +277,7 @@ fn assert_window(m: &Maneuver, class: &str, start_s: f64, end_s: f64) {
     assert_abs_diff_eq!(m.end_s, end_s, epsilon = 0.2);
 }
 
-fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
+fn assert_only(record: &Record, class: &str, start_s: f64, end_s: f64) {
     let segmented = found(record);
     assert_eq!(
         (&segmented.problems[..], &segmented.unknown[..]),
@@ -285,7 +287,7 @@ fn assert_one(record: &Record, class: &str, start_s: f64, end_s: f64) {
     assert_window(&segmented.maneuvers[0], class, start_s, end_s);
 }
 
-/// Noise that feedback makes of turbulence: white noise through two lags of 0.15 s, of the given
+/// Surface motion from feedback in turbulence: white noise through two lags of 0.15 s, of the given
 /// standard deviation.
 fn turbulence(record: &mut Record, name: &str, seed: u64, deviation: f64) {
     let mut state = seed;
@@ -322,7 +324,7 @@ fn doublets_of_surfaces_are_found_with_their_window_and_condition() {
     up(&mut r, "obes", 20.0, 40.0);
     doublet(&mut r, "dsa_deg", 21.0, 5.0);
     doublet(&mut r, "de_deg", 26.0, -4.0);
-    assert_one(&r, "DOUBLETS", 20.0, 29.5);
+    assert_only(&r, "DOUBLETS", 20.0, 29.5);
     let m = &found(&r).maneuvers[0];
     assert_eq!(
         (m.maneuver_id.as_str(), m.origin.name()),
@@ -347,21 +349,21 @@ fn doublets_of_surfaces_are_found_with_their_window_and_condition() {
 }
 
 #[test]
-fn lengths_of_pulses_tell_a_3_2_1_1_with_its_unit_from_a_series() {
+fn a_3_2_1_1_and_a_series_are_separated_by_lengths_of_pulses() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    assert_one(&r, "3211", 20.0, 32.5);
+    assert_only(&r, "3211", 20.0, 32.5);
     let evidence = found(&r).maneuvers[0].recognised.evidence.clone();
     assert!(evidence.contains("pulses of 1.00 s the unit"), "{evidence}");
 
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     let last_s = pilot_steps(&mut r, "de_deg", 21.0, 4.0, 10, 0.9);
-    assert_one(&r, "SERIES", 20.0, last_s + 1.5);
+    assert_only(&r, "SERIES", 20.0, last_s + 1.5);
 }
 
-/// A maneuver of the on-board system with the flag as given, and the flag's verdict.
+/// A record of two maneuvers of the on-board system with the flag as given, segmented.
 fn with_flag(flag: impl Fn(&mut Record)) -> Segmented {
     let mut r = flight(120);
     three_two_one_one(&mut r, 21.0);
@@ -418,7 +420,7 @@ fn a_flag_that_is_stuck_up_makes_no_maneuver_of_ordinary_flying() {
     put(&mut r, "obes", |_| 1.0);
     put(&mut r, "tvcs", |_| 1.0);
     let last_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.8);
-    assert_one(&r, "PITCH", 19.0, last_s + 2.5);
+    assert_only(&r, "PITCH", 19.0, last_s + 2.5);
     let evidence = &found(&r).maneuvers[0].recognised.evidence;
     assert!(
         evidence.contains("although obes is up; although tvcs is up; dpv_deg rests"),
@@ -427,7 +429,7 @@ fn a_flag_that_is_stuck_up_makes_no_maneuver_of_ordinary_flying() {
 }
 
 #[test]
-fn vanes_that_move_tell_the_class_whatever_the_flag_says() {
+fn moving_vanes_decide_the_class_whatever_the_flag() {
     for (tvcs, moves, class) in [
         (0.0, false, "PITCH"),
         (1.0, true, "PITCH_TV"),
@@ -441,14 +443,14 @@ fn vanes_that_move_tell_the_class_whatever_the_flag_says() {
         if moves {
             pilot_steps(&mut r, "dpv_deg", 20.05, 4.0, 8, 1.8);
         }
-        assert_one(&r, class, 19.0, last_s + 2.5);
+        assert_only(&r, class, 19.0, last_s + 2.5);
         let followed = if moves { "de_deg, dpv_deg" } else { "de_deg" };
         assert_eq!(found(&r).maneuvers[0].recognised.followed, followed);
     }
 }
 
 #[test]
-fn where_no_vane_is_recorded_the_flag_decides_and_without_both_nothing_does() {
+fn without_a_recorded_vane_the_flag_decides_and_without_both_nothing_does() {
     for (tvcs, class) in [(0.0, "PITCH"), (1.0, "PITCH_TV")] {
         let mut r = flight(60);
         r.signals.remove("dpv_deg");
@@ -478,7 +480,7 @@ fn pedal_then_stick_is_one_maneuver_and_the_recovery_is_left_out() {
         "stick_lat_in",
         &[(last_s + 2.5, 1.7), (last_s + 4.0, -1.7)],
     );
-    assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.4);
+    assert_only(&r, "YAW_ROLL", 19.0, last_s + 2.4);
 }
 
 #[test]
@@ -488,7 +490,7 @@ fn a_window_ends_where_the_pilot_takes_over() {
     up(&mut r, "obes", 20.0, 30.0);
     edges(&mut r, "stick_pitch_in", &[(30.0, -2.0), (31.0, 2.0)]);
     edges(&mut r, "de_deg", &[(30.1, 6.0), (31.1, -6.0)]);
-    assert_one(&r, "3211", 20.0, 29.9);
+    assert_only(&r, "3211", 20.0, 29.9);
 }
 
 #[test]
@@ -513,7 +515,7 @@ fn surfaces_that_follow_the_stick_and_ordinary_flying_are_no_maneuvers() {
 }
 
 #[test]
-fn excitation_that_fits_no_class_is_unknown_with_its_times_and_the_reason() {
+fn excitation_that_fits_no_class_is_unknown_with_times_and_reason() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 30.0);
     doublet(&mut r, "de_deg", 21.0, 5.0);
@@ -612,7 +614,7 @@ fn missing_samples_do_not_cut_a_maneuver() {
             series.values[k] = f64::NAN;
         }
     }
-    assert_one(&r, "3211", 20.0, 32.5);
+    assert_only(&r, "3211", 20.0, 32.5);
 }
 
 #[test]
@@ -682,13 +684,12 @@ fn doublets_of_one_surface_after_another_are_one_maneuver_in_one_round_or_in_two
         for (at, name) in [20.0, 23.2, 26.4, 29.6].into_iter().zip(order) {
             doublet(&mut r, name, at, 5.0);
         }
-        assert_one(&r, "DOUBLETS", 19.0, 33.1);
+        assert_only(&r, "DOUBLETS", 19.0, 33.1);
     }
 }
 
 #[test]
-fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_and_a_late_one_does_not()
- {
+fn a_flag_gap_between_two_rounds_of_doublets_parts_them_unless_the_flag_is_late() {
     for (late_s, classes) in [(0.0, &["DOUBLETS", "DOUBLETS"][..]), (3.0, &["DOUBLETS"])] {
         let mut r = flight(60);
         for (at, name) in [20.0, 23.2, 28.6, 31.8]
@@ -706,7 +707,7 @@ fn a_flag_that_rests_between_two_rounds_of_doublets_makes_two_maneuvers_of_them_
 }
 
 #[test]
-fn a_series_flown_again_after_its_decay_is_cut_there_and_not_where_its_surface_passes_trim() {
+fn a_repeated_series_is_cut_at_its_decay_and_not_where_the_surface_passes_trim() {
     let mut r = flight(90);
     // A series that is held at trim in its midst, and ends away from where it began by what
     // feedback leaves of it.
@@ -732,8 +733,7 @@ fn a_series_flown_again_after_its_decay_is_cut_there_and_not_where_its_surface_p
 }
 
 #[test]
-fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_control_is_at_trim()
-{
+fn pilot_maneuvers_without_a_pause_are_cut_where_the_control_is_at_trim() {
     let mut r = flight(90);
     let first_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 7, 1.4);
     let second_s = pilot_steps(&mut r, "stick_pitch_in", first_s + 1.0, 1.5, 7, 1.4);
@@ -759,7 +759,7 @@ fn pilot_steps_that_follow_each_other_faster_than_a_step_is_held_part_where_the_
 }
 
 #[test]
-fn of_a_pause_too_short_for_both_the_lead_in_has_the_greater_part() {
+fn a_pause_too_short_for_decay_and_lead_in_goes_mostly_to_the_lead_in() {
     let mut r = flight(60);
     three_two_one_one(&mut r, 21.0);
     three_two_one_one(&mut r, 29.0);
@@ -775,7 +775,7 @@ fn the_pilot_may_rest_when_he_goes_over_from_one_control_to_another_but_not_to_t
     let mut r = flight(60);
     let pedal_s = pilot_steps(&mut r, "pedal_in", 20.0, 1.5, 3, 1.2);
     let last_s = pilot_steps(&mut r, "stick_lat_in", pedal_s + 2.6, -1.5, 3, 1.2);
-    assert_one(&r, "YAW_ROLL", 19.0, last_s + 2.5);
+    assert_only(&r, "YAW_ROLL", 19.0, last_s + 2.5);
     // Steps broken off, and what the pilot recovers with: together as many as a maneuver has.
     let mut r = flight(60);
     let broken_off_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 3, 1.2);
@@ -784,7 +784,7 @@ fn the_pilot_may_rest_when_he_goes_over_from_one_control_to_another_but_not_to_t
 }
 
 #[test]
-fn the_flag_tells_the_system_s_first_input_from_an_answer_to_the_pilot_s_last() {
+fn the_flag_separates_the_system_s_first_input_from_feedback_to_the_pilot_s_last() {
     let mut r = flight(60);
     let last_s = pilot_steps(&mut r, "stick_pitch_in", 10.0, 1.5, 7, 1.2);
     three_two_one_one(&mut r, last_s + 0.8);
@@ -814,7 +814,7 @@ fn a_maneuver_against_a_turn_has_the_same_window() {
     }
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
-    assert_one(&r, "3211", 20.0, 32.5);
+    assert_only(&r, "3211", 20.0, 32.5);
     let last_s = pilot_steps(&mut r, "stick_pitch_in", 42.0, 1.5, 7, 1.2);
     let segmented = found(&r);
     assert_eq!(classes_of(&segmented), ["3211", "PITCH"]);
@@ -838,9 +838,9 @@ fn steps_back_to_a_trim_that_drifted_in_a_turn_belong_to_the_maneuver() {
 fn a_doublet_that_may_go_with_a_series_belongs_to_it() {
     let mut r = flight(60);
     let last_s = pilot_steps(&mut r, "de_deg", 20.0, 5.0, 10, 0.8);
-    assert_one(&r, "SERIES", 19.0, last_s + 1.5);
+    assert_only(&r, "SERIES", 19.0, last_s + 1.5);
     doublet(&mut r, "dpv_deg", last_s + 1.2, 5.0);
-    assert_one(&r, "SERIES", 19.0, last_s + 3.2 + 1.5);
+    assert_only(&r, "SERIES", 19.0, last_s + 3.2 + 1.5);
 }
 
 #[test]
@@ -884,7 +884,7 @@ fn a_maneuver_that_the_record_cuts_is_unknown() {
 }
 
 #[test]
-fn a_record_without_a_signal_says_which_classes_suffer_and_segments_the_rest() {
+fn a_missing_signal_is_a_problem_and_the_rest_is_segmented() {
     let mut r = flight(60);
     pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 8, 1.5);
     r.signals.remove("dsa_deg");
@@ -904,7 +904,7 @@ fn a_record_without_a_signal_says_which_classes_suffer_and_segments_the_rest() {
 }
 
 #[test]
-fn without_pilot_controls_only_a_flag_tells_who_moved_the_surfaces() {
+fn without_pilot_controls_only_a_flag_attributes_steps_to_the_system() {
     let mut r = flight(60);
     three_two_one_one(&mut r, 21.0);
     for name in ["stick_pitch_in", "stick_lat_in", "pedal_in"] {
@@ -1087,7 +1087,7 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
     let mut limited = settings();
-    let of = |lower_deg, rate_deg_s| quality::Actuator {
+    let of = |lower_deg, rate_deg_s| Actuator {
         lower_deg,
         upper_deg: 40.0,
         rate_deg_s,
@@ -1114,7 +1114,7 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
     );
     limited.quality.saturated_share = 0.1;
     assert!(measured(&limited).reason.contains("rests at its stop"));
-    limited.quality = quality::Limits::default();
+    limited.quality = Limits::default();
     limited
         .quality
         .actuators
@@ -1129,7 +1129,7 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
 }
 
 #[test]
-fn what_the_analyst_gave_is_measured_and_never_rejected() {
+fn a_given_maneuver_is_measured_and_never_rejected() {
     let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
     three_two_one_one(&mut r, 21.0);
@@ -1202,13 +1202,13 @@ fn events_replace_what_overlaps_and_are_compared_with_it() {
         &settings().quality,
     );
     assert_eq!(segmented.problems, []);
-    let said: Vec<(&str, &str)> = segmented
+    let origins: Vec<(&str, &str)> = segmented
         .maneuvers
         .iter()
         .map(|m| (m.class.as_str(), m.origin.name()))
         .collect();
     assert_eq!(
-        said,
+        origins,
         [
             ("3211", "given"),
             ("SERIES", "given"),

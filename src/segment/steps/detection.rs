@@ -1,65 +1,36 @@
-//! Steps of a signal: a change between two levels, averaged shortly before and shortly after it,
-//! that is beyond the smallest step.
+//! Detection of steps: a step is a fast, lasting change between two levels of a signal.
 //!
-//! At each time t the level before is averaged over [t − transit/2 − level, t − transit/2], the
-//! level after over [t + transit/2, t + transit/2 + level]. A run of times at which their
-//! difference has one sign and exceeds the smallest step is one step, at the middle of the run's
-//! near-maximum. What this sees and what it does not:
-//! - the trim does not matter, only the change;
-//! - smooth motion counts only where it is as fast as an actuator: it must cross the smallest step within
-//!   transit + level;
-//! - chatter from sample to sample averages out, so ordinary stick activity leaves no steps;
-//! - a level leaves out its largest and smallest sample, so one spike that ingest did not find makes no step;
-//! - NaN samples are skipped; a level of fewer than half its samples does not exist, and neither does a step there.
+//! At each time t the level before is the mean over [t − transit/2 − level, t − transit/2]. The
+//! level after is the mean over [t + transit/2, t + transit/2 + level]. A run of times at which
+//! their difference keeps its sign and exceeds the smallest step is one step. Its time is the
+//! middle of the run's near-maximum.
+//!
+//! - The trim has no influence, only the change has.
+//! - Smooth motion counts where it is as fast as an actuator: it must cross the smallest step within
+//!   transit + level.
+//! - Chatter from sample to sample averages out, so ordinary stick activity leaves no steps.
+//! - A level leaves out its largest and smallest sample, so a spike that ingest missed makes no step.
+//! - NaN samples are skipped. A level of fewer than half its samples does not exist, and neither does
+//!   a step there.
 
-use std::collections::BTreeMap;
-
+use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
 use crate::numerics::order_statistics::upper_median_in_place;
+use crate::segment::settings::Settings;
 
-use super::Settings;
+/// Share of a run's largest change from which its changes form the near-maximum. The flat top of a
+/// step keeps 5 % of slope and noise; a lower share would shift the middle of a skewed step.
+const NEAR_MAXIMUM: f64 = 0.95;
 
-/// One step of one signal: when (s on the record's clock), from which level to which.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    pub time_s: f64,
-    pub before: f64,
-    pub after: f64,
-}
+/// Standard deviation of a normal distribution over its median magnitude.
+const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
-impl Step {
-    #[must_use]
-    pub fn change(&self) -> f64 {
-        self.after - self.before
-    }
-}
-
-/// The steps of a record by signal, each in order of time, and the smallest change that counts as
-/// one.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Steps {
-    pub of: BTreeMap<String, Vec<Step>>,
-    pub smallest: BTreeMap<String, f64>,
-    /// The standard deviation of the signal's own changes, where turbulence has raised its smallest
-    /// step; else 0.
-    pub noise: BTreeMap<String, f64>,
-}
-
-impl Steps {
-    /// The steps of a signal from one time to another.
-    pub fn between(&self, signal: &str, from_s: f64, to_s: f64) -> &[Step] {
-        let steps = self.of.get(signal).map_or(&[][..], Vec::as_slice);
-        let first = steps.partition_point(|s| s.time_s < from_s);
-        let end = steps.partition_point(|s| s.time_s <= to_s);
-        steps.get(first..end.max(first)).unwrap_or_default()
-    }
-}
-
-/// The steps of every signal that has a smallest step and is in the record, and the deflections:
-/// those and all changes of at least the deflection's share of the smallest step. The smallest step
-/// is the one set, or the noise of the signal's own changes times `steps_over_noise` where that is
-/// larger: a surface that works in turbulence.
-pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) {
+/// Detects the steps and the deflections of every signal that has a smallest step.
+///
+/// The smallest step is the one in the settings, or `steps_over_noise` times the noise of the
+/// signal's own changes where that is larger: feedback moves a surface in turbulence. Deflections
+/// are all changes of at least `deflection_share` of the smallest step; every step is one.
+pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
     for (signal, set) in &settings.steps {
@@ -67,37 +38,43 @@ pub(super) fn of_record(record: &Record, settings: &Settings) -> (Steps, Steps) 
             continue;
         };
         let levels = levels(values, window.level);
-        let noise = noise(&levels, window);
-        let smallest = set.max(settings.steps_over_noise * noise);
-        let raised = if smallest > *set { noise } else { 0.0 };
-        for (kept, size) in [
-            (&mut steps, smallest),
-            (&mut deflections, settings.deflection_share * smallest),
-        ] {
-            let mut found = of_levels(&levels, size, window);
-            for step in &mut found {
-                step.time_s = record.start_s + step.time_s * record.step_s;
-            }
-            kept.of.insert(signal.clone(), found);
-            kept.smallest.insert(signal.clone(), size);
-            kept.noise.insert(signal.clone(), raised);
-        }
+        let own_noise = noise(&levels, window);
+        let smallest = set.max(settings.steps_over_noise * own_noise);
+        let noise = if smallest > *set { own_noise } else { 0.0 };
+        let larger_than = |smallest: f64| SignalSteps {
+            steps: on_record_clock(steps_of_levels(&levels, smallest, window), record),
+            smallest,
+            noise,
+        };
+        let smallest_deflection = settings.deflection_share * smallest;
+        steps
+            .by_signal
+            .insert(signal.clone(), larger_than(smallest));
+        deflections
+            .by_signal
+            .insert(signal.clone(), larger_than(smallest_deflection));
     }
     (steps, deflections)
 }
 
-/// The largest change of a signal, between levels as those of a step, from one time to another; 0
-/// where nothing is known.
-pub(super) fn largest_change(
+/// Converts the times of steps from samples to s on the record's clock.
+fn on_record_clock(mut steps: Vec<Step>, record: &Record) -> Vec<Step> {
+    for step in &mut steps {
+        step.time_s = record.start_s + step.time_s * record.step_s;
+    }
+    steps
+}
+
+/// Largest change between levels of a signal from one time to another; 0 without samples.
+pub(in crate::segment) fn largest_change(
     record: &Record,
     signal: &str,
     settings: &Settings,
     (from_s, to_s): (f64, f64),
 ) -> f64 {
     let window = Window::of(record, settings);
-    let reach = window.half_transit + window.level;
-    let first = record.sample_at(from_s).saturating_sub(reach);
-    let end = (record.sample_at(to_s) + reach).min(record.samples);
+    let first = record.sample_at(from_s).saturating_sub(window.reach());
+    let end = (record.sample_at(to_s) + window.reach()).min(record.samples);
     let values = record
         .values(signal)
         .and_then(|v| v.get(first..end))
@@ -107,8 +84,7 @@ pub(super) fn largest_change(
         .fold(0.0, f64::max)
 }
 
-/// The standard deviation of changes that nobody commanded: from the median of all, of which steps
-/// are few.
+/// Standard deviation of uncommanded changes, from the median size of all changes: steps are few.
 fn noise(levels: &[f64], window: Window) -> f64 {
     let mut sizes: Vec<f64> = changes(levels, window)
         .map(|change| change.size())
@@ -116,10 +92,10 @@ fn noise(levels: &[f64], window: Window) -> f64 {
     if sizes.len() < 2 {
         return 0.0;
     }
-    1.4826 * upper_median_in_place(&mut sizes).unwrap_or(0.0)
+    SIGMA_PER_MEDIAN * upper_median_in_place(&mut sizes).unwrap_or(0.0)
 }
 
-/// A time in whole samples, at least one.
+/// Converts a time to whole samples, at least one.
 fn samples(time_s: f64, step_s: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
@@ -144,29 +120,38 @@ impl Window {
             level: samples(settings.level_s, record.step_s),
         }
     }
+
+    /// Samples on one side of a time that the detector looks at.
+    fn reach(self) -> usize {
+        self.half_transit + self.level
+    }
 }
 
-/// The level before and the level after a time, in samples.
+/// The levels before and after a time, in samples.
 #[derive(Clone, Copy, Debug)]
-struct Change {
+struct LevelChange {
     at: usize,
     before: f64,
     after: f64,
 }
 
-impl Change {
+impl LevelChange {
+    fn signed(&self) -> f64 {
+        self.after - self.before
+    }
+
     fn size(&self) -> f64 {
-        (self.after - self.before).abs()
+        self.signed().abs()
     }
 }
 
-/// The changes between levels at each time at which both exist.
-fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = Change> {
-    let reach = window.half_transit + window.level;
+/// The changes between levels at each time at which both levels exist.
+fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = LevelChange> {
+    let reach = window.reach();
     let after = levels
         .get(reach + window.half_transit..)
         .unwrap_or_default();
-    let change = move |(k, (before, after)): (usize, (&f64, &f64))| Change {
+    let change = move |(k, (before, after)): (usize, (&f64, &f64))| LevelChange {
         at: k + reach,
         before: *before,
         after: *after,
@@ -179,46 +164,50 @@ fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = Change> {
         .filter(|change| change.size().is_finite())
 }
 
-/// The steps among the changes between levels, their times in samples (a step between samples 9 and
-/// 10 is at 9.5).
-fn of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
-    let reach = window.half_transit + window.level;
+/// Finds the steps among the changes between levels, times in samples: a step between samples 9
+/// and 10 is at 9.5.
+///
+/// Where a level is missing a run neither goes on nor ends, unless the gap is longer than a step.
+fn steps_of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
     let mut steps = Vec::new();
-    let mut run: Vec<Change> = Vec::new();
-    // Where a level is missing the run neither goes on nor ends, unless the gap is longer than a
-    // step.
+    let mut run: Vec<LevelChange> = Vec::new();
     for change in changes(levels, window) {
-        let big = change.size() >= smallest;
-        let goes_on = |last: &Change| {
-            big && (change.after - change.before) * (last.after - last.before) > 0.0
-                && change.at - last.at <= reach
+        let is_large = change.size() >= smallest;
+        let continues = |last: &LevelChange| {
+            is_large
+                && change.signed() * last.signed() > 0.0
+                && change.at - last.at <= window.reach()
         };
-        if !run.last().is_none_or(goes_on) {
-            steps.extend(peak(&run));
+        if !run.last().is_none_or(continues) {
+            steps.extend(step_of_run(&run));
             run.clear();
         }
-        if big {
+        if is_large {
             run.push(change);
         }
     }
-    steps.extend(peak(&run));
+    steps.extend(step_of_run(&run));
     steps
 }
 
-/// The one step of a run: where the change is within 5% of its maximum, in the middle.
-fn peak(run: &[Change]) -> Option<Step> {
+/// The step of a run, at the middle of its near-maximum.
+fn step_of_run(run: &[LevelChange]) -> Option<Step> {
     let (top, largest) = run
         .iter()
         .enumerate()
         .max_by(|a, b| a.1.size().total_cmp(&b.1.size()))?;
-    let near = |c: &&Change| c.size() >= 0.95 * largest.size();
+    let is_near = |c: &&LevelChange| c.size() >= NEAR_MAXIMUM * largest.size();
     let first = run[..top]
         .iter()
         .rev()
-        .take_while(near)
+        .take_while(is_near)
         .last()
         .unwrap_or(largest);
-    let last = run[top..].iter().take_while(near).last().unwrap_or(largest);
+    let last = run[top..]
+        .iter()
+        .take_while(is_near)
+        .last()
+        .unwrap_or(largest);
     let between_samples = (first.at + last.at) as f64 / 2.0 - 0.5;
     Some(Step {
         time_s: between_samples,
@@ -227,11 +216,14 @@ fn peak(run: &[Change]) -> Option<Step> {
     })
 }
 
-/// Levels that are averaged side by side, in the processor's vectors.
+/// Number of levels averaged side by side: a multiple of every vector width, small enough for L1.
 const SIDE: usize = 64;
 
+/// Fewest finite samples of a level that leaves out its largest and smallest: two remain.
+const FEWEST_TO_TRIM: f64 = 4.0;
+
 /// The level that begins at each sample: the mean of its finite samples without the largest and the
-/// smallest of them; NaN where fewer than half are finite.
+/// smallest; NaN where fewer than half are finite.
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
     let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
     let side_by_side = pulp::Arch::new();
@@ -241,14 +233,14 @@ fn levels(values: &[f64], length: usize) -> Vec<f64> {
         .map(|(i, levels)| (i * SIDE, levels))
     {
         let samples = &values[from..from + levels.len() + length - 1];
-        side_by_side.dispatch(|| level_each(samples, length, levels));
+        side_by_side.dispatch(|| average_levels(samples, length, levels));
     }
     levels
 }
 
 #[expect(clippy::inline_always, reason = "compiled for each width of vectors")]
 #[inline(always)]
-fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
+fn average_levels(samples: &[f64], length: usize, levels: &mut [f64]) {
     let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
     let (mut low, mut high) = ([f64::INFINITY; SIDE], [f64::NEG_INFINITY; SIDE]);
     for later in samples.windows(levels.len()).take(length) {
@@ -267,7 +259,11 @@ fn level_each(samples: &[f64], length: usize, levels: &mut [f64]) {
     let of_level = known.iter().zip(&sum).zip(low.iter().zip(&high));
     for (level, ((known, sum), (low, high))) in levels.iter_mut().zip(of_level) {
         let inner = (sum - low - high) / (known - 2.0);
-        let mean = if *known >= 4.0 { inner } else { sum / known };
+        let mean = if *known >= FEWEST_TO_TRIM {
+            inner
+        } else {
+            sum / known
+        };
         *level = if 2.0 * known < length as f64 {
             f64::NAN
         } else {
@@ -287,7 +283,7 @@ mod tests {
     };
 
     fn steps(values: &[f64]) -> Vec<Step> {
-        of_levels(&levels(values, WINDOW.level), 2.0, WINDOW)
+        steps_of_levels(&levels(values, WINDOW.level), 2.0, WINDOW)
     }
 
     /// A level that jumps at the given samples.
@@ -335,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_is_the_mean_without_the_largest_and_the_smallest_of_what_is_known() {
+    fn a_level_is_the_mean_of_finite_samples_without_the_largest_and_the_smallest() {
         let mut values: Vec<f64> = (0..150).map(|k| f64::from(k * k % 17)).collect();
         for k in [3, 70, 71, 72, 100, 101] {
             values[k] = f64::NAN;

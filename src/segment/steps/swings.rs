@@ -1,10 +1,14 @@
 //! Swings of a signal: from one extreme to the next, by more than the smallest step. Unlike steps
-//! they need not be fast, so a slow sine shows them as well as a pulse does.
+//! they need not be fast, so a slow sine has them as well as a pulse.
 
-/// From one extreme to the other: when the signal has left the first by a quarter of the way, and
-/// when it has come within a quarter of the second, s or samples.
+/// Share of the way between two extremes that a swing leaves out at either end: near an extreme
+/// the signal is flat, and noise would decide the swing's times.
+const NEAR_EXTREME: f64 = 0.25;
+
+/// One swing: the times at which the signal has left the first extreme and has come near the
+/// second (by [`NEAR_EXTREME`]), s or samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Swing {
+pub(in crate::segment) struct Swing {
     pub from_s: f64,
     pub to_s: f64,
 }
@@ -15,9 +19,10 @@ impl Swing {
     }
 }
 
-/// The swings of a signal beyond a size, times in samples. Missing samples are passed over; a lone
-/// spike is taken out by the median of three.
-pub(super) fn of_signal(values: &[f64], size: f64) -> Vec<Swing> {
+/// Finds the swings of a signal beyond a size, times in samples.
+///
+/// Missing samples are skipped. The median of three neighbours takes out a lone spike.
+pub(in crate::segment) fn swings(values: &[f64], size: f64) -> Vec<Swing> {
     let finite: Vec<(usize, f64)> = values
         .iter()
         .copied()
@@ -26,17 +31,25 @@ pub(super) fn of_signal(values: &[f64], size: f64) -> Vec<Swing> {
         .collect();
     let smooth: Vec<(usize, f64)> = finite
         .windows(3)
-        .map(|w| (w[1].0, middle(w[0].1, w[1].1, w[2].1)))
+        .map(|w| (w[1].0, median_of_three(w[0].1, w[1].1, w[2].1)))
         .collect();
     let extremes = extremes(&smooth, size);
     let pairs = extremes.windows(2);
     pairs
-        .filter_map(|pair| smooth.get(pair[0]..=pair[1]).and_then(swing))
+        .filter_map(|pair| smooth.get(pair[0]..=pair[1]).and_then(swing_between))
         .collect()
 }
 
-fn middle(a: f64, b: f64, c: f64) -> f64 {
+fn median_of_three(a: f64, b: f64, c: f64) -> f64 {
     a.min(b).max(a.max(b).min(c))
+}
+
+/// Direction in which a signal has moved by the size of a swing.
+#[derive(Clone, Copy, PartialEq)]
+enum Direction {
+    None,
+    Rising,
+    Falling,
 }
 
 /// The indices of samples at which the signal turns, with at least `size` between neighbours.
@@ -46,8 +59,7 @@ fn extremes(values: &[(usize, f64)], size: f64) -> Vec<usize> {
     };
     let (mut low, mut high) = ((0, first.1), (0, first.1));
     let mut turns = Vec::new();
-    // 1 while it rises, -1 while it falls, 0 before anything has happened.
-    let mut direction = 0;
+    let mut direction = Direction::None;
     for (k, (_, v)) in values.iter().enumerate() {
         if *v > high.1 {
             high = (k, *v);
@@ -55,27 +67,33 @@ fn extremes(values: &[(usize, f64)], size: f64) -> Vec<usize> {
         if *v < low.1 {
             low = (k, *v);
         }
-        if direction >= 0 && high.1 - v >= size {
+        if direction != Direction::Falling && high.1 - v >= size {
             turns.push(high.0);
-            (direction, low, high) = (-1, (k, *v), (k, *v));
-        } else if direction <= 0 && v - low.1 >= size {
+            (direction, low, high) = (Direction::Falling, (k, *v), (k, *v));
+        } else if direction != Direction::Rising && v - low.1 >= size {
             turns.push(low.0);
-            (direction, low, high) = (1, (k, *v), (k, *v));
+            (direction, low, high) = (Direction::Rising, (k, *v), (k, *v));
         }
     }
     match direction {
-        1 => turns.push(high.0),
-        -1 => turns.push(low.0),
-        _ => {}
+        Direction::Rising => turns.push(high.0),
+        Direction::Falling => turns.push(low.0),
+        Direction::None => {}
     }
     turns
 }
 
-fn swing(part: &[(usize, f64)]) -> Option<Swing> {
-    let (first, last) = (part.first()?.1, part.last()?.1);
+/// The swing of the samples from one extreme to the next.
+fn swing_between(extremes: &[(usize, f64)]) -> Option<Swing> {
+    let (first, last) = (extremes.first()?.1, extremes.last()?.1);
     let share = |v: f64| (v - first) / (last - first);
-    let from = part.iter().rev().find(|(_, v)| share(*v) <= 0.25)?;
-    let to = part.iter().find(|(_, v)| share(*v) >= 0.75)?;
+    let from = extremes
+        .iter()
+        .rev()
+        .find(|(_, v)| share(*v) <= NEAR_EXTREME)?;
+    let to = extremes
+        .iter()
+        .find(|(_, v)| share(*v) >= 1.0 - NEAR_EXTREME)?;
     Some(Swing {
         from_s: from.0 as f64,
         to_s: to.0 as f64,
@@ -92,7 +110,7 @@ mod tests {
             let values: Vec<f64> = (0..600)
                 .map(|k| 4.0 * (f64::from(k) * std::f64::consts::TAU / period).sin())
                 .collect();
-            let swings = of_signal(&values, 3.0);
+            let swings = swings(&values, 3.0);
             assert!(
                 (swings.len() as f64 - 1200.0 / period).abs() <= 1.0,
                 "{}",
@@ -114,8 +132,8 @@ mod tests {
             .collect();
         values[100] = 30.0;
         values[200] = f64::NAN;
-        assert_eq!(of_signal(&values, 3.0), []);
-        assert_eq!(of_signal(&[f64::NAN; 20], 3.0), []);
-        assert_eq!(of_signal(&[], 3.0), []);
+        assert_eq!(swings(&values, 3.0), []);
+        assert_eq!(swings(&[f64::NAN; 20], 3.0), []);
+        assert_eq!(swings(&[], 3.0), []);
     }
 }

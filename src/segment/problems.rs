@@ -1,0 +1,104 @@
+//! Problems of a record in segment: excitation that fits no class, missing signals, stuck flags.
+
+use std::collections::BTreeSet;
+
+use super::recognition::found::FoundManeuver;
+use super::settings::Settings;
+use crate::error::{Problem, ProblemStage};
+use crate::flight::Record;
+use crate::maneuver::{Class, Unknown};
+
+/// Fewest maneuvers that contradict a constant flag before it counts as stuck: one may be
+/// misclassified.
+const FEWEST_CONTRADICTIONS: usize = 2;
+
+/// A problem of a record at a place: a signal or a time.
+fn at_place(record: &Record, place: String, reason: String) -> Problem {
+    Problem {
+        stage: ProblemStage::Segment,
+        flight_id: record.flight_id.clone(),
+        place,
+        reason,
+    }
+}
+
+/// A problem at a time of the record.
+pub(super) fn at_time(record: &Record, time_s: f64, reason: String) -> Problem {
+    at_place(record, format!("t = {time_s:.1} s"), reason)
+}
+
+/// One problem for each excitation that fits no class.
+pub(super) fn of_unknown(record: &Record, unknown: &[Unknown]) -> Vec<Problem> {
+    let problem = |u: &Unknown| {
+        let lasting_s = u.end_s - u.start_s;
+        let reason = format!(
+            "excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}",
+            u.reason, u.inputs
+        );
+        at_time(record, u.start_s, reason)
+    };
+    unknown.iter().map(problem).collect()
+}
+
+/// One problem for each signal that recognition needs and the record lacks.
+pub(super) fn of_missing_signals(
+    record: &Record,
+    classes: &[Class],
+    settings: &Settings,
+) -> Vec<Problem> {
+    let flags: BTreeSet<&String> = classes
+        .iter()
+        .flat_map(|c| c.recognition.flags.keys())
+        .chain([&settings.excitation_flag])
+        .collect();
+    let counted = classes.iter().flat_map(|c| c.recognition.counted());
+    let needed: BTreeSet<&String> = counted
+        .chain(&settings.pilot_controls)
+        .chain(flags.iter().copied())
+        .collect();
+    let is_missing = |signal: &&String| {
+        record
+            .values(signal)
+            .is_none_or(|v| v.iter().all(|v| !v.is_finite()))
+    };
+    let problem = |signal: &String| {
+        let reason = if flags.contains(signal) {
+            "the record has no such flag; maneuvers are recognised by their inputs alone"
+        } else {
+            "the record has no such signal; maneuvers of the classes that count its steps cannot be recognised"
+        };
+        at_place(record, signal.clone(), reason.to_owned())
+    };
+    needed.into_iter().filter(is_missing).map(problem).collect()
+}
+
+/// One problem for each flag that never changes although maneuvers contradict it.
+pub(super) fn of_stuck_flags(record: &Record, found: &[FoundManeuver]) -> Vec<Problem> {
+    let flags: BTreeSet<&String> = found
+        .iter()
+        .flat_map(|f| f.class.recognition.flags.keys())
+        .collect();
+    flags
+        .into_iter()
+        .filter_map(|flag| of_stuck_flag(record, flag, found))
+        .collect()
+}
+
+fn of_stuck_flag(record: &Record, flag: &str, found: &[FoundManeuver]) -> Option<Problem> {
+    let mut positions = record
+        .values(flag)?
+        .iter()
+        .filter(|v| v.is_finite())
+        .map(|v| *v > 0.5);
+    let is_up = positions.next()?;
+    let contradictions = found
+        .iter()
+        .filter(|f| f.class.recognition.flags.get(flag) == Some(&!is_up))
+        .count();
+    let reason = format!(
+        "is {} throughout, and {contradictions} maneuvers say otherwise: it is stuck",
+        if is_up { "up" } else { "down" }
+    );
+    (contradictions >= FEWEST_CONTRADICTIONS && positions.all(|up| up == is_up))
+        .then(|| at_place(record, flag.to_owned(), reason))
+}

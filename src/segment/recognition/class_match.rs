@@ -1,0 +1,74 @@
+//! Matching of a segment with a class: the conditions of its recognition that fail.
+
+use super::mismatch::Mismatch;
+use super::patterns;
+use super::segment::Segment;
+use crate::maneuver::Class;
+
+/// Most steps of the pilot during a maneuver of the on-board system: one correction is a step there
+/// and one back; more is flying.
+const CORRECTION_STEPS: usize = 2;
+
+/// True where every condition of a class holds in a segment.
+pub(super) fn fits(segment: &Segment, class: &Class) -> bool {
+    mismatches(segment, class).is_empty()
+}
+
+/// The conditions of a class that fail in a segment; none where it fits.
+pub(super) fn mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
+    let mut mismatches = step_mismatches(segment, class);
+    for (signal, pulses) in &class.recognition.pulses {
+        if let Err(mismatch) = patterns::fit_pulses(&segment.steps_of(signal), pulses) {
+            mismatches.push(mismatch.of_signal(signal));
+        }
+    }
+    for (signal, wanted) in &class.recognition.moves {
+        if segment.moves(signal) == Some(!wanted) {
+            let does = if *wanted { "does not move" } else { "moves" };
+            mismatches.push(Mismatch::contradiction(format!("{signal} {does}")));
+        }
+    }
+    if segment.is_onboard() {
+        mismatches.extend(pilot_mismatch(segment, class));
+    }
+    mismatches
+}
+
+/// Signals that step too seldom or too often for a class.
+fn step_mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
+    let mut mismatches = Vec::new();
+    for (signal, count) in &class.recognition.steps {
+        let n = segment.steps_of(signal).len();
+        if n < count.at_least {
+            let reason = format!(
+                "{signal} steps {n} times, at least {} wanted",
+                count.at_least
+            );
+            mismatches.push(Mismatch::shortfall(reason));
+        } else if n > count.at_most && segment.count_against(signal) > count.at_most {
+            let reason = format!("{signal} steps {n} times, at most {} wanted", count.at_most);
+            mismatches.push(Mismatch::contradiction(reason));
+        }
+    }
+    mismatches
+}
+
+/// The reason why steps of surfaces are not attributed to the on-board system.
+fn pilot_mismatch(segment: &Segment, class: &Class) -> Option<Mismatch> {
+    let detections = segment.detections;
+    let flags = &class.recognition.flags;
+    let a_flag_is_up = || {
+        flags
+            .iter()
+            .any(|(flag, up)| *up && segment.flag_is_up(flag) == Some(true))
+    };
+    if !detections.pilot_is_recorded && !a_flag_is_up() {
+        return Some(Mismatch::contradiction(
+            "no pilot control is recorded and no flag says that the surfaces moved by themselves"
+                .to_owned(),
+        ));
+    }
+    let n = detections.count_pilot_steps(segment.from_s, segment.to_s);
+    (n > CORRECTION_STEPS)
+        .then(|| Mismatch::contradiction(format!("the pilot's controls step {n} times meanwhile")))
+}

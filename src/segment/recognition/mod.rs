@@ -1,0 +1,23 @@
+//! Recognition: the maneuvers of a record, their classes, and excitation that fits none.
+//!
+//! [`detections`] gathers the steps of a record; [`sequences`] (with [`pilot_sequences`]) groups
+//! them; [`cuts`] cuts a sequence into maneuvers by [`penalties`]; [`recognise`] classifies each of
+//! them. A [`segment`] is matched with a class in [`class_match`] (with [`patterns`]), and
+//! [`class_evidence`] weighs what else is recorded. [`sweeps`] are found by their swings. What is
+//! left is [`unclassified`]. [`windows`] adds lead-in and decay.
+
+mod class_evidence;
+mod class_match;
+mod cuts;
+pub(super) mod detections;
+pub(super) mod found;
+mod mismatch;
+mod patterns;
+mod penalties;
+mod pilot_sequences;
+pub(super) mod recognise;
+mod segment;
+mod sequences;
+mod sweeps;
+mod unclassified;
+pub(super) mod windows;

@@ -1,0 +1,93 @@
+//! Excitation that fits no class, or several alike, with the reason in words.
+
+use std::collections::BTreeSet;
+
+use super::class_match::mismatches;
+use super::cuts::CutSearch;
+use super::mismatch::Mismatch;
+use super::segment::Segment;
+use crate::maneuver::{Class, Unknown};
+
+/// Fewest steps of pilot controls that are more than ordinary flying: four reversals.
+const FEWEST_PILOT_STEPS: usize = 4;
+
+/// Time before the first step within which the start of the record may have cut a maneuver, s.
+const CUT_AT_START_S: f64 = 1.0;
+
+/// Reports steps that no maneuver explains, unless they may be ordinary flying.
+///
+/// They are reported where a signal goes to one side, to the other by more than in ordinary flying,
+/// and back. Pilots move their controls anyway: a few of their steps, or steps among which no class
+/// has one of its inputs complete, are not reported.
+pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<Unknown> {
+    let segment = search.segment(steps);
+    let (class, mismatches) = search
+        .classes
+        .iter()
+        .map(|class| (*class, mismatches(&segment, class)))
+        .min_by_key(|(class, mismatches)| {
+            (
+                usize::MAX - segment.count_explained(class),
+                mismatches.len(),
+            )
+        })?;
+    let signals: BTreeSet<&str> = search.sequence.steps.iter().map(|s| s.signal).collect();
+    if !signals.into_iter().any(|s| segment.is_excitation(s)) {
+        return None;
+    }
+    let is_incomplete = mismatches.iter().any(Mismatch::is_shortfall);
+    if !segment.is_onboard() && is_incomplete && !is_series(&segment, class) {
+        return None;
+    }
+    let reason = reason_in_words(&segment, class, &mismatches);
+    Some(unknown(search, &segment, class.name.clone(), reason))
+}
+
+/// Reports a segment that fits several classes alike.
+pub(super) fn ambiguous(search: &CutSearch, segment: &Segment, names: String) -> Unknown {
+    let reason = format!("fits {names} alike; make their recognition exclude each other");
+    unknown(search, segment, names, reason)
+}
+
+/// True for pilot steps beyond ordinary flying: at least half of what the class wants of all its
+/// inputs together, and [`FEWEST_PILOT_STEPS`].
+fn is_series(segment: &Segment, class: &Class) -> bool {
+    let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
+    segment.count_explained(class) >= wanted.div_ceil(2).max(FEWEST_PILOT_STEPS)
+}
+
+fn unknown(
+    search: &CutSearch,
+    segment: &Segment,
+    nearest_class: String,
+    reason: String,
+) -> Unknown {
+    let counted = search
+        .classes
+        .iter()
+        .flat_map(|c| c.recognition.counted())
+        .map(String::as_str);
+    Unknown {
+        flight_id: segment.detections.record.flight_id.clone(),
+        start_s: segment.from_s,
+        end_s: segment.to_s,
+        inputs: segment.count_in_words(counted),
+        nearest_class,
+        reason,
+    }
+}
+
+fn reason_in_words(segment: &Segment, class: &Class, mismatches: &[Mismatch]) -> String {
+    let record = segment.detections.record;
+    let record_end_s = record.time_s(record.samples.saturating_sub(1));
+    let is_cut = segment.to_s + segment.detections.settings.longest_hold_s > record_end_s
+        || segment.from_s - CUT_AT_START_S < record.start_s;
+    let is_broken_off = mismatches.iter().all(Mismatch::is_shortfall);
+    let why = match (is_broken_off, is_cut) {
+        (true, true) => "cut by the end of the record, or broken off: ",
+        (true, false) => "broken off? ",
+        (false, _) => "",
+    };
+    let reasons: Vec<&str> = mismatches.iter().map(|m| m.reason.as_str()).collect();
+    format!("nearest to {}; {why}{}", class.name, reasons.join("; "))
+}
