@@ -1,15 +1,15 @@
 //! Verdicts in words: neighbouring angles of attack with the same verdict become one range and one
-//! sentence, and the ranges that disagree are ranked by how much of the derivative's size they are
-//! apart.
+//! sentence. Ranges that disagree are ranked by their largest difference over the derivative's size.
 
-use super::{Agreement, Settings};
+use super::judgement::Agreement;
+use super::settings::Settings;
 use crate::aero::WindTunnel;
 use crate::numerics::order_statistics::median;
 use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
-/// One compared angle of attack, of whichever comparison.
+/// One compared angle of attack, of the tunnel or of an earlier campaign.
 #[derive(Clone, Copy, Debug)]
-struct Place<'a> {
+struct ComparedAlpha<'a> {
     derivative: &'a str,
     unit: &'a str,
     group: &'a str,
@@ -22,9 +22,9 @@ struct Place<'a> {
     z: Option<f64>,
 }
 
-impl<'a> Place<'a> {
-    fn of_tunnel(r: &'a ComparisonRow) -> Place<'a> {
-        Place {
+impl<'a> ComparedAlpha<'a> {
+    fn of_tunnel(r: &'a ComparisonRow) -> ComparedAlpha<'a> {
+        ComparedAlpha {
             derivative: &r.derivative,
             unit: &r.unit,
             group: &r.group,
@@ -38,8 +38,8 @@ impl<'a> Place<'a> {
         }
     }
 
-    fn of_change(r: &'a ChangeRow) -> Place<'a> {
-        Place {
+    fn of_change(r: &'a ChangeRow) -> ComparedAlpha<'a> {
+        ComparedAlpha {
             derivative: &r.derivative,
             unit: &r.unit,
             group: &r.group,
@@ -56,56 +56,57 @@ impl<'a> Place<'a> {
 
 /// The ranges of the comparison with the tunnel, and the worst of them.
 #[must_use]
-pub fn of_tunnel(
+pub fn ranges_of_tunnel(
     rows: &[ComparisonRow],
     tunnel: &WindTunnel,
     settings: &Settings,
 ) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
-    let places: Vec<Place> = rows.iter().map(Place::of_tunnel).collect();
-    ranges(&places, "wind tunnel", "tunnel", settings, |name| {
+    let compared: Vec<ComparedAlpha> = rows.iter().map(ComparedAlpha::of_tunnel).collect();
+    ranges(&compared, "wind tunnel", "tunnel", settings, |name| {
         tunnel.root_mean_square(name)
     })
 }
 
 /// The ranges of the comparison with one earlier campaign, and the worst of them.
 #[must_use]
-pub fn of_changes(
+pub fn ranges_of_changes(
     rows: &[ChangeRow],
     against: &str,
     settings: &Settings,
 ) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
-    let places: Vec<Place> = rows
+    let compared: Vec<ComparedAlpha> = rows
         .iter()
         .filter(|r| r.against == against)
-        .map(Place::of_change)
+        .map(ComparedAlpha::of_change)
         .collect();
     let size = |name: &str| {
-        let values: Vec<f64> = places
+        let values: Vec<f64> = compared
             .iter()
             .filter(|p| p.derivative == name)
             .filter_map(|p| p.other)
             .collect();
         (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
     };
-    ranges(&places, against, against, settings, size)
+    ranges(&compared, against, against, settings, size)
 }
 
 fn ranges(
-    places: &[Place],
+    compared: &[ComparedAlpha],
     against: &str,
     called: &str,
     settings: &Settings,
     size: impl Fn(&str) -> f64,
 ) -> (Vec<VerdictRow>, Vec<DisagreementRow>) {
     let (mut verdicts, mut worst) = (Vec::new(), Vec::new());
-    let same = |a: &Place, b: &Place| a.derivative == b.derivative && a.group == b.group;
-    for derivative in places.chunk_by(same) {
+    let same_trend =
+        |a: &ComparedAlpha, b: &ComparedAlpha| a.derivative == b.derivative && a.group == b.group;
+    for derivative in compared.chunk_by(same_trend) {
         let mut done = 0_usize;
         for run in derivative.chunk_by(|a, b| a.verdict == b.verdict) {
             let before = done.checked_sub(1).map(|i| derivative[i].alpha_deg);
             done += run.len();
             let (first, last) = (run[0], run[run.len() - 1]);
-            let words = words(run, before, done == derivative.len(), called, settings);
+            let words = range_in_words(run, before, done == derivative.len(), called, settings);
             verdicts.push(VerdictRow {
                 against: against.to_owned(),
                 derivative: first.derivative.to_owned(),
@@ -130,14 +131,19 @@ fn ranges(
 }
 
 /// The worst angle of attack of a range that disagrees.
-fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Option<DisagreementRow> {
-    let apart = |p: &Place| p.other.map(|other| p.flight - other);
+fn disagreement(
+    run: &[ComparedAlpha],
+    against: &str,
+    size: f64,
+    words: String,
+) -> Option<DisagreementRow> {
+    let apart = |p: &ComparedAlpha| p.other.map(|other| p.flight - other);
     let disagrees = !matches!(run[0].agreement, Agreement::Agrees | Agreement::NoValue);
-    let far = |p: &Place| apart(p).map_or(0.0, f64::abs);
+    let distance = |p: &ComparedAlpha| apart(p).map_or(0.0, f64::abs);
     let p = run
         .iter()
         .filter(|_| disagrees)
-        .max_by(|a, b| far(a).total_cmp(&far(b)))?;
+        .max_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let difference = apart(p)?;
     Some(DisagreementRow {
         rank: 0,
@@ -154,9 +160,9 @@ fn disagreement(run: &[Place], against: &str, size: f64, words: String) -> Optio
     })
 }
 
-/// One range in words.
-fn words(
-    run: &[Place],
+/// Describes one range of equal verdicts.
+fn range_in_words(
+    run: &[ComparedAlpha],
     before_deg: Option<f64>,
     to_the_end: bool,
     called: &str,
@@ -181,10 +187,13 @@ fn words(
             settings.agreement_pct
         ),
         Agreement::Higher => {
-            format!("flight higher than {called} {range}{}", by(run))
+            format!(
+                "flight higher than {called} {range}{}",
+                extent_in_words(run)
+            )
         }
         Agreement::Lower => {
-            format!("flight lower than {called} {range}{}", by(run))
+            format!("flight lower than {called} {range}{}", extent_in_words(run))
         }
         Agreement::SignDiffers => match before_deg.filter(|_| to_the_end) {
             Some(before) => format!("sign differs above {before}°"),
@@ -194,16 +203,16 @@ fn words(
     }
 }
 
-/// By how much: the median in percent of the other's magnitude, with its extremes where they are
-/// far from it; in the derivative's unit where the other is zero.
-fn by(run: &[Place]) -> String {
+/// Extent of a disagreement: the median in percent of the other's magnitude, with its extremes where
+/// they are far from it; in the derivative's unit where the other is zero.
+fn extent_in_words(run: &[ComparedAlpha]) -> String {
     let mut shares: Vec<f64> = run
         .iter()
         .filter_map(|p| p.difference_pct)
         .map(f64::abs)
         .collect();
     shares.sort_by(f64::total_cmp);
-    let whole = |share: f64| {
+    let percent = |share: f64| {
         if share < 9.95 {
             format!("{share:.1}%")
         } else {
@@ -218,12 +227,12 @@ fn by(run: &[Place]) -> String {
         (Some(middle), Some(least), Some(most)) if most - least > 0.5 * middle => {
             format!(
                 ", by {} ({} to {})",
-                whole(middle),
-                whole(*least),
-                whole(*most)
+                percent(middle),
+                percent(*least),
+                percent(*most)
             )
         }
-        (Some(middle), ..) => format!(", by {}", whole(middle)),
+        (Some(middle), ..) => format!(", by {}", percent(middle)),
         _ => {
             let apart = run
                 .iter()
@@ -282,8 +291,8 @@ mod tests {
         tunnel
     }
 
-    fn said(rows: &[ComparisonRow]) -> Vec<String> {
-        of_tunnel(rows, &tunnel(), &Settings::default())
+    fn sentences(rows: &[ComparisonRow]) -> Vec<String> {
+        ranges_of_tunnel(rows, &tunnel(), &Settings::default())
             .0
             .into_iter()
             .map(|v| v.words)
@@ -300,7 +309,7 @@ mod tests {
             row(60.0, 1.38, Some(2.0), TunnelVerdict::FlightLower),
         ];
         assert_eq!(
-            said(&rows),
+            sentences(&rows),
             [
                 "agrees within its uncertainty from 5° to 10°",
                 "flight lower than tunnel from 35° to 60°, by 30%"
@@ -317,7 +326,7 @@ mod tests {
             row(50.0, 1.0, Some(-2.0), TunnelVerdict::SignDiffers),
         ];
         assert_eq!(
-            said(&rows),
+            sentences(&rows),
             [
                 "no tunnel value at 35°",
                 "flight higher than tunnel at 40°, by 2.500e0 per_deg",
@@ -327,22 +336,22 @@ mod tests {
     }
 
     #[test]
-    fn uneven_differences_are_told_with_their_extremes() {
+    fn uneven_differences_have_their_extremes_in_words() {
         let rows = [
             row(5.0, 2.2, Some(2.0), TunnelVerdict::FlightHigher),
             row(10.0, 2.6, Some(2.0), TunnelVerdict::FlightHigher),
             row(15.0, 3.0, Some(2.0), TunnelVerdict::FlightHigher),
         ];
         assert_eq!(
-            said(&rows),
+            sentences(&rows),
             ["flight higher than tunnel from 5° to 15°, by 30% (10% to 50%)"]
         );
     }
 
     #[test]
-    fn agreement_by_percent_alone_says_so() {
+    fn agreement_by_percent_alone_is_worded_as_such() {
         assert_eq!(
-            said(&[row(5.0, 2.3, Some(2.0), TunnelVerdict::Agrees)]),
+            sentences(&[row(5.0, 2.3, Some(2.0), TunnelVerdict::Agrees)]),
             ["agrees within its uncertainty or 5% at 5°"]
         );
     }
@@ -355,7 +364,7 @@ mod tests {
             row(15.0, 1.5, Some(2.0), TunnelVerdict::FlightLower),
             row(20.0, 1.2, Some(2.0), TunnelVerdict::FlightLower),
         ];
-        let (_, worst) = of_tunnel(&rows, &tunnel(), &Settings::default());
+        let (_, worst) = ranges_of_tunnel(&rows, &tunnel(), &Settings::default());
         assert_eq!(
             worst
                 .iter()
@@ -369,6 +378,6 @@ mod tests {
             worst: 1,
             ..Settings::default()
         };
-        assert_eq!(of_tunnel(&rows, &tunnel(), &one).1.len(), 1);
+        assert_eq!(ranges_of_tunnel(&rows, &tunnel(), &one).1.len(), 1);
     }
 }

@@ -1,5 +1,4 @@
-//! A maneuver class: how it is recognised in a record, what is estimated from it, with which
-//! weights.
+//! A maneuver class: its recognition in a record, the status of each derivative, and the weights.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,8 +19,8 @@ words! {
     }
 }
 
-/// How many fast steps of one signal a maneuver of the class has. One that may step as often as a
-/// doublet does but need not is an input of those maneuvers in which it does.
+/// Number of fast steps of one signal in a maneuver of the class. A signal that may step as often as
+/// a doublet but need not is an input of those maneuvers in which it does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepCount {
@@ -44,8 +43,8 @@ pub struct Pulses {
     /// The shortest and the longest unit, s. Default: any.
     #[serde(default = "any_unit")]
     pub unit_s: (f64, f64),
-    /// By how many units a pulse may be longer or shorter. Default 0.5: nearer to its own number
-    /// than to the next.
+    /// Largest difference of a pulse from its length, in units. Default 0.5: a pulse is nearer to its
+    /// own number of units than to the next.
     #[serde(default = "half_a_unit")]
     pub tolerance: f64,
 }
@@ -63,7 +62,7 @@ fn half_a_unit() -> f64 {
 pub struct Sweep {
     /// The fewest swings from one side to the other.
     pub at_least: usize,
-    /// By what factor the frequency rises at least from the first third of the swings to the last.
+    /// Least ratio of the frequency in the last third of the swings to that in the first third.
     /// Default 2.
     #[serde(default = "an_octave")]
     pub ratio: f64,
@@ -73,31 +72,31 @@ fn an_octave() -> f64 {
     2.0
 }
 
-/// How a class is recognised. What its inputs do must all hold; flags are evidence, for they may be
-/// missing, stuck or late.
+/// Recognition of a class. All conditions on its inputs must hold. Flags are evidence only: they may
+/// be missing, stuck or late.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recognition {
-    /// Flag signal → whether it is up for most of the maneuver. Evidence: it raises or lowers the
-    /// confidence, and decides only between classes that differ in nothing else that is recorded.
+    /// Flag signal → true where it is up for most of the maneuver. It raises or lowers the confidence,
+    /// and decides only between classes that differ in nothing else that is recorded.
     #[serde(default)]
     pub flags: BTreeMap<String, bool>,
-    /// Signal → how often it steps. A signal that is not named may do as it likes.
+    /// Signal → number of its steps. A signal without an entry may step any number of times.
     #[serde(default)]
     pub steps: BTreeMap<String, StepCount>,
-    /// Signal → whether it moves at all during the maneuver (a thrust-vectoring vane). One that is
+    /// Signal → true where it moves during the maneuver (a thrust-vectoring vane). A signal that is
     /// not recorded decides nothing.
     #[serde(default)]
     pub moves: BTreeMap<String, bool>,
-    /// Signal → the pulses that it makes.
+    /// Signal → its pulses.
     #[serde(default)]
     pub pulses: BTreeMap<String, Pulses>,
-    /// Signal → the sweep that it makes.
+    /// Signal → its sweep.
     #[serde(default)]
     pub sweep: BTreeMap<String, Sweep>,
-    /// How long before the first input the maneuver begins, s: trimmed flight to start from.
+    /// Time from the maneuver's start to the first input, s: trimmed flight.
     pub lead_in_s: f64,
-    /// How long after the last input the maneuver ends, s: the response's decay.
+    /// Time from the last input to the maneuver's end, s: the response's decay.
     pub decay_s: f64,
 }
 
@@ -117,12 +116,12 @@ impl Recognition {
             .collect()
     }
 
-    /// The signals that it asks something of.
+    /// The signals of its conditions and flags.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
         self.counted().chain(self.flags.keys()).map(String::as_str)
     }
 
-    /// The signals that need a smallest step, for something of theirs is counted.
+    /// The signals that need a smallest step: those of all conditions.
     pub fn counted(&self) -> impl Iterator<Item = &String> {
         self.steps
             .keys()
@@ -132,7 +131,7 @@ impl Recognition {
     }
 }
 
-/// Settings that hold for part of the α range instead of the class's own.
+/// Weights and statuses that replace the class's own in part of the α range.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Overrides {
     /// For maneuvers whose mean α is above this.
@@ -148,7 +147,7 @@ pub struct Class {
     pub title: String,
     pub axis: Axis,
     pub recognition: Recognition,
-    /// Every derivative and bias of the axis → what becomes of it.
+    /// Every derivative and bias of the axis → its status.
     pub statuses: BTreeMap<String, Status>,
     /// The diagonal of W₁ (Tables 2 and 4), on residuals in deg, deg/s and g.
     pub weights: BTreeMap<Output, f64>,
@@ -156,7 +155,7 @@ pub struct Class {
 }
 
 impl Class {
-    /// What becomes of a derivative at a mean angle of attack.
+    /// Status of a derivative at a mean angle of attack.
     #[must_use]
     pub fn status(&self, name: &str, alpha_deg: f64) -> Option<Status> {
         self.overrides_at(alpha_deg)
@@ -176,8 +175,8 @@ impl Class {
             .copied()
     }
 
-    /// The class as it is at a mean angle of attack, and so at every other: for maneuvers that must
-    /// agree.
+    /// The class with the overrides at a mean angle of attack applied and none left: for maneuvers
+    /// that are estimated together.
     #[must_use]
     pub fn at(&self, alpha_deg: f64) -> Class {
         let mut class = self.clone();

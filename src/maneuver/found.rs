@@ -164,8 +164,8 @@ table! {
 }
 
 impl Maneuver {
-    /// Where a tunnel is read for this maneuver: its means, as far as the tunnel's third variable
-    /// is among them.
+    /// Condition at which the tunnel is read for this maneuver: its means. The third variable is
+    /// `None` where it is no mean of a maneuver.
     #[must_use]
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
         let third = tunnel

@@ -1,5 +1,5 @@
-//! A maneuver class is one column of the paper's Tables 1-4 with the way it is recognised; a
-//! maneuver is one flown.
+//! Maneuver classes, each a column of the paper's Tables 1-4 with its recognition, and maneuvers
+//! flown.
 
 pub mod class;
 pub mod found;

@@ -13,7 +13,7 @@ use super::segment_step::{self, SegmentStep};
 use super::step::Step;
 use super::step_runner::{Absent, StepRunner};
 use super::trend_stage::{self, COMPARE_VERSION, TREND_VERSION};
-use crate::compare::against::Earlier;
+use crate::compare::earlier_campaign::Earlier;
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Stage;

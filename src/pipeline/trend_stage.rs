@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::campaign::Campaign;
-use crate::compare::against::{self, Earlier};
-use crate::compare::{self, beyond, ranges};
+use crate::compare::earlier_campaign::{self, Earlier};
+use crate::compare::{self, extrapolation, ranges};
 use crate::config::Config;
 use crate::error::Result;
 use crate::output_error::Outcome;
@@ -65,15 +65,17 @@ pub fn compare(config: &Config, earlier: &[Earlier], campaign: &mut Campaign) {
     let (tunnel, settings) = (&config.tunnel, &config.compare);
     let maneuvers = &campaign.maneuvers;
     let comparison =
-        compare::comparison(&campaign.trends, maneuvers, tunnel, &config.trend, settings);
+        compare::compare_trends(&campaign.trends, maneuvers, tunnel, &config.trend, settings);
     let converged = converged_estimates(config, campaign);
-    let maneuver_comparison = compare::of_maneuvers(&converged, maneuvers, tunnel, settings);
-    let extrapolations = beyond::beyond(&campaign.estimates, maneuvers, &comparison, tunnel);
-    let (mut verdicts, mut disagreements) = ranges::of_tunnel(&comparison, tunnel, settings);
+    let maneuver_comparison = compare::compare_maneuvers(&converged, maneuvers, tunnel, settings);
+    let extrapolations =
+        extrapolation::extrapolations(&campaign.estimates, maneuvers, &comparison, tunnel);
+    let (mut verdicts, mut disagreements) = ranges::ranges_of_tunnel(&comparison, tunnel, settings);
     let mut changes = Vec::new();
     for campaign_before in earlier {
-        let rows = against::changes(&campaign.trends, campaign_before, &config.trend, settings);
-        let (words, largest) = ranges::of_changes(&rows, &campaign_before.name, settings);
+        let rows =
+            earlier_campaign::changes(&campaign.trends, campaign_before, &config.trend, settings);
+        let (words, largest) = ranges::ranges_of_changes(&rows, &campaign_before.name, settings);
         changes.extend(rows);
         verdicts.extend(words);
         disagreements.extend(largest);

@@ -1,9 +1,9 @@
-//! What a trend is made of: Legendre polynomials of the α range scaled to −1..1, or B-splines (Cox
+//! Basis functions of a trend: Legendre polynomials of the α range scaled to −1..1, or B-splines (Cox
 //! and de Boor's recursion) between knots.
 
 use nalgebra::RowDVector;
 
-/// A family of functions of α, of which a trend is a sum.
+/// A family of functions of α; a trend is a linear combination of them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Basis {
     /// The range of the data, deg.
@@ -47,7 +47,7 @@ impl Basis {
         self.order + 1 + self.knots.len()
     }
 
-    /// In words, for the table.
+    /// The name in the table `trends`.
     pub(super) fn name(&self) -> String {
         if self.knots.is_empty() {
             return "polynomial".to_owned();
@@ -56,7 +56,7 @@ impl Basis {
         format!("spline, knots {}", knots.join(" "))
     }
 
-    /// The functions at an angle of attack.
+    /// The values of the functions at an angle of attack.
     pub(super) fn row(&self, alpha_deg: f64) -> RowDVector<f64> {
         if self.knots.is_empty() {
             self.legendre(alpha_deg)
@@ -88,7 +88,7 @@ impl Basis {
             .chain(ends(high))
             .collect();
         let x = alpha_deg.clamp(low, high);
-        // Order 0: one on the interval of x; at the upper end on the last interval that has a
+        // Order 0 is one on the interval of x; at the upper end, on the last interval of non-zero
         // length.
         let inside = |i: usize| {
             knots[i] < knots[i + 1] && knots[i] <= x && (x < knots[i + 1] || knots[i + 1] >= high)

@@ -1,10 +1,9 @@
-//! Do the bands hold what they promise: seeded Monte Carlo over few and many maneuvers, straight
-//! and bent truths.
+//! Coverage of the bands: seeded Monte Carlo over few and many maneuvers, straight and bent truths.
 
 use super::tests::{Lcg, estimate, through};
 use super::*;
 
-/// How a campaign of one derivative is drawn.
+/// A simulated campaign of one derivative.
 #[derive(Debug)]
 struct Study {
     maneuvers: usize,
@@ -14,8 +13,8 @@ struct Study {
     scatter: f64,
 }
 
-/// Shares of 95% bands that held the truth, and of prediction bands that held one more maneuver.
-fn covered(study: &Study, campaigns: u64) -> (f64, f64) {
+/// Shares of 95% bands that cover the truth, and of prediction bands that cover one more maneuver.
+fn coverage(study: &Study, campaigns: u64) -> (f64, f64) {
     let mut random = Lcg(11);
     let (mut held, mut predicted, mut all) = (0.0, 0.0, 0.0);
     for _ in 0..campaigns {
@@ -63,9 +62,8 @@ fn stall(a: f64) -> f64 {
     0.08 - 0.07 / (1.0 + (-(a - 22.0) / 4.0).exp()) + 3e-4 * a
 }
 
-/// Maneuvers, test points, truth, scatter between maneuvers; the share that the band holds at
-/// least. A stall within 15° bends more than test points 5° apart show: there the band is known to
-/// hold less than it says.
+/// Studies with the least coverage of the band. A stall within 15° bends more than test points 5°
+/// apart resolve: there the coverage is below the nominal one.
 const STUDIES: [(Study, f64); 7] = [
     (
         Study {
@@ -133,22 +131,22 @@ const STUDIES: [(Study, f64); 7] = [
 ];
 
 #[test]
-fn the_bands_hold_the_truth_and_one_more_maneuver_as_often_as_they_say() {
+fn bands_cover_the_truth_and_one_more_maneuver_at_their_nominal_rate() {
     for (study, least) in &STUDIES {
-        let (held, predicted) = covered(study, 60);
+        let (held, predicted) = coverage(study, 60);
         assert!(held >= *least, "{study:?}: {held}");
         assert!(predicted >= 0.92, "{study:?}: {predicted}");
     }
 }
 
 #[test]
-fn the_bands_are_not_wide_for_nothing() {
+fn bands_are_no_wider_than_needed() {
     let study = Study {
         maneuvers: 40,
         points: 12,
         truth: parabola,
         scatter: 0.008,
     };
-    let (held, predicted) = covered(&study, 60);
+    let (held, predicted) = coverage(&study, 60);
     assert!(held < 0.99 && predicted < 0.98, "{held} {predicted}");
 }

@@ -5,53 +5,51 @@
 //! maneuver's own deviation + error, with the functions of [`Basis`], deviations of standard
 //! deviation τ, errors of standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value at which
 //! the weighted residuals come out as large as their degrees of freedom, Σ r²/(b² + τ²) = Σ (1 −
-//! hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is what an estimate
-//! pulls its own trend, and the sum n − p over all maneuvers. A class of `OWN_SCATTER` maneuvers
-//! has a τ of its own: one that strays (a derivative of it is held at a wrong value, say) does not
-//! take the weight from those that agree.
+//! hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is the
+//! leverage of an estimate on its own trend; the sum is n − p over all maneuvers. A class of
+//! `OWN_SCATTER` maneuvers has a τ of its own. So a class with wrong values, say because a derivative
+//! is held at a wrong one, keeps its scatter to itself.
 //!
-//! One wild estimate must bend neither the trend nor τ: a residual beyond `HUBER` standard
-//! deviations counts as if it were just that far (Huber's weights in the fit, his proposal 2 for
-//! τ). And no maneuver is trusted beyond a share `BOUND_FLOOR` of the group's median bound: bounds
-//! are themselves only known to a factor of a few.
+//! One outlier must bend neither the trend nor τ: a residual beyond `HUBER` standard deviations
+//! counts as if it were just that far (Huber's weights in the fit, his proposal 2 for τ). No bound
+//! counts as less than the share `BOUND_FLOOR` of the group's median bound: bounds are themselves
+//! uncertain by a factor of a few.
 //!
 //! The covariance of the coefficients is that of an M-estimate (Huber 1981, section 7.6),
 //!
 //! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
 //!
 //! with u the residuals over their standard deviations, ψ cutting them at `HUBER`, m the share that
-//! is not cut and V = b² + τ². The bracket is what makes few data honest: it scales by the
-//! residuals as they are, not by what bounds and τ say they should be, and the interval takes
-//! Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is never smaller than
-//! what the bounds alone say.
+//! is not cut and V = b² + τ². The bracket scales the covariance by the residuals as they are, not as
+//! bounds and τ predict them; few data need that. The interval takes Student's t with n − p degrees
+//! of freedom (Hartung and Knapp 2001). It is never narrower than the bounds alone give.
 //!
-//! The order is chosen by a criterion, and choosing is uncertain too: the orders that were not
-//! chosen count in the variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's
-//! unconditional variance), each with its own variance and its distance from the chosen trend. And
-//! a criterion smooths: it leaves a bias as large as the errors. So no standard error is smaller
-//! than that of one coefficient more (undersmoothing, Hall 1992).
+//! A criterion chooses the order, and its choice is uncertain. The other orders count in the
+//! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance),
+//! each with its own variance and its distance from the chosen trend. A criterion also smooths: it
+//! leaves a bias as large as the errors. So no standard error is smaller than that of one
+//! coefficient more (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 
 use super::basis::Basis;
-use super::{Criterion, Settings};
+use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
 use crate::numerics::student;
 
-/// Standard deviations beyond which a residual pulls no harder than there: Huber's weights. The fit
-/// then bears a quarter of wild estimates, and costs 4% of efficiency where there are none.
+/// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
+/// fit then tolerates a quarter of outliers, and loses 4% of efficiency where there are none.
 const HUBER: f64 = 1.5;
 /// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the
 /// equation for τ².
 const HUBER_VARIANCE: f64 = 0.778_465;
-/// Standard deviations beyond which a residual says nothing about the order of the polynomial.
-const WILD: f64 = 3.0;
-/// No bound is taken as smaller than this share of the median bound.
+/// Standard deviations beyond which a residual has no influence on the order of the polynomial.
+const OUTLYING: f64 = 3.0;
+/// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
-/// A class of so many maneuvers has a scatter of its own; from fewer it would be a guess, and they
-/// have that of all.
+/// Fewest maneuvers of a class with a scatter of its own; classes with fewer share that of all.
 const OWN_SCATTER: usize = 8;
-/// Steps of the iteration between coefficients, τ² and Huber's weights; it settles in about ten.
+/// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
 const MOST_STEPS: usize = 100;
 
 /// One maneuver's estimate.
@@ -60,7 +58,7 @@ pub(super) struct Point {
     pub alpha_deg: f64,
     pub value: f64,
     pub bound: f64,
-    /// The place of its class among those of the trend.
+    /// Index of its class among those of the trend.
     pub class: usize,
 }
 
@@ -76,27 +74,28 @@ pub(super) struct Fit {
     basis: Basis,
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// The covariance if the bounds were all there is.
-    of_bounds: DMatrix<f64>,
-    /// Of each point, in its order: τ², and with the bound squared.
+    /// Covariance from the bounds alone, without scatter.
+    covariance_of_bounds: DMatrix<f64>,
+    /// τ² of each point, in the points' order.
     scatter2: Vec<f64>,
+    /// τ² + bound² of each point.
     variances: Vec<f64>,
     degrees_of_freedom: usize,
     criterion: f64,
-    /// Of each point, in its order.
+    /// In the points' order.
     residuals: Vec<Residual>,
 }
 
-/// How one maneuver's estimate lies to the trend.
+/// Residual of one maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residual {
-    /// Over its standard deviation, with what the estimate itself pulls the trend counted.
+    /// Over its standard deviation, which the estimate's leverage on the trend reduces.
     pub z: f64,
-    /// What is left of its weight: one, less for a wild one.
+    /// Share of its weight that Huber's weights leave: one, less for an outlier.
     pub share: f64,
 }
 
-/// The trend of the order that the criterion likes best, with the other orders' doubts about it.
+/// The trend of the order that the criterion chooses, with the other orders for its uncertainty.
 #[derive(Clone, Debug)]
 pub(super) struct Trend {
     pub best: Fit,
@@ -105,8 +104,8 @@ pub(super) struct Trend {
 }
 
 impl Trend {
-    /// The trend through points sorted by α: the lower order on a tie, none where no order has a
-    /// solution.
+    /// The trend through points sorted by α: the lower order on a tie; `None` where no order has
+    /// a solution.
     pub(super) fn through(
         points: &[Point],
         settings: &Settings,
@@ -142,11 +141,11 @@ impl Trend {
             weight * (error * error + (other - value).powi(2))
         };
         let averaged = self.orders.iter().map(variance).sum::<f64>().sqrt();
-        (value, averaged.max(self.error_of_the_next_order(alpha_deg)))
+        (value, averaged.max(self.error_of_next_order(alpha_deg)))
     }
 
     /// The standard error of the fit with one coefficient more; zero where the data allow none.
-    fn error_of_the_next_order(&self, alpha_deg: f64) -> f64 {
+    fn error_of_next_order(&self, alpha_deg: f64) -> f64 {
         let size = self.best.basis.size() + 1;
         let next = self.orders.iter().find(|(_, fit)| fit.basis.size() == size);
         next.map_or(0.0, |(_, fit)| fit.at(alpha_deg).1)
@@ -166,7 +165,7 @@ impl Fit {
             return Vec::new();
         };
         let range = (first.alpha_deg, last.alpha_deg);
-        let flown = flown(points, settings.alpha_step_deg);
+        let flown = flown_alphas(points, settings.alpha_step_deg);
         let most = flown.len().min(points.len().saturating_sub(2));
         let highest = if knots_deg.is_empty() {
             settings.max_order
@@ -200,7 +199,7 @@ impl Fit {
             .collect()
     }
 
-    /// The fit of one basis; none where the normal equations have no solution.
+    /// The fit of one basis; `None` where the normal equations have no solution.
     pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<Fit> {
         let (n, p) = (points.len(), basis.size());
         let design = DMatrix::from_rows(
@@ -219,7 +218,7 @@ impl Fit {
         for _ in 0..MOST_STEPS {
             let residuals = &values - &design * &solution.0;
             let before = total;
-            let freedom = freedom(&design, &weights, &solution.1);
+            let freedom = residual_freedom(&design, &weights, &solution.1);
             total = total_variances(&residuals, &variances, &freedom, &strata);
             weights = DVector::from_iterator(n, (0..n).map(|i| weight(residuals[i], total[i])));
             let next = solve(&design, &values, &weights)?;
@@ -239,7 +238,7 @@ impl Fit {
             .map(|i| deviance(residuals[i], total[i]))
             .sum::<f64>();
         let covariance = robust_covariance(&design, &residuals, &total)?;
-        let of_bounds = solve(
+        let covariance_of_bounds = solve(
             &design,
             &values,
             &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)),
@@ -250,7 +249,7 @@ impl Fit {
             basis,
             coefficients: solution.0,
             covariance,
-            of_bounds,
+            covariance_of_bounds,
             scatter2: total
                 .iter()
                 .zip(&variances)
@@ -266,7 +265,7 @@ impl Fit {
     pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
         let row = self.basis.row(alpha_deg);
         let variance = |covariance: &DMatrix<f64>| (&row * covariance * row.transpose())[(0, 0)];
-        let variance = variance(&self.covariance).max(variance(&self.of_bounds));
+        let variance = variance(&self.covariance).max(variance(&self.covariance_of_bounds));
         (
             (&row * &self.coefficients)[(0, 0)],
             variance.max(0.0).sqrt(),
@@ -286,8 +285,8 @@ impl Fit {
         upper_median(self.scatter2.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
-    /// τ and bound together of the median maneuver: how far one more lies from what is true.
-    pub(super) fn one_more(&self) -> f64 {
+    /// τ and bound together of the median maneuver: the standard deviation of one more estimate.
+    pub(super) fn deviation_of_one_more(&self) -> f64 {
         upper_median(self.variances.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
@@ -298,7 +297,7 @@ impl Fit {
     }
 }
 
-/// The covariance of an M-estimate's coefficients, by the residuals as they are.
+/// Covariance of the coefficients of an M-estimate (Huber 1981, section 7.6).
 fn robust_covariance(
     design: &DMatrix<f64>,
     residuals: &DVector<f64>,
@@ -308,7 +307,7 @@ fn robust_covariance(
     let u2 = || residuals.iter().zip(variances).map(|(r, v)| r * r / v);
     let kept = u2().filter(|u2| *u2 <= HUBER * HUBER).count() as f64 / n;
     let cut: f64 = u2().map(|u2| u2.min(HUBER * HUBER)).sum();
-    // Most of the residuals beyond the cut: a fit that describes half of its data does not exist.
+    // At least half of the residuals lie within the cut of any fit worth publishing.
     let kept = kept.max(0.5);
     let correction = 1.0 + p / n * (1.0 - kept) / kept;
     let scale = correction * correction * cut / (n - p) / (kept * kept);
@@ -316,8 +315,7 @@ fn robust_covariance(
     Some(solve(design, residuals, &weights)?.1 * scale)
 }
 
-/// Residuals over their standard deviations: the variance of a residual is less by what the
-/// estimate pulls the trend.
+/// Residuals over their standard deviations: leverage reduces the variance of a residual.
 fn standardised(
     design: &DMatrix<f64>,
     residuals: &DVector<f64>,
@@ -337,9 +335,9 @@ fn standardised(
     (0..design.nrows()).map(of).collect()
 }
 
-/// The distinct α that were flown, deg, ascending: a new one begins half a step of the published
-/// grid beyond the last one's beginning. Each is the mean of its maneuvers, to a tenth.
-fn flown(points: &[Point], step_deg: f64) -> Vec<f64> {
+/// Clusters the flown α, deg, ascending: a cluster spans half a step of the published grid. Each is
+/// the mean of its maneuvers, to a tenth.
+fn flown_alphas(points: &[Point], step_deg: f64) -> Vec<f64> {
     let mut clusters: Vec<Vec<f64>> = Vec::new();
     for p in points {
         match clusters.last_mut() {
@@ -362,8 +360,8 @@ fn floored_variances(points: &[Point]) -> Vec<f64> {
     points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
 }
 
-/// The points of each scatter: of every class that has one of its own, and of all points, last,
-/// where any is left.
+/// The points of each stratum, a set with one τ: every class with a scatter of its own, then all
+/// points where any is left.
 fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     let classes = points
         .iter()
@@ -385,8 +383,12 @@ fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     strata
 }
 
-/// 1 − h of each point: h is what its value pulls the trend there.
-fn freedom(design: &DMatrix<f64>, weights: &DVector<f64>, inverse: &DMatrix<f64>) -> Vec<f64> {
+/// 1 − h of each point, with h its leverage.
+fn residual_freedom(
+    design: &DMatrix<f64>,
+    weights: &DVector<f64>,
+    inverse: &DMatrix<f64>,
+) -> Vec<f64> {
     let of = |i: usize| {
         let row = design.row(i);
         (1.0 - weights[i] * (row * inverse * row.transpose())[(0, 0)]).max(0.0)
@@ -394,7 +396,7 @@ fn freedom(design: &DMatrix<f64>, weights: &DVector<f64>, inverse: &DMatrix<f64>
     (0..design.nrows()).map(of).collect()
 }
 
-/// b² + τ² of each point, τ of its stratum: the classes' own take the place of that of all.
+/// b² + τ² of each point: τ of its class where that is a stratum, else τ of all.
 fn total_variances(
     residuals: &DVector<f64>,
     variances: &[f64],
@@ -428,7 +430,7 @@ fn solve(
     ))
 }
 
-/// One over the variance, less where the residual is wild.
+/// Weight of a residual: one over the variance, less for an outlier.
 fn weight(residual: f64, variance: f64) -> f64 {
     let u = residual.abs() / variance.sqrt();
     if u > HUBER {
@@ -438,13 +440,13 @@ fn weight(residual: f64, variance: f64) -> f64 {
     }
 }
 
-/// Minus twice the log-likelihood of one residual; a wild one costs the same however wild it is, so
-/// that no order is chosen for coming nearer to it.
+/// Minus twice the log-likelihood of one residual, constant for outliers: no order is chosen because
+/// it comes nearer to one.
 fn deviance(residual: f64, variance: f64) -> f64 {
-    variance.ln() + (residual * residual / variance).min(WILD * WILD)
+    variance.ln() + (residual * residual / variance).min(OUTLYING * OUTLYING)
 }
 
-/// What `k` parameters fitted to `n` data cost.
+/// Penalty of a criterion for `k` parameters fitted to `n` data.
 fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     let (n, k) = (n as f64, k as f64);
     match criterion {
@@ -454,9 +456,8 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     }
 }
 
-/// τ² of some of the points: where the sum of their squared residuals over their variances, wild
-/// ones cut, is what its degrees of freedom expect. The sum falls as τ² grows, so bisection finds
-/// it.
+/// Solves for τ² of some of the points: the sum of their squared residuals over their variances,
+/// outliers cut, equals its expectation. The sum falls as τ² grows, so bisection finds it.
 fn scatter_squared(
     residuals: &DVector<f64>,
     variances: &[f64],
@@ -590,7 +591,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wild_estimate_at_the_end_does_not_bend_the_trend() {
+    fn one_outlier_at_the_end_does_not_bend_the_trend() {
         let line = |a: f64| 0.05 + 0.001 * a;
         let mut data = points(line, &alphas());
         for (i, p) in data.iter_mut().enumerate() {

@@ -1,5 +1,5 @@
-//! Trend fits least squares across α through the estimates of one derivative, for the group of
-//! classes that speaks for it and for each class alone.
+//! Trend fits the estimates of each derivative across α by least squares, for the derivative's group
+//! of classes and for each class alone.
 //!
 //! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights
 //! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds.
@@ -8,132 +8,41 @@ mod basis;
 #[cfg(test)]
 mod coverage;
 mod fit;
+mod settings;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
-use crate::settings::{elements, settings, single_values};
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
 
-/// A trend through fewer maneuvers than this has no scatter to speak of and is not drawn.
+pub use settings::{Criterion, Group, Settings};
+
+/// Fewest maneuvers of a trend: from fewer their scatter cannot be estimated.
 const FEWEST_MANEUVERS: usize = 3;
 
-settings! {
-    /// Settings of the trends across angle of attack.
-    pub struct Settings {
-        /// Criterion that chooses the order of a trend's polynomial or spline: `aicc`, Akaike's
-        /// with the correction for few data, or `bic`, Schwarz's. `bic` chooses lower orders, so
-        /// trends become smoother and their standard errors smaller.
-        pub criterion: Criterion = Criterion::default(),
-        /// Highest order of the polynomial. Lower: smoother trends that may miss the bends of
-        /// derivatives through stall. There are never more coefficients than flown angles of
-        /// attack.
-        pub max_order: usize = 10,
-        /// Spacing of the angles of attack at which trends are published, deg. It changes the rows
-        /// of the tables, not the fitted trends.
-        pub alpha_step_deg: f64 = 5.0,
-        /// Angles of attack at which trends may bend sharply, deg. With knots a trend is a spline of
-        /// up to third order, or a polynomial of up to third order where that fits better. Without,
-        /// it is a polynomial, or a spline between the flown angles of attack.
-        pub knots_deg: Vec<f64> = Vec::new(),
-        /// Distance from its trend beyond which a maneuver is listed in the table `outliers`,
-        /// standard deviations. It changes that table only: the fit limits the influence of any
-        /// maneuver beyond 1.5.
-        pub outlier_z: f64 = 3.0,
-        /// Classes whose maneuvers make the trend of each derivative. The first group that names a
-        /// derivative, or that names none, is used. Other classes then have trends of their own only.
-        pub groups: Vec<Group> = vec![Group {
-            name: "all".into(),
-            ..Group::default()
-        }],
-    }
-    expert {
-        /// Distance beyond the outermost maneuver within which a trend is still published, deg. At 0
-        /// a maneuver flown for 60 deg with a mean of 59.8 deg loses the row at 60 deg.
-        pub alpha_reach_deg: f64 = 0.5,
-        /// Trends of single classes beside the groups' trends. `false` removes their rows.
-        pub per_class: bool = true,
-        /// Names without a trend, for instance sensor biases. The named ones lose their rows.
-        pub leave_out: BTreeSet<String> = BTreeSet::new(),
-    }
-}
-
-settings! {
-    /// Classes that make the trends of some derivatives.
-    pub struct Group {
-        /// Name of the group, as the tables have it.
-        pub name: String,
-        /// Derivatives of the group; without any, all that no group before it names.
-        #[serde(default)]
-        pub derivatives: Vec<String>,
-        /// Classes of the group; without any, all classes.
-        #[serde(default)]
-        pub classes: Vec<String>,
-        /// Knots of the group's trends, deg, in place of `knots_deg` of all trends.
-        #[serde(default)]
-        pub knots_deg: Option<Vec<f64>>,
-    }
-}
-elements!(Vec<Group>: Group as "[]");
-single_values!(Criterion);
-
-/// Criterion for the order of a trend. Both weigh the misfit against the number of coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Criterion {
-    /// Akaike's criterion with the correction for few data.
-    #[default]
-    Aicc,
-    /// The Bayesian criterion of Schwarz.
-    Bic,
-}
-
-impl Settings {
-    /// The group that speaks for a derivative; none where no group names it and none takes the
-    /// rest.
-    #[must_use]
-    pub fn group_of(&self, derivative: &str) -> Option<&Group> {
-        let names = |g: &&Group| g.derivatives.iter().any(|d| d == derivative);
-        let rest = |g: &&Group| g.derivatives.is_empty();
-        self.groups
-            .iter()
-            .find(names)
-            .or_else(|| self.groups.iter().find(rest))
-    }
-}
-
-impl Group {
-    #[must_use]
-    pub fn has(&self, class: &str) -> bool {
-        self.classes.is_empty() || self.classes.iter().any(|c| c == class)
-    }
-}
-
-/// What comes of trends.
+/// Trends of all derivatives, outliers and problems.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trends {
     pub rows: Vec<TrendRow>,
-    /// Every maneuver that lies far from a trend.
+    /// The maneuvers that lie far from a trend.
     pub outliers: Vec<OutlierRow>,
     pub problems: Vec<Problem>,
 }
 
-/// The trends of every derivative, in the order in which the derivatives first appear: its group's,
-/// then its classes'.
+/// Fits the trends of every derivative: its group's, then its classes'. Derivatives keep the order in
+/// which they first appear.
 ///
-/// Give it the estimates of converged fits only. Of them it takes those with status `estimated`, a
-/// value and a bound (the corrected one where there is one). A group of fewer than three maneuvers
-/// has no trend and is a problem; a single class of so few is passed over. A trend is published at
-/// the multiples of the step and at the derivative's `breakpoints`, deg, as far as they lie inside
-/// its data.
+/// `estimates` are those of converged fits. Estimates with status `estimated`, a value and a bound
+/// (the corrected one where there is one) count. A group of fewer than three maneuvers has no trend
+/// and is a problem; a class of fewer is skipped. A trend is published at the multiples of the step
+/// and at the derivative's `breakpoints`, deg, inside the range of its data.
 #[must_use]
 pub fn trends(
     estimates: &[EstimateRow],
@@ -142,8 +51,8 @@ pub fn trends(
 ) -> Trends {
     let each: Vec<Trends> = by_derivative(estimates, settings)
         .into_par_iter()
-        .map(|(derivative, of_it)| {
-            of_derivative(derivative, &of_it, settings, &breakpoints(derivative))
+        .map(|(derivative, own)| {
+            trends_of_derivative(derivative, &own, settings, &breakpoints(derivative))
         })
         .collect();
     let mut trends = Trends::default();
@@ -155,23 +64,23 @@ pub fn trends(
     trends
 }
 
-/// Those of one derivative.
-fn of_derivative(
+/// Fits the trends of one derivative.
+fn trends_of_derivative(
     derivative: &str,
-    of_it: &[&EstimateRow],
+    own: &[&EstimateRow],
     settings: &Settings,
     further: &[f64],
 ) -> Trends {
     let mut trends = Trends::default();
     let group = settings.group_of(derivative);
     if let Some(group) = group {
-        let members: Vec<&EstimateRow> = of_it
+        let members: Vec<&EstimateRow> = own
             .iter()
             .filter(|e| group.has(&e.class))
             .copied()
             .collect();
         let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
-        match trend(&members, &group.name, settings, knots, further) {
+        match fit_trend(&members, &group.name, settings, knots, further) {
             Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
             Err(reason) => trends
                 .problems
@@ -179,16 +88,15 @@ fn of_derivative(
         }
     }
     if settings.per_class {
-        let names: BTreeSet<&str> = of_it.iter().map(|e| e.class.as_str()).collect();
+        let names: BTreeSet<&str> = own.iter().map(|e| e.class.as_str()).collect();
         for class in names
             .into_iter()
             .filter(|name| group.is_none_or(|g| g.name != *name))
         {
             let members: Vec<&EstimateRow> =
-                of_it.iter().filter(|e| e.class == class).copied().collect();
-            // What lies far from its class's trend alone is no more than a hint, and its group's
-            // names it too.
-            let of_class = trend(&members, class, settings, &settings.knots_deg, further);
+                own.iter().filter(|e| e.class == class).copied().collect();
+            // Outliers of the class's trend are not published: the group's trend names them too.
+            let of_class = fit_trend(&members, class, settings, &settings.knots_deg, further);
             trends
                 .rows
                 .extend(of_class.map(|(rows, _)| rows).unwrap_or_default());
@@ -219,7 +127,7 @@ fn by_derivative<'a>(
     order
 }
 
-/// An estimate as the fit sees it, of the first class; none without a value and a bound.
+/// The point of an estimate, with class index 0; `None` without a value and a bound.
 fn point(e: &EstimateRow) -> Option<Point> {
     let bound = e.bound_corrected.or(e.bound)?;
     let p = Point {
@@ -232,8 +140,8 @@ fn point(e: &EstimateRow) -> Option<Point> {
         .then_some(p)
 }
 
-/// One trend on the published grid, and the maneuvers far from it.
-fn trend(
+/// Fits one trend: its rows on the published grid, and its outliers.
+fn fit_trend(
     members: &[&EstimateRow],
     group: &str,
     settings: &Settings,
@@ -269,9 +177,9 @@ fn trend(
         .ok_or("the least-squares fit has no solution")?;
     let outliers = outliers(&placed, &fit, group, settings.outlier_z);
     let (half_width, named) = (fit.best.quantile_95(), outliers.len());
-    let one_more = fit.best.one_more();
+    let one_more = fit.best.deviation_of_one_more();
     let row = |alpha_deg: f64| {
-        let (value, own_error) = fit.at(inside(&points, alpha_deg));
+        let (value, own_error) = fit.at(clamp_to_data(&points, alpha_deg));
         let standard_error =
             own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
         let prediction = half_width * standard_error.hypot(one_more);
@@ -329,19 +237,18 @@ fn outliers(
     .collect()
 }
 
-/// α, or the end of the data where it lies a little beyond: a trend is not continued past its last
-/// maneuver.
-fn inside(points: &[Point], alpha_deg: f64) -> f64 {
+/// Clamps α to the range of the data: a trend is not continued past its last maneuver.
+fn clamp_to_data(points: &[Point], alpha_deg: f64) -> f64 {
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
         return alpha_deg;
     };
     alpha_deg.max(first.alpha_deg).min(last.alpha_deg)
 }
 
-/// What the uncertainty of held values and of the instruments' calibration does to the trend at an
-/// angle of attack. Maneuvers that hold the same derivative at the same tunnel err together, and so
-/// do those with the same instruments: it does not average out. It is the mean over the maneuvers
-/// within a step of α, each with its weight 1/bound².
+/// Standard error of the trend at an α from held values and the instruments' calibration.
+///
+/// Errors of held values and of instruments are common to the maneuvers, so they do not average out.
+/// The result is the mean over the maneuvers within a step of α, with weights 1/bound².
 fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
     let near = members
         .iter()
@@ -373,7 +280,7 @@ fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> 
     if step > 0.0 {
         let steps = std::iter::successors(Some((from / step).ceil()), |k| Some(k + 1.0));
         let multiples = steps.map(|k| k * step).take_while(|alpha| *alpha <= to);
-        // A breakpoint that is a multiple but for rounding stands once, as the tunnel writes it.
+        // A breakpoint that equals a multiple but for rounding is published once, as the tunnel has it.
         let new: Vec<f64> = multiples
             .filter(|alpha| !breakpoints.iter().any(|b| (b - alpha).abs() < 1e-6 * step))
             .collect();

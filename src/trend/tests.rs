@@ -1,4 +1,4 @@
-//! Trend on estimates made up from known truths.
+//! Trend on synthetic estimates with known truths.
 
 use approx::assert_relative_eq;
 
@@ -65,7 +65,7 @@ fn groups_of<'a>(rows: &'a [TrendRow], derivative: &str) -> BTreeSet<&'a str> {
 }
 
 #[test]
-fn the_band_covers_the_truth_as_often_as_it_says() {
+fn the_band_covers_the_truth_at_its_nominal_rate() {
     let truth = |a: f64| 0.06 - 2e-3 * (a - 30.0) + 3e-5 * (a - 30.0).powi(2);
     let mut random = Lcg(7);
     let (mut inside, mut all) = (0.0, 0.0);

@@ -1,5 +1,5 @@
-//! Where the tunnel was to be read beyond its tables: at maneuvers, for values held or compared,
-//! and at the trends' α.
+//! Extrapolation of the wind tunnel: reads outside its tables, at maneuvers for values held or
+//! compared, and at the trends' α.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,10 @@ use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::tables::{ComparisonRow, EstimateRow, ExtrapolationRow, Treatment};
 
-/// One row per maneuver (or α of the comparison), variable and range of tables, with the
-/// derivatives it concerns.
+/// Lists the reads outside the tables: one row per maneuver (or α of the comparison), variable and
+/// range of tables, with the derivatives concerned.
 #[must_use]
-pub fn beyond(
+pub fn extrapolations(
     estimates: &[EstimateRow],
     maneuvers: &[Maneuver],
     comparison: &[ComparisonRow],
@@ -19,27 +19,27 @@ pub fn beyond(
 ) -> Vec<ExtrapolationRow> {
     let mut rows = Vec::new();
     for maneuver in maneuvers {
-        let of_it = estimates
+        let of_maneuver = estimates
             .iter()
             .filter(|e| e.maneuver_id == maneuver.maneuver_id);
-        let names = of_it.map(|e| e.derivative.as_str());
-        rows.extend(at(
+        let names = of_maneuver.map(|e| e.derivative.as_str());
+        rows.extend(extrapolations_at(
             &maneuver.maneuver_id,
             &maneuver.condition(tunnel),
             names,
             tunnel,
         ));
     }
-    let places = comparison
+    let compared = comparison
         .iter()
         .filter_map(|c| Some((c, c.wind_tunnel.and(c.mach)?)));
-    for (c, mach) in places {
+    for (c, mach) in compared {
         let condition = Condition {
             alpha_deg: c.alpha_deg,
             mach,
             third: None,
         };
-        rows.extend(at(
+        rows.extend(extrapolations_at(
             "",
             &condition,
             std::iter::once(c.derivative.as_str()),
@@ -49,13 +49,13 @@ pub fn beyond(
     rows
 }
 
-fn at<'a>(
+fn extrapolations_at<'a>(
     maneuver_id: &str,
     condition: &Condition,
     derivatives: impl Iterator<Item = &'a str>,
     tunnel: &WindTunnel,
 ) -> Vec<ExtrapolationRow> {
-    // Tables that end alike share a row; the key is their ends to the bit.
+    // Tables with equal ends share a row.
     let mut found: BTreeMap<(String, u64, u64), (ExtrapolatedReading, Vec<&str>)> = BTreeMap::new();
     for name in derivatives {
         for beyond in tunnel.extrapolations(name, condition) {

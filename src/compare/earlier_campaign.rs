@@ -1,12 +1,13 @@
-//! A campaign against an earlier one: the trend that speaks for each derivative beside the earlier
-//! trend of the same group, z = (now − before) / √(standard error now² + standard error before²).
+//! Comparison of a campaign with an earlier one: the trend of each derivative's group with the
+//! earlier trend of that group, z = (now − before) / √(standard error now² + standard error before²).
 //!
 //! Where both campaigns share flights their errors are not independent, and z is smaller than it
-//! should be: a change that counts here is one that the data made.
+//! should be. So this comparison misses small changes, and those it reports are real.
 
 use std::path::Path;
 
-use super::{Settings, judge};
+use super::judgement::judge;
+use super::settings::Settings;
 use crate::tables::{ChangeRow, PublishedTrend, TrendRow};
 use crate::trend;
 
@@ -27,8 +28,8 @@ impl Earlier {
         }
     }
 
-    /// Value and standard error of a trend, linear between its published α; none outside of them or
-    /// in another unit.
+    /// Value and standard error of the earlier trend at an α, linear between its published α; `None`
+    /// outside of them or in another unit.
     fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
         let same = |e: &&PublishedTrend| {
             e.derivative == now.derivative
@@ -54,7 +55,7 @@ impl Earlier {
     }
 }
 
-/// One row per derivative and α of the trend that speaks for it.
+/// Compares the trend of each derivative's group with the earlier one: one row per α.
 #[must_use]
 pub fn changes(
     trends: &[TrendRow],
@@ -62,7 +63,7 @@ pub fn changes(
     groups: &trend::Settings,
     settings: &Settings,
 ) -> Vec<ChangeRow> {
-    let speaks = |t: &&TrendRow| {
+    let is_of_group = |t: &&TrendRow| {
         groups
             .group_of(&t.derivative)
             .is_some_and(|g| g.name == t.group)
@@ -91,7 +92,7 @@ pub fn changes(
             verdict: judged.agreement.into(),
         }
     };
-    trends.iter().filter(speaks).map(row).collect()
+    trends.iter().filter(is_of_group).map(row).collect()
 }
 
 #[cfg(test)]
@@ -159,7 +160,7 @@ mod tests {
         assert_relative_eq!(rows[1].before.expect("before"), 3.0);
         assert_relative_eq!(rows[1].z.expect("z"), 4.0, max_relative = 1e-14);
         let (verdicts, worst) =
-            super::super::ranges::of_changes(&rows, "reports/last", &Settings::default());
+            crate::compare::ranges::ranges_of_changes(&rows, "reports/last", &Settings::default());
         assert_eq!(
             verdicts[1].words,
             "flight higher than reports/last at 15°, by 67%"
