@@ -1,5 +1,5 @@
-//! What a wrong configuration is answered with: each test copies the shipped pipeline, spoils one
-//! thing and reads the error.
+//! Errors of a wrong configuration: each test copies the shipped pipeline, spoils one thing and reads
+//! the error.
 
 use std::fs;
 use std::path::{Path, PathBuf};

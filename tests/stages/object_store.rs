@@ -161,7 +161,7 @@ fn local() -> Campaign {
     campaign
 }
 
-/// What they come to, from folders.
+/// Their tables, from folders.
 fn expected() -> &'static BTreeMap<PathBuf, Vec<u8>> {
     static TABLES: OnceLock<BTreeMap<PathBuf, Vec<u8>>> = OnceLock::new();
     TABLES.get_or_init(|| {

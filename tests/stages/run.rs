@@ -121,8 +121,9 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// Of these the demonstration has no rows: it has one maneuver of each class at an angle of attack,
-/// no list of events, and nothing fails.
+/// Tables without rows in the demonstration: it has one maneuver of each class at an angle of attack,
+/// no list of events, and nothing fails. Their rows are tested in `rows`, `together`, `segment` and
+/// `ingest`.
 const WITHOUT_ROWS: [&str; 7] = [
     "beyond_tunnel",
     "changes",

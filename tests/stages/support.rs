@@ -1,5 +1,5 @@
-//! What the tests of the stages share: the program on temporary folders, demonstration flights that
-//! can be spoiled, and tables read back.
+//! Shared parts of the tests of the stages: the program on temporary folders, demonstration flights
+//! that can be spoiled, and tables read back.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -24,7 +24,7 @@ pub fn harvest() -> Command {
     command
 }
 
-/// How a run ended and what it said.
+/// Exit code and output of a run.
 #[derive(Debug)]
 pub struct Outcome {
     pub code: Option<i32>,
@@ -180,9 +180,9 @@ impl Campaign {
         ParquetReader::new(file).finish().unwrap()
     }
 
-    /// Bytes of every file below a folder of the campaign, by relative path: of the reports under
-    /// the names that hold, of the store without what knows a clock, a process or a folder of this
-    /// machine.
+    /// Bytes of every file below a folder of the campaign, by relative path. Left out are files that
+    /// depend on a clock, a process or a folder of this machine, and the nights beside the current
+    /// one.
     pub fn bytes(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
         let folder = self.path(folder);
         let relative = |p: PathBuf| p.strip_prefix(&folder).unwrap().to_owned();
@@ -234,7 +234,7 @@ pub fn demo() -> &'static Demo {
     })
 }
 
-/// What a run of the demonstration campaign left, in memory: nothing of it stays on the disk.
+/// Results of a run of the demonstration campaign, in memory: nothing of it stays on the disk.
 #[derive(Debug)]
 pub struct Demo {
     pub outcome: Outcome,

@@ -1,5 +1,5 @@
-//! What is made from several maneuvers, and what each lets the tunnel hold: `hold: evidence`,
-//! `estimate: joint`, the prediction of data not used, through the program.
+//! Results from several maneuvers and from evidence, through the program: `hold: evidence`,
+//! `estimate: joint`, the prediction of data not used.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
