@@ -1,0 +1,99 @@
+//! Reference dimensions, engines, sensors and vanes of an aircraft.
+
+use serde::{Deserialize, Serialize};
+
+/// Reference dimensions, engines and sensors of one aircraft.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Aircraft {
+    pub name: String,
+    /// Reference area S.
+    pub wing_area_ft2: f64,
+    /// Reference span b, of the rolling and yawing moments and of p and r.
+    pub span_ft: f64,
+    /// Reference chord c̄, of the pitching moment and of q.
+    pub chord_ft: f64,
+    /// `I_xe` of one engine; the gyroscopic moment contains the sum of both engines' momenta.
+    pub engine_inertia_slug_ft2: f64,
+    /// Latitude of the campaign; gravity depends on it.
+    pub latitude_deg: f64,
+    pub sensors: Sensors,
+}
+
+/// Positions of the sensors and equations of the vanes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensors {
+    pub an: Position,
+    pub ax: Position,
+    pub ay: Position,
+    pub alpha_vane: Vane,
+    pub beta_vane: Vane,
+    /// Equations of the vanes: `exact` local velocity at the vane, or the paper's small-angle forms
+    /// 2.9 and 3.8.
+    #[serde(default)]
+    pub vane_model: VaneModel,
+    /// Thrust in the axial accelerometer's equation. An accelerometer feels thrust; `false`
+    /// reproduces the print of eq. 2.8.
+    #[serde(default = "default_true")]
+    pub thrust_in_ax: bool,
+}
+
+fn default_true() -> bool {
+    true
+}
+
+/// A point of the aircraft, ft aft, right and above of the reference point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Position {
+    pub x_ft: f64,
+    pub y_ft: f64,
+    pub z_ft: f64,
+}
+
+/// A flow vane: its position, and the factor of its reading over the local angle by upwash or
+/// sidewash.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vane {
+    pub x_ft: f64,
+    pub y_ft: f64,
+    pub z_ft: f64,
+    /// `k_alpha` or `k_beta`.
+    pub factor: f64,
+}
+
+impl Vane {
+    #[must_use]
+    pub fn position(self) -> Position {
+        Position {
+            x_ft: self.x_ft,
+            y_ft: self.y_ft,
+            z_ft: self.z_ft,
+        }
+    }
+}
+
+/// Model of the flow vanes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VaneModel {
+    /// Angle of the local velocity at the vane, times its factor.
+    #[default]
+    Exact,
+    /// Eqs. 2.9 and 3.8 of the paper, linear in the rates.
+    SmallAngle,
+}
+
+impl Position {
+    /// Arm from the c.g. to this point in body axes, ft forward, right and down.
+    #[must_use]
+    pub fn arm(self, cg: Position) -> [f64; 3] {
+        [
+            cg.x_ft - self.x_ft,
+            self.y_ft - cg.y_ft,
+            cg.z_ft - self.z_ft,
+        ]
+    }
+}
