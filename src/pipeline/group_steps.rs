@@ -134,17 +134,16 @@ pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         .collect();
     let brought: Result<Vec<_>> = steps.par_iter().map(|step| runner.bring(step)).collect();
     for (bin, joined) in bins.iter().zip(brought?) {
-        match joined {
-            Some(joined) => add_joined(campaign, joined.artefact),
-            None => {
-                let missing = MissingArtefact {
-                    item: bin.joint_id.clone(),
-                    flight_id: String::new(),
-                    class: Some(bin.class.clone()),
-                };
-                campaign.state(Stage::Estimate).missing.push(missing);
-            }
+        if let Some(joined) = joined {
+            add_joined(campaign, joined.artefact);
+            continue;
         }
+        let missing = MissingArtefact {
+            item: bin.joint_id.clone(),
+            flight_id: String::new(),
+            class: Some(bin.class.clone()),
+        };
+        campaign.state(Stage::Estimate).missing.push(missing);
     }
     Ok(())
 }

@@ -78,7 +78,7 @@ impl Lock {
             match lock(&file) {
                 Ok(()) => break,
                 Err(TryLockError::WouldBlock) if Instant::now() < patience => {
-                    std::thread::sleep(RETRY_INTERVAL)
+                    std::thread::sleep(RETRY_INTERVAL);
                 }
                 Err(TryLockError::WouldBlock) => {
                     return Err(Error::Busy {

@@ -133,9 +133,9 @@ fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
         };
         let (first, flight) = flights.entry(flight_id.clone()).or_insert_with(new);
         if *first == source {
-            flight.files.push(file)
+            flight.files.push(file);
         } else {
-            flight.rivals.push(file)
+            flight.rivals.push(file);
         }
     }
     flights.into_values().map(|(_, flight)| flight).collect()
@@ -447,7 +447,7 @@ pub fn read(
             let unit = opened.unit(file, name).map(str::to_owned);
             let mut values = Vec::with_capacity(opened.rows(file));
             let read = opened.read(file, name, 0..opened.rows(file), &mut |v| {
-                values.extend_from_slice(v)
+                values.extend_from_slice(v);
             });
             read.map_err(|reason| Problem {
                 stage: ProblemStage::Ingest,
