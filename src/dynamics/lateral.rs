@@ -1,11 +1,17 @@
 //! Lateral-directional equations: states β, p, r, φ (3.1-3.4); outputs β at the vane, p, r, φ,
 //! `a_y` (3.7, 3.8).
 //!
-//! Forces: V β̇ = f_y cos β − sin β (f_x cos α + f_z sin α) + g-terms + V (p sin α − r cos α), with
-//! f_y = q̄S CY/m. The longitudinal specific forces f_x, f_z are taken as measured, brought to the
-//! c.g.; in 3.1 they stand as C_D sin β and T cos α sin β (minus: thrust pulls the nose back into
-//! the wind's direction). Moments: Euler's equations about x and z for a symmetric airframe with
-//! the engines' momentum H along +x, whose yawing moment is +q H.
+//! Forces, with f the specific force in body axes:
+//!
+//! ```text
+//! V β̇ = f_y cos β − sin β (f_x cos α + f_z sin α) + gravity + V (p sin α − r cos α)
+//! f_y = q̄S CY/m
+//! ```
+//!
+//! f_x and f_z are taken as measured, brought to the c.g. In 3.1 they stand as C_D sin β and
+//! T cos α sin β, with a minus sign: thrust turns the path towards the nose. Moments follow Euler's
+//! equations about x and z for a symmetric airframe. The engines' angular momentum H along +x has the
+//! yawing moment +q H.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -13,9 +19,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::equations::{COEFFICIENTS, Equations, Outputs, Rates};
 use super::lever::lever;
-use super::motion::Motion;
+use super::{COEFFICIENTS, Equations, Motion, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::numerics::trig::sin_cos;

@@ -1,11 +1,16 @@
 //! Longitudinal equations: states α, q, θ (2.1-2.3); outputs α at the vane, q, θ, `a_n`, `a_x`
 //! (2.7-2.9).
 //!
-//! Forces: with f the specific force in body axes and gravity g, V cos β α̇ = f_z cos α − f_x sin α
-//! + g-terms + V cos β q − V sin β (p cos α + r sin α), with f_z = −q̄S CN/m and f_x = (T − q̄S
-//! CA)/m. The paper's 2.1 with C_L = CN cos α − CA sin α is this. Moments: Euler's equation about y
-//! for a symmetric airframe (I_xy = I_yz = 0) with the engines' momentum H along +x, whose moment
-//! is −r H.
+//! Forces, with f the specific force in body axes:
+//!
+//! ```text
+//! V cos β α̇ = f_z cos α − f_x sin α + gravity + V cos β q − V sin β (p cos α + r sin α)
+//! f_z = −q̄S CN/m,   f_x = (T − q̄S CA)/m
+//! ```
+//!
+//! This is 2.1 with C_L = CN cos α − CA sin α. Moments follow Euler's equation about y for a
+//! symmetric airframe (I_xy = I_yz = 0). The engines' angular momentum H along +x has the moment
+//! −r H.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -13,9 +18,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::equations::{COEFFICIENTS, Equations, OUTPUTS, Outputs, Rates};
 use super::lever::lever;
-use super::motion::Motion;
+use super::{COEFFICIENTS, Equations, Motion, OUTPUTS, Outputs, Rates};
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::numerics::trig::sin_cos;

@@ -153,7 +153,7 @@ impl AlignedMatrix {
         Arch::new().dispatch(|| {
             sums.iter_mut()
                 .zip(values)
-                .for_each(|(sum, v)| *sum += factor * v)
+                .for_each(|(sum, v)| *sum += factor * v);
         });
     }
 

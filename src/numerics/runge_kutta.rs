@@ -52,10 +52,6 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn plus(x: &f64, slope: &f64, h: f64) -> f64 {
-        x + h * slope
-    }
-
     /// Integrates x' = a x², x(0) = 1, whose solution is 1/(1 − a t), with its sensitivity to a.
     fn integrate(a: f64, steps: u32) -> (f64, f64) {
         let (mut x, mut s, h) = (1.0, 0.0, 1.0 / f64::from(steps));
@@ -68,13 +64,13 @@ mod tests {
                     at[stage] = *x;
                     a * x * x
                 },
-                plus,
+                |x, slope, h| x + h * slope,
             );
             s = step(
                 &s,
                 h,
                 |stage, s| 2.0 * a * at[stage] * s + at[stage] * at[stage],
-                plus,
+                |x, slope, h| x + h * slope,
             );
             x = next;
         }

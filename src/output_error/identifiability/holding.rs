@@ -129,34 +129,22 @@ impl HoldingCandidates {
         if self.information[(parameter, parameter)] <= 0.0 {
             return Some(HoldingReason::NotExcited);
         }
-        let mut freed = held.to_vec();
-        freed[parameter] = false;
-        let free = indices(&freed, false);
-        let at = free.iter().position(|&j| j == parameter)?;
+        let (free, at) = freed_set(held, parameter)?;
         match self.free_set(&free) {
             FreeSet::Undetermined(direction) if direction[at] != 0.0 => {
-                let others = free
-                    .iter()
-                    .enumerate()
-                    .filter(|(i, _)| *i != at && direction[*i] != 0.0);
-                Some(HoldingReason::NotSeparable(
-                    others.map(|(_, &j)| j).collect(),
-                ))
+                let others = free.iter().zip(direction.iter());
+                let others = others.filter(|(j, part)| **j != parameter && **part != 0.0);
+                let others = others.map(|(&j, _)| j).collect();
+                Some(HoldingReason::NotSeparable(others))
             }
             FreeSet::Undetermined(_) => None,
             FreeSet::Determined { bounds, inverse } => {
                 let uncertainty = self.uncertainty[parameter]?;
-                let unit = scale(&inverse);
-                let correlation = |i: usize| inverse[(i, at)] * unit[i] * unit[at];
-                let partner = (0..free.len())
-                    .filter(|&i| i != at)
-                    .max_by(|&a, &b| correlation(a).abs().total_cmp(&correlation(b).abs()))
-                    .map(|i| (free[i], correlation(i)));
                 let bound = bounds[at];
-                (bound > uncertainty).then_some(HoldingReason::Bound {
+                (bound > uncertainty).then(|| HoldingReason::Bound {
                     bound,
                     uncertainty,
-                    partner,
+                    partner: largest_correlation(&inverse, at).map(|(i, c)| (free[i], c)),
                 })
             }
         }
@@ -166,17 +154,14 @@ impl HoldingCandidates {
     /// most accurate tunnel value along it.
     fn first_undetermined(&self, held: &[bool]) -> Option<usize> {
         let free = indices(held, false);
-        let silent =
-            |j: &usize| self.uncertainty[*j].is_some() && self.information[(*j, *j)] <= 0.0;
-        match free.iter().copied().find(silent) {
-            Some(j) => Some(j),
-            None => match self.free_set(&free) {
-                FreeSet::Undetermined(direction) => {
-                    self.largest_ratio(&free, &direction.abs(), 0.0)
-                }
-                FreeSet::Determined { .. } => None,
-            },
-        }
+        let unexcited = free
+            .iter()
+            .copied()
+            .find(|&j| self.uncertainty[j].is_some() && self.information[(j, j)] <= 0.0);
+        unexcited.or_else(|| match self.free_set(&free) {
+            FreeSet::Undetermined(direction) => self.largest_ratio(&free, &direction.abs(), 0.0),
+            FreeSet::Determined { .. } => None,
+        })
     }
 
     /// Free parameter to hold next: an undetermined one, or the one with the largest ratio above
@@ -205,31 +190,27 @@ impl HoldingCandidates {
 
     /// Held parameter with the smallest ratio below one, unless freed before.
     fn next_to_free(&self, held: &[bool], released: &[bool]) -> Option<usize> {
-        let ratio = |j: usize| {
-            let mut freed = held.to_vec();
-            freed[j] = false;
-            let free = indices(&freed, false);
-            let at = free.iter().position(|&i| i == j)?;
-            match self.free_set(&free) {
-                FreeSet::Determined { bounds, .. } => Some(bounds[at] / self.uncertainty[j]?),
-                FreeSet::Undetermined(_) => None,
-            }
-        };
         let candidates = indices(held, true)
             .into_iter()
             .filter(|&j| !released[j] && self.information[(j, j)] > 0.0);
-        let ratios = candidates.filter_map(|j| Some((j, ratio(j)?)));
+        let ratios = candidates.filter_map(|j| Some((j, self.ratio_if_freed(held, j)?)));
         ratios
             .filter(|(_, ratio)| *ratio < 1.0)
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map(|(j, _)| j)
     }
 
+    /// Bound of a held parameter, freed alone, relative to the tunnel's uncertainty.
+    fn ratio_if_freed(&self, held: &[bool], parameter: usize) -> Option<f64> {
+        let (free, at) = freed_set(held, parameter)?;
+        match self.free_set(&free) {
+            FreeSet::Determined { bounds, .. } => Some(bounds[at] / self.uncertainty[parameter]?),
+            FreeSet::Undetermined(_) => None,
+        }
+    }
+
     fn free_set(&self, free: &[usize]) -> FreeSet {
-        let part = |m: &DMatrix<f64>| {
-            DMatrix::from_fn(free.len(), free.len(), |i, j| m[(free[i], free[j])])
-        };
-        let own = part(&self.information);
+        let own = submatrix(&self.information, free);
         if own.is_empty() {
             return FreeSet::Determined {
                 bounds: DVector::zeros(0),
@@ -239,23 +220,53 @@ impl HoldingCandidates {
         let unit = scale(&own);
         let eigen = SymmetricEigen::new(scaled(&own, &unit));
         let least = eigen.eigenvalues.imin();
-        if eigen.eigenvalues[least] <= eigen.eigenvalues.max() / self.max_condition_number {
-            let vector = eigen.eigenvectors.column(least);
-            let takes_part = |v: f64| if v * v >= DIRECTION_SHARE { v } else { 0.0 };
-            return FreeSet::Undetermined(DVector::from_fn(free.len(), |i, _| {
-                takes_part(vector[i]) * unit[i]
-            }));
+        let floor = eigen.eigenvalues.max() / self.max_condition_number;
+        if eigen.eigenvalues[least] <= floor {
+            let direction = eigen.eigenvectors.column(least);
+            let parts = direction.zip_map(&unit, |v, unit| {
+                if v * v >= DIRECTION_SHARE {
+                    v * unit
+                } else {
+                    0.0
+                }
+            });
+            return FreeSet::Undetermined(parts);
         }
         let inverse = &eigen.eigenvectors
             * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
             * eigen.eigenvectors.transpose();
         let inverse = scaled(&inverse, &unit);
-        let covariance = &inverse * part(&self.gradient_covariance) * &inverse;
+        let covariance = &inverse * submatrix(&self.gradient_covariance, free) * &inverse;
         FreeSet::Determined {
             bounds: covariance.diagonal().map(f64::sqrt),
             inverse,
         }
     }
+}
+
+/// Rows and columns of a symmetric matrix.
+fn submatrix(matrix: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(places.len(), places.len(), |i, j| {
+        matrix[(places[i], places[j])]
+    })
+}
+
+/// Free parameters once a held one is freed, and its place among them.
+fn freed_set(held: &[bool], parameter: usize) -> Option<(Vec<usize>, usize)> {
+    let mut held = held.to_vec();
+    held[parameter] = false;
+    let free = indices(&held, false);
+    let at = free.iter().position(|&j| j == parameter)?;
+    Some((free, at))
+}
+
+/// Parameter that correlates most with one, and the correlation.
+fn largest_correlation(covariance: &DMatrix<f64>, at: usize) -> Option<(usize, f64)> {
+    let unit = scale(covariance);
+    let others = (0..unit.len()).filter(|&i| i != at);
+    others
+        .map(|i| (i, covariance[(i, at)] * unit[i] * unit[at]))
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
 fn indices(flags: &[bool], wanted: bool) -> Vec<usize> {

@@ -10,10 +10,6 @@
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
 )]
-#![expect(
-    clippy::needless_range_loop,
-    reason = "plain indices become straight code for the vectors"
-)]
 
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd};
@@ -176,7 +172,7 @@ impl NormalSums {
             Arch::new().dispatch(|| {
                 sum.iter_mut()
                     .zip(gram.slice())
-                    .for_each(|(sum, s)| *sum += factor * s)
+                    .for_each(|(sum, s)| *sum += factor * s);
             });
         }
         self.symmetric_by_parameter(|a, b| match (a.only_output, b.only_output) {

@@ -99,12 +99,11 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     fn place_parameters(&mut self, label: &str, names: &[String]) -> Vec<usize> {
         let mut places = Vec::with_capacity(names.len());
         for (j, name) in names.iter().enumerate() {
-            match self.shared.iter().position(|&s| s == j) {
-                Some(place) => places.push(place),
-                None => {
-                    places.push(self.names.len());
-                    self.names.push(format!("{name} of {label}"));
-                }
+            if let Some(place) = self.shared.iter().position(|&s| s == j) {
+                places.push(place);
+            } else {
+                places.push(self.names.len());
+                self.names.push(format!("{name} of {label}"));
             }
         }
         places
