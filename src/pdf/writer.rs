@@ -171,9 +171,9 @@ fn write_outline(pdf: &mut Pdf, headings: &[Heading], pages: usize) {
                 .count(-to_i32(end - chapter - 1));
         }
         item.finish();
-        for section in chapter + 1..end {
+        for (section, heading) in headings.iter().enumerate().take(end).skip(chapter + 1) {
             let mut item = pdf.outline_item(id(section));
-            describe(&mut item, &headings[section], id(chapter));
+            describe(&mut item, heading, id(chapter));
             if section > chapter + 1 {
                 item.prev(id(section - 1));
             }

@@ -312,17 +312,17 @@ impl StripColumn {
     /// bars.
     fn flags(&self, svg: &mut SvgWriter, spans: &FlaggedSpans, (top, bottom): (f64, f64)) {
         let ends = |(start_s, end_s): &(f64, f64)| (self.x(*start_s), self.x(*end_s));
-        let bridged = spans
+        let bridged: String = spans
             .bridged
             .iter()
             .map(|span| bridged_mark(ends(span), bottom))
             .collect();
-        let despiked = spans
+        let despiked: String = spans
             .despiked
             .iter()
             .map(|(start_s, end_s)| despiked_mark(self.x(0.5 * (start_s + end_s)), top))
             .collect();
-        let missing = spans
+        let missing: String = spans
             .missing
             .iter()
             .map(|span| missing_mark(ends(span), bottom))
@@ -330,23 +330,23 @@ impl StripColumn {
         flag_group(
             svg,
             "mark bridged",
-            bridged,
+            &bridged,
             PathStyle::filled(EXCLUDED_COLOUR),
         );
         flag_group(
             svg,
             "mark despiked",
-            despiked,
+            &despiked,
             PathStyle::filled(EXCLUDED_COLOUR),
         );
-        flag_group(svg, "mark missing", missing, MISSING_STYLE);
+        flag_group(svg, "mark missing", &missing, MISSING_STYLE);
     }
 }
 
-fn flag_group(svg: &mut SvgWriter, class: &str, data: String, style: PathStyle) {
+fn flag_group(svg: &mut SvgWriter, class: &str, data: &str, style: PathStyle) {
     if !data.is_empty() {
         svg.open_group(&[("class", class)], "");
-        svg.path(&data, style);
+        svg.path(data, style);
         svg.close_group();
     }
 }
