@@ -19,8 +19,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::equations::{COEFFICIENTS, Equations, Outputs, Rates};
 use super::lever::lever;
-use super::{COEFFICIENTS, Equations, Motion, Outputs, Rates};
+use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
 use crate::numerics::trig::sin_cos;
