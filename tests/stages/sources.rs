@@ -390,7 +390,23 @@ impl Node {
         }
         let (mut imports, mut used) = (Vec::new(), Vec::new());
         let mut at = 0;
+        let (mut depth, mut inline_ends) = (0, Vec::new());
         while at < tokens.len() {
+            match tokens[at] {
+                "{" => depth += 1,
+                "}" => {
+                    depth -= 1;
+                    inline_ends.pop_if(|end| *end == depth);
+                }
+                "mod" if tokens.get(at + 2) == Some(&"{") => inline_ends.push(depth),
+                _ => {}
+            }
+            // `super` of a module within the file is the file.
+            let is_use = usize::from(tokens[at] == "use");
+            if !inline_ends.is_empty() && tokens.get(at + is_use) == Some(&"super") {
+                at += is_use + 1;
+                continue;
+            }
             let is_word = tokens[at].starts_with(|c: char| c.is_alphabetic() || c == '_');
             let begins = is_word && tokens.get(at + 1) == Some(&"::") && before(at) != "::";
             if tokens[at] == "use" && !["::", "."].contains(&before(at)) {

@@ -29,6 +29,7 @@ use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
 use super::object;
+use file_rules::{is_hidden, unreadable};
 
 /// Files of one flight, in the order of their names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,11 +45,6 @@ const DEPTH: usize = 16;
 
 /// Rows decoded at a time: a few MB for row groups of any size.
 const BATCH_ROWS: usize = 16_384;
-
-/// `true` for a name that other programs reserve for temporary files.
-fn is_hidden(name: &str) -> bool {
-    name.starts_with(['.', '_'])
-}
 
 /// Most numbers of a file, rows times mapped columns: more than ten hours of sixty channels at 200
 /// Hz. A damaged file of a few kilobytes can claim any number of rows.
@@ -232,10 +228,6 @@ fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     result.unwrap_or_else(|_| {
         Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned())
     })
-}
-
-fn unreadable(e: &dyn std::fmt::Display) -> String {
-    format!("not a readable Parquet file (truncated, or another format?): {e}")
 }
 
 fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
@@ -498,6 +490,7 @@ fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
     Unit::parse(name).ok()?.factor_to(mapped)
 }
 
+mod file_rules;
 mod remote;
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,7 @@ use parquet::file::metadata::ParquetMetaData;
 use parquet::file::page_index::offset_index::OffsetIndexMetaData;
 
 use super::super::object;
-use super::{is_hidden, unreadable};
+use super::file_rules::{is_hidden, unreadable};
 use crate::error::Error;
 
 /// Finds the objects of an archive `s3://bucket/prefix`: those below it whose names end in

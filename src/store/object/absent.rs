@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use bytes::Bytes;
 
-use super::{Failure, ObjectInfo};
+use super::failure::{Failure, ObjectInfo};
 
 /// No connection.
 #[derive(Debug)]

@@ -19,7 +19,7 @@ use object_store::{
 };
 use tokio::runtime::Runtime;
 
-use super::{Failure, ObjectInfo};
+use super::failure::{Failure, ObjectInfo};
 
 /// Requests in a row without an answer after which the endpoint counts as dead.
 const SILENT_REQUESTS: usize = 3;

@@ -10,124 +10,23 @@
 mod client;
 #[cfg(feature = "s3")]
 mod client;
+mod address;
+mod failure;
 mod reader;
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, OnceLock};
 
-use crate::error::{Error, Result};
-use client::Client;
+use crate::error::Result;
+use address::{Address, SCHEME, at};
 
+pub use address::is_object;
+pub use failure::{Failure, ObjectInfo};
 pub use reader::Reader;
-
-const SCHEME: &str = "s3://";
 
 /// Memory for copying an object to or from a file, bytes.
 const PART: usize = 16 << 20;
-
-/// Failure of a request, with what to do about it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Failure {
-    /// Another try may succeed: no answer, or the object was replaced meanwhile.
-    Passing(String),
-    /// Another try will fail as well: no such bucket, no right to it, or no credentials.
-    Lasting(String),
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Failure::Passing(what) | Failure::Lasting(what)) = self;
-        f.write_str(what)
-    }
-}
-
-impl std::error::Error for Failure {}
-
-impl Failure {
-    /// Converts to the error that stops a run.
-    #[must_use]
-    pub fn at(self, place: &Path) -> Error {
-        match self {
-            Failure::Passing(what) => Error::Unavailable {
-                place: place.to_owned(),
-                what,
-            },
-            Failure::Lasting(what) => Error::Archive {
-                place: place.to_owned(),
-                what,
-            },
-        }
-    }
-}
-
-/// Size and tag of an object.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ObjectInfo {
-    pub bytes: u64,
-    /// ETag, the store's mark of the content. Not every store lists it.
-    pub tag: Option<String>,
-}
-
-/// `true` for the path of an object or of a prefix.
-#[must_use]
-pub fn is_object(path: &Path) -> bool {
-    path.to_str().is_some_and(|text| text.starts_with(SCHEME))
-}
-
-/// Splits a path into bucket and key.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Address {
-    bucket: String,
-    key: String,
-}
-
-impl Address {
-    fn parse(path: &Path) -> Result<Address, Failure> {
-        let text = path.to_string_lossy();
-        let wrong = |what: &str| Failure::Lasting(format!("{what}; expected s3://bucket/prefix"));
-        let rest = text
-            .strip_prefix(SCHEME)
-            .ok_or_else(|| wrong("not in an object store"))?;
-        let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
-        let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-        if bucket.is_empty() || !bucket.chars().all(is_name) {
-            return Err(wrong(&format!("`{bucket}` is no name of a bucket")));
-        }
-        let key = key.trim_end_matches('/');
-        if key.split('/').any(|part| matches!(part, "." | ".."))
-            || key.contains("//")
-            || key.starts_with('/')
-        {
-            return Err(wrong(&format!("`{key}` is no key: its parts have names")));
-        }
-        Ok(Address {
-            bucket: bucket.to_owned(),
-            key: key.to_owned(),
-        })
-    }
-
-    fn client(&self) -> Result<Arc<Client>, Failure> {
-        // Connections last as long as the process, like its environment.
-        static OPENED: OnceLock<Mutex<BTreeMap<String, Arc<Client>>>> = OnceLock::new();
-        let mut opened = OPENED
-            .get_or_init(Mutex::default)
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(client) = opened.get(&self.bucket) {
-            return Ok(client.clone());
-        }
-        let client = Arc::new(Client::open(&self.bucket)?);
-        opened.insert(self.bucket.clone(), client.clone());
-        Ok(client)
-    }
-}
-
-fn at(path: &Path) -> Result<(Arc<Client>, String), Failure> {
-    let address = Address::parse(path)?;
-    Ok((address.client()?, address.key))
-}
 
 /// Checks the form of an object's path, without a request.
 ///

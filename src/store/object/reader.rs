@@ -9,8 +9,9 @@ use bytes::{Buf, Bytes};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{ChunkReader, Length};
 
+use super::address::at;
 use super::client::Client;
-use super::{Failure, ObjectInfo, at};
+use super::failure::{Failure, ObjectInfo};
 
 /// Longest read-ahead of a request, bytes: a request takes as long as some hundred kilobytes.
 const AHEAD: u64 = 1 << 20;
