@@ -45,7 +45,7 @@ impl Style {
                 "stroke-dasharray" => style.dash = dashes(value),
                 "fill-opacity" | "opacity" => style.opacity = percent(value),
                 "font-size" => {
-                    style.size = value.trim_end_matches("px").parse().unwrap_or(style.size)
+                    style.size = value.trim_end_matches("px").parse().unwrap_or(style.size);
                 }
                 "font-weight" => {
                     style.weight = if value == "bold" {

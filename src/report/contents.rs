@@ -62,6 +62,7 @@ pub struct Contents<'a> {
 
 impl<'a> Contents<'a> {
     /// Maps each maneuver's identifier to its fit.
+    #[must_use]
     pub fn fits_by_maneuver(&self) -> BTreeMap<&'a str, &'a FitRow> {
         self.fits
             .iter()

@@ -195,7 +195,7 @@ impl StripColumn {
         }
         self.time_axis(&mut axes, y - 2.0 * self.sizes.half_gap);
         svg.path(&axes.grid, PathStyle::line("#cccccc", 0.5));
-        svg.append(lines);
+        svg.append(&lines);
         svg.path(&axes.frame, PathStyle::line("#000000", 0.8));
         for (place, text, style) in axes.texts {
             svg.text(place, &text, style);
@@ -282,12 +282,13 @@ impl StripColumn {
             };
             svg.path(&self.line(line, strip, top), style);
         }
-        let dots: String = strip
-            .dots
-            .iter()
-            .map(|&(time_s, value)| (self.x(time_s) - 2.0, strip.y(top, value) - 2.0))
-            .map(|(x, y)| format!("M{} {}h4v4h-4z", coordinate(x), coordinate(y)))
-            .collect();
+        let mut dots = String::new();
+        for &(time_s, value) in &strip.dots {
+            let x = coordinate(self.x(time_s) - 2.0);
+            let y = coordinate(strip.y(top, value) - 2.0);
+            // Writing into a String cannot fail.
+            let _ = write!(dots, "M{x} {y}h4v4h-4z");
+        }
         svg.path(&dots, PathStyle::filled(EXCLUDED_COLOUR));
         self.flags(svg, &strip.flagged, (top, top + strip.height));
         if !strip.attributes.is_empty() {

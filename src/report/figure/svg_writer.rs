@@ -147,7 +147,7 @@ impl SvgWriter {
     }
 
     /// Appends the elements of another drawing.
-    pub fn append(&mut self, other: SvgWriter) {
+    pub fn append(&mut self, other: &SvgWriter) {
         self.svg.push_str(&other.svg);
     }
 
