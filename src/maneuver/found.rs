@@ -61,7 +61,7 @@ table! {
 }
 
 impl Maneuver {
-    /// Whether it should not be estimated.
+    /// `true` for a maneuver that is not estimated.
     #[must_use]
     pub fn is_rejected(&self) -> bool {
         self.quality.verdict == Acceptance::Rejected

@@ -53,7 +53,7 @@ pub trait Row: Sized {
 /// A row type with a table of its own.
 pub trait Table: Row {
     const NAME: &'static str;
-    /// What has a row: `derivative and angle of attack`.
+    /// Subject of a row: `derivative and angle of attack`.
     const PER: &'static str;
     const MEANING: &'static str;
 }

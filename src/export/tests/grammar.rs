@@ -138,7 +138,7 @@ fn of(node: Node) -> Vec<String> {
     faults
 }
 
-/// Whether names come in a model's order; each part takes as many as it can, which is enough for
+/// Test for names in a model's order; each part takes as many as it can, which is enough for
 /// these models.
 fn follows(names: &[&str], model: &str) -> bool {
     let mut rest = names;

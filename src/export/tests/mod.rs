@@ -268,7 +268,7 @@ fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
     }
 }
 
-/// Where a value stands, by its bits: derivative, α, Mach, third variable.
+/// Place of a value, by its bits: derivative, α, Mach, third variable.
 type Place = (String, [Option<u64>; 3]);
 
 /// The values and uncertainties of rows, by their bits.

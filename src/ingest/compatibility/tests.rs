@@ -303,7 +303,7 @@ fn window_samples(seconds: f64) -> usize {
     (seconds / STEP_S) as usize
 }
 
-/// What is terms at a state, as the window knows it from exact signals.
+/// Terms of the equations at a state, from exact signals.
 fn terms_at(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> MeasuredTerms {
     let along = Vector3::new(x[0], x[1], x[2]);
     MeasuredTerms {
@@ -443,7 +443,7 @@ const NOISE: [f64; INSTRUMENTS] = [
     0.1, 0.05, 0.05, 0.003, 0.005, 0.01, 0.1, 0.1, 0.6, 0.05, 0.05, 0.05, 4.0, 0.15, 0.0008,
 ];
 
-/// What instruments with these errors (bias, scale, delay) record of an exact flight. A delay is a
+/// Record of an exact flight by instruments with these errors (bias, scale, delay). A delay is a
 /// whole number of samples.
 fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
     let mut record = exact.clone();

@@ -16,7 +16,7 @@ pub(super) struct SequenceStep<'a> {
     pub change: f64,
 }
 
-/// Who makes the steps of a sequence.
+/// Source of the steps of a sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// The on-board excitation system: uncommanded steps of surfaces.
