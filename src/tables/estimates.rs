@@ -90,11 +90,11 @@ table! {
     ///   errors of calibration. Student's t accounts for the few seconds from which the
     ///   autocovariance is estimated. It is never below `bound`, and contains `bound_held`.
     ///   `docs/coverage.md` has the measured coverage of its intervals.
-    /// - `bound_calibration` is the effect of the errors that `estimate: calibration:` states: the
+    /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`: the
     ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
     ///   root sum of squares. It does not average out over maneuvers with the same instruments.
     ///
-    /// No bound contains errors of signals that `calibration` does not name (as shipped: mass, c.g.,
+    /// No bound contains errors of signals without such an `uncertainty` (as shipped: mass, c.g.,
     /// inertias), or noise of signals other than the five outputs and the surfaces.
     ///
     /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
