@@ -9,11 +9,12 @@ cd "$(dirname "$0")/.."
 
 built=$(mktemp) log=$(mktemp)
 trap 'rm -f "$built" "$log"' EXIT
-cargo test --locked --no-run 2> >(tee "$built" >&2) || exit 1
-wait
+cargo test --locked --no-run 2>&1 | tee "$built" || exit 1
+programs=$(sed -n 's/^ *Executable .*(\(.*\))$/\1/p' "$built")
+[ -n "$programs" ] || { echo "cargo named no test program"; exit 1; }
 
 code=0
-for program in $(sed -n 's/^ *Executable .*(\(.*\))$/\1/p' "$built"); do
+for program in $programs; do
     RUSTC_BOOTSTRAP=1 "$program" -Z unstable-options --report-time "$@" | tee -a "$log"
     [ "${PIPESTATUS[0]}" = 0 ] || code=101
 done
