@@ -70,7 +70,7 @@ impl BodyState {
 
     /// Rotation matrix from body to earth axes.
     #[must_use]
-    pub fn to_earth(&self) -> Matrix3<f64> {
+    pub fn earth_from_body(&self) -> Matrix3<f64> {
         UnitQuaternion::from_quaternion(self.attitude)
             .to_rotation_matrix()
             .into_inner()
@@ -79,7 +79,7 @@ impl BodyState {
     /// Euler angles; ψ between −π and π.
     #[must_use]
     pub fn euler(&self) -> Euler {
-        let m = self.to_earth();
+        let m = self.earth_from_body();
         Euler {
             phi: m[(2, 1)].atan2(m[(2, 2)]),
             theta: (-m[(2, 0)]).clamp(-1.0, 1.0).asin(),
@@ -124,7 +124,7 @@ pub struct Loads {
 #[must_use]
 pub fn state_rate(state: &BodyState, loading: &Loading, loads: &Loads) -> StateRate {
     let (v, w) = (state.velocity, state.rates);
-    let to_earth = state.to_earth();
+    let to_earth = state.earth_from_body();
     let gravity = to_earth.transpose() * Vector3::new(0.0, 0.0, loads.gravity_ft_s2);
     let inertia = loading.inertia();
     let momentum = inertia * w + Vector3::new(loads.engine_momentum, 0.0, 0.0);
@@ -194,13 +194,17 @@ mod tests {
     #[test]
     fn free_of_moments_energy_and_the_angular_momentum_in_space_stay() {
         let energy = |s: &BodyState| 0.5 * s.rates.dot(&(LOADING.inertia() * s.rates));
-        let momentum = |s: &BodyState| s.to_earth() * (LOADING.inertia() * s.rates);
+        let momentum = |s: &BodyState| s.earth_from_body() * (LOADING.inertia() * s.rates);
         let (start, end) = (tumbling(), after(tumbling(), 20, &FREE));
         assert!((start.rates - end.rates).norm() > 0.1, "it does tumble");
         assert_relative_eq!(energy(&start), energy(&end), max_relative = 1e-9);
         assert!((momentum(&start) - momentum(&end)).norm() < 1e-8 * momentum(&start).norm());
         // The path over the ground is straight although the body axes turn.
-        assert!((start.to_earth() * start.velocity - end.to_earth() * end.velocity).norm() < 1e-6);
+        assert!(
+            (start.earth_from_body() * start.velocity - end.earth_from_body() * end.velocity)
+                .norm()
+                < 1e-6
+        );
         assert_abs_diff_eq!(end.attitude.norm(), 1.0, epsilon = 1e-14);
     }
 

@@ -83,9 +83,9 @@ fn altitude_of_gravity_ft(g: f64) -> f64 {
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
         if gravity_ft_s2(LATITUDE_DEG, middle) > g {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     0.5 * (low + high)
