@@ -1,4 +1,4 @@
-# One target per stage of the pipeline, and the chores. `make` alone says what there is.
+# One target per stage of the pipeline, and the chores. `make` alone lists them.
 #
 #   make nightly                                   the main job on the pipeline pipelines/harv
 #   make nightly PIPELINE=mine                     on pipelines/mine
@@ -11,7 +11,7 @@ OUT ?= data/simulation/campaign
 # Of make show: FLIGHT or MANEUVER, an id as in the table maneuvers.
 shown = $(if $(MANEUVER),maneuver '$(MANEUVER)',$(if $(FLIGHT),flight '$(FLIGHT)'))
 
-# Handed to harvest where they are set; otherwise the pipeline's own settings hold.
+# Options of harvest where they are set; otherwise the pipeline's settings apply.
 options = \
 	$(if $(ARCHIVE),--archive '$(ARCHIVE)') \
 	$(if $(WIND_TUNNEL),--wind-tunnel '$(WIND_TUNNEL)') \
@@ -55,22 +55,22 @@ export: build ## write the flight-updated derivatives for simulators: DAVE-ML, J
 nightly: build ## the main job: every stage, to the report
 	$(call harvest,run) $(running)
 
-check: build ## is the pipeline's configuration right, and what would it do
+check: build ## check the configuration and print what a run would do
 	$(call harvest,check)
 
-status: build ## what is fresh, stale or failed, and why
+status: build ## fresh, stale and failed artefacts by stage, and why
 	$(call harvest,status)
 
-explain: shown build ## the whole story of MANEUVER
+explain: shown build ## origin, fit and dependencies of MANEUVER
 	cargo run --release --locked --quiet -- explain '$(MANEUVER)' '$(PIPELINE)' $(options)
 
-diff: build ## what changed since the night before, and why
+diff: build ## changes since the night before, and their causes
 	$(call harvest,diff)
 
-verify: build ## does what is published still hold
+verify: build ## compare published bytes, input, configuration and code with the lineage
 	$(call harvest,verify)
 
-gc: build ## what nothing published needs; with YES=1 it is removed
+gc: build ## list what nothing published needs; with YES=1 remove it
 	$(call harvest,gc) $(if $(YES),--yes)
 
 show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder show of the reports
@@ -79,15 +79,15 @@ show: shown build ## a strip chart of FLIGHT or MANEUVER, SVG, into the folder s
 simulate: build ## fly the test cards CARDS into OUT: archive, wind-tunnel database and truth
 	cargo run --release --locked --quiet -- lab simulate '$(CARDS)' --out '$(OUT)' $(if $(THREADS),--threads '$(THREADS)')
 
-validate: build ## how often the intervals hold the truth, by Monte Carlo: docs/coverage.md (takes long)
+validate: build ## measure the coverage of the bounds by Monte Carlo: docs/coverage.md (takes long)
 	cargo run --release --locked --quiet -- lab validate '$(CARDS)' --out data/simulation/validation --page docs/coverage.md \
 		$(if $(REALISATIONS),--realisations '$(REALISATIONS)') $(if $(THREADS),--threads '$(THREADS)')
 
-# Before the build: that there is something to show.
+# Checks before the build that a flight or maneuver is named.
 shown:
 	$(if $(shown),@:,$(error make show FLIGHT=<flight_id>, or make show MANEUVER=<maneuver_id>))
 
-# By itself, so that the long first build shows its progress; the stages then only start the binary.
+# A step of its own, so that the long first build shows its progress.
 build: ## build the binary (the first time takes minutes)
 	cargo build --release --locked
 
