@@ -1,6 +1,7 @@
 //! Errors of a wrong configuration: each test copies the shipped pipeline, spoils one thing and reads
 //! the error.
 
+use approx::assert_relative_eq;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -662,9 +663,9 @@ fn keys_that_several_stages_share_reach_each_of_them() {
         "  expert: { share_constants: true }\n  joint: {} #",
     );
     let config = copy.load(Overrides::default()).unwrap();
-    assert_eq!(config.ingest.checks.standard_errors, 5.0);
-    assert_eq!(config.ingest.compatibility.fault_standard_errors, 5.0);
-    assert_eq!(config.estimate.max_marked_share, 0.3);
+    assert_relative_eq!(config.ingest.checks.standard_errors, 5.0);
+    assert_relative_eq!(config.ingest.compatibility.fault_standard_errors, 5.0);
+    assert_relative_eq!(config.estimate.max_marked_share, 0.3);
     assert!(config.estimate.joint.unwrap().share_constants);
     assert!(config.estimate.prediction.unwrap().share_constants);
 }

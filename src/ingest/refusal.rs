@@ -12,6 +12,7 @@ pub struct Refusal {
 
 impl Refusal {
     /// A refusal at a channel, by its name in the channel map.
+    #[must_use]
     pub fn of_channel(name: &str, reason: String) -> Refusal {
         Refusal {
             place: format!("channel `{name}`"),

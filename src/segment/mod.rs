@@ -23,6 +23,7 @@ mod tests;
 
 use std::collections::BTreeSet;
 
+use crate::aero::Output;
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::maneuver::Class;
@@ -39,10 +40,6 @@ pub use settings::{Actuator, Limits, Settings};
 #[must_use]
 pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
     let recognised_by = classes.iter().flat_map(|c| c.recognition.signals());
-    let outputs = classes
-        .iter()
-        .flat_map(|c| c.axis.outputs())
-        .map(|o| o.signal());
     let set = settings
         .steps
         .keys()
@@ -50,12 +47,15 @@ pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
         .chain(settings.quality.actuators.keys())
         .chain([&settings.excitation_flag])
         .map(String::as_str);
-    recognised_by
-        .chain(outputs)
-        .chain(condition::SIGNALS.iter().copied())
-        .chain(set)
-        .map(str::to_owned)
-        .collect()
+    let mut signals: BTreeSet<&str> = recognised_by.chain(set).collect();
+    signals.extend(condition::SIGNALS);
+    signals.extend(
+        classes
+            .iter()
+            .flat_map(|c| c.axis.outputs())
+            .map(Output::signal),
+    );
+    signals.into_iter().map(str::to_owned).collect()
 }
 
 /// Finds the maneuvers of one record.

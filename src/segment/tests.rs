@@ -1027,7 +1027,7 @@ fn each_limit_rejects_with_its_own_reason() {
                 } else {
                     0.0
                 }
-            })
+            });
         },
         "not trimmed at the start",
     );

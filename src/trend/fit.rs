@@ -342,7 +342,7 @@ fn flown_alphas(points: &[Point], step_deg: f64) -> Vec<f64> {
     for p in points {
         match clusters.last_mut() {
             Some(cluster) if p.alpha_deg - cluster[0] <= 0.5 * step_deg => {
-                cluster.push(p.alpha_deg)
+                cluster.push(p.alpha_deg);
             }
             _ => clusters.push(vec![p.alpha_deg]),
         }
@@ -477,9 +477,9 @@ fn scatter_squared(
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         if sum(middle) > expected {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     high

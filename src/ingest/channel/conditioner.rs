@@ -242,15 +242,12 @@ impl Conditioner {
             return;
         };
         for part in recorded.chunks(UNWRAPPED_AT_ONCE) {
-            match unwrapper.common_offset(part) {
-                Some(offset) => {
-                    let moved = part.iter().map(|v| (v + offset) * factor);
-                    self.values.extend(moved);
-                }
-                None => {
-                    let unwrapped = part.iter().map(|v| unwrapper.unwrap_value(*v));
-                    self.values.extend(unwrapped.map(converted));
-                }
+            if let Some(offset) = unwrapper.common_offset(part) {
+                let moved = part.iter().map(|v| (v + offset) * factor);
+                self.values.extend(moved);
+            } else {
+                let unwrapped = part.iter().map(|v| unwrapper.unwrap_value(*v));
+                self.values.extend(unwrapped.map(converted));
             }
         }
     }

@@ -116,7 +116,7 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
                 at.by_state[(o, j)],
                 (up[o] - down[o]) / (2.0 * h),
                 epsilon = 1e-5
-            )
+            );
         });
     }
     for j in 0..3 {
@@ -129,7 +129,7 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
                 at.by_rates[(o, j)],
                 (up[o] - down[o]) / 2e-6,
                 epsilon = 1e-5
-            )
+            );
         });
     }
 }

@@ -146,7 +146,7 @@ fn usable_runs(record: &Record) -> Vec<Range<usize>> {
             Some(run)
                 if run.end == k && !jumps(phi, k) && !psi.is_some_and(|psi| jumps(psi, k)) =>
             {
-                run.end = k + 1
+                run.end = k + 1;
             }
             _ => runs.push(k..k + 1),
         }
