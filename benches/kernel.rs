@@ -110,16 +110,16 @@ fn kernel(c: &mut Criterion) {
     let mut response = case.response();
     let reference = Reference::new(standard.aircraft(), &window, &model, &case);
     c.bench_function("one pass, kernel", |b| {
-        b.iter(|| case.respond(&start, &mut response))
+        b.iter(|| case.respond(&start, &mut response));
     });
     c.bench_function("one pass, plain scalar", |b| {
         b.iter(|| reference.run(&start, &weights));
     });
     c.bench_function("one pass, coarse", |b| {
-        b.iter(|| case.respond_with(Detail::Coarse, &start, &mut response))
+        b.iter(|| case.respond_with(Detail::Coarse, &start, &mut response));
     });
     c.bench_function("sensitivities kept", |b| {
-        b.iter(|| case.sensitivities(&start))
+        b.iter(|| case.sensitivities(&start));
     });
     c.bench_function("maneuver prepared", |b| b.iter(|| standard.case(&window)));
     let mut pass_s = f64::INFINITY;

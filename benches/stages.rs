@@ -149,7 +149,7 @@ fn stages(c: &mut Criterion) -> anyhow::Result<()> {
         anyhow::bail!("the archive is empty");
     };
     c.bench_function("read one flight", |b| {
-        b.iter(|| archive::read(&files, &config.channels))
+        b.iter(|| archive::read(&files, &config.channels));
     });
     let raw = archive::read(&files, &config.channels)
         .map_err(|p| anyhow::anyhow!(p.reason))?

@@ -23,7 +23,6 @@ mod tests;
 
 use std::collections::BTreeSet;
 
-use crate::aero::Output;
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::maneuver::Class;
@@ -47,15 +46,14 @@ pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
         .chain(settings.quality.actuators.keys())
         .chain([&settings.excitation_flag])
         .map(String::as_str);
-    let mut signals: BTreeSet<&str> = recognised_by.chain(set).collect();
-    signals.extend(condition::SIGNALS);
-    signals.extend(
-        classes
-            .iter()
-            .flat_map(|c| c.axis.outputs())
-            .map(Output::signal),
-    );
-    signals.into_iter().map(str::to_owned).collect()
+    let mut signals: BTreeSet<String> = recognised_by
+        .chain(set)
+        .chain(condition::SIGNALS.iter().copied())
+        .map(str::to_owned)
+        .collect();
+    let outputs = classes.iter().flat_map(|c| c.axis.outputs());
+    signals.extend(outputs.map(|output| output.signal().to_owned()));
+    signals
 }
 
 /// Finds the maneuvers of one record.

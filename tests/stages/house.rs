@@ -3,6 +3,7 @@
 //! and comments read as the style has it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -89,10 +90,10 @@ fn files_form_no_circles() {
     assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 300);
     let mut found = String::new();
     for circle in circles(&uses) {
-        found += &format!("{} files:\n", circle.len());
+        writeln!(found, "{} files:", circle.len()).unwrap();
         for file in &circle {
             let others: Vec<&str> = uses[file].intersection(&circle).copied().collect();
-            found += &format!("  {file} uses {}\n", others.join(", "));
+            writeln!(found, "  {file} uses {}", others.join(", ")).unwrap();
         }
     }
     assert!(found.is_empty(), "\n{found}");

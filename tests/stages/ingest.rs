@@ -79,7 +79,7 @@ fn a_text_file_named_parquet_is_refused() {
             campaign.flight("spoiled"),
             "time,alpha\n0.0,5.1\n0.025,5.2\n",
         )
-        .unwrap()
+        .unwrap();
     };
     is_refused(
         text,

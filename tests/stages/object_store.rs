@@ -375,6 +375,22 @@ fn a_truncated_object_is_refused_by_name_and_the_rest_is_done() {
     );
 }
 
+/// Runs a command that must end at once with every one of the words and without the secret.
+fn refused(command: &mut Command, words: &[&str]) {
+    let begun = Instant::now();
+    let outcome = run(command);
+    assert_eq!(outcome.code, Some(1), "{outcome:?}");
+    for words in words {
+        assert!(outcome.stderr.contains(words), "{words}: {outcome:?}");
+    }
+    assert!(!outcome.stderr.contains(SECRET), "{outcome:?}");
+    assert!(
+        begun.elapsed() < Duration::from_mins(1),
+        "it took {:?}",
+        begun.elapsed()
+    );
+}
+
 #[test]
 fn what_stands_in_the_way_is_named_with_what_to_do() {
     let local = local();
@@ -382,20 +398,6 @@ fn what_stands_in_the_way_is_named_with_what_to_do() {
         return;
     };
     let machine = Campaign::new();
-    let refused = |command: &mut Command, words: &[&str]| {
-        let begun = Instant::now();
-        let outcome = run(command);
-        assert_eq!(outcome.code, Some(1), "{outcome:?}");
-        for words in words {
-            assert!(outcome.stderr.contains(words), "{words}: {outcome:?}");
-        }
-        assert!(!outcome.stderr.contains(SECRET), "{outcome:?}");
-        assert!(
-            begun.elapsed() < Duration::from_mins(1),
-            "it took {:?}",
-            begun.elapsed()
-        );
-    };
     refused(
         &mut server.command(&machine, "run", "s3://nowhere/1995"),
         &["s3://nowhere/1995: there is no bucket `nowhere`"],

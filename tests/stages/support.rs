@@ -271,9 +271,9 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            found.extend(files(&path))
+            found.extend(files(&path));
         } else {
-            found.push(path)
+            found.push(path);
         }
     }
     found.sort();
@@ -400,11 +400,12 @@ pub fn without(record: &RecordBatch, channel: &str) -> RecordBatch {
 /// Reports a test that cannot run for want of a program or server of this machine's. With `CI=true`
 /// it fails instead.
 pub fn skip(missing: &str) {
-    use std::io::Write;
+    use std::io::Write as _;
     let is_ci = std::env::var("CI").is_ok_and(|ci| ci == "true");
     assert!(!is_ci, "{missing}, and CI must have it");
     // Not by a macro, whose output is kept back where a test passes.
-    writeln!(std::io::stderr(), "skipped: {missing}").unwrap();
+    let mut stderr = std::io::stderr();
+    writeln!(stderr, "skipped: {missing}").unwrap();
 }
 
 /// A number that the environment may give, for tests that take as long as they are let.
