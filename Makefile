@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store status explain diff verify gc docs torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test same bench lint clean help
+.PHONY: cluster object-store status explain diff verify gc doc docs torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test same bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -96,6 +96,9 @@ test: ## run the tests and name the ten slowest
 
 same: ## are the published tables those of the revision SINCE, byte for byte
 	bash tests/same_tables.sh '$(SINCE)'
+
+doc: ## the documentation of the code, private items included, into target/doc
+	cargo doc --locked --no-deps --document-private-items
 
 docs: ## write docs/tables.md and docs/settings.md from the declarations of tables and settings
 	HARVEST_WRITE_DOCS=1 cargo test --locked --lib --quiet -- the_page_of_

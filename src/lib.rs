@@ -28,16 +28,18 @@
 //! [`pipeline`] runs the stages over flights and maneuvers; [`cli`] is the command line.
 //!
 //! The modules stand in order; a module uses only modules listed above it (`tests/stages/house.rs`).
+//! Public are those that tests and benchmarks use; in the others the compiler sees dead code.
+//! `make doc` documents all of them.
 
 // Vocabulary: flights, aircraft, derivatives, tables.
 pub mod schema;
-pub mod units;
-pub mod numerics;
+mod units;
+mod numerics;
 pub mod error;
-pub mod settings;
-pub mod earth;
+mod settings;
+mod earth;
 pub mod flight;
-pub mod aircraft;
+mod aircraft;
 pub mod aero;
 pub mod maneuver;
 pub mod tables;
@@ -53,11 +55,11 @@ pub mod output_error;
 pub mod ingest;
 pub mod segment;
 pub mod estimate;
-pub mod trend;
-pub mod compare;
-pub mod export;
-pub mod pdf;
-pub mod report;
+mod trend;
+mod compare;
+mod export;
+mod pdf;
+mod report;
 
 // Outside: disk and configuration.
 pub mod store;
@@ -67,7 +69,7 @@ pub mod config;
 pub mod memory;
 pub mod pipeline;
 pub mod night;
-pub mod cluster;
+mod cluster;
 
 // Laboratory: simulator, study of the bounds, timing. The nightly job needs none of it.
 pub mod lab;

@@ -8,4 +8,4 @@ mod geometry;
 mod vanes;
 
 pub use geometry::{Aircraft, Position, Sensors, Vane, VaneModel};
-pub use vanes::{Flow, Reading};
+pub use vanes::Flow;

@@ -1,7 +1,6 @@
 //! One derivative over the grid of the export.
 
-use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Condition, WindTunnel, wind_tunnel};
+use crate::aero::Condition;
 use crate::tables::ExportRow;
 
 /// One derivative over the grid of angle of attack, Mach number and third variable.
@@ -130,26 +129,4 @@ pub fn rows(tables: &[DerivativeTable]) -> Vec<ExportRow> {
         .iter()
         .flat_map(|table| table.points().map(move |(at, cell)| row(table, at, cell)))
         .collect()
-}
-
-/// A database of the tables, read linearly and clamped, as simulators read them.
-#[must_use]
-pub fn database(tables: &[DerivativeTable], settings: &wind_tunnel::Settings) -> WindTunnel {
-    let mut database = WindTunnel::new(wind_tunnel::Settings {
-        third: settings.third.clone(),
-        ..Default::default()
-    });
-    for table in tables {
-        for (at, cell) in table.points() {
-            let point = TunnelPoint {
-                alpha_deg: at.alpha_deg,
-                mach: Some(at.mach).filter(|_| !table.machs.is_empty()),
-                value: cell.value,
-                uncertainty: cell.uncertainty,
-                source: Some(cell.source.clone()),
-            };
-            database.insert_at(&table.derivative, at.third, point);
-        }
-    }
-    database
 }

@@ -17,6 +17,6 @@ pub mod jsbsim;
 mod tests;
 
 pub use contents::Contents;
-pub use derivative_table::{DerivativeTable, GridCell, database, rows};
+pub use derivative_table::rows;
 pub use flight_update::tables;
 pub use settings::Settings;

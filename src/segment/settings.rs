@@ -1,8 +1,7 @@
 //! Settings of segment: sizes of steps, pauses, and the limits of quality.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use crate::maneuver::Class;
 use crate::settings::{elements, settings};
 
 settings! {
@@ -65,19 +64,6 @@ settings! {
         /// Fewest steps of excitation that is reported when it fits no class. The default is the
         /// edges of one doublet. Smaller: flickering flags and turns appear in `unknown`.
         pub fewest_steps: usize = 3,
-    }
-}
-
-impl Settings {
-    /// The signals whose steps some class counts and that have no smallest step: a mistake in the
-    /// configuration, since such a class could never be recognised.
-    #[must_use]
-    pub fn without_smallest_step(&self, classes: &[Class]) -> BTreeSet<String> {
-        let counted = classes.iter().flat_map(|c| c.recognition.counted());
-        counted
-            .filter(|s| !self.steps.contains_key(*s))
-            .cloned()
-            .collect()
     }
 }
 

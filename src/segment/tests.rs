@@ -1154,17 +1154,6 @@ fn a_given_maneuver_is_measured_and_never_rejected() {
     );
 }
 
-#[test]
-fn a_class_whose_signal_has_no_smallest_step_is_named() {
-    let mut short = settings();
-    short.steps.remove("pedal_in");
-    assert_eq!(
-        short.without_smallest_step(&classes()),
-        ["pedal_in".to_owned()].into()
-    );
-    assert!(settings().without_smallest_step(&classes()).is_empty());
-}
-
 fn event(class: &str, start_s: f64, end_s: f64) -> Event {
     Event {
         flight_id: "f1".into(),

@@ -22,7 +22,9 @@ use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
 
-pub use settings::{Criterion, Group, Settings};
+#[cfg(test)]
+pub use settings::Group;
+pub use settings::Settings;
 
 /// Fewest maneuvers of a trend: from fewer their scatter cannot be estimated.
 const FEWEST_MANEUVERS: usize = 3;

@@ -11,7 +11,7 @@ use std::path::Path;
 use approx::assert_relative_eq;
 use nalgebra::Vector3;
 
-use super::derivative_table::is_same_breakpoint;
+use super::derivative_table::{DerivativeTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Axis, Condition, WindTunnel, wind_tunnel};
@@ -23,6 +23,27 @@ use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
 use crate::tables::{EstimateRow, TrendRow};
+
+/// A database of the tables, read linearly and clamped, as simulators read them.
+fn database(tables: &[DerivativeTable], settings: &wind_tunnel::Settings) -> WindTunnel {
+    let mut database = WindTunnel::new(wind_tunnel::Settings {
+        third: settings.third.clone(),
+        ..Default::default()
+    });
+    for table in tables {
+        for (at, cell) in table.points() {
+            let point = TunnelPoint {
+                alpha_deg: at.alpha_deg,
+                mach: Some(at.mach).filter(|_| !table.machs.is_empty()),
+                value: cell.value,
+                uncertainty: cell.uncertainty,
+                source: Some(cell.source.clone()),
+            };
+            database.insert_at(&table.derivative, at.third, point);
+        }
+    }
+    database
+}
 
 const ALPHAS: [f64; 7] = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0];
 
