@@ -84,7 +84,7 @@ table! {
         pub inputs: String,
         /// Signals that stepped with them, by gearing or feedback.
         pub followed: String,
-        /// Evidence in words: flags, vanes, the unit of pulses.
+        /// Evidence in words: flags, vanes, the unit of pulses; the penalties of the cut.
         pub evidence: String,
     }
 }

@@ -61,14 +61,15 @@ impl<'s, 'a> CutSearch<'s, 'a> {
         Segment::of_steps(self.detections, self.sequence, steps)
     }
 
-    /// Finds the best cut: the parts of the sequence in order.
-    pub fn best_cut(&self) -> Vec<Part> {
+    /// Finds the best cut: the parts of the sequence in order, and the penalties.
+    pub fn best_cut(&self) -> (Vec<Part>, Penalties) {
         let bursts = self.bursts();
         let mut best: Vec<Cut> = vec![Cut::default()];
         for end in 1..=bursts.len() {
             let cut = self.best_cut_before(&bursts[..end], &best);
             best.push(cut);
         }
+        let penalties = best[bursts.len()].penalties;
         let mut parts = Vec::new();
         let mut end = bursts.len();
         while end > 0 {
@@ -80,7 +81,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
             end = from;
         }
         parts.reverse();
-        parts
+        (parts, penalties)
     }
 
     /// Bursts of the sequence: steps that follow each other without a pause, as `first..end`.

@@ -16,6 +16,15 @@ impl FoundManeuver<'_> {
     pub fn excited_for_s(&self) -> f64 {
         self.last_s - self.first_s
     }
+
+    /// Appends words to the evidence for the class.
+    pub fn add_evidence(&mut self, words: &str) {
+        let evidence = &mut self.recognised.evidence;
+        if !evidence.is_empty() {
+            evidence.push_str("; ");
+        }
+        evidence.push_str(words);
+    }
 }
 
 /// Recognition of a record or of one sequence of its steps.

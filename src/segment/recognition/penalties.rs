@@ -63,6 +63,37 @@ impl Add for Penalties {
     }
 }
 
+impl Penalties {
+    /// The terms in words: the unexplained steps, and every other term that is not zero.
+    pub fn in_words(&self) -> String {
+        let counts = [
+            (
+                self.unexplained_steps,
+                "step unexplained",
+                "steps unexplained",
+            ),
+            (self.steps_in_pulses.0, "step in pulses", "steps in pulses"),
+            (self.flag_gaps, "flag gap", "flag gaps"),
+            (self.maneuvers, "maneuver", "maneuvers"),
+            (self.short_pauses, "short pause", "short pauses"),
+            (self.unlike_repeats, "unlike repeat", "unlike repeats"),
+            (self.loose_ends, "loose end", "loose ends"),
+        ];
+        let mut words: Vec<String> = counts
+            .into_iter()
+            .enumerate()
+            .filter(|(k, (count, ..))| *count > 0 || *k == 0)
+            .map(|(_, (count, one, many))| {
+                format!("{count} {}", if count == 1 { one } else { many })
+            })
+            .collect();
+        if self.pauses_s.0 > 0.0 {
+            words.push(format!("pauses of {:.1} s", self.pauses_s.0));
+        }
+        words.join(", ")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +127,24 @@ mod tests {
         for pair in worse.windows(2) {
             assert!(pair[1] < pair[0], "{pair:?}");
         }
+    }
+    #[test]
+    fn terms_that_are_zero_are_left_out_of_the_words_except_the_first() {
+        let one = Penalties {
+            maneuvers: 1,
+            ..Penalties::default()
+        };
+        assert_eq!(one.in_words(), "0 steps unexplained, 1 maneuver");
+        let two = Penalties {
+            unexplained_steps: 1,
+            steps_in_pulses: Reverse(5),
+            maneuvers: 2,
+            pauses_s: Reverse(1.6),
+            ..Penalties::default()
+        };
+        assert_eq!(
+            two.in_words(),
+            "1 step unexplained, 5 steps in pulses, 2 maneuvers, pauses of 1.6 s"
+        );
     }
 }

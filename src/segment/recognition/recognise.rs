@@ -67,7 +67,7 @@ fn recognise_sequence<'a>(
         sequence,
     };
     let mut recognition = Recognition::default();
-    let parts = search.best_cut();
+    let (parts, penalties) = search.best_cut();
     for run in parts.chunk_by(|a, b| !a.is_maneuver && !b.is_maneuver) {
         let (first, last) = (run[0], run[run.len() - 1]);
         if !first.is_maneuver {
@@ -76,7 +76,10 @@ fn recognise_sequence<'a>(
             continue;
         }
         match classify(&search, first.steps) {
-            Classified::Found(found) => recognition.found.push(found),
+            Classified::Found(mut found) => {
+                found.add_evidence(&format!("cut: {}", penalties.in_words()));
+                recognition.found.push(found);
+            }
             Classified::Ambiguous(unknown) => recognition.unknown.push(unknown),
             Classified::None => {}
         }
