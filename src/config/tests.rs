@@ -595,9 +595,12 @@ fn errors_of_an_unknown_instrument_or_of_a_negative_size_are_refused() {
     );
     let copy = Copy::new();
     let line = copy.spoil("aircraft.yaml", "{ scale_pct: 0.5 }", "{ scale_pct: -0.5 }");
+    let instrument = line - 1;
     assert_eq!(
         copy.error(),
-        format!("aircraft.yaml:{line}: `qbar_psf`: sizes of errors are not negative, not -0.5")
+        format!(
+            "aircraft.yaml:{instrument}: `qbar_psf`: sizes of errors are not negative, not -0.5"
+        )
     );
 }
 
