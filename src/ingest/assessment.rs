@@ -165,9 +165,11 @@ impl Examination<'_> {
 
     /// Reconciles gross faults with instrument errors.
     ///
-    /// Where a sign or a unit is wrong, the errors of the other instruments are estimated with that
+    /// Reconciles the relations between channels with the errors of the instruments.
+    ///
+    /// With a wrong sign or unit, the errors of the other instruments are estimated with that
     /// channel corrected, and the record is left as it is. A relation that no sign and no unit
-    /// explains may fail because of a delay: where it holds once the delays are removed, the delay
+    /// explains may fail because of a delay: if it holds once the delays are removed, the delay
     /// is the fault.
     fn reconcile(&self, blocks: &BlockMeans) -> (RelationResult, Findings) {
         let relations = self.check(blocks);

@@ -30,7 +30,7 @@ pub struct NightTables<'a> {
     pub verdicts: &'a [PublishedVerdict],
 }
 
-/// The same tables of a published night.
+/// Tables of a published night that are compared with those of another.
 #[derive(Clone, Debug)]
 pub struct PublishedNight {
     lineage: Lineage,

@@ -94,7 +94,7 @@ impl Store {
         }
     }
 
-    /// The same store as the cache of one in an object store, if a place there is given.
+    /// Makes the store the cache of one in an object store, if a place there is given.
     ///
     /// # Errors
     /// [`Error::Store`] or [`Error::Archive`] naming the place that cannot be listed.

@@ -377,7 +377,7 @@ pub fn read(path: &Path) -> Result<Record, Error> {
 }
 
 impl RecordFile {
-    /// The same record with corrections applied as it is read.
+    /// Applies corrections to the record as it is read.
     #[must_use]
     pub fn corrected(self, corrections: Vec<Correction>) -> RecordFile {
         RecordFile {

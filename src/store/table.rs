@@ -33,8 +33,7 @@ impl Shelf {
         }
     }
 
-    /// The same with pairs for the key-value metadata of each Parquet file; the CSV beside it stays
-    /// as it is.
+    /// Adds pairs for the key-value metadata of each Parquet file; the CSV beside it stays as it is.
     #[must_use]
     pub fn with(mut self, provenance: Vec<(String, String)>) -> Shelf {
         self.provenance = provenance;

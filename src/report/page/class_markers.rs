@@ -46,7 +46,7 @@ impl<'a> ClassMarkers<'a> {
         self.classes.iter().position(|(name, _)| *name == class)
     }
 
-    /// The same with classes added that occur in estimates only.
+    /// Adds classes that occur in estimates only.
     #[must_use]
     pub fn with<'b>(&self, classes: impl Iterator<Item = &'b str>) -> ClassMarkers<'b>
     where

@@ -42,8 +42,8 @@ impl<'a> Recognition<'a> {
 
     /// Puts the maneuvers in order of time and removes overlaps.
     ///
-    /// Where inputs overlap the longer excitation stays. Excitation of no class goes where it
-    /// overlaps a maneuver, or something longer of its kind: it is a part of that.
+    /// Keeps the longer of two excitations whose inputs overlap. Excitation of no class goes if it
+    /// overlaps a maneuver, or longer excitation of no class: it is a part of that.
     pub fn remove_overlaps(&mut self) {
         self.found
             .sort_by(|a, b| b.excited_for_s().total_cmp(&a.excited_for_s()));

@@ -167,7 +167,8 @@ fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = LevelChange> 
 /// Finds the steps among the changes between levels, times in samples: a step between samples 9
 /// and 10 is at 9.5.
 ///
-/// Where a level is missing a run neither goes on nor ends, unless the gap is longer than a step.
+/// Steps of a signal's levels. A missing level neither continues nor ends a run, unless the gap is
+/// longer than a step.
 fn steps_of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut run: Vec<LevelChange> = Vec::new();

@@ -70,7 +70,7 @@ impl Reader {
         &self.source.about
     }
 
-    /// The same object, of which only these ranges are read.
+    /// Reader of the same object that reads these ranges only.
     #[must_use]
     pub fn of_stretches(&self, wanted: Vec<Range<u64>>) -> Reader {
         let Source {
