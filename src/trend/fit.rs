@@ -35,7 +35,7 @@ use nalgebra::{DMatrix, DVector};
 use super::basis::Basis;
 use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
-use crate::numerics::student;
+use crate::numerics::{student, symmetric};
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
 /// fit then tolerates a quarter of outliers, and loses 4% of efficiency where there are none.
@@ -422,12 +422,8 @@ fn solve(
     let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| {
         weights[i] * design[(i, j)]
     });
-    let normal = weighted.transpose() * design;
-    let cholesky = normal.cholesky()?;
-    Some((
-        cholesky.solve(&(weighted.transpose() * values)),
-        cholesky.inverse(),
-    ))
+    let inverse = symmetric::inverse(&(weighted.transpose() * design))?;
+    Some((&inverse * (weighted.transpose() * values), inverse))
 }
 
 /// Weight of a residual: one over the variance, less for an outlier.

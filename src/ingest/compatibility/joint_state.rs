@@ -6,12 +6,13 @@
 //! windows. A delay common to all channels is no error: the mean of the delays, with the weights
 //! 1/P, is held at zero.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::error_sizes::ErrorSizes;
 use super::parameters::{ALL_KINDS, KINDS, Kind, PARAMETERS, Parameters};
 use super::window_fit::{FitContext, WindowFit};
+use crate::numerics::symmetric;
 
 /// Most Gauss-Newton steps between two estimates of R: more would settle on weights that change.
 const STEPS: usize = 2;
@@ -183,7 +184,7 @@ impl JointState<'_> {
                 own
             }
         });
-        let inverse = Cholesky::new(whitened)?.inverse();
+        let inverse = symmetric::inverse(&whitened)?;
         Some(DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
             if both(i, j) {
                 inverse[(i, j)] * prior[i] * prior[j]

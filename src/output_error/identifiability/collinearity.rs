@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::{inverse, scale, scaled};
 use crate::settings::settings;
 
 settings! {
@@ -93,7 +93,9 @@ pub fn collinearity(
     let least = directions.eigen.eigenvalues.min();
     Some(Collinearity {
         inflation,
-        correlation: determined.then(|| directions.correlation()),
+        correlation: inverse(&own)
+            .filter(|_| determined)
+            .map(|covariance| scaled(&covariance, &scale(&covariance))),
         largest_index: if determined {
             (most / least).sqrt()
         } else {
@@ -140,14 +142,6 @@ impl Directions {
 
     fn is_undetermined(&self, k: usize) -> bool {
         self.eigen.eigenvalues[k] <= self.floor
-    }
-
-    fn correlation(&self) -> DMatrix<f64> {
-        let lengths = self.eigen.eigenvalues.map(|l| 1.0 / l);
-        let inverse = &self.eigen.eigenvectors
-            * DMatrix::from_diagonal(&lengths)
-            * self.eigen.eigenvectors.transpose();
-        scaled(&inverse, &scale(&inverse))
     }
 
     fn groups(&self, limits: &Limits) -> Vec<Group> {

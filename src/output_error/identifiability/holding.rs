@@ -18,7 +18,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::{inverse, scale, scaled};
 use crate::output_error::bounds::bounded::Bounded;
 use crate::output_error::bounds::coloured::{self, ResidualNoise};
 use crate::output_error::case::Case;
@@ -221,26 +221,21 @@ impl HoldingCandidates {
         let eigen = SymmetricEigen::new(scaled(&own, &unit));
         let least = eigen.eigenvalues.imin();
         let floor = eigen.eigenvalues.max() / self.max_condition_number;
-        if eigen.eigenvalues[least] <= floor {
-            let direction = eigen.eigenvectors.column(least);
-            let parts = direction.zip_map(&unit, |v, unit| {
-                if v * v >= DIRECTION_SHARE {
-                    v * unit
-                } else {
-                    0.0
-                }
-            });
-            return FreeSet::Undetermined(parts);
+        if let Some(inverse) = inverse(&own).filter(|_| eigen.eigenvalues[least] > floor) {
+            let covariance = &inverse * submatrix(&self.gradient_covariance, free) * &inverse;
+            return FreeSet::Determined {
+                bounds: covariance.diagonal().map(f64::sqrt),
+                inverse,
+            };
         }
-        let inverse = &eigen.eigenvectors
-            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|l| 1.0 / l))
-            * eigen.eigenvectors.transpose();
-        let inverse = scaled(&inverse, &unit);
-        let covariance = &inverse * submatrix(&self.gradient_covariance, free) * &inverse;
-        FreeSet::Determined {
-            bounds: covariance.diagonal().map(f64::sqrt),
-            inverse,
-        }
+        let direction = eigen.eigenvectors.column(least);
+        FreeSet::Undetermined(direction.zip_map(&unit, |v, unit| {
+            if v * v >= DIRECTION_SHARE {
+                v * unit
+            } else {
+                0.0
+            }
+        }))
     }
 }
 

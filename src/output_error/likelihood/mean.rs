@@ -7,7 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::{inverse, scale, scaled};
 
 /// Estimates of some of the wanted parameters, with their covariance.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,15 +37,6 @@ pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
     let solution = Cholesky::new(scaled(&information, &scale))?.solve(&right.component_mul(&scale));
     let mean = solution.component_mul(&scale);
     mean.iter().all(|v| v.is_finite()).then_some(mean)
-}
-
-/// Inverse of a positive definite matrix, computed at unit diagonal.
-fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let scale = scale(matrix);
-    Some(scaled(
-        &Cholesky::new(scaled(matrix, &scale))?.inverse(),
-        &scale,
-    ))
 }
 
 #[cfg(test)]
