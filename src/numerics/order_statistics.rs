@@ -12,9 +12,11 @@
 //! Every function returns `None` for no values. The functions on `_in_place` reorder their argument
 //! and allocate nothing; they select in linear time. The upper median of many values is one of
 //! them, so it needs one selection where the mean of the middle two needs a second pass: noise
-//! estimates over thousands of samples use it.
+//! estimates over thousands of samples use it. Trends use it for the scatter of the median maneuver,
+//! which then is that of a maneuver and no mean of two classes; [`median`] would move the published
+//! scatter.
 
-/// Standard deviation of a normal distribution over the median of its absolute deviation: 1/Φ⁻¹(¾).
+/// Standard deviation of a normal distribution over the median of its absolute deviations: 1/Φ⁻¹(¾).
 pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 
 /// Median of the finite values; the mean of the two middle ones of an even count.

@@ -84,7 +84,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 11;
+    const VERSION: u32 = 12;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

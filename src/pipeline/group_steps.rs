@@ -72,7 +72,7 @@ impl<'a> Step for JointStep<'a> {
     type Artefact = Joined;
 
     const KIND: Kind = Kind::Joint;
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
 
     fn item(&self) -> &str {
         &self.bin.joint_id
@@ -185,7 +185,7 @@ impl<'a> Step for PredictStep<'a> {
     type Artefact = Predicted;
 
     const KIND: Kind = Kind::Predict;
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
 
     fn item(&self) -> &str {
         &self.member.maneuver.maneuver_id

@@ -8,7 +8,7 @@ use super::settings::{Actuator, Limits};
 use crate::aero::Axis;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
-use crate::numerics::order_statistics::upper_median_in_place;
+use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
 
 /// Time before the first input that is left out of the lead-in, s: the detector places a step within
 /// a few samples of the input's begin.
@@ -24,9 +24,6 @@ const AT_FULL_RATE: f64 = 0.9;
 
 /// Fewest samples of a mean square about a line: two determine the line.
 const FEWEST_SAMPLES: f64 = 3.0;
-
-/// Standard deviation of a normal distribution over its median magnitude.
-const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
 /// Measures the quality of a maneuver and judges it by the limits.
 ///
@@ -202,7 +199,7 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
             return None;
         }
         // Second differences of white noise have six times its variance.
-        let noise = SIGMA_PER_MEDIAN * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
+        let noise = SIGMA_PER_MAD * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
         ratio(Some(mean_square(values, About::Line)?.sqrt()), Some(noise))
     };
     signals.iter().filter_map(of_signal).max_by(f64::total_cmp)

@@ -7,7 +7,7 @@ use super::relations::{self, Relation, Selection};
 use super::windows::{WindowPair, window_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::upper_median;
+use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
 use crate::tables::{CheckRow, CheckVerdict};
 
 /// Windows that are selected of a short flight where the largest are selected, in multiples of the
@@ -17,9 +17,6 @@ const LEAST_SELECTED: usize = 5;
 /// Distance of a window from the line through all windows, in robust standard deviations, from
 /// which it holds a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
-
-/// Standard deviations of a normal distribution in its median absolute deviation.
-const MAD_TO_SD: f64 = 1.4826;
 
 /// Error of a relation that biases may cause, as a share of the level from which it counts as
 /// excited. The levels of [`crate::ingest::Excitation`] are twice that error.
@@ -183,7 +180,7 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
     let slope = median_slope(pairs);
     let distance =
         |p: &WindowPair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
-    let spread = MAD_TO_SD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
+    let spread = SIGMA_PER_MAD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
     let limit = (JUMP_DEVIATIONS * spread).max(relation.selection.level());
     let jumps: Vec<usize> = pairs
         .iter()

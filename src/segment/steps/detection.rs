@@ -15,15 +15,12 @@
 
 use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
-use crate::numerics::order_statistics::upper_median_in_place;
+use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
 use crate::segment::settings::Settings;
 
 /// Share of a run's largest change from which its changes form the near-maximum. The flat top of a
 /// step keeps 5 % of slope and noise; a lower share would shift the middle of a skewed step.
 const NEAR_MAXIMUM: f64 = 0.95;
-
-/// Standard deviation of a normal distribution over its median magnitude.
-const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
 /// Detects the steps and the deflections of every signal that has a smallest step.
 ///
@@ -92,7 +89,7 @@ fn noise(levels: &[f64], window: Window) -> f64 {
     if sizes.len() < 2 {
         return 0.0;
     }
-    SIGMA_PER_MEDIAN * upper_median_in_place(&mut sizes).unwrap_or(0.0)
+    SIGMA_PER_MAD * upper_median_in_place(&mut sizes).unwrap_or(0.0)
 }
 
 /// Converts a time to whole samples, at least one.
