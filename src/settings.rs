@@ -120,9 +120,53 @@ pub trait SplitGroup: Sized {
     fn keys_of_experts() -> Vec<Key>;
 }
 
+/// Declares a struct and its `Default` from fields with their defaults.
+macro_rules! struct_with_defaults {
+    (
+        $(#[$about:meta])*
+        $visibility:vis struct $name:ident {
+            $(
+                $(#[$attribute:meta])*
+                $field:ident: $type:ty = $default:expr,
+            )*
+        }
+    ) => {
+        $(#[$about])*
+        $visibility struct $name {
+            $(
+                $(#[$attribute])*
+                pub $field: $type,
+            )*
+        }
+
+        impl Default for $name {
+            fn default() -> $name {
+                $name { $($field: $default,)* }
+            }
+        }
+    };
+}
+pub(crate) use struct_with_defaults;
+
+/// Keys of fields of a struct, with its defaults.
+macro_rules! keys_of_fields {
+    ($name:ty: $($field:ident: $type:ty, $($doc:literal)+;)*) => {{
+        let defaults = <$name>::default();
+        let keys: Vec<Vec<$crate::settings::Key>> = vec![
+            $($crate::settings::keys_of::<$type>(
+                &[stringify!($field)],
+                $crate::settings::written_default(&defaults.$field),
+                &[$($doc),+],
+            )),*
+        ];
+        keys.concat()
+    }};
+}
+pub(crate) use keys_of_fields;
+
 /// Declares a group of settings. The forms:
 ///
-/// - fields with defaults: a group in sight, or wholly under somebody's `expert:`;
+/// - fields with defaults: a group in sight, or wholly under another group's `expert:`;
 /// - the same and `expert { … }`: a stage; `split { … }` lists its groups of the next form;
 /// - the same and `split expert { … }`: a group with keys in both places of its stage;
 /// - fields without defaults: an element of a map or list. A field with `#[serde(default)]` may be
@@ -150,29 +194,22 @@ macro_rules! settings {
             }
         )?
     ) => {
-        $(#[doc = $about])+
-        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-        $(#[derive($derive)])?
-        #[serde(deny_unknown_fields, default)]
-        pub struct $name {
-            $(
-                $(#[doc = $doc])+
-                $(#[serde($($serde)*)])?
-                pub $field: $type,
-            )*
-            $($(
-                $(#[doc = $other_doc])+
-                #[serde(skip_deserializing)]
-                pub $other: $other_type,
-            )*)?
-        }
-
-        impl Default for $name {
-            fn default() -> $name {
-                $name {
-                    $($field: $default,)*
-                    $($($other: $other_default,)*)?
-                }
+        $crate::settings::struct_with_defaults! {
+            $(#[doc = $about])+
+            #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+            $(#[derive($derive)])?
+            #[serde(deny_unknown_fields, default)]
+            pub struct $name {
+                $(
+                    $(#[doc = $doc])+
+                    $(#[serde($($serde)*)])?
+                    $field: $type = $default,
+                )*
+                $($(
+                    $(#[doc = $other_doc])+
+                    #[serde(skip_deserializing)]
+                    $other: $other_type = $other_default,
+                )*)?
             }
         }
 
@@ -180,15 +217,7 @@ macro_rules! settings {
             const IS_GROUP: bool = true;
 
             fn keys() -> Vec<$crate::settings::Key> {
-                let defaults = <$name>::default();
-                [
-                    $($crate::settings::keys_of::<$type>(
-                        &[stringify!($field)],
-                        $crate::settings::written_default(&defaults.$field),
-                        &[$($doc),+],
-                    )),*
-                ]
-                .concat()
+                $crate::settings::keys_of_fields!($name: $($field: $type, $($doc)+;)*)
             }
         }
     };
@@ -226,73 +255,50 @@ macro_rules! settings {
             }
         )?
     ) => {
-        $(#[doc = $about])+
-        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-        pub struct $name {
-            $(
-                $(#[doc = $doc])+
-                $(#[serde($($serde)*)])?
-                pub $field: $type,
-            )*
-            $(
-                $(#[doc = $expert_doc])+
-                $(#[serde($($expert_serde)*)])?
-                pub $expert: $expert_type,
-            )*
-            $($(
-                $(#[doc = $split_doc])+
-                pub $split: $split_type,
-            )*)?
-            $($(
-                $(#[doc = $other_doc])+
-                pub $other: $other_type,
-            )*)?
-        }
-
-        impl Default for $name {
-            fn default() -> $name {
-                $name {
-                    $($field: $default,)*
-                    $($expert: $expert_default,)*
-                    $($($split: <$split_type>::default(),)*)?
-                    $($($other: $other_default,)*)?
-                }
+        $crate::settings::struct_with_defaults! {
+            $(#[doc = $about])+
+            #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+            pub struct $name {
+                $(
+                    $(#[doc = $doc])+
+                    $(#[serde($($serde)*)])?
+                    $field: $type = $default,
+                )*
+                $(
+                    $(#[doc = $expert_doc])+
+                    $(#[serde($($expert_serde)*)])?
+                    $expert: $expert_type = $expert_default,
+                )*
+                $($(
+                    $(#[doc = $split_doc])+
+                    $split: $split_type = <$split_type>::default(),
+                )*)?
+                $($(
+                    $(#[doc = $other_doc])+
+                    $other: $other_type = $other_default,
+                )*)?
             }
         }
 
         const _: () = {
-            use $crate::settings::{Key, Setting, keys_of, written_default};
-            #[derive(serde::Deserialize)]
-            #[serde(deny_unknown_fields, default)]
-            struct Written {
-                $($field: $type,)*
-                $($($split: <$split_type as $crate::settings::SplitGroup>::InSight,)*)?
-                expert: WrittenExpert,
-            }
+            use $crate::settings::{Key, Setting, below, keys_of_fields, struct_with_defaults};
 
-            #[derive(serde::Deserialize)]
-            #[serde(deny_unknown_fields, default)]
-            struct WrittenExpert {
-                $($expert: $expert_type,)*
-                $($($split: <$split_type as $crate::settings::SplitGroup>::Expert,)*)?
-            }
-
-            impl Default for Written {
-                fn default() -> Written {
-                    Written {
-                        $($field: $default,)*
-                        $($($split: Default::default(),)*)?
-                        expert: WrittenExpert::default(),
-                    }
+            struct_with_defaults! {
+                #[derive(serde::Deserialize)]
+                #[serde(deny_unknown_fields, default)]
+                struct Written {
+                    $($field: $type = $default,)*
+                    $($($split: <$split_type as $crate::settings::SplitGroup>::InSight = Default::default(),)*)?
+                    expert: WrittenExpert = WrittenExpert::default(),
                 }
             }
 
-            impl Default for WrittenExpert {
-                fn default() -> WrittenExpert {
-                    WrittenExpert {
-                        $($expert: $expert_default,)*
-                        $($($split: Default::default(),)*)?
-                    }
+            struct_with_defaults! {
+                #[derive(serde::Deserialize)]
+                #[serde(deny_unknown_fields, default)]
+                struct WrittenExpert {
+                    $($expert: $expert_type = $expert_default,)*
+                    $($($split: <$split_type as $crate::settings::SplitGroup>::Expert = Default::default(),)*)?
                 }
             }
 
@@ -302,10 +308,7 @@ macro_rules! settings {
                     Ok($name {
                         $($field: written.$field,)*
                         $($expert: written.expert.$expert,)*
-                        $($($split: $crate::settings::SplitGroup::join(
-                            written.$split,
-                            written.expert.$split,
-                        ),)*)?
+                        $($($split: $crate::settings::SplitGroup::join(written.$split, written.expert.$split),)*)?
                         $($($other: $other_default,)*)?
                     })
                 }
@@ -315,23 +318,17 @@ macro_rules! settings {
                 const IS_GROUP: bool = true;
 
                 fn keys() -> Vec<Key> {
-                    let defaults = <$name>::default();
                     [
-                        $(keys_of::<$type>(
-                            &[stringify!($field)],
-                            written_default(&defaults.$field),
-                            &[$($doc),+],
-                        ),)*
-                        $($($crate::settings::below(
+                        keys_of_fields!($name: $($field: $type, $($doc)+;)*),
+                        $($(below(
                             &[stringify!($split)],
                             <$split_type as $crate::settings::SplitGroup>::keys_in_sight(),
                         ),)*)?
-                        $(keys_of::<$expert_type>(
-                            &["expert", stringify!($expert)],
-                            written_default(&defaults.$expert),
-                            &[$($expert_doc),+],
-                        ),)*
-                        $($($crate::settings::below(
+                        below(
+                            &["expert"],
+                            keys_of_fields!($name: $($expert: $expert_type, $($expert_doc)+;)*),
+                        ),
+                        $($(below(
                             &["expert", stringify!($split)],
                             <$split_type as $crate::settings::SplitGroup>::keys_of_experts(),
                         ),)*)?
@@ -365,59 +362,41 @@ macro_rules! settings {
             }
         )?
     ) => {
-        $(#[doc = $about])+
-        #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-        pub struct $name {
-            $(
-                $(#[doc = $doc])+
-                pub $field: $type,
-            )*
-            $(
-                $(#[doc = $expert_doc])+
-                pub $expert: $expert_type,
-            )*
-            $($(
-                $(#[doc = $other_doc])+
-                pub $other: $other_type,
-            )*)?
-        }
-
-        impl Default for $name {
-            fn default() -> $name {
-                $name {
-                    $($field: $default,)*
-                    $($expert: $expert_default,)*
-                    $($($other: $other_default,)*)?
-                }
+        $crate::settings::struct_with_defaults! {
+            $(#[doc = $about])+
+            #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+            pub struct $name {
+                $(
+                    $(#[doc = $doc])+
+                    $field: $type = $default,
+                )*
+                $(
+                    $(#[doc = $expert_doc])+
+                    $expert: $expert_type = $expert_default,
+                )*
+                $($(
+                    $(#[doc = $other_doc])+
+                    $other: $other_type = $other_default,
+                )*)?
             }
         }
 
         const _: () = {
-            use $crate::settings::{Key, SplitGroup, keys_of, written_default};
+            use $crate::settings::{Key, SplitGroup, keys_of_fields, struct_with_defaults};
 
-            #[derive(serde::Deserialize)]
-            #[serde(deny_unknown_fields, default)]
-            #[derive(Debug)]
-            pub struct InSight {
-                $($field: $type,)*
-            }
-
-            #[derive(serde::Deserialize)]
-            #[serde(deny_unknown_fields, default)]
-            #[derive(Debug)]
-            pub struct Expert {
-                $($expert: $expert_type,)*
-            }
-
-            impl Default for InSight {
-                fn default() -> InSight {
-                    InSight { $($field: $default,)* }
+            struct_with_defaults! {
+                #[derive(Debug, serde::Deserialize)]
+                #[serde(deny_unknown_fields, default)]
+                pub struct InSight {
+                    $($field: $type = $default,)*
                 }
             }
 
-            impl Default for Expert {
-                fn default() -> Expert {
-                    Expert { $($expert: $expert_default,)* }
+            struct_with_defaults! {
+                #[derive(Debug, serde::Deserialize)]
+                #[serde(deny_unknown_fields, default)]
+                pub struct Expert {
+                    $($expert: $expert_type = $expert_default,)*
                 }
             }
 
@@ -434,27 +413,11 @@ macro_rules! settings {
                 }
 
                 fn keys_in_sight() -> Vec<Key> {
-                    let defaults = <$name>::default();
-                    [
-                        $(keys_of::<$type>(
-                            &[stringify!($field)],
-                            written_default(&defaults.$field),
-                            &[$($doc),+],
-                        )),*
-                    ]
-                    .concat()
+                    keys_of_fields!($name: $($field: $type, $($doc)+;)*)
                 }
 
                 fn keys_of_experts() -> Vec<Key> {
-                    let defaults = <$name>::default();
-                    [
-                        $(keys_of::<$expert_type>(
-                            &[stringify!($expert)],
-                            written_default(&defaults.$expert),
-                            &[$($expert_doc),+],
-                        )),*
-                    ]
-                    .concat()
+                    keys_of_fields!($name: $($expert: $expert_type, $($expert_doc)+;)*)
                 }
             }
         };
