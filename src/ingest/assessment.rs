@@ -4,6 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::channel::{
     ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel,
 };
@@ -25,7 +27,7 @@ use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, InstrumentRow};
 const PART_SAMPLES: usize = 1 << 17;
 
 /// Results of ingest for one stretch, besides its record.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Assessment {
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
@@ -33,6 +35,7 @@ pub struct Assessment {
     /// Corrections that are applied to signals when the record is read.
     pub corrections: Vec<Correction>,
     pub problems: Vec<Problem>,
+    /// Signature of the samples, by which repeated rows are found.
     pub signature: Signature,
 }
 

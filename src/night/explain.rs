@@ -158,11 +158,11 @@ fn write_origin(text: &mut String, config: &Config, m: &Maneuver) {
 /// Writes the repairs and failed checks of the flight's channels.
 fn write_record(text: &mut String, flight: &Flight, maneuver: &Maneuver) {
     write_heading(text, &format!("The record of {}", maneuver.flight_id));
-    let channels = flight.ingested.channels.iter();
+    let channels = flight.ingested.assessment.channels.iter();
     let repaired = channels.filter(|c| c.bridged + c.despiked + c.missing > 0);
     let repaired: Vec<String> = repaired.map(repairs).collect();
     write_line(text, "repaired", &joined_or(&repaired, ", ", "nothing"));
-    let checks = flight.ingested.checks.iter();
+    let checks = flight.ingested.assessment.checks.iter();
     let failed: Vec<String> = checks
         .filter(|c| !c.verdict.passed())
         .map(|c| format!("{}: {}", c.relation, c.verdict))

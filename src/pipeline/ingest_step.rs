@@ -194,7 +194,7 @@ fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: Brought<Ingested
     if flight.is_stored {
         campaign.state(Stage::Ingest).fresh += 1;
     } else {
-        let reasons = stretches.iter().flat_map(|s| &s.problems);
+        let reasons = stretches.iter().flat_map(|s| &s.assessment.problems);
         let reasons: Vec<&str> = reasons.map(|p| p.reason.as_str()).collect();
         let reasons = reasons.join("; ");
         campaign.unread.insert(flight_id.to_owned(), reasons);
@@ -213,13 +213,11 @@ fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: Brought<Ingested
 fn collect_rows(campaign: &mut Campaign) {
     let mut failed = Vec::new();
     for flight in &campaign.flights {
-        let ingested = &flight.ingested;
-        campaign.channels.extend_from_slice(&ingested.channels);
-        campaign.checks.extend_from_slice(&ingested.checks);
-        campaign
-            .instruments
-            .extend_from_slice(&ingested.instruments);
-        campaign.problems.extend_from_slice(&ingested.problems);
+        let found = &flight.ingested.assessment;
+        campaign.channels.extend_from_slice(&found.channels);
+        campaign.checks.extend_from_slice(&found.checks);
+        campaign.instruments.extend_from_slice(&found.instruments);
+        campaign.problems.extend_from_slice(&found.problems);
         if !flight.is_accepted() {
             failed.push(Failure {
                 item: flight.id().to_owned(),

@@ -3,12 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Problem, Result};
-use crate::flight::{Correction, is_stretch};
-use crate::ingest::Signature;
+use crate::flight::is_stretch;
+use crate::ingest::Assessment;
 use crate::maneuver::Event;
 use crate::store::record_file::{self, RecordFile, RecordHeader};
 use crate::store::{ArtefactName, Digest, Store};
-use crate::tables::{ChannelRow, CheckRow, InstrumentRow};
 
 /// A record in the store.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,14 +23,7 @@ pub struct IngestedStretch {
     pub flight_id: String,
     /// `None` for a rejected stretch.
     pub record: Option<StoredRecord>,
-    pub channels: Vec<ChannelRow>,
-    pub checks: Vec<CheckRow>,
-    pub instruments: Vec<InstrumentRow>,
-    /// Corrections of the signals, applied as the record is read.
-    pub corrections: Vec<Correction>,
-    pub problems: Vec<Problem>,
-    /// Signature of the samples, by which repeated rows are found.
-    pub signature: Signature,
+    pub assessment: Assessment,
 }
 
 impl IngestedStretch {
@@ -40,12 +32,10 @@ impl IngestedStretch {
         IngestedStretch {
             flight_id: flight_id.to_owned(),
             record: None,
-            channels: vec![],
-            checks: vec![],
-            instruments: vec![],
-            corrections: vec![],
-            problems: vec![problem],
-            signature: Signature::default(),
+            assessment: Assessment {
+                problems: vec![problem],
+                ..Assessment::default()
+            },
         }
     }
 }
@@ -100,7 +90,7 @@ impl Flight {
             record.ok_or_else(|| Error::store(self.id().as_ref(), &"the flight has no record"))?;
         store.fetch(&record.name, &record.digest)?;
         Ok(record_file::open(&store.path(&record.name))?
-            .corrected(self.ingested.corrections.clone()))
+            .corrected(self.ingested.assessment.corrections.clone()))
     }
 
     /// `true` for a stretch of the flight of this id, and for the flight itself.
@@ -110,7 +100,7 @@ impl Flight {
 
     /// Problems as one line: `place: reason; place: reason`.
     pub fn reasons(&self) -> String {
-        let problems = self.ingested.problems.iter();
+        let problems = self.ingested.assessment.problems.iter();
         problems
             .map(|p| format!("{}: {}", p.place, p.reason))
             .collect::<Vec<_>>()

@@ -97,8 +97,8 @@ impl RecordWriting<'_> {
         let checked = self
             .write(opened, stretch, &mut readers, &mut draft)
             .and_then(|()| self.check(stretch, readers, &draft));
-        let judged = match checked {
-            Ok(judged) => judged,
+        let assessment = match checked {
+            Ok(assessment) => assessment,
             Err(Halt::Rejected(problem)) => return Ok(IngestedStretch::rejected(id, problem)),
             Err(Halt::Disk(reason)) => return Err(Error::store(&path, &reason)),
         };
@@ -108,12 +108,7 @@ impl RecordWriting<'_> {
         Ok(IngestedStretch {
             flight_id: id.clone(),
             record: Some(StoredRecord { name, digest }),
-            channels: judged.channels,
-            checks: judged.checks,
-            instruments: judged.instruments,
-            corrections: judged.corrections,
-            problems: judged.problems,
-            signature: judged.signature,
+            assessment,
         })
     }
 

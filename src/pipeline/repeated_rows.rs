@@ -42,8 +42,8 @@ enum Shared {
 }
 
 fn shared_rows(flight: &Flight, earlier: &Flight) -> Shared {
-    let signature = &flight.ingested.signature;
-    match signature.overlap(&earlier.ingested.signature) {
+    let signature = &flight.ingested.assessment.signature;
+    match signature.overlap(&earlier.ingested.assessment.signature) {
         None => Shared::None,
         Some(overlap) if overlap.share >= COPY_SHARE => Shared::All,
         Some(overlap) => Shared::Part(RepeatedRows {
@@ -70,6 +70,7 @@ fn note(flight: &mut Flight, earlier: &str, rows: &RepeatedRows) {
     );
     flight
         .ingested
+        .assessment
         .problems
         .push(problem(ProblemStage::Ingest, &id, &id, &reason));
 }
