@@ -6,8 +6,8 @@ use crate::schema::{table, words};
 table! {
     /// Outcome of each maneuver's estimation, and of its prediction from other maneuvers.
     ///
-    /// Where maneuvers are estimated together (`estimate: joint:`), their rows follow, with
-    /// `maneuver_id` `joint/<class>/<mean α>`.
+    /// Rows of maneuvers estimated together (`estimate: joint:`) follow, with `maneuver_id`
+    /// `joint/<class>/<mean α>`.
     pub struct FitRow in "fits" per "maneuver" {
         /// Maneuver, or group of maneuvers estimated together.
         pub maneuver_id: String,
