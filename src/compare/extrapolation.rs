@@ -32,7 +32,7 @@ pub fn extrapolations(
     }
     let compared = comparison
         .iter()
-        .filter_map(|c| Some((c, c.wind_tunnel.and(c.mach)?)));
+        .filter_map(|c| Some((c, c.tunnel.wind_tunnel.and(c.mach)?)));
     for (c, mach) in compared {
         let condition = Condition {
             alpha_deg: c.alpha_deg,

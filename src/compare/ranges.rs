@@ -29,12 +29,12 @@ impl<'a> ComparedAlpha<'a> {
             unit: &r.unit,
             group: &r.group,
             alpha_deg: r.alpha_deg,
-            verdict: Verdict::Tunnel(r.verdict),
-            agreement: r.verdict.into(),
+            verdict: Verdict::Tunnel(r.tunnel.verdict),
+            agreement: r.tunnel.verdict.into(),
             flight: r.flight,
-            other: r.wind_tunnel,
-            difference_pct: r.difference_pct,
-            z: r.z,
+            other: r.tunnel.wind_tunnel,
+            difference_pct: r.tunnel.difference_pct,
+            z: r.tunnel.z,
         }
     }
 
@@ -248,7 +248,7 @@ fn extent_in_words(run: &[ComparedAlpha]) -> String {
 mod tests {
     use super::*;
     use crate::aero::wind_tunnel::TunnelPoint;
-    use crate::tables::TunnelVerdict;
+    use crate::tables::{TunnelDifference, TunnelVerdict};
     use approx::assert_relative_eq;
 
     fn row(
@@ -265,14 +265,16 @@ mod tests {
             mach: Some(0.3),
             flight,
             standard_error: 0.1,
-            wind_tunnel: tunnel,
-            difference: tunnel.map(|t| flight - t),
-            uncertainty: tunnel.map(|_| 0.1),
-            difference_pct: tunnel
-                .filter(|t| *t != 0.0)
-                .map(|t| 100.0 * (flight - t) / t.abs()),
-            z: tunnel.map(|t| (flight - t) / 0.1),
-            verdict,
+            tunnel: TunnelDifference {
+                wind_tunnel: tunnel,
+                difference: tunnel.map(|t| flight - t),
+                uncertainty: tunnel.map(|_| 0.1),
+                difference_pct: tunnel
+                    .filter(|t| *t != 0.0)
+                    .map(|t| 100.0 * (flight - t) / t.abs()),
+                z: tunnel.map(|t| (flight - t) / 0.1),
+                verdict,
+            },
         }
     }
 

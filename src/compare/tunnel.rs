@@ -5,9 +5,12 @@ use std::collections::BTreeMap;
 
 use super::judgement::judge;
 use super::settings::Settings;
+use crate::aero::wind_tunnel::TunnelValue;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
-use crate::tables::{ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow};
+use crate::tables::{
+    ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow, TunnelDifference,
+};
 use crate::trend;
 
 /// Compares the trend of each derivative's group with the tunnel: one row per derivative and α, in
@@ -50,12 +53,6 @@ pub fn compare_trends(
         let value = condition
             .filter(|_| comparable)
             .and_then(|condition| tunnel.at(&t.derivative, &condition));
-        let judged = judge(
-            t.value,
-            t.standard_error,
-            value.map(|w| (w.value, w.uncertainty)),
-            settings,
-        );
         Some(ComparisonRow {
             derivative: t.derivative.clone(),
             unit: t.unit.clone(),
@@ -64,12 +61,7 @@ pub fn compare_trends(
             mach: condition.map(|c| c.mach),
             flight: t.value,
             standard_error: t.standard_error,
-            wind_tunnel: value.map(|w| w.value),
-            difference: judged.difference,
-            uncertainty: judged.uncertainty,
-            difference_pct: judged.difference_pct,
-            z: judged.z,
-            verdict: judged.agreement.into(),
+            tunnel: against_tunnel(t.value, t.standard_error, value, settings),
         })
     };
     trends.iter().filter_map(row).collect()
@@ -95,12 +87,6 @@ pub fn compare_maneuvers(
         let value = tunnel
             .at(&e.derivative, &maneuver.condition(tunnel))
             .filter(|_| comparable);
-        let judged = judge(
-            flight,
-            bound,
-            value.map(|w| (w.value, w.uncertainty)),
-            settings,
-        );
         Some(ManeuverComparisonRow {
             maneuver_id: e.maneuver_id.clone(),
             class: e.class.clone(),
@@ -110,12 +96,7 @@ pub fn compare_maneuvers(
             mach: maneuver.mach,
             flight,
             bound,
-            wind_tunnel: value.map(|w| w.value),
-            difference: judged.difference,
-            uncertainty: judged.uncertainty,
-            difference_pct: judged.difference_pct,
-            z: judged.z,
-            verdict: judged.agreement.into(),
+            tunnel: against_tunnel(flight, bound, value, settings),
         })
     };
     estimates
@@ -123,6 +104,25 @@ pub fn compare_maneuvers(
         .filter(|e| e.status == Status::Estimated)
         .filter_map(row)
         .collect()
+}
+
+/// Compares a value of flight and its standard error with a reading of the tunnel.
+fn against_tunnel(
+    flight: f64,
+    error: f64,
+    tunnel: Option<TunnelValue>,
+    settings: &Settings,
+) -> TunnelDifference {
+    let other = tunnel.map(|reading| (reading.value, reading.uncertainty));
+    let judged = judge(flight, error, other, settings);
+    TunnelDifference {
+        wind_tunnel: tunnel.map(|reading| reading.value),
+        difference: judged.difference,
+        uncertainty: judged.uncertainty,
+        difference_pct: judged.difference_pct,
+        z: judged.z,
+        verdict: judged.agreement.into(),
+    }
 }
 
 /// Mean flight condition at an α of the maneuvers within half a step of it, or else of the nearest
@@ -245,7 +245,9 @@ mod tests {
     }
 
     fn verdict_on(trend: TrendRow, value: f64, uncertainty: Option<f64>) -> TunnelVerdict {
-        one(trend, &tunnel(value, uncertainty), &Settings::default()).verdict
+        one(trend, &tunnel(value, uncertainty), &Settings::default())
+            .tunnel
+            .verdict
     }
 
     #[test]
@@ -275,7 +277,7 @@ mod tests {
             &tunnel(1.0, Some(0.4)),
             &Settings::default(),
         );
-        assert_relative_eq!(row.z.expect("z"), 1.0);
+        assert_relative_eq!(row.tunnel.z.expect("z"), 1.0);
     }
 
     #[test]
@@ -323,9 +325,14 @@ mod tests {
         };
         let refused = one(flight(1.0, 0.1), &tunnel(1.0, None), &settings);
         for row in [none, refused] {
-            assert_eq!(row.verdict, TunnelVerdict::NoTunnelValue);
+            assert_eq!(row.tunnel.verdict, TunnelVerdict::NoTunnelValue);
             assert_eq!(
-                (row.wind_tunnel, row.difference, row.difference_pct, row.z),
+                (
+                    row.tunnel.wind_tunnel,
+                    row.tunnel.difference,
+                    row.tunnel.difference_pct,
+                    row.tunnel.z
+                ),
                 (None, None, None, None)
             );
         }
@@ -338,12 +345,16 @@ mod tests {
             &tunnel(-2.0, None),
             &Settings::default(),
         );
-        assert_relative_eq!(row.difference.expect("difference"), 0.5);
-        assert_relative_eq!(row.difference_pct.expect("percent"), 25.0);
-        assert_relative_eq!(row.z.expect("z"), 2.0);
+        assert_relative_eq!(row.tunnel.difference.expect("difference"), 0.5);
+        assert_relative_eq!(row.tunnel.difference_pct.expect("percent"), 25.0);
+        assert_relative_eq!(row.tunnel.z.expect("z"), 2.0);
         let zero = one(flight(1.0, 0.0), &tunnel(0.0, None), &Settings::default());
         assert_eq!(
-            (zero.difference_pct, zero.z, zero.verdict),
+            (
+                zero.tunnel.difference_pct,
+                zero.tunnel.z,
+                zero.tunnel.verdict
+            ),
             (None, None, TunnelVerdict::FlightHigher)
         );
     }
@@ -392,12 +403,12 @@ mod tests {
         // of 30°, and the nearest is that at 21°.
         assert_eq!(rows.len(), 2);
         assert_relative_eq!(
-            rows[0].wind_tunnel.expect("tunnel"),
+            rows[0].tunnel.wind_tunnel.expect("tunnel"),
             3.5,
             max_relative = 1e-12
         );
         assert_relative_eq!(
-            rows[1].wind_tunnel.expect("tunnel"),
+            rows[1].tunnel.wind_tunnel.expect("tunnel"),
             4.0,
             max_relative = 1e-12
         );
@@ -481,19 +492,19 @@ mod tests {
             &tunnel,
             &Settings::default(),
         );
-        assert_relative_eq!(rows[0].wind_tunnel.expect("tunnel"), 3.0);
+        assert_relative_eq!(rows[0].tunnel.wind_tunnel.expect("tunnel"), 3.0);
         assert_relative_eq!(
-            rows[0].uncertainty.expect("uncertainty"),
+            rows[0].tunnel.uncertainty.expect("uncertainty"),
             0.5,
             max_relative = 1e-14
         );
-        assert_relative_eq!(rows[0].z.expect("z"), 2.0, max_relative = 1e-14);
+        assert_relative_eq!(rows[0].tunnel.z.expect("z"), 2.0, max_relative = 1e-14);
         assert_relative_eq!(
-            rows[0].difference_pct.expect("percent"),
+            rows[0].tunnel.difference_pct.expect("percent"),
             100.0 / 3.0,
             max_relative = 1e-14
         );
-        assert_eq!(rows[0].verdict, TunnelVerdict::Agrees);
+        assert_eq!(rows[0].tunnel.verdict, TunnelVerdict::Agrees);
         estimate.status = Status::Held;
         assert_eq!(
             compare_maneuvers(&[estimate], &maneuvers, &tunnel, &Settings::default()),

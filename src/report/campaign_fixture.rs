@@ -12,7 +12,7 @@ use crate::output_error::identifiability::Limits;
 use crate::tables::{
     ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow, CorrelationRow, EstimateRow,
     EventRow, EventVerdict, FitRow, History, HistoryOutput, InstrumentRow, Outcome, PredictionRow,
-    TrendRow, TunnelVerdict,
+    TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -290,15 +290,17 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         mach: Some(0.3),
         flight: value,
         standard_error: 0.001,
-        wind_tunnel: Some(0.05),
-        difference: Some(value - 0.05),
-        uncertainty: Some(0.001),
-        difference_pct: Some(100.0 * (value - 0.05) / 0.05),
-        z: Some(-3.0),
-        verdict: if alpha_deg < 25.0 {
-            TunnelVerdict::Agrees
-        } else {
-            TunnelVerdict::FlightLower
+        tunnel: TunnelDifference {
+            wind_tunnel: Some(0.05),
+            difference: Some(value - 0.05),
+            uncertainty: Some(0.001),
+            difference_pct: Some(100.0 * (value - 0.05) / 0.05),
+            z: Some(-3.0),
+            verdict: if alpha_deg < 25.0 {
+                TunnelVerdict::Agrees
+            } else {
+                TunnelVerdict::FlightLower
+            },
         },
     });
 }

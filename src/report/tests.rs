@@ -236,13 +236,13 @@ fn numbers_that_are_not_finite_do_not_break_the_page() {
         ) = (bad, bad, bad);
         (
             campaign.comparison[i].flight,
-            campaign.comparison[i].difference,
+            campaign.comparison[i].tunnel.difference,
         ) = (bad, Some(bad));
         (
-            campaign.comparison[i + 5].wind_tunnel,
+            campaign.comparison[i + 5].tunnel.wind_tunnel,
             campaign.comparison[i + 10].alpha_deg,
         ) = (Some(bad), bad);
-        campaign.comparison[i].difference_pct = Some(bad);
+        campaign.comparison[i].tunnel.difference_pct = Some(bad);
     }
     for history in &mut campaign.histories {
         history.time_s[0] = f64::NAN;

@@ -5,6 +5,25 @@ use serde::{Deserialize, Serialize, Serializer};
 use crate::schema::{Entry, Words, table, words};
 
 table! {
+    /// Columns of `comparison` and `maneuver_comparison` about the tunnel.
+    pub struct TunnelDifference {
+        /// Tunnel's value, in the column `unit`.
+        pub wind_tunnel: Option<f64>,
+        /// Flight minus tunnel, in the column `unit`.
+        pub difference: Option<f64>,
+        /// Standard error of the difference, in the column `unit`: root sum of squares of
+        /// flight's and the tunnel's stated one.
+        pub uncertainty: Option<f64>,
+        /// Difference over the tunnel's magnitude.
+        pub difference_pct: Option<f64> ["%"],
+        /// Difference over its standard error.
+        pub z: Option<f64> ["1"],
+        /// Verdict on flight against tunnel.
+        pub verdict: TunnelVerdict,
+    }
+}
+
+table! {
     /// Trends against the wind tunnel.
     pub struct ComparisonRow in "comparison" per "derivative and angle of attack" {
         /// Name of the derivative in the model.
@@ -22,19 +41,8 @@ table! {
         pub flight: f64,
         /// Standard error of the trend, in the column `unit`.
         pub standard_error: f64,
-        /// Tunnel's value, in the column `unit`.
-        pub wind_tunnel: Option<f64>,
-        /// Flight minus tunnel, in the column `unit`.
-        pub difference: Option<f64>,
-        /// Standard error of the difference, in the column `unit`: √(standard_error² + the tunnel's
-        /// stated uncertainty²).
-        pub uncertainty: Option<f64>,
-        /// Difference over the tunnel's magnitude.
-        pub difference_pct: Option<f64> ["%"],
-        /// Difference over its standard error.
-        pub z: Option<f64> ["1"],
-        /// Verdict on flight against tunnel.
-        pub verdict: TunnelVerdict,
+        /// Comparison with the tunnel.
+        pub tunnel: TunnelDifference,
     }
 }
 
@@ -75,18 +83,8 @@ table! {
         pub flight: f64,
         /// Corrected bound of the estimate, or its bound where there is none, in the column `unit`.
         pub bound: f64,
-        /// Tunnel's value, in the column `unit`.
-        pub wind_tunnel: Option<f64>,
-        /// Flight minus tunnel, in the column `unit`.
-        pub difference: Option<f64>,
-        /// Standard error of the difference, in the column `unit`.
-        pub uncertainty: Option<f64>,
-        /// Difference over the tunnel's magnitude.
-        pub difference_pct: Option<f64> ["%"],
-        /// Difference over its standard error.
-        pub z: Option<f64> ["1"],
-        /// Verdict on flight against tunnel.
-        pub verdict: TunnelVerdict,
+        /// Comparison with the tunnel.
+        pub tunnel: TunnelDifference,
     }
 }
 

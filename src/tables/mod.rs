@@ -18,7 +18,7 @@ mod trends;
 pub use bounds_study::{CoverageRow, Residuals, StartRow, StartVariant, Weights};
 pub use comparison::{
     ChangeRow, ChangeVerdict, ComparisonRow, DisagreementRow, ExtrapolationRow,
-    ManeuverComparisonRow, Treatment, TunnelVerdict, Verdict, VerdictRow,
+    ManeuverComparisonRow, Treatment, TunnelDifference, TunnelVerdict, Verdict, VerdictRow,
 };
 pub use estimates::{
     CorrelationKind, CorrelationRow, EstimateRow, FitRow, JOINT_FLIGHT, JointRow, Outcome,

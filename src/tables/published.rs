@@ -49,7 +49,7 @@ impl From<&ComparisonRow> for PublishedVerdict {
         PublishedVerdict {
             derivative: row.derivative.clone(),
             alpha_deg: row.alpha_deg,
-            verdict: row.verdict,
+            verdict: row.tunnel.verdict,
         }
     }
 }

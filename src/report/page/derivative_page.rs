@@ -309,7 +309,7 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
     let rows = &derivative.comparison;
     let values = rows
         .iter()
-        .flat_map(|c| [Some(c.flight), c.wind_tunnel])
+        .flat_map(|c| [Some(c.flight), c.tunnel.wind_tunnel])
         .flatten();
     let digits = Digits::of(values, 4);
     let row = |c: &&ComparisonRow| {
@@ -317,12 +317,15 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
             angle(c.alpha_deg),
             digits.write(Some(c.flight)),
             digits.write(Some(c.standard_error)),
-            digits.write(c.wind_tunnel),
-            digits.write(c.difference),
-            c.difference_pct
+            digits.write(c.tunnel.wind_tunnel),
+            digits.write(c.tunnel.difference),
+            c.tunnel
+                .difference_pct
                 .map_or_else(|| NOTHING.to_owned(), |p| fixed(p, 1)),
-            c.z.map_or_else(|| NOTHING.to_owned(), |z| fixed(z, 1)),
-            c.verdict.to_string(),
+            c.tunnel
+                .z
+                .map_or_else(|| NOTHING.to_owned(), |z| fixed(z, 1)),
+            c.tunnel.verdict.to_string(),
         ]
     };
     let heads = [
@@ -382,7 +385,8 @@ mod tests {
     fn a_derivative_without_tunnel_value_shows_none() {
         let mut campaign = campaign_fixture::campaign();
         for row in &mut campaign.comparison {
-            (row.wind_tunnel, row.verdict) = (None, TunnelVerdict::NoTunnelValue);
+            row.tunnel.wind_tunnel = None;
+            row.tunnel.verdict = TunnelVerdict::NoTunnelValue;
         }
         let contents = campaign.contents();
         let derivatives = derivative_results::collect(&contents);

@@ -186,7 +186,10 @@ impl<'a> DerivativeRows<'a, '_> {
     /// Tunnel values of the comparison, or those that the estimation used where a derivative is not
     /// compared.
     fn tunnel(&self) -> Vec<(f64, f64)> {
-        let compared = self.comparison.iter().map(|c| (c.alpha_deg, c.wind_tunnel));
+        let compared = self
+            .comparison
+            .iter()
+            .map(|c| (c.alpha_deg, c.tunnel.wind_tunnel));
         let used = self.estimates.iter().map(|e| (e.alpha_deg, e.wind_tunnel));
         let rows: Vec<_> = if self.comparison.is_empty() {
             used.collect()

@@ -70,10 +70,13 @@ fn flown(contents: &Contents, classes: &[ClassOutcomes]) -> String {
 /// tunnel has none.
 fn agreeing_share(derivative: &DerivativeResults) -> Option<f64> {
     let rows = &derivative.comparison;
-    let compared = rows.iter().filter(|c| c.wind_tunnel.is_some()).count();
+    let compared = rows
+        .iter()
+        .filter(|c| c.tunnel.wind_tunnel.is_some())
+        .count();
     let agreeing = rows
         .iter()
-        .filter(|c| c.verdict == TunnelVerdict::Agrees)
+        .filter(|c| c.tunnel.verdict == TunnelVerdict::Agrees)
         .count();
     (compared > 0).then(|| agreeing as f64 / compared as f64)
 }
@@ -132,8 +135,8 @@ fn worst_disagreement<'a>(derivative: &DerivativeResults<'a>) -> Option<Disagree
     derivative
         .comparison
         .iter()
-        .filter(|row| row.verdict != TunnelVerdict::Agrees)
-        .filter_map(|row| Some((row.z.filter(|z| z.is_finite())?.abs(), *row)))
+        .filter(|row| row.tunnel.verdict != TunnelVerdict::Agrees)
+        .filter_map(|row| Some((row.tunnel.z.filter(|z| z.is_finite())?.abs(), *row)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -156,12 +159,13 @@ fn largest_disagreements(derivatives: &[DerivativeResults]) -> Option<String> {
 
 fn disagreement_in_words(name: &str, z: f64, row: &ComparisonRow) -> String {
     let percentage = row
+        .tunnel
         .difference_pct
         .filter(|pct| pct.is_finite() && pct.abs() < LARGEST_PERCENTAGE)
         .map_or_else(String::new, |pct| format!(" by {} %", fixed(pct.abs(), 0)));
     format!(
         "{name} {}{percentage} at {} (z {})",
-        row.verdict,
+        row.tunnel.verdict,
         angle(row.alpha_deg),
         fixed(z, 0)
     )
@@ -249,7 +253,7 @@ mod tests {
     #[test]
     fn opposite_signs_are_in_the_summary() {
         let mut campaign = campaign();
-        campaign.comparison[0].verdict = TunnelVerdict::SignDiffers;
+        campaign.comparison[0].tunnel.verdict = TunnelVerdict::SignDiffers;
         let contents = campaign.contents();
         let lines = summary(
             &contents,

@@ -46,12 +46,12 @@ pub fn ranges(rows: &[&ComparisonRow]) -> Vec<VerdictRange> {
         let left_deg = alpha - 0.5 * before.or(after).unwrap_or(1.0);
         let right_deg = alpha + 0.5 * after.or(before).unwrap_or(1.0);
         match ranges.last_mut() {
-            Some(range) if range.verdict == row.verdict => {
+            Some(range) if range.verdict == row.tunnel.verdict => {
                 range.to_deg = alpha;
                 range.right_deg = right_deg;
             }
             _ => ranges.push(VerdictRange {
-                verdict: row.verdict,
+                verdict: row.tunnel.verdict,
                 from_deg: alpha,
                 to_deg: alpha,
                 left_deg,
@@ -115,6 +115,7 @@ fn total_width_deg(ranges: &[&VerdictRange]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tables::TunnelDifference;
 
     fn rows(verdicts: &[(f64, TunnelVerdict)]) -> Vec<ComparisonRow> {
         let row = |(alpha_deg, verdict): &(f64, TunnelVerdict)| ComparisonRow {
@@ -125,12 +126,14 @@ mod tests {
             mach: None,
             flight: 1.0,
             standard_error: 0.1,
-            wind_tunnel: None,
-            difference: None,
-            uncertainty: None,
-            difference_pct: None,
-            z: None,
-            verdict: *verdict,
+            tunnel: TunnelDifference {
+                wind_tunnel: None,
+                difference: None,
+                uncertainty: None,
+                difference_pct: None,
+                z: None,
+                verdict: *verdict,
+            },
         };
         verdicts.iter().map(row).collect()
     }

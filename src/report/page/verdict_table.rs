@@ -108,12 +108,13 @@ fn largest_difference(derivative: &DerivativeResults) -> String {
     let differences = derivative
         .comparison
         .iter()
-        .filter_map(|row| Some((row, row.difference.filter(|d| d.is_finite())?)));
+        .filter_map(|row| Some((row, row.tunnel.difference.filter(|d| d.is_finite())?)));
     let largest = differences.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let Some((row, difference)) = largest else {
         return NOTHING.to_owned();
     };
     let percentage = row
+        .tunnel
         .difference_pct
         .filter(|pct| pct.is_finite() && pct.abs() < LARGEST_PERCENTAGE)
         .map_or_else(String::new, |pct| {
