@@ -8,7 +8,7 @@ use crate::support::{Campaign, Row, number, pitch_steps, run, with_values};
 
 /// Two flights with one maneuver each, of one class at one angle of attack: the second is the first
 /// as other instruments would have recorded it. The pipeline is the shipped one, edited.
-fn twins(edits: &[(&str, &str)]) -> Campaign {
+fn two_recordings(edits: &[(&str, &str)]) -> Campaign {
     let campaign = Campaign::new();
     let first = pitch_steps();
     // A sawtooth of the size of the gyro's noise.
@@ -24,8 +24,8 @@ fn twins(edits: &[(&str, &str)]) -> Campaign {
     campaign
 }
 
-/// Everything that a run has left.
-fn left(campaign: &Campaign) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
+/// Bytes of store and reports.
+fn published_bytes(campaign: &Campaign) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
     [campaign.bytes("store"), campaign.bytes("reports")]
 }
 
@@ -36,7 +36,7 @@ fn without_joint(rows: Vec<Row>) -> Vec<Row> {
 }
 
 #[test]
-fn by_evidence_every_held_derivative_says_why_and_a_second_run_changes_nothing() {
+fn hold_by_evidence_gives_each_held_derivative_a_reason_and_a_second_run_changes_nothing() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
     campaign.edit("pipeline.yaml", "hold: table", "hold: evidence");
@@ -52,24 +52,23 @@ fn by_evidence_every_held_derivative_says_why_and_a_second_run_changes_nothing()
     assert!(estimates.iter().any(|row| row["status"] == "held"));
     let report = std::fs::read_to_string(campaign.path("reports/report.html")).unwrap();
     assert!(report.contains("By the evidence of each maneuver"));
-    let before = left(&campaign);
+    let before = published_bytes(&campaign);
     campaign.finishes("run");
-    assert!(left(&campaign) == before);
+    assert!(published_bytes(&campaign) == before);
 }
 
 #[test]
-fn maneuvers_joined_have_rows_of_their_own_leave_the_others_alone_and_are_the_same_with_one_thread_and_with_two()
- {
-    let alone = twins(&[]);
+fn joint_estimates_add_rows_without_changing_others_for_any_number_of_threads() {
+    let alone = two_recordings(&[]);
     alone.ends("estimate", 0);
     assert!(alone.table("joint").is_empty());
 
-    let joint = twins(&[("# joint: { alpha_bin_deg: 2.5 }", "joint: {}")]);
+    let joint = two_recordings(&[("# joint: { alpha_bin_deg: 2.5 }", "joint: {}")]);
     let with_threads = |threads: &str| {
         joint.forget();
         let outcome = run(joint.command("estimate").args(["--threads", threads]));
         assert_eq!(outcome.code, Some(0), "{outcome:?}");
-        left(&joint)
+        published_bytes(&joint)
     };
     let one = with_threads("1");
     assert!(
@@ -123,7 +122,7 @@ fn maneuvers_joined_have_rows_of_their_own_leave_the_others_alone_and_are_the_sa
 }
 
 #[test]
-fn what_each_maneuver_holds_by_its_own_evidence_cannot_be_joined_and_the_configuration_says_so() {
+fn joint_estimation_is_refused_with_hold_by_evidence() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
     campaign.edit("pipeline.yaml", "hold: table", "hold: evidence");
@@ -142,8 +141,8 @@ fn what_each_maneuver_holds_by_its_own_evidence_cannot_be_joined_and_the_configu
 }
 
 #[test]
-fn each_of_two_maneuvers_is_predicted_from_the_other_and_one_alone_says_why_it_is_not() {
-    let campaign = twins(&[]);
+fn two_maneuvers_predict_each_other_and_a_single_one_has_a_reason_for_none() {
+    let campaign = two_recordings(&[]);
     campaign.ends("estimate", 0);
     let outputs = ["alpha", "q", "theta", "an", "ax"];
     for fit in campaign.table("fits") {
@@ -173,9 +172,9 @@ fn each_of_two_maneuvers_is_predicted_from_the_other_and_one_alone_says_why_it_i
         .map(|row| row["output"].as_str())
         .collect();
     assert_eq!((predictions.len(), predicted), (10, outputs.into()));
-    let before = left(&campaign);
+    let before = published_bytes(&campaign);
     campaign.ends("estimate", 0);
-    assert!(left(&campaign) == before);
+    assert!(published_bytes(&campaign) == before);
 
     std::fs::remove_file(campaign.flight("flight_002")).unwrap();
     campaign.ends("estimate", 0);

@@ -1,6 +1,5 @@
-//! Nights: whatever happens to a run, the next one ends with the same bytes; what is published
-//! changes at once, says what it was made from and what changed, and nothing that it needs is
-//! removed.
+//! Nights: after any disturbance the next run ends with the same bytes. Publication changes at once,
+//! with lineage and differences, and `gc` removes nothing that it needs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +15,7 @@ use crate::support::{
 };
 
 /// Every file of store and reports with its bytes, but those that hold a clock or a process.
-fn everything(campaign: &Campaign) -> BTreeMap<PathBuf, Vec<u8>> {
+fn bytes_without_locks(campaign: &Campaign) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = campaign.bytes("store");
     let nights = campaign.path("reports/nights");
     let kept = files(&nights).into_iter().filter(|p| !p.ends_with("lock"));
@@ -65,13 +64,16 @@ fn two_nights(campaign: &Campaign, mut disturb: impl FnMut(&Campaign)) {
 
 /// In the suite a few kills; `make torture` does many.
 #[test]
-fn a_run_that_is_killed_at_any_moment_ends_with_the_bytes_of_one_that_is_not() {
+fn after_kills_at_any_moment_a_run_ends_with_the_same_bytes() {
     let campaign = Campaign::new();
     let begun = Instant::now();
     two_nights(&campaign, |_| {});
     // A run of either night takes about half of it; kills may come when it is over, too.
     let longest = begun.elapsed().mul_f64(0.6);
-    let (expected, wanted) = (everything(&campaign), from_environment("HARVEST_KILLS", 12));
+    let (expected, wanted) = (
+        bytes_without_locks(&campaign),
+        from_environment("HARVEST_KILLS", 12),
+    );
     let (mut random, mut kills, mut hit) = (Random::new(0x5eed), 0, 0);
     while kills < wanted {
         campaign.forget();
@@ -88,14 +90,14 @@ fn a_run_that_is_killed_at_any_moment_ends_with_the_bytes_of_one_that_is_not() {
                 kills += 1;
             }
         });
-        let differing = differing(&everything(&campaign), &expected);
+        let differing = differing(&bytes_without_locks(&campaign), &expected);
         assert!(differing.is_empty(), "after {kills} kills: {differing:?}");
     }
     assert!(hit > wanted / 4, "{hit} of {kills} kills came while it ran");
 }
 
 #[test]
-fn of_two_runs_at_once_one_leaves_with_a_word_about_the_other_or_waits_for_it() {
+fn a_second_run_at_once_names_the_first_and_ends_or_waits() {
     let campaign = Campaign::new();
     campaign.add("flight_001", &flight(1, 300));
     let mut first = spawned(&campaign);
@@ -117,7 +119,7 @@ fn of_two_runs_at_once_one_leaves_with_a_word_about_the_other_or_waits_for_it() 
 }
 
 #[test]
-fn the_lock_of_a_dead_process_blocks_nobody() {
+fn the_lock_of_a_dead_process_does_not_block_a_run() {
     let campaign = Campaign::of_pitch_steps();
     let mut child = spawned(&campaign);
     let patience = Instant::now() + Duration::from_mins(1);
@@ -131,10 +133,10 @@ fn the_lock_of_a_dead_process_blocks_nobody() {
 }
 
 #[test]
-fn runs_that_race_from_the_start_leave_one_good_store() {
+fn runs_started_together_leave_one_valid_store() {
     let campaign = Campaign::of_pitch_steps();
     campaign.finishes("run");
-    let expected = everything(&campaign);
+    let expected = bytes_without_locks(&campaign);
     campaign.forget();
     let mut racing: Vec<_> = (0..4)
         .map(|_| {
@@ -148,7 +150,7 @@ fn runs_that_race_from_the_start_leave_one_good_store() {
     for child in &mut racing {
         assert!(matches!(child.wait().unwrap().code(), Some(0 | 2)));
     }
-    let differing = differing(&everything(&campaign), &expected);
+    let differing = differing(&bytes_without_locks(&campaign), &expected);
     assert!(differing.is_empty(), "{differing:?}");
 }
 
@@ -173,10 +175,10 @@ fn with_room_for(campaign: &Campaign, kilobytes: u32) -> Outcome {
 
 #[cfg(unix)]
 #[test]
-fn a_full_disk_ends_in_a_clear_message_and_a_store_that_is_still_good() {
+fn a_full_disk_ends_with_a_message_and_a_valid_store() {
     let campaign = Campaign::of_pitch_steps();
     campaign.finishes("run");
-    let expected = everything(&campaign);
+    let expected = bytes_without_locks(&campaign);
     let largest = |folder: &str| {
         files(&campaign.path(folder))
             .iter()
@@ -201,7 +203,7 @@ fn a_full_disk_ends_in_a_clear_message_and_a_store_that_is_still_good() {
         );
         assert!(!campaign.path("reports/report.html").exists());
         campaign.finishes("run");
-        let differing = differing(&everything(&campaign), &expected);
+        let differing = differing(&bytes_without_locks(&campaign), &expected);
         assert!(differing.is_empty(), "{room} kB: {differing:?}");
     }
     // What is published stays where there is no room for more.
@@ -213,7 +215,7 @@ fn a_full_disk_ends_in_a_clear_message_and_a_store_that_is_still_good() {
 
 #[cfg(unix)]
 #[test]
-fn a_read_only_folder_ends_in_a_clear_message() {
+fn a_read_only_folder_ends_with_a_message() {
     use std::os::unix::fs::PermissionsExt;
     let campaign = Campaign::of_pitch_steps();
     for folder in ["store", "reports"] {
@@ -235,7 +237,7 @@ fn a_read_only_folder_ends_in_a_clear_message() {
 }
 
 #[test]
-fn a_file_that_vanishes_or_is_no_file_is_a_problem_of_its_flight() {
+fn a_missing_or_irregular_file_is_a_problem_of_its_flight() {
     let campaign = Campaign::of_pitch_steps();
     #[cfg(unix)]
     std::os::unix::fs::symlink("nowhere", campaign.flight("flight_002")).unwrap();
@@ -254,7 +256,7 @@ fn a_file_that_vanishes_or_is_no_file_is_a_problem_of_its_flight() {
 }
 
 #[test]
-fn a_copy_of_a_flight_does_not_count_twice_and_comes_in_when_it_is_another() {
+fn a_copy_of_a_flight_is_rejected_until_its_rows_differ() {
     let campaign = Campaign::of_pitch_steps();
     fs::copy(campaign.flight("flight_001"), campaign.flight("flight_002")).unwrap();
     campaign.ends("segment", 2);
@@ -285,7 +287,7 @@ fn a_copy_of_a_flight_does_not_count_twice_and_comes_in_when_it_is_another() {
 }
 
 #[test]
-fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
+fn the_report_lists_changes_with_causes_and_diff_ends_with_its_exit_code() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     let said = campaign.ends("diff", 0).stdout;
@@ -337,7 +339,7 @@ fn the_morning_page_says_what_is_new_and_why_and_the_exit_code_what_moved() {
 }
 
 #[test]
-fn status_says_what_a_run_would_do_and_why_and_changes_nothing() {
+fn status_lists_stale_artefacts_with_reasons_and_changes_nothing() {
     let campaign = Campaign::of_pitch_steps();
     let before = campaign.ends("status", 3).stdout;
     assert!(
@@ -373,7 +375,7 @@ fn status_says_what_a_run_would_do_and_why_and_changes_nothing() {
 }
 
 #[test]
-fn a_maneuver_s_story_is_told_whole() {
+fn explain_prints_origin_fit_and_dependencies_of_a_maneuver() {
     let campaign = Campaign::of_pitch_steps();
     campaign.finishes("run");
     let explain = |id: &str| {
@@ -414,7 +416,7 @@ fn a_maneuver_s_story_is_told_whole() {
 }
 
 #[test]
-fn every_published_table_carries_its_lineage_and_verify_says_whether_it_holds() {
+fn published_tables_carry_their_lineage_and_verify_checks_it() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
     campaign.finishes("run");
@@ -485,7 +487,7 @@ fn flip(path: &Path) {
 }
 
 #[test]
-fn any_file_of_store_and_reports_may_be_damaged_and_the_next_run_ends_the_same() {
+fn after_damage_to_any_file_the_next_run_ends_with_the_same_bytes() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     let expected = campaign.bytes("reports");
@@ -529,7 +531,7 @@ fn any_file_of_store_and_reports_may_be_damaged_and_the_next_run_ends_the_same()
 }
 
 #[test]
-fn gc_shows_first_removes_what_no_night_needs_and_nothing_else() {
+fn gc_lists_then_removes_only_what_no_night_needs() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     assert!(
@@ -569,7 +571,7 @@ fn gc_shows_first_removes_what_no_night_needs_and_nothing_else() {
 }
 
 #[test]
-fn gc_removes_nothing_where_it_cannot_tell_what_a_night_needs() {
+fn gc_removes_nothing_where_a_night_s_needs_are_unreadable() {
     let campaign = Campaign::new();
     two_nights(&campaign, |_| {});
     flip(&campaign.path("reports/nights/0001/night.json"));
@@ -591,16 +593,16 @@ fn gc_removes_nothing_where_it_cannot_tell_what_a_night_needs() {
 }
 
 #[test]
-fn a_stage_that_has_nothing_new_leaves_the_whole_night_in_its_place() {
+fn a_stage_without_changes_keeps_the_published_night() {
     let campaign = Campaign::of_pitch_steps();
     campaign.finishes("run");
-    let published = everything(&campaign);
+    let published = bytes_without_locks(&campaign);
     let outcome = campaign.harvest("estimate");
     assert!(
         outcome.stdout.contains("nothing new: night 0001 holds"),
         "{outcome:?}"
     );
-    assert!(everything(&campaign) == published);
+    assert!(bytes_without_locks(&campaign) == published);
     for estimate in files(&campaign.path("store/estimate")) {
         fs::remove_file(estimate).unwrap();
     }
@@ -610,11 +612,11 @@ fn a_stage_that_has_nothing_new_leaves_the_whole_night_in_its_place() {
         "the same night, to the report"
     );
     campaign.finishes("run");
-    assert!(everything(&campaign) == published);
+    assert!(bytes_without_locks(&campaign) == published);
 }
 
 #[test]
-fn the_log_is_one_json_object_per_line_with_a_clock_and_the_terminal_stays_quiet() {
+fn the_log_has_one_json_object_per_line_and_the_terminal_is_quiet() {
     let campaign = Campaign::of_pitch_steps();
     fs::write(campaign.flight("spoiled"), "text").unwrap();
     let log = campaign.path("nightly.jsonl");
