@@ -1,5 +1,5 @@
-//! Standard atmosphere (U.S. Standard Atmosphere, 1976) to 65,000 ft: ρ = p/(R T) with a temperature
-//! that falls linearly to the tropopause and is constant above.
+//! U.S. Standard Atmosphere, 1976, to a geopotential height of 32 km (105,000 ft): density
+//! ρ = p/(R T) from layers in which the temperature is linear in the height.
 
 use crate::units::M_PER_FT;
 
@@ -16,32 +16,74 @@ const KG_M3_PER_SLUG_FT3: f64 = 515.378_818_393_2;
 const GAS: f64 = 287.052_87;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
-/// Geopotential height of the tropopause.
-const TROPOPAUSE_M: f64 = 11_000.0;
 /// Radius of the earth in the definition of the geopotential height.
 const RADIUS_M: f64 = 6_356_766.0;
-/// Lapse rate of the troposphere, K/m.
-const LAPSE: f64 = 0.006_5;
+/// Ratio of specific heats of air.
+const HEAT_RATIO: f64 = 1.4;
 /// Temperature at sea level, K.
 const SEA_LEVEL_K: f64 = 288.15;
 /// Pressure at sea level, Pa.
 const SEA_LEVEL_PA: f64 = 101_325.0;
-/// Ratio of specific heats of air.
-const HEAT_RATIO: f64 = 1.4;
 
-/// Air at a geometric height, ft.
+/// A layer up to a geopotential height.
+struct Layer {
+    top_m: f64,
+    /// Rise of the temperature with the height, K/m.
+    gradient: f64,
+}
+
+/// Troposphere and lower stratosphere, from sea level up.
+const LAYERS: [Layer; 3] = [
+    Layer {
+        top_m: 11_000.0,
+        gradient: -0.006_5,
+    },
+    Layer {
+        top_m: 20_000.0,
+        gradient: 0.0,
+    },
+    Layer {
+        top_m: 32_000.0,
+        gradient: 0.001,
+    },
+];
+
+/// Air at a geometric height, ft; NaN above the layers and where the height is NaN.
 #[must_use]
 pub fn air(altitude_ft: f64) -> Air {
     let geometric = altitude_ft * M_PER_FT;
     // The layers are defined over geopotential height.
-    let h = geometric * RADIUS_M / (RADIUS_M + geometric);
-    let temperature = SEA_LEVEL_K - LAPSE * h.min(TROPOPAUSE_M);
-    let troposphere = SEA_LEVEL_PA * (temperature / SEA_LEVEL_K).powf(GRAVITY / (LAPSE * GAS));
-    let above = (h - TROPOPAUSE_M).max(0.0);
-    let pressure = troposphere * (-GRAVITY * above / (GAS * temperature)).exp();
+    let (temperature, pressure) = state_at(geometric * RADIUS_M / (RADIUS_M + geometric));
     Air {
         density_slug_ft3: pressure / (GAS * temperature) / KG_M3_PER_SLUG_FT3,
         sound_ft_s: (HEAT_RATIO * GAS * temperature).sqrt() / M_PER_FT,
+    }
+}
+
+/// Temperature, K, and pressure, Pa, at a geopotential height.
+fn state_at(height_m: f64) -> (f64, f64) {
+    let (mut base_m, mut temperature, mut pressure) = (0.0, SEA_LEVEL_K, SEA_LEVEL_PA);
+    for layer in LAYERS {
+        let rise_m = height_m.min(layer.top_m) - base_m;
+        (temperature, pressure) = layer.climb(temperature, pressure, rise_m);
+        if height_m <= layer.top_m {
+            return (temperature, pressure);
+        }
+        base_m = layer.top_m;
+    }
+    (f64::NAN, f64::NAN)
+}
+
+impl Layer {
+    /// Temperature and pressure so much higher in the layer: dp/dh = −ρ g.
+    fn climb(&self, temperature: f64, pressure: f64, rise_m: f64) -> (f64, f64) {
+        if self.gradient == 0.0 {
+            let decay = (-GRAVITY * rise_m / (GAS * temperature)).exp();
+            return (temperature, pressure * decay);
+        }
+        let above = temperature + self.gradient * rise_m;
+        let exponent = -GRAVITY / (self.gradient * GAS);
+        (above, pressure * (above / temperature).powf(exponent))
     }
 }
 
@@ -52,17 +94,47 @@ mod tests {
 
     #[test]
     fn density_and_sound_are_those_of_the_published_tables() {
-        for (altitude_ft, density, sound) in [
-            (0.0, 2.3769e-3, 1116.45),
-            (25_000.0, 1.0663e-3, 1016.1),
-            (45_000.0, 4.6227e-4, 968.08),
+        // U.S. Standard Atmosphere, 1976, Table I, over geometric height: kg/m³ and m/s.
+        for (altitude_m, density, sound) in [
+            (-1000.0, 1.347_0, 344.11),
+            (0.0, 1.225_0, 340.29),
+            (5000.0, 7.364_3e-1, 320.55),
+            (10_000.0, 4.135_1e-1, 299.53),
+            (15_000.0, 1.947_6e-1, 295.07),
+            (20_000.0, 8.891_0e-2, 295.07),
+            (25_000.0, 4.008_4e-2, 298.39),
+            (30_000.0, 1.841_0e-2, 301.71),
         ] {
+            let air = air(altitude_m / M_PER_FT);
             assert_relative_eq!(
-                air(altitude_ft).density_slug_ft3,
+                air.density_slug_ft3 * KG_M3_PER_SLUG_FT3,
                 density,
-                max_relative = 3e-4
+                max_relative = 6e-5
             );
-            assert_relative_eq!(air(altitude_ft).sound_ft_s, sound, max_relative = 2e-4);
+            assert_relative_eq!(air.sound_ft_s * M_PER_FT, sound, max_relative = 3e-5);
+        }
+    }
+
+    #[test]
+    fn pressures_at_the_layers_limits_are_the_defined_ones() {
+        // Table 4 of the standard, mbar over geopotential height.
+        for (height_m, pressure_mbar) in [
+            (11_000.0, 226.320_6),
+            (20_000.0, 54.748_89),
+            (32_000.0, 8.680_187),
+        ] {
+            let (_, pressure) = state_at(height_m);
+            assert_relative_eq!(pressure / 100.0, pressure_mbar, max_relative = 5e-6);
+        }
+    }
+
+    #[test]
+    fn there_is_no_air_above_the_layers_nor_at_no_height() {
+        let top_ft = 32_000.0 * RADIUS_M / (RADIUS_M - 32_000.0) / M_PER_FT;
+        assert!(air(top_ft - 1.0).density_slug_ft3 > 0.0);
+        for altitude_ft in [top_ft + 1.0, f64::INFINITY, f64::NAN] {
+            let air = air(altitude_ft);
+            assert!(air.density_slug_ft3.is_nan() && air.sound_ft_s.is_nan());
         }
     }
 }

@@ -8,7 +8,6 @@
 //! clock's list of runs and the block means that the kinematic relations compare ([`assess`]).
 
 mod assessment;
-mod atmosphere;
 mod channel;
 mod checks;
 mod clock;

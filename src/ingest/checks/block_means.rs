@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::earth::air;
 use crate::flight::{Correction, signal};
-use crate::ingest::atmosphere::atmosphere;
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
 
@@ -167,11 +167,11 @@ impl BlockMeans {
     /// most of the record. One of them may be dead.
     pub fn is_flying_faster_than(&self, velocity_ft_s: f64) -> bool {
         // At sea level: higher up the same pressure takes a higher velocity.
-        let (density, sound) = atmosphere(0.0);
-        let pressure = 0.5 * density * velocity_ft_s * velocity_ft_s;
+        let sea_level = air(0.0);
+        let pressure = 0.5 * sea_level.density_slug_ft3 * velocity_ft_s * velocity_ft_s;
         self.mostly_exceeds(signal::VELOCITY, velocity_ft_s)
             || self.mostly_exceeds(signal::QBAR, pressure)
-            || self.mostly_exceeds(signal::MACH, velocity_ft_s / sound)
+            || self.mostly_exceeds(signal::MACH, velocity_ft_s / sea_level.sound_ft_s)
     }
 
     fn mostly_exceeds(&self, signal: &str, level: f64) -> bool {

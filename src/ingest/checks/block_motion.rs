@@ -6,9 +6,8 @@
 
 use super::block_means::BlockMeans;
 use crate::aircraft::{Aircraft, Flow, Position};
-use crate::earth::gravity_ft_s2;
+use crate::earth::{Air, air, gravity_ft_s2};
 use crate::flight::signal;
-use crate::ingest::atmosphere::atmosphere;
 use crate::ingest::settings::Checks;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -33,9 +32,8 @@ pub struct BlockMotion {
     pub ay: f64,
     pub mach: f64,
     pub qbar: f64,
-    /// Standard atmosphere at the altitude: slug/ft³ and ft/s.
-    pub density: f64,
-    pub sound: f64,
+    /// Standard atmosphere at the altitude.
+    pub air: Air,
     /// Arms from the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and
     /// down.
     pub arms: [[f64; 3]; 3],
@@ -73,7 +71,6 @@ impl BlockMotion {
         let (sin_beta, cos_beta) = flow.beta.sin_cos();
         let (theta, phi) = (angle(signal::THETA), angle(signal::PHI));
         let altitude = mean(signal::ALTITUDE);
-        let (density, sound) = atmosphere(altitude);
         Some(BlockMotion {
             rates,
             theta,
@@ -92,8 +89,7 @@ impl BlockMotion {
             ay: mean(signal::AY),
             mach: mean(signal::MACH),
             qbar: mean(signal::QBAR),
-            density,
-            sound,
+            air: air(altitude),
             arms: [sensors.an.arm(cg), sensors.ax.arm(cg), sensors.ay.arm(cg)],
         })
     }

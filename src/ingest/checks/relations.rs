@@ -301,7 +301,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             &[s::QBAR, s::VELOCITY, s::ALTITUDE],
             2,
             integral(|m| m.qbar),
-            integral(|m| 0.5 * m.density * m.velocity * m.velocity),
+            integral(|m| 0.5 * m.air.density_slug_ft3 * m.velocity * m.velocity),
             Selection::Above(settings.excitation.qbar_psf),
         ),
         relation(
@@ -309,7 +309,7 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             &[s::MACH, s::VELOCITY, s::ALTITUDE],
             2,
             integral(|m| m.mach),
-            integral(|m| m.velocity / m.sound),
+            integral(|m| m.velocity / m.air.sound_ft_s),
             Selection::Above(settings.excitation.mach),
         ),
     ]

@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::parameters::{INPUTS, OUTPUTS};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
-use crate::ingest::atmosphere::atmosphere;
+use crate::earth::air;
 use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 
@@ -301,17 +301,15 @@ struct AirWithSlopes {
 
 impl AirWithSlopes {
     fn at(altitude_ft: f64) -> AirWithSlopes {
-        let ((density, sound), up, down) = (
-            atmosphere(altitude_ft),
-            atmosphere(altitude_ft + SLOPE_REACH_FT),
-            atmosphere(altitude_ft - SLOPE_REACH_FT),
-        );
-        let slope = |up: f64, down: f64| (up - down) / (2.0 * SLOPE_REACH_FT);
+        let here = air(altitude_ft);
+        let up = air(altitude_ft + SLOPE_REACH_FT);
+        let down = air(altitude_ft - SLOPE_REACH_FT);
+        let span_ft = 2.0 * SLOPE_REACH_FT;
         AirWithSlopes {
-            density,
-            density_slope: slope(up.0, down.0),
-            sound,
-            sound_slope: slope(up.1, down.1),
+            density: here.density_slug_ft3,
+            density_slope: (up.density_slug_ft3 - down.density_slug_ft3) / span_ft,
+            sound: here.sound_ft_s,
+            sound_slope: (up.sound_ft_s - down.sound_ft_s) / span_ft,
         }
     }
 }
