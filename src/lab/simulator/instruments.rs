@@ -1,16 +1,17 @@
-//! Instruments: lag, scale factor, bias, white and coloured noise, quantisation, spikes and dropouts
+//! Instruments: delay, lag, scale factor, bias, white and coloured noise, quantisation, spikes and dropouts
 //! of a recorded signal.
 //!
-//! y = (1 + s) x(lagged) + b + w + c, rounded to the quantum; c is a first-order Gauss-Markov
+//! y = (1 + s) x(delayed and lagged) + b + w + c, rounded to the quantum; c is a first-order Gauss-Markov
 //! process, `c_{k+1}` = e^(−Δt/τ) `c_k` + σ√(1 − e^(−2Δt/τ)) `n_k`.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::random::RandomStream;
 use crate::flight::record::Series;
-use crate::flight::{Mark, Record};
+use crate::flight::{Correction, Mark, Record};
 
 /// Errors of one signal's instrument, in the signal's unit. All zero: a perfect instrument.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,6 +30,8 @@ pub struct Instrument {
     pub scale: f64,
     /// Standard deviation of the further scale factor error drawn for each flight.
     pub scale_spread: f64,
+    /// Delay of the recorder; negative: ahead of the other signals.
+    pub delay_s: f64,
     /// Time constant of a first-order lag.
     pub lag_s: f64,
     /// Quantisation step.
@@ -92,6 +95,7 @@ impl Instruments {
 
 impl Instrument {
     fn record(&self, exact: &[f64], step_s: f64, random: &mut RandomStream) -> Series {
+        let exact = &*self.delayed(exact, step_s);
         let lag = if self.lag_s > 0.0 {
             (-step_s / self.lag_s).exp()
         } else {
@@ -131,6 +135,20 @@ impl Instrument {
             });
         }
         self.with_spikes_and_dropouts(values, step_s, random)
+    }
+
+    /// Signal by the delay later.
+    fn delayed<'a>(&self, exact: &'a [f64], step_s: f64) -> Cow<'a, [f64]> {
+        if self.delay_s == 0.0 {
+            return exact.into();
+        }
+        let ahead = Correction {
+            signal: String::new(),
+            bias: 0.0,
+            scale: 0.0,
+            delay_s: -self.delay_s,
+        };
+        ahead.of_values(exact, step_s).into()
     }
 
     /// Adds spikes and dropouts; samples in a dropout are missing.
@@ -250,6 +268,22 @@ mod tests {
         )
         .values;
         assert_abs_diff_eq!(exact[399] - values[399], 0.1, epsilon = 1e-9);
+    }
+
+    #[test]
+    fn a_delayed_sine_is_the_sine_of_an_earlier_time() {
+        let sine = |t: f64| (2.0 * t).sin();
+        let time_s = |k: u32| 0.025 * f64::from(k);
+        let exact: Vec<f64> = (0..400).map(|k| sine(time_s(k))).collect();
+        let instrument = Instrument {
+            delay_s: 0.01,
+            ..Instrument::default()
+        };
+        let values = record(instrument, &exact).values;
+        for k in 2..398 {
+            let found = values[usize::try_from(k).unwrap()];
+            assert_abs_diff_eq!(found, sine(time_s(k) - 0.01), epsilon = 1e-5);
+        }
     }
 
     #[test]
