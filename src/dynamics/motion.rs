@@ -159,6 +159,24 @@ impl Window {
         window
     }
 
+    /// Window as a recorder would have recorded it with a signal late by `delay_s`, to first order in
+    /// the delay.
+    #[must_use]
+    pub fn late(&self, name: &str, delay_s: f64) -> Window {
+        let mut window = self.clone();
+        if let Some(points) = window.points.get_mut(name) {
+            // Points lie half a step apart.
+            let per_difference = delay_s / self.step_s;
+            let last = points.len().saturating_sub(1);
+            let value = |(i, value): (usize, &f64)| {
+                let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
+                value - per_difference * difference
+            };
+            *points = Arc::new(points.iter().enumerate().map(value).collect());
+        }
+        window
+    }
+
     /// Window with a further, constant signal.
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {

@@ -4,8 +4,8 @@
 //!
 //! The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the residuals at
 //! the same parameters to v′, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first order in the
-//! error. A surface in error is equivalent to its derivatives in error, so v′ − v follows from
-//! sensitivities. For other signals it is integrated.
+//! error. A surface's scale error or bias is equivalent to its derivatives
+//! in error, so v′ − v follows from sensitivities. For other errors it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -41,6 +41,31 @@ pub struct Misreading<'a> {
     pub scale: f64,
     /// In the signal's unit.
     pub bias: f64,
+    /// Delay of a surface; other signals have none.
+    pub delay_s: f64,
+}
+
+impl<'a> Misreading<'a> {
+    /// Delay of a surface.
+    #[must_use]
+    pub fn late(signal: &'a str, delay_s: f64) -> Misreading<'a> {
+        Misreading {
+            signal,
+            scale: 0.0,
+            bias: 0.0,
+            delay_s,
+        }
+    }
+
+    /// Window as it would have been recorded with the error.
+    #[must_use]
+    pub fn of_window(&self, window: &Window) -> Window {
+        let misread = window.misread(self.signal, self.scale, self.bias);
+        if self.delay_s == 0.0 {
+            return misread;
+        }
+        misread.late(self.signal, self.delay_s)
+    }
 }
 
 impl Calibration {
@@ -50,11 +75,13 @@ impl Calibration {
             signal,
             scale: self.scale_pct / 100.0,
             bias: 0.0,
+            delay_s: 0.0,
         };
         let bias = Misreading {
             signal,
             scale: 0.0,
             bias: self.bias,
+            delay_s: 0.0,
         };
         [scale, bias]
             .into_iter()
@@ -86,7 +113,8 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         let mut shifts = Vec::with_capacity(errors.len());
         for error in errors {
             let is_surface = |(d, _): &(&Derivative, f64)| is_along(d, error.signal);
-            shifts.push(if held.iter().any(is_surface) {
+            // A delayed surface is no combination of its derivatives and a constant.
+            shifts.push(if error.delay_s == 0.0 && held.iter().any(is_surface) {
                 if surfaces.is_none() {
                     surfaces = Some(SurfaceErrors::new(self, &held)?);
                 }
@@ -106,7 +134,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
         exact: &[[f64; OUTPUTS]],
         sensitivities: &Sensitivities,
     ) -> Result<DVector<f64>, Diverged> {
-        let misread = self.window.misread(error.signal, error.scale, error.bias);
+        let misread = error.of_window(self.window);
         let computed = self.computed(&misread, held)?;
         let misread_outputs = E::AXIS.outputs().map(|o| o.signal() == error.signal);
         let measurements = &self.case.measurements;

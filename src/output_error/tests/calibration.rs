@@ -77,7 +77,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
                 .iter_mut()
                 .for_each(|z| z[o] += error.scale * z[o] + error.bias);
         }
-        let window = self.window.misread(error.signal, error.scale, error.bias);
+        let window = error.of_window(&self.window);
         let case = Case::<NX, E>::new(&aircraft(), &window, measurements, &model(&self.truth));
         let settings = Settings {
             tolerance: 1e-13,
@@ -94,32 +94,38 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         DVector::from_vec(fit.values) - DVector::from_vec(self.parameters.clone())
     }
 
-    /// Compares predicted and actual changes, in units of each parameter's bound.
     fn assert_predictions_hold(&self, signals: &[(&str, f64)]) {
-        let sums = cost::sums(&self.response, &TABLE);
-        let scale = symmetric::scale(&sums.information);
         for (signal, bias) in signals {
             for error in [
                 Misreading {
                     signal,
                     scale: 1e-3,
                     bias: 0.0,
+                    delay_s: 0.0,
                 },
                 Misreading {
                     signal,
                     scale: 0.0,
                     bias: *bias,
+                    delay_s: 0.0,
                 },
             ] {
-                let (predicted, moved) = (self.predicted(&error), self.moved(&error));
-                let off = (&predicted - &moved).component_div(&scale).norm()
-                    / moved.component_div(&scale).norm();
-                assert!(
-                    moved.norm() > 0.0 && off < 0.05,
-                    "{error:?}: prediction and change differ by {off:.3}"
-                );
+                self.assert_prediction_holds(&error);
             }
         }
+    }
+
+    /// Compares predicted and actual changes, in units of each parameter's bound.
+    fn assert_prediction_holds(&self, error: &Misreading) {
+        let sums = cost::sums(&self.response, &TABLE);
+        let scale = symmetric::scale(&sums.information);
+        let (predicted, moved) = (self.predicted(error), self.moved(error));
+        let off =
+            (&predicted - &moved).component_div(&scale).norm() / moved.component_div(&scale).norm();
+        assert!(
+            moved.norm() > 0.0 && off < 0.05,
+            "{error:?}: prediction and change differ by {off:.3}"
+        );
     }
 }
 
@@ -154,12 +160,23 @@ fn predicted_effects_of_input_and_output_errors_match_the_estimates() {
 }
 
 #[test]
+fn predicted_effects_of_late_surfaces_match_the_estimates() {
+    let longitudinal = Exact::<3, Longitudinal>::new();
+    longitudinal.assert_prediction_holds(&Misreading::late("de_deg", 5e-5));
+    longitudinal.assert_prediction_holds(&Misreading::late("dpv_deg", -5e-5));
+    let lateral = Exact::<4, Lateral>::new();
+    lateral.assert_prediction_holds(&Misreading::late("da_deg", 5e-5));
+    lateral.assert_prediction_holds(&Misreading::late("dyv_deg", 5e-5));
+}
+
+#[test]
 fn a_scale_error_of_a_surface_changes_its_own_derivatives_only() {
     let exact = Exact::<3, Longitudinal>::new();
     let shift = exact.predicted(&Misreading {
         signal: "de_deg",
         scale: 1e-4,
         bias: 0.0,
+        delay_s: 0.0,
     });
     for ((name, shift), value) in exact
         .case
@@ -192,7 +209,8 @@ fn exact_calibration_has_no_errors() {
         Misreading {
             signal: "q_deg_s",
             scale: 0.02,
-            bias: 0.0
+            bias: 0.0,
+            delay_s: 0.0
         }
     );
     assert_eq!(
@@ -200,7 +218,8 @@ fn exact_calibration_has_no_errors() {
         Misreading {
             signal: "q_deg_s",
             scale: 0.0,
-            bias: 0.1
+            bias: 0.1,
+            delay_s: 0.0
         }
     );
 }
