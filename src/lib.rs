@@ -12,7 +12,8 @@
 //!    [`ingest::compatibility`] estimates the errors of its instruments; a [`flight::Correction`]
 //!    removes them.
 //! 4. **Maneuver.** [`segment::maneuvers`] finds each [`maneuver::Maneuver`] in the record and its
-//!    [`maneuver::Class`].
+//!    [`maneuver::Class`]. The equations of motion give the delays of the surfaces, from all
+//!    maneuvers together.
 //! 5. **Case.** A [`dynamics::motion::Window`] is the maneuver's part of the record. An
 //!    [`output_error::Case`] adds the [`aero::Buildup`]: regressors, free and held derivatives,
 //!    measured outputs.
@@ -54,6 +55,7 @@ pub mod output_error;
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;
 pub mod segment;
+mod surfaces;
 pub mod estimate;
 mod trend;
 mod compare;

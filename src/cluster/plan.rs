@@ -6,15 +6,16 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::lineage::{Lineage, Stage};
+use crate::surfaces::DelayCorrection;
 
 /// Version of the file; another version is refused.
-const FORM: u32 = 1;
+const FORM: u32 = 2;
 
 /// Kind of items that a plan deals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Dealt {
-    /// Flights: ingest and segment.
+    /// Flights: ingest, segment, evidence on the surfaces.
     Flights,
     /// Maneuvers of flights that are ingested and segmented: estimate.
     Maneuvers,
@@ -72,6 +73,8 @@ pub struct Plan {
     pub of: Dealt,
     pub shards: usize,
     pub items: Vec<Item>,
+    /// Corrections of the surfaces' delays from all flights; a plan of flights has none.
+    pub delays: Vec<DelayCorrection>,
     /// Lineage as far as the last stage of the shards.
     pub lineage: Lineage,
 }
@@ -82,7 +85,13 @@ impl Plan {
     /// A shard gets neighbours: the maneuvers of a flight share its record. Its cost differs from the
     /// mean by no more than the dearest item.
     #[must_use]
-    pub fn deal(of: Dealt, shards: usize, work: Vec<Work>, lineage: &Lineage) -> Plan {
+    pub fn deal(
+        of: Dealt,
+        shards: usize,
+        work: Vec<Work>,
+        delays: Vec<DelayCorrection>,
+        lineage: &Lineage,
+    ) -> Plan {
         let shards = shards.max(1);
         let total: f64 = work.iter().map(|work| work.cost).sum();
         let mut before = 0.0;
@@ -107,6 +116,7 @@ impl Plan {
             of,
             shards,
             items: work.into_iter().map(item).collect(),
+            delays,
             lineage: lineage.until(of.last_stage()),
         }
     }
@@ -231,7 +241,13 @@ mod tests {
     fn every_item_is_dealt_once_and_no_shard_is_dearer_than_the_mean_and_one_item() {
         for n in [1, 4, 24, 200] {
             let costs: Vec<f64> = (0..106).map(|i| 1.0 + f64::from(i * i % 17)).collect();
-            let plan = Plan::deal(Dealt::Maneuvers, n, work(&costs), &Lineage::default());
+            let plan = Plan::deal(
+                Dealt::Maneuvers,
+                n,
+                work(&costs),
+                vec![],
+                &Lineage::default(),
+            );
             assert_eq!((1..=n).flat_map(|shard| plan.share(shard)).count(), 106);
             let (mean, dearest) = (costs.iter().sum::<f64>() / n as f64, 17.0);
             assert!(
@@ -247,13 +263,25 @@ mod tests {
 
     #[test]
     fn items_that_cost_nothing_are_dealt_all_the_same() {
-        let plan = Plan::deal(Dealt::Flights, 3, work(&[0.0, 0.0]), &Lineage::default());
+        let plan = Plan::deal(
+            Dealt::Flights,
+            3,
+            work(&[0.0, 0.0]),
+            vec![],
+            &Lineage::default(),
+        );
         assert_eq!(Plan::read(&plan.text()), Ok(plan));
     }
 
     #[test]
     fn a_plan_with_an_item_twice_or_in_no_shard_is_refused() {
-        let plan = Plan::deal(Dealt::Maneuvers, 2, work(&[1.0, 1.0]), &Lineage::default());
+        let plan = Plan::deal(
+            Dealt::Maneuvers,
+            2,
+            work(&[1.0, 1.0]),
+            vec![],
+            &Lineage::default(),
+        );
         let refused = |change: &dyn Fn(&mut Plan)| {
             let mut other = plan.clone();
             change(&mut other);

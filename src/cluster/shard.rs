@@ -19,6 +19,7 @@ use crate::night::{RunOutcome, campaign_lineage, run};
 use crate::pipeline::{Absent, Campaign, Conductor, Progress, bring_maneuvers};
 use crate::store::archive::{self, FlightFiles};
 use crate::store::files;
+use crate::surfaces::DelayCorrection;
 
 /// Reads a plan's file.
 ///
@@ -40,13 +41,13 @@ pub fn deal(
     progress: &dyn Progress,
 ) -> Result<Plan> {
     let archive = archive::find(&config.archive)?;
-    let conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
+    let mut conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
     conductor.remember_contents()?;
-    let work = match dealt {
-        Dealt::Flights => flights(&conductor),
-        Dealt::Maneuvers => maneuvers(&conductor)?,
+    let (work, delays) = match dealt {
+        Dealt::Flights => (flights(&conductor), vec![]),
+        Dealt::Maneuvers => maneuvers(&mut conductor)?,
     };
-    let plan = Plan::deal(dealt, shards, work, &campaign_lineage(&conductor));
+    let plan = Plan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
     conductor.runner.store.check_transfers()?;
     files::place_text(file, &plan.text())?;
     Ok(plan)
@@ -79,13 +80,15 @@ pub fn compute(
     archive.retain(|f| flight_ids.contains(f.flight_id.as_str()));
     let conductor = Conductor::join(config, archive, Absent::Make, wait, progress)?;
     check_lineage(plan, &conductor, Some(&flight_ids))?;
-    let campaign = conductor.campaign(until.min(Stage::Segment))?;
+    let mut campaign = conductor.campaign(until.min(Stage::Segment))?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {
         let what = format!("the flight could not be read: {why}");
         return Err(Error::store(Path::new(flight), &what));
     }
-    if plan.of == Dealt::Maneuvers {
-        estimate(&conductor, &campaign, &items)?;
+    match plan.of {
+        Dealt::Maneuvers => estimate(&conductor, &campaign, plan, &items)?,
+        Dealt::Flights if until >= Stage::Segment => conductor.surfaces(&mut campaign)?,
+        Dealt::Flights => {}
     }
     let store = &conductor.runner.store;
     store.send_unsent()?;
@@ -196,8 +199,8 @@ fn flights(conductor: &Conductor) -> Vec<Work> {
     readable.map(work).collect()
 }
 
-/// Every maneuver of the campaign.
-fn maneuvers(conductor: &Conductor) -> Result<Vec<Work>> {
+/// Every maneuver of the campaign, and the corrections of the surfaces' delays.
+fn maneuvers(conductor: &mut Conductor) -> Result<(Vec<Work>, Vec<DelayCorrection>)> {
     let config = conductor.runner.config;
     let mut campaign = conductor.campaign(Stage::Segment)?;
     let mut missing: BTreeSet<String> = BTreeSet::new();
@@ -212,6 +215,9 @@ fn maneuvers(conductor: &Conductor) -> Result<Vec<Work>> {
         );
         return Err(Error::config(&config.store, None, what));
     }
+    // The shards of the flights have made the evidence, but for rows that two flights share.
+    conductor.runner.absent = Absent::Make;
+    conductor.surfaces(&mut campaign)?;
     let work = |m: &Maneuver| {
         let mut archive = conductor.archive.iter();
         let file = archive.find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
@@ -221,7 +227,8 @@ fn maneuvers(conductor: &Conductor) -> Result<Vec<Work>> {
             cost: cost(config, m),
         })
     };
-    Ok(campaign.maneuvers.iter().filter_map(work).collect())
+    let work = campaign.maneuvers.iter().filter_map(work).collect();
+    Ok((work, campaign.delays))
 }
 
 /// Cost of estimating a maneuver: samples times the square of the parameters.
@@ -236,7 +243,12 @@ fn cost(config: &Config, maneuver: &Maneuver) -> f64 {
 }
 
 /// Estimates the maneuvers of a shard.
-fn estimate(conductor: &Conductor, campaign: &Campaign, items: &[&Item]) -> Result<()> {
+fn estimate(
+    conductor: &Conductor,
+    campaign: &Campaign,
+    plan: &Plan,
+    items: &[&Item],
+) -> Result<()> {
     let by_id: BTreeMap<&str, &Maneuver> = campaign
         .maneuvers
         .iter()
@@ -252,5 +264,11 @@ fn estimate(conductor: &Conductor, campaign: &Campaign, items: &[&Item]) -> Resu
         })
     };
     let maneuvers: Result<Vec<&Maneuver>> = items.iter().map(maneuver).collect();
-    bring_maneuvers(&conductor.runner, &campaign.flights, &maneuvers?).map(|_| ())
+    bring_maneuvers(
+        &conductor.runner,
+        &campaign.flights,
+        &maneuvers?,
+        &plan.delays,
+    )
+    .map(|_| ())
 }

@@ -19,7 +19,9 @@ impl<'a> Task<'a> {
         prepared: &PreparedCase<'a, NX, E>,
         fit: &mut Fit,
     ) {
-        if fit.covariance_corrected.is_none() || self.context.settings.calibration.is_empty() {
+        let context = self.context;
+        let is_exact = context.settings.calibration.is_empty() && context.delays.is_empty();
+        if fit.covariance_corrected.is_none() || is_exact {
             return;
         }
         match self.gradient_shifts(prepared, &fit.values, &fit.weights) {
@@ -38,8 +40,12 @@ impl<'a> Task<'a> {
     ) -> Result<Vec<DVector<f64>>, Diverged> {
         let calibration = self.context.settings.calibration.iter();
         // A signal that the maneuver does not use has no effect.
-        let used = calibration.filter(|(signal, _)| !prepared.window.signal(signal).is_empty());
-        let errors: Vec<Misreading> = used.flat_map(|(signal, c)| c.misreadings(signal)).collect();
+        let is_used = |signal: &str| !prepared.window.signal(signal).is_empty();
+        let used = calibration.filter(|(signal, _)| is_used(signal));
+        let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
+        let delays = self.context.delays.iter().filter(|d| is_used(&d.surface));
+        let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
+        let errors: Vec<Misreading> = readings.chain(late).collect();
         let aircraft = self.context.aircraft;
         let PreparedCase {
             window,

@@ -3,6 +3,7 @@
 use super::settings::Settings;
 use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
+use crate::surfaces::DelayCorrection;
 
 /// Everything that all maneuvers of a campaign are estimated with.
 #[derive(Clone, Debug)]
@@ -13,6 +14,8 @@ pub struct Context<'a> {
     /// Table of starting values: the tunnel's, except in studies of the iteration.
     pub start: &'a WindTunnel,
     pub settings: &'a Settings,
+    /// What stays unknown of the surfaces' delays, common to all maneuvers; the records are corrected.
+    pub delays: &'a [DelayCorrection],
 }
 
 impl<'a> Context<'a> {
@@ -30,6 +33,13 @@ impl<'a> Context<'a> {
             tunnel,
             start: tunnel,
             settings,
+            delays: &[],
         }
+    }
+
+    /// The context of records whose surfaces' delays are corrected.
+    #[must_use]
+    pub fn with_delays(self, delays: &'a [DelayCorrection]) -> Context<'a> {
+        Context { delays, ..self }
     }
 }

@@ -11,6 +11,7 @@ use crate::output_error::estimation::Weights;
 use crate::output_error::identifiability;
 use crate::output_error::{InitialState, newton_raphson};
 use crate::settings::{settings, single_values};
+use crate::surfaces;
 use crate::tables::StartingValues;
 
 /// Effect of an inactive surface that moves a little all the same because feedback stays closed.
@@ -94,6 +95,9 @@ settings! {
         /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
         /// derivatives.
         pub held_uncertainty_pct: f64 = 20.0,
+        /// Delays of the surfaces, estimated from all maneuvers of the campaign.
+        #[serde(skip_serializing)]
+        pub surfaces: surfaces::Settings = surfaces::Settings::default(),
         /// Joint estimation of maneuvers of one class and angle of attack, besides each alone. It
         /// adds rows and changes none; it needs `hold: table`.
         #[serde(skip_serializing)]

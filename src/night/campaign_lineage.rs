@@ -101,6 +101,7 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
                 ("classes", classes),
                 ("model", value(&config.buildup)),
                 ("estimate", value(estimate)),
+                ("surfaces", value(&estimate.surfaces)),
                 ("joint", value(&estimate.joint)),
                 ("prediction", value(&estimate.prediction)),
             ]),

@@ -12,7 +12,6 @@ use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
 use crate::pipeline::{Campaign, Conductor, EstimateStep, Flight, LazyRecord, Progress};
 use crate::pipeline::{SegmentStep, Step};
-use crate::store::archive::FlightFiles;
 use crate::tables::{ChannelRow, EstimateRow, StartingValues};
 
 /// Explains the maneuver of this id, as text.
@@ -21,21 +20,14 @@ use crate::tables::{ChannelRow, EstimateRow, StartingValues};
 /// No archive, or no such maneuver in the store; then with the likely name.
 pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<String> {
     let conductor = Conductor::look(config, progress)?;
-    // Ids begin with the flight's: the artefacts of most flights need not be read.
-    let (likely, rest): (Vec<FlightFiles>, Vec<FlightFiles>) = conductor
-        .archive
-        .iter()
-        .cloned()
-        .partition(|f| id.starts_with(f.flight_id.as_str()));
-    let mut known = Vec::new();
-    for files in [likely, rest] {
-        let campaign = conductor.campaign_of(&files, Stage::Segment)?;
-        if let Some(maneuver) = campaign.maneuvers.iter().find(|m| m.maneuver_id == id) {
-            return explain_maneuver(&conductor, &campaign, maneuver);
-        }
-        known.extend(campaign.maneuvers.into_iter().map(|m| m.maneuver_id));
+    // All flights: their surfaces' delays decide every estimate.
+    let mut campaign = conductor.campaign(Stage::Segment)?;
+    conductor.surfaces(&mut campaign)?;
+    if let Some(maneuver) = campaign.maneuvers.iter().find(|m| m.maneuver_id == id) {
+        return explain_maneuver(&conductor, &campaign, maneuver);
     }
-    let likely = did_you_mean(id, known.iter().map(String::as_str));
+    let known = campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str());
+    let likely = did_you_mean(id, known);
     let what = format!(
         "the store has no maneuver `{id}`{likely}; `harvest status` reports whether it is up to date"
     );
@@ -56,7 +48,7 @@ fn explain_maneuver(
     let step = EstimateStep {
         config,
         store: &runner.store,
-        record: &LazyRecord::new(flight, &runner.store),
+        record: &LazyRecord::new(flight, &runner.store, &campaign.delays),
         maneuver,
     };
     let mut text = String::new();
@@ -109,7 +101,7 @@ fn write_method(text: &mut String, conductor: &Conductor) {
     let code = &lineage.code;
     let program = format!("harvest {} ({})", code.version, code.source);
     write_line(text, "code", &program);
-    let methods = ["ingest", "segment", "estimate"].map(|name| {
+    let methods = ["ingest", "segment", "surfaces", "estimate"].map(|name| {
         let version = code.methods.get(name).copied().unwrap_or_default();
         format!("{name} {version}")
     });

@@ -10,6 +10,7 @@ use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Unknown};
 use crate::output_error::Outcome;
 use crate::store::ArtefactName;
+use crate::surfaces::DelayCorrection;
 use crate::tables::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
     EventRow, ExtrapolationRow, FitRow, InstrumentRow, ManeuverComparisonRow, OutlierRow,
@@ -68,6 +69,8 @@ pub struct Campaign {
     /// Excitation that fits no class.
     pub unknown: Vec<Unknown>,
     pub events: Vec<EventRow>,
+    /// Corrections of the surfaces' delays, from all flights.
+    pub delays: Vec<DelayCorrection>,
     /// Names of the maneuvers' estimates, in the order of the maneuvers.
     pub estimate_names: Vec<ArtefactName>,
     pub fits: Vec<FitRow>,

@@ -12,6 +12,7 @@ use super::progress::Progress;
 use super::segment_step::{self, SegmentStep};
 use super::step::Step;
 use super::step_runner::{Absent, StepRunner};
+use super::surfaces_step::{self, SurfacesStep};
 use super::trend_stage::{self, COMPARE_VERSION, TREND_VERSION};
 use crate::compare::earlier_campaign::Earlier;
 use crate::config::Config;
@@ -22,10 +23,11 @@ use crate::store::{Contents, Store};
 
 /// Name and version of each method whose artefacts the store keeps.
 #[must_use]
-pub fn step_versions() -> [(&'static str, u32); 5] {
+pub fn step_versions() -> [(&'static str, u32); 6] {
     [
         version_of::<IngestStep>(),
         version_of::<SegmentStep>(),
+        version_of::<SurfacesStep>(),
         version_of::<EstimateStep>(),
         version_of::<JointStep>(),
         version_of::<PredictStep>(),
@@ -192,6 +194,14 @@ impl<'a> Conductor<'a> {
         Ok(campaign)
     }
 
+    /// Brings the delays of the surfaces of a segmented campaign, by which estimates are corrected.
+    ///
+    /// # Errors
+    /// As [`Conductor::campaign`].
+    pub fn surfaces(&self, campaign: &mut Campaign) -> Result<()> {
+        surfaces_step::surfaces(&self.runner, campaign)
+    }
+
     /// Brings the estimates of all maneuvers and groups of a segmented campaign; `false` if some are
     /// missing.
     ///
@@ -199,6 +209,7 @@ impl<'a> Conductor<'a> {
     /// As [`Conductor::campaign`].
     pub fn estimate(&self, campaign: &mut Campaign) -> Result<bool> {
         let runner = &self.runner;
+        surfaces_step::surfaces(runner, campaign)?;
         let Some(estimates) = estimate_step::estimate(runner, campaign)? else {
             return Ok(false);
         };

@@ -10,7 +10,7 @@ use super::ingested::Flight;
 use super::problems::problem;
 use super::step::{Brought, Companion, Made, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::{ProblemStage, Result};
@@ -22,6 +22,7 @@ use crate::output_error::Outcome;
 use crate::report;
 use crate::store::record_file::RecordFile;
 use crate::store::{ArtefactName, Kind, Store};
+use crate::surfaces::DelayCorrection;
 
 /// Everything that decides the derivatives of a maneuver.
 #[derive(Serialize)]
@@ -34,20 +35,29 @@ pub struct EstimateKey<'a> {
     model: &'a Buildup,
     tunnel: &'a WindTunnel,
     estimate: &'a estimate::Settings,
+    /// Corrections of the surfaces of the maneuver's axis.
+    delays: Vec<&'a DelayCorrection>,
 }
 
-/// Record of a flight, opened by the first maneuver that reads it.
+/// Record of a flight with the surfaces' delays corrected, opened by the first maneuver that reads
+/// it.
 pub struct LazyRecord<'a> {
     pub flight: &'a Flight,
     store: &'a Store,
+    delays: &'a [DelayCorrection],
     record: Mutex<Option<Arc<RecordFile>>>,
 }
 
 impl<'a> LazyRecord<'a> {
-    pub fn new(flight: &'a Flight, store: &'a Store) -> LazyRecord<'a> {
+    pub fn new(
+        flight: &'a Flight,
+        store: &'a Store,
+        delays: &'a [DelayCorrection],
+    ) -> LazyRecord<'a> {
         LazyRecord {
             flight,
             store,
+            delays,
             record: Mutex::default(),
         }
     }
@@ -65,7 +75,8 @@ impl<'a> LazyRecord<'a> {
         if let Some(record) = &*record {
             return Ok(Arc::clone(record));
         }
-        let opened = Arc::new(self.flight.open(self.store)?);
+        let further = self.delays.iter().filter_map(DelayCorrection::of_record);
+        let opened = Arc::new(self.flight.open(self.store)?.corrected_further(further));
         *record = Some(Arc::clone(&opened));
         Ok(opened)
     }
@@ -84,7 +95,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 12;
+    const VERSION: u32 = 13;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id
@@ -100,12 +111,14 @@ impl<'a> Step for EstimateStep<'a> {
             model: &config.buildup,
             tunnel: &config.tunnel,
             estimate: &config.estimate,
+            delays: delays_of_axis(config, self.record.delays, self.maneuver.axis),
         }
     }
 
     fn make(&self, name: &ArtefactName) -> Result<Made<Estimated>> {
         let record = self.record.part(self.maneuver)?;
-        let mut estimated = estimate_maneuver(self.config, &record, self.maneuver);
+        let mut estimated =
+            estimate_maneuver(self.config, &record, self.maneuver, self.record.delays);
         let history = estimated.history.take().map(|h| report::thinned(&h));
         self.store.save(&name.sibling(Kind::History), &history)?;
         Ok(Made::Settled(estimated))
@@ -119,22 +132,40 @@ impl<'a> Step for EstimateStep<'a> {
     }
 }
 
-/// Estimates a maneuver from the part of its record.
-pub fn estimate_maneuver(config: &Config, record: &Record, maneuver: &Maneuver) -> Estimated {
+/// Corrections of the surfaces of an axis: the others decide nothing.
+fn delays_of_axis<'a>(
+    config: &'a Config,
+    delays: &'a [DelayCorrection],
+    axis: Axis,
+) -> Vec<&'a DelayCorrection> {
+    let surfaces = config.buildup.derivatives_of(axis);
+    let surfaces: Vec<&str> = surfaces.filter_map(|d| d.regressor.surface()).collect();
+    let is_of_axis = |delay: &&DelayCorrection| surfaces.contains(&delay.surface.as_str());
+    delays.iter().filter(is_of_axis).collect()
+}
+
+/// Estimates a maneuver from the part of its record, whose delays are corrected.
+pub fn estimate_maneuver(
+    config: &Config,
+    record: &Record,
+    maneuver: &Maneuver,
+    delays: &[DelayCorrection],
+) -> Estimated {
     match config.class(&maneuver.class) {
-        Some(class) => estimate::maneuver(record, maneuver, class, &context(config)),
+        Some(class) => estimate::maneuver(record, maneuver, class, &context(config, delays)),
         None => Estimated::unknown_class(maneuver),
     }
 }
 
-/// Model, aircraft and settings of every estimate.
-pub fn context(config: &Config) -> Context<'_> {
+/// Model, aircraft, settings and surfaces' delays of every estimate.
+pub fn context<'a>(config: &'a Config, delays: &'a [DelayCorrection]) -> Context<'a> {
     Context::new(
         &config.aircraft,
         &config.buildup,
         &config.tunnel,
         &config.estimate,
     )
+    .with_delays(delays)
 }
 
 /// Brings the estimates of all maneuvers, in their order. `None` if some are missing where nothing
@@ -144,7 +175,7 @@ pub fn context(config: &Config) -> Context<'_> {
 /// A fault that stops the run.
 pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<Vec<Estimated>>> {
     let all: Vec<&Maneuver> = campaign.maneuvers.iter().collect();
-    let brought = bring_maneuvers(runner, &campaign.flights, &all)?;
+    let brought = bring_maneuvers(runner, &campaign.flights, &all, &campaign.delays)?;
     let mut missing = Vec::new();
     let mut estimates = Vec::new();
     for (maneuver, estimate) in campaign.maneuvers.iter().zip(brought) {
@@ -156,7 +187,7 @@ pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<V
     let is_whole = missing.is_empty();
     let state = campaign.state(Stage::Estimate);
     state.fresh = estimates.len();
-    state.missing = missing;
+    state.missing.extend(missing);
     let failed = estimates.iter().filter_map(|e| failure(&e.artefact));
     state.failed.extend(failed);
     let (names, estimated): (Vec<_>, Vec<_>) =
@@ -190,9 +221,10 @@ pub fn bring_maneuvers(
     runner: &StepRunner,
     flights: &[Flight],
     maneuvers: &[&Maneuver],
+    delays: &[DelayCorrection],
 ) -> Result<Vec<Option<Brought<Estimated>>>> {
     let of_flight = |flight: &Flight| {
-        let record = LazyRecord::new(flight, &runner.store);
+        let record = LazyRecord::new(flight, &runner.store, delays);
         let of_flight = maneuvers.iter().filter(|m| m.flight_id == flight.id());
         let steps: Vec<EstimateStep> = of_flight
             .map(|maneuver| EstimateStep {

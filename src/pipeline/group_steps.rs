@@ -22,6 +22,7 @@ use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::store::{ArtefactName, Kind, Store};
+use crate::surfaces::DelayCorrection;
 use crate::tables::{FitRow, JOINT_FLIGHT};
 
 /// A maneuver with its flight and the name of its estimate.
@@ -30,6 +31,7 @@ struct Member<'a> {
     flight: &'a Flight,
     maneuver: &'a Maneuver,
     estimate: &'a ArtefactName,
+    delays: &'a [DelayCorrection],
 }
 
 impl<'a> Member<'a> {
@@ -41,11 +43,12 @@ impl<'a> Member<'a> {
             flight: flights.find(|f| f.id() == maneuver.flight_id)?,
             maneuver,
             estimate: campaign.estimate_names.get(index)?,
+            delays: &campaign.delays,
         })
     }
 
     fn record(&self, store: &Store) -> Result<Record> {
-        LazyRecord::new(self.flight, store).part(self.maneuver)
+        LazyRecord::new(self.flight, store, self.delays).part(self.maneuver)
     }
 }
 
@@ -65,6 +68,7 @@ pub struct JointStep<'a> {
     settings: &'a JointSettings,
     bin: &'a Bin,
     members: Vec<Member<'a>>,
+    delays: &'a [DelayCorrection],
 }
 
 impl<'a> Step for JointStep<'a> {
@@ -102,7 +106,7 @@ impl<'a> Step for JointStep<'a> {
             joint_id,
             &members,
             class,
-            &context(self.config),
+            &context(self.config, self.delays),
         )))
     }
 }
@@ -130,6 +134,7 @@ pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
             settings,
             bin,
             members: members(bin),
+            delays: &campaign.delays,
         })
         .collect();
     let brought: Result<Vec<_>> = steps.par_iter().map(|step| runner.bring(step)).collect();
@@ -205,7 +210,8 @@ impl<'a> Step for PredictStep<'a> {
         let predicted = match self.config.class(&maneuver.class) {
             Some(class) => {
                 let record = self.member.record(self.store)?;
-                prediction::maneuver(&record, maneuver, class, &context(self.config), &from)
+                let context = context(self.config, self.member.delays);
+                prediction::maneuver(&record, maneuver, class, &context, &from)
             }
             None => Predicted::none("the configuration has no such class", from.len()),
         };

@@ -1,6 +1,6 @@
 //! The pipeline: the stages of a campaign, brought up to date in order.
 //!
-//! Ingest, segment, estimate, joint estimate and prediction are steps ([`step::Step`]): artefacts
+//! Ingest, segment, surfaces, estimate, joint estimate and prediction are steps ([`step::Step`]): artefacts
 //! of the store, each a function of a key. [`step_runner::StepRunner`] loads an artefact or makes
 //! it, so what is up to date is not done again and a killed run goes on where it was. Trends,
 //! comparison and report are small and made anew each time. [`Conductor`] brings the stages in
@@ -26,6 +26,7 @@ mod segment_step;
 pub mod show;
 mod step;
 mod step_runner;
+mod surfaces_step;
 mod trend_stage;
 
 pub use progress::Progress;

@@ -17,6 +17,7 @@ use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
 use crate::report::strip_chart::{self, FlightView, ManeuverView, SignalGroups};
 use crate::store::atomic;
+use crate::surfaces::DelayCorrection;
 
 /// Most samples of a flight that are drawn. Of a longer flight the smallest and the largest of
 /// several samples are drawn; a chart has far fewer columns.
@@ -150,16 +151,20 @@ fn draw_maneuver(conductor: &Conductor, campaign: &Campaign, id: &str) -> Result
         .find(|(m, _)| m.maneuver_id == id)
         .ok_or_else(|| unknown(config, format!("there is no maneuver `{id}`")))?;
     let flight = accepted_flight(config, campaign, &maneuver.flight_id)?;
-    let record = flight.open(&conductor.runner.store)?.part(
+    let further = campaign.delays.iter();
+    let further = further.filter_map(DelayCorrection::of_record);
+    let file = flight.open(&conductor.runner.store)?;
+    let record = file.corrected_further(further).part(
         None,
         maneuver.start_s - MARGIN_S,
         maneuver.end_s + MARGIN_S,
     )?;
+    let delays = &campaign.delays;
     // The stored history is thinned for the report; the chart shows every sample.
     let history = if fit.outcome == Outcome::Rejected {
         None
     } else {
-        estimate_maneuver(config, &record, maneuver).history
+        estimate_maneuver(config, &record, maneuver, delays).history
     };
     Ok(strip_chart::draw_maneuver(&ManeuverView {
         aircraft: &config.aircraft.name,

@@ -14,6 +14,8 @@ pub enum Kind {
     Records,
     /// Maneuvers found in a flight.
     Segment,
+    /// Evidence of a flight on the delays and signs of its surfaces.
+    Surfaces,
     /// Derivatives of a maneuver.
     Estimate,
     /// Measured and computed outputs of a maneuver, thinned for the report.
@@ -25,10 +27,11 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Kind; 7] = [
+    pub const ALL: [Kind; 8] = [
         Kind::Ingest,
         Kind::Records,
         Kind::Segment,
+        Kind::Surfaces,
         Kind::Estimate,
         Kind::History,
         Kind::Joint,
@@ -42,6 +45,7 @@ impl Kind {
             Kind::Ingest => "ingest",
             Kind::Records => "records",
             Kind::Segment => "segment",
+            Kind::Surfaces => "surfaces",
             Kind::Estimate => "estimate",
             Kind::History => "history",
             Kind::Joint => "joint",

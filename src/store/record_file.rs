@@ -386,6 +386,13 @@ impl RecordFile {
         }
     }
 
+    /// Applies further corrections.
+    #[must_use]
+    pub fn corrected_further(mut self, further: impl Iterator<Item = Correction>) -> RecordFile {
+        self.corrections.extend(further);
+        self
+    }
+
     /// Index of the sample nearest to a time, inside the record.
     #[must_use]
     pub fn sample_at(&self, time_s: f64) -> usize {

@@ -125,8 +125,8 @@ table! {
         pub bound: Option<f64>,
         /// Part of both bounds that comes from the held values, in the column `unit`.
         pub bound_held: Option<f64>,
-        /// Part of `bound_corrected` that comes from errors of calibration, in the column `unit`;
-        /// empty where none are stated.
+        /// Part of `bound_corrected` that comes from errors of calibration and from what stays unknown
+        /// of the surfaces' delays, in the column `unit`; empty where there are none.
         pub bound_calibration: Option<f64>,
         /// Bound for coloured residuals, noisy surfaces and errors of calibration: the one to use.
         /// In the column `unit`.

@@ -107,12 +107,14 @@ impl CheckVerdict {
 }
 
 table! {
-    /// Errors of the instruments from the kinematic equations alone: reading = `scale` × truth(t −
-    /// `delay_s`) + `bias`.
+    /// Errors of the instruments: reading = `scale` × truth(t − `delay_s`) + `bias`.
     ///
-    /// An error that the flight does not determine is empty.
-    pub struct InstrumentRow in "instruments" per "flight and instrument" {
-        /// Flight, or stretch of a flight.
+    /// Errors of rates, accelerations, attitudes and air data come from the kinematic equations
+    /// alone, delays and signs of the surfaces from the equations of motion. An error that the
+    /// flight does not determine is empty.
+    pub struct InstrumentRow in "instruments" per "flight and instrument, and surface of all flights" {
+        /// Flight, or stretch of a flight; `all` for a surface's delay from all flights together, by
+        /// which the surface is corrected.
         pub flight_id: String,
         /// Column of the archive's file.
         pub channel: String,
@@ -133,12 +135,15 @@ table! {
         /// Standard deviation of the delay.
         pub delay_bound_s: Option<f64> ["s"],
         /// Errors by which the record is corrected, separated by spaces: `bias`, `scale`, `delay`.
-        /// The settings are `ingest: compatibility:`.
+        /// The settings are `ingest: compatibility:`, of surfaces `estimate: surfaces:`.
         pub applied: String,
         /// Verdict on the instrument.
         pub verdict: InstrumentVerdict,
     }
 }
+
+/// `flight_id` of what all flights give together.
+pub const ALL_FLIGHTS: &str = "all";
 
 words! {
     /// Verdict on an instrument.

@@ -26,8 +26,8 @@ pub use estimates::{
 };
 pub use export::ExportRow;
 pub use flights::{
-    ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict, InstrumentRow,
-    InstrumentVerdict,
+    ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict,
+    InstrumentRow, InstrumentVerdict,
 };
 pub use history::{History, HistoryOutput};
 pub use page::page;

@@ -27,4 +27,5 @@ mod shards;
 mod show;
 mod sources;
 mod support;
+mod surfaces;
 mod trend;

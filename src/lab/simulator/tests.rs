@@ -15,8 +15,10 @@ use super::{Card, FlownManeuver, Instrument, Instruments, Program, Simulator, se
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Context, Estimated};
-use crate::flight::signal;
+use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
+use crate::maneuver::Maneuver;
+use crate::surfaces::{self, Basis};
 use crate::tables::Outcome;
 use crate::units::DEG;
 
@@ -411,4 +413,63 @@ fn instruments_change_a_record_and_not_the_flight() {
     );
     assert_eq!(record.values(signal::P), flown.record.values(signal::P));
     assert_eq!(flown, campaign.simulator.fly(&card).unwrap());
+}
+
+/// Instruments of the shipped campaign on a recorder that stores these surfaces late.
+fn late(campaign: &SimulatedCampaign, delays_s: &[(&str, f64)]) -> Instruments {
+    let mut instruments = campaign.cards.instruments.clone();
+    for (surface, delay_s) in delays_s {
+        let instrument = instruments.0.get_mut(*surface).unwrap();
+        instrument.delay_s = *delay_s;
+    }
+    // Spikes and dropouts are ingest's to repair.
+    for instrument in instruments.0.values_mut() {
+        (instrument.spikes_per_s, instrument.dropouts_per_s) = (0.0, 0.0);
+    }
+    instruments
+}
+
+#[test]
+fn delays_of_a_recorder_s_buses_are_found_within_their_bounds() {
+    let campaign = shipped_campaign();
+    let config = &campaign.config;
+    let basis = Basis {
+        aircraft: &config.aircraft,
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+    };
+    let fly = |(class, alpha_deg)| {
+        let card = campaign.card(class, alpha_deg).unwrap();
+        campaign.simulator.fly(&card).unwrap()
+    };
+    let cards = [
+        ("3211", 20.0),
+        ("SSIMD_LON", 30.0),
+        ("PPSS", 15.0),
+        ("OLAT", 20.0),
+        ("SSIMD_LAT", 30.0),
+        ("PYRS", 15.0),
+    ];
+    let flown: Vec<FlownManeuver> = cards.into_iter().map(fly).collect();
+    let truth = [("de_deg", 0.006), ("da_deg", 0.006), ("dr_deg", 0.012)];
+    let instruments = late(&campaign, &truth);
+    let (mut squares, mut count) = (0.0, 0.0);
+    for seed in 0..12 {
+        let recorded = |f| FlownManeuver::recorded(f, &instruments, seed);
+        let records: Vec<(Record, &Maneuver)> =
+            flown.iter().map(|f| (recorded(f), &f.maneuver)).collect();
+        let evidence = surfaces::flight_evidence("f", &records, basis);
+        let delays = surfaces::of_campaign(&[evidence]);
+        for (surface, delay_s) in truth {
+            let found = delays.iter().find(|d| d.surface == surface).unwrap();
+            let off_s = found.delay_s - delay_s;
+            assert!(off_s.abs() < 3e-3 && found.bound_s < 2e-3, "{found:?}");
+            squares += (off_s / found.bound_s).powi(2);
+            count += 1.0;
+        }
+    }
+    // The mean square of so many standard normals lies between 0.6 and 1.5; the bounds contain
+    // an error of the equations besides, which is the same each time.
+    let mean_square: f64 = squares / count;
+    assert!((0.1..1.6).contains(&mean_square), "{mean_square}");
 }

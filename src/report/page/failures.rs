@@ -10,7 +10,8 @@ use crate::report::notation::{NOTHING, angle, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::schema::Words;
 use crate::tables::{
-    ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, InstrumentRow, InstrumentVerdict, Outcome,
+    ALL_FLIGHTS, ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, InstrumentRow,
+    InstrumentVerdict, Outcome,
 };
 
 /// The tables of failures, without empty ones.
@@ -160,6 +161,7 @@ fn instruments(contents: &Contents) -> TableView {
         .instruments
         .iter()
         .filter(|row| row.verdict != InstrumentVerdict::NotExcited)
+        .filter(|row| row.flight_id != ALL_FLIGHTS)
     {
         by_channel
             .entry((&row.channel, &row.unit))
@@ -180,8 +182,9 @@ fn instruments(contents: &Contents) -> TableView {
         "scale",
         "delay, ms",
     ];
-    let note = "From the kinematic equations alone, smallest and largest over the flights; the \
-                table `instruments` has each with its bound.";
+    let note = "Surfaces from the equations of motion, the others from the kinematic equations \
+                alone; smallest and largest over the flights. The table `instruments` has each \
+                with its bound, and the delays of the surfaces over all flights.";
     TableView::new("Instruments", note, &heads, rows)
 }
 
@@ -196,7 +199,7 @@ fn instrument(channel: &str, unit: &str, rows: &[&InstrumentRow]) -> Vec<String>
         faults.to_string(),
         range(rows.iter().filter_map(|r| r.bias), 3),
         range(rows.iter().filter_map(|r| r.scale), 4),
-        range(rows.iter().filter_map(|r| r.delay_s.map(|d| 1e3 * d)), 0),
+        range(rows.iter().filter_map(|r| r.delay_s.map(|d| 1e3 * d)), 1),
     ]
 }
 

@@ -1,0 +1,127 @@
+//! Surfaces of the campaign: one artefact a stretch, with the evidence of its maneuvers on the delays
+//! and signs of its surfaces. The delays themselves are combined anew each time from all flights.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::campaign::{Campaign, MissingArtefact};
+use super::estimate_step::LazyRecord;
+use super::ingested::Flight;
+use super::step::{Made, Step};
+use super::step_runner::StepRunner;
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::config::Config;
+use crate::error::Result;
+use crate::flight::Record;
+use crate::lineage::Stage;
+use crate::maneuver::Maneuver;
+use crate::store::{ArtefactName, Kind, Store};
+use crate::surfaces::{self, Basis, FlightEvidence};
+
+/// Everything that decides a stretch's evidence on its surfaces.
+#[derive(Serialize)]
+pub struct SurfacesKey<'a> {
+    /// Fingerprint of the flight's ingest.
+    ingest: &'a str,
+    maneuvers: &'a [&'a Maneuver],
+    aircraft: &'a Aircraft,
+    model: &'a Buildup,
+    tunnel: &'a WindTunnel,
+}
+
+/// Evidence of one stretch's maneuvers.
+pub struct SurfacesStep<'a> {
+    config: &'a Config,
+    store: &'a Store,
+    flight: &'a Flight,
+    maneuvers: &'a [&'a Maneuver],
+}
+
+impl<'a> Step for SurfacesStep<'a> {
+    type Key = SurfacesKey<'a>;
+    type Artefact = FlightEvidence;
+
+    const KIND: Kind = Kind::Surfaces;
+    const VERSION: u32 = 1;
+
+    fn item(&self) -> &str {
+        self.flight.id()
+    }
+
+    fn key(&self) -> SurfacesKey<'a> {
+        SurfacesKey {
+            ingest: &self.flight.fingerprint,
+            maneuvers: self.maneuvers,
+            aircraft: &self.config.aircraft,
+            model: &self.config.buildup,
+            tunnel: &self.config.tunnel,
+        }
+    }
+
+    fn make(&self, _: &ArtefactName) -> Result<Made<FlightEvidence>> {
+        let file = LazyRecord::new(self.flight, self.store, &[]);
+        let part = |maneuver: &&'a Maneuver| Ok((file.part(maneuver)?, *maneuver));
+        let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
+        let basis = Basis {
+            aircraft: &self.config.aircraft,
+            buildup: &self.config.buildup,
+            tunnel: &self.config.tunnel,
+        };
+        let evidence = surfaces::flight_evidence(self.flight.id(), &parts?, basis);
+        Ok(Made::Settled(evidence))
+    }
+}
+
+/// Brings the evidence of all flights, and combines it to the delays of the surfaces.
+///
+/// # Errors
+/// A fault that stops the run.
+pub fn surfaces(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
+    let flights: Vec<&Flight> = campaign
+        .flights
+        .iter()
+        .filter(|f| f.is_accepted())
+        .collect();
+    let bring = |flight: &&Flight| {
+        let of_flight = |m: &&Maneuver| m.flight_id == flight.id();
+        let maneuvers: Vec<&Maneuver> = campaign.maneuvers.iter().filter(of_flight).collect();
+        let brought = runner.bring(&SurfacesStep {
+            config: runner.config,
+            store: &runner.store,
+            flight,
+            maneuvers: &maneuvers,
+        });
+        runner.advance(flight.id());
+        brought
+    };
+    let brought: Result<Vec<_>> = runner.with_progress("surfaces", flights.len(), || {
+        flights.par_iter().map(bring).collect()
+    });
+    let ids: Vec<String> = flights.iter().map(|f| f.id().to_owned()).collect();
+    let mut known = Vec::with_capacity(ids.len());
+    for (flight_id, evidence) in ids.into_iter().zip(brought?) {
+        match evidence {
+            Some(evidence) => known.push(evidence.artefact),
+            None => campaign
+                .state(Stage::Estimate)
+                .missing
+                .push(MissingArtefact {
+                    item: flight_id.clone(),
+                    flight_id,
+                    class: None,
+                }),
+        }
+    }
+    combine(runner.config, campaign, &known);
+    Ok(())
+}
+
+/// Adds the delays of the surfaces from all flights, and what was found of each flight.
+fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence]) {
+    let delays = surfaces::of_campaign(flights);
+    campaign.delays = surfaces::corrections(&delays, &config.estimate.surfaces);
+    let found = surfaces::findings(flights, &delays, &campaign.delays, &config.channels);
+    campaign.instruments.extend(found.rows);
+    campaign.problems.extend(found.problems);
+}

@@ -1,0 +1,171 @@
+//! Rows of the table `instruments` about surfaces, and problems of surfaces with a reversed sign.
+
+use std::collections::BTreeMap;
+
+use super::correction::DelayCorrection;
+use super::evidence::{Effect, FlightEvidence, SurfaceDelay};
+use crate::error::{Problem, ProblemStage};
+use crate::flight::Channel;
+use crate::tables::{ALL_FLIGHTS, InstrumentRow, InstrumentVerdict};
+use crate::units::Unit;
+
+/// Size, in standard errors, beyond which an effect is surely opposite to the tunnel's. Effects of
+/// healthy surfaces in simulated campaigns are no lower than −0.2.
+const SURELY_REVERSED: f64 = 4.0;
+
+/// Effect of a surface over the tunnel's, from several maneuvers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct MeanEffect {
+    ratio: f64,
+    bound: f64,
+    maneuvers: usize,
+}
+
+impl MeanEffect {
+    /// Mean weighted by the bounds, with the scatter of the maneuvers in its own.
+    fn of<'a>(effects: impl Iterator<Item = &'a Effect> + Clone) -> MeanEffect {
+        let weights = effects.clone().map(|e| e.bound.powi(-2));
+        let information: f64 = weights.clone().sum();
+        let both = effects.clone().zip(weights.clone());
+        let ratio = both.map(|(e, w)| w * e.ratio).sum::<f64>() / information;
+        let both = effects.clone().zip(weights);
+        let square: f64 = both.map(|(e, w)| w * (e.ratio - ratio).powi(2)).sum();
+        let maneuvers = effects.count();
+        let dispersion = square / (maneuvers.max(2) - 1) as f64;
+        MeanEffect {
+            ratio,
+            bound: (dispersion.max(1.0) / information).sqrt(),
+            maneuvers,
+        }
+    }
+
+    /// `true` where the effect is surely opposite to the tunnel's, and nearer to its opposite than
+    /// to none.
+    fn is_reversed(&self) -> bool {
+        self.ratio < -0.5 && self.ratio < -SURELY_REVERSED * self.bound
+    }
+}
+
+/// Rows and problems of a campaign's surfaces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    pub rows: Vec<InstrumentRow>,
+    pub problems: Vec<Problem>,
+}
+
+/// Findings of every flight, then of all flights together.
+#[must_use]
+pub fn findings(
+    flights: &[FlightEvidence],
+    pooled: &[SurfaceDelay],
+    corrections: &[DelayCorrection],
+    channels: &BTreeMap<String, Channel>,
+) -> Findings {
+    let mut findings = Findings::default();
+    for flight in flights {
+        for delay in &flight.own_delays {
+            let effects = flight.effects.iter();
+            let effect = MeanEffect::of(effects.filter(|e| e.surface == delay.surface));
+            findings.add(&flight.flight_id, delay, effect, corrections, channels);
+        }
+    }
+    for delay in pooled {
+        let effects = flights.iter().flat_map(|flight| &flight.effects);
+        let effect = MeanEffect::of(effects.filter(|e| e.surface == delay.surface));
+        let row = row(ALL_FLIGHTS, delay, &effect, corrections, channels);
+        findings.rows.extend(row);
+    }
+    findings
+}
+
+impl Findings {
+    /// Adds the row of a flight's surface, and a problem where its sign is reversed.
+    fn add(
+        &mut self,
+        flight_id: &str,
+        delay: &SurfaceDelay,
+        effect: MeanEffect,
+        corrections: &[DelayCorrection],
+        channels: &BTreeMap<String, Channel>,
+    ) {
+        let Some(row) = row(flight_id, delay, &effect, corrections, channels) else {
+            return;
+        };
+        if effect.is_reversed() {
+            self.problems.push(Problem {
+                stage: ProblemStage::Segment,
+                flight_id: flight_id.to_owned(),
+                place: format!("channel `{}`", row.channel),
+                reason: format!(
+                    "`{}` acts against the wind tunnel: {:.2} times its effect (bound {:.2}) in {} maneuvers. Its sign \
+                     is reversed, or its tunnel values are: check both (aircraft.yaml: channels: {}: sign: -1)",
+                    row.channel, effect.ratio, effect.bound, effect.maneuvers, row.channel
+                ),
+            });
+        }
+        self.rows.push(row);
+    }
+}
+
+/// Row of a surface; `None` for one without a channel.
+fn row(
+    flight_id: &str,
+    delay: &SurfaceDelay,
+    effect: &MeanEffect,
+    corrections: &[DelayCorrection],
+    channels: &BTreeMap<String, Channel>,
+) -> Option<InstrumentRow> {
+    let (channel, _) = channels.iter().find(|(_, c)| c.signal == delay.surface)?;
+    let is_shifted = corrections
+        .iter()
+        .any(|c| c.surface == delay.surface && c.delay_s != 0.0);
+    let verdict = if effect.is_reversed() {
+        InstrumentVerdict::Fault("sign reversed".to_owned())
+    } else if delay.is_determined() {
+        InstrumentVerdict::Ok
+    } else {
+        InstrumentVerdict::NotExcited
+    };
+    let told = delay.is_determined();
+    Some(InstrumentRow {
+        flight_id: flight_id.to_owned(),
+        channel: channel.clone(),
+        signal: delay.surface.clone(),
+        unit: Unit::of_signal(&delay.surface).name.to_owned(),
+        bias: None,
+        bias_bound: None,
+        scale: None,
+        scale_bound: None,
+        delay_s: told.then_some(delay.delay_s),
+        delay_bound_s: told.then_some(delay.bound_s),
+        applied: if is_shifted { "delay" } else { "" }.to_owned(),
+        verdict,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean(ratios: &[(f64, f64)]) -> MeanEffect {
+        let effects: Vec<Effect> = ratios
+            .iter()
+            .map(|(ratio, bound)| Effect {
+                surface: "da".to_owned(),
+                ratio: *ratio,
+                bound: *bound,
+            })
+            .collect();
+        MeanEffect::of(effects.iter())
+    }
+
+    #[test]
+    fn a_reversed_surface_is_as_sure_as_its_maneuvers_agree() {
+        assert!(mean(&[(-1.0, 0.3), (-0.9, 0.3), (-1.1, 0.3)]).is_reversed());
+        assert!(!mean(&[(-1.0, 0.6)]).is_reversed());
+        assert!(!mean(&[(-0.3, 0.05)]).is_reversed());
+        assert!(!mean(&[(-3.0, 0.2), (1.0, 0.2), (-2.0, 0.2)]).is_reversed());
+        assert!(!mean(&[(1.0, 0.1), (0.9, 0.1)]).is_reversed());
+        assert!(!mean(&[]).is_reversed());
+    }
+}

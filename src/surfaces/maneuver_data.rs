@@ -1,0 +1,195 @@
+//! A maneuver laid out for equation error in the frequency domain: the spectra of the coefficients
+//! that the measured motion implies, and of their regressors.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use nalgebra::Complex;
+
+use super::fourier::{Band, Shifted, Spectrum};
+use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::dynamics::motion::{MassProperties, SLOPE_REACH, Window};
+use crate::dynamics::{COEFFICIENTS, Equations, Lateral, Longitudinal};
+use crate::flight::Record;
+use crate::maneuver::Maneuver;
+use crate::output_error::{Case, InitialState, Measurements, Model};
+
+/// A maneuver in the frequency domain.
+#[derive(Clone, Debug)]
+pub struct ManeuverData {
+    pub frequencies_hz: Vec<f64>,
+    /// Signals of the surfaces that act in the maneuver's axis.
+    pub surfaces: Vec<String>,
+    pub coefficients: Vec<CoefficientData>,
+}
+
+/// One coefficient of the build-up.
+#[derive(Clone, Debug)]
+pub struct CoefficientData {
+    /// Coefficient that the measured motion implies.
+    pub implied: Spectrum,
+    pub terms: Vec<TermData>,
+}
+
+/// One derivative of the build-up.
+#[derive(Clone, Debug)]
+pub struct TermData {
+    pub regressor: Shifted,
+    /// Index of its surface.
+    pub surface: Option<usize>,
+    /// Tunnel's value.
+    pub tunnel: Option<f64>,
+    /// Root mean square of the tunnel's table; zero without a table.
+    pub size: f64,
+}
+
+/// Aircraft, model and tunnel of a campaign.
+#[derive(Clone, Copy, Debug)]
+pub struct Basis<'a> {
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+    pub tunnel: &'a WindTunnel,
+}
+
+impl ManeuverData {
+    /// Lays out a maneuver; `None` where it is too short or a signal is missing.
+    pub fn new(record: &Record, maneuver: &Maneuver, basis: Basis) -> Option<ManeuverData> {
+        match maneuver.axis {
+            Axis::Longitudinal => Self::of_axis::<3, Longitudinal>(record, maneuver, basis),
+            Axis::Lateral => Self::of_axis::<4, Lateral>(record, maneuver, basis),
+        }
+    }
+
+    fn of_axis<const NX: usize, E: Equations<NX>>(
+        record: &Record,
+        maneuver: &Maneuver,
+        basis: Basis,
+    ) -> Option<ManeuverData> {
+        let range = record.sample_at(maneuver.start_s)..record.sample_at(maneuver.end_s) + 1;
+        let band = Band::new(range.len(), record.step_s)?;
+        let derivatives = derivatives(record, E::AXIS, basis.buildup);
+        let surfaces = surfaces_of(&derivatives);
+        let signals = surfaces.iter().map(String::as_str);
+        let window = Window::cut(record, range, signals, MassProperties::Recorded).ok()?;
+        let model = Model {
+            free: derivatives,
+            initial_state: InitialState::Measured,
+            ..Model::default()
+        };
+        let case = Case::<NX, E>::new(basis.aircraft, &window, Measurements::default(), &model);
+        let frequencies_hz = band.frequencies_hz();
+        let slope_response = slope_response(&frequencies_hz, record.step_s);
+        let mut columns = BTreeMap::new();
+        let mut term = |j: usize| {
+            let derivative = basis.buildup.derivative(&case.names[j])?;
+            let regressor = columns
+                .entry(case.terms[j].column)
+                .or_insert_with(|| Shifted::new(&band, &case.measured_regressor(j)));
+            let condition = maneuver.condition(basis.tunnel);
+            Some(TermData {
+                regressor: regressor.clone(),
+                surface: surface_index(derivative, &surfaces),
+                tunnel: basis
+                    .tunnel
+                    .at(&derivative.name, &condition)
+                    .map(|v| v.value),
+                size: basis.tunnel.root_mean_square(&derivative.name),
+            })
+        };
+        let coefficients = (0..COEFFICIENTS)
+            .map(|k| {
+                let implied: Vec<f64> = case.implied.iter().map(|implied| implied[k]).collect();
+                let mut implied = band.spectrum(&implied);
+                if E::AXIS.coefficients()[k].is_moment() {
+                    divide(&mut implied, &slope_response);
+                }
+                CoefficientData {
+                    implied,
+                    terms: case.ranges[k].clone().filter_map(&mut term).collect(),
+                }
+            })
+            .collect();
+        Some(ManeuverData {
+            frequencies_hz,
+            surfaces,
+            coefficients,
+        })
+    }
+}
+
+/// Derivatives of an axis without the constants, which the mean removes, and without surfaces that
+/// are not recorded.
+fn derivatives<'a>(record: &Record, axis: Axis, buildup: &'a Buildup) -> Vec<&'a Derivative> {
+    let is_recorded = |d: &&Derivative| {
+        let surface = d.regressor.surface();
+        surface.is_none_or(|s| record.signals.contains_key(s))
+    };
+    buildup
+        .derivatives_of(axis)
+        .filter(|d| d.regressor != Regressor::Constant)
+        .filter(is_recorded)
+        .collect()
+}
+
+/// Signals of the surfaces of derivatives, sorted.
+fn surfaces_of(derivatives: &[&Derivative]) -> Vec<String> {
+    let surfaces = derivatives.iter().filter_map(|d| d.regressor.surface());
+    let mut surfaces: Vec<String> = surfaces.map(str::to_owned).collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    surfaces
+}
+
+fn surface_index(derivative: &Derivative, surfaces: &[String]) -> Option<usize> {
+    let surface = derivative.regressor.surface()?;
+    surfaces.iter().position(|s| s == surface)
+}
+
+/// Response of the local straight line's slope, over that of the exact derivative: real, since the
+/// line is symmetric about its sample, so it turns no phase.
+fn slope_response(frequencies_hz: &[f64], step_s: f64) -> Vec<f64> {
+    let response = |frequency_hz: &f64| {
+        let angle = 2.0 * PI * frequency_hz * step_s;
+        let (mut slope, mut norm) = (0.0, 0.0);
+        for d in 1..=SLOPE_REACH {
+            let d = d as f64;
+            slope += d * (d * angle).sin();
+            norm += d * d * angle;
+        }
+        slope / norm
+    };
+    frequencies_hz.iter().map(response).collect()
+}
+
+fn divide(spectrum: &mut [Complex<f64>], response: &[f64]) {
+    for (value, response) in spectrum.iter_mut().zip(response) {
+        *value /= *response;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    #[test]
+    fn the_response_of_the_slope_is_that_of_nine_samples_of_a_sine() {
+        let (frequency_hz, step_s) = (1.7, 0.025);
+        let omega = 2.0 * PI * frequency_hz;
+        let sine = |k: f64| (omega * k * step_s).sin();
+        let (mut up, mut norm) = (0.0, 0.0);
+        for d in 1..=4 {
+            let d = f64::from(d);
+            up += d * (sine(d) - sine(-d));
+            norm += 2.0 * d * d;
+        }
+        let slope = up / (norm * step_s);
+        assert_relative_eq!(
+            slope_response(&[frequency_hz], step_s)[0],
+            slope / omega,
+            max_relative = 1e-12
+        );
+    }
+}

@@ -1,0 +1,33 @@
+//! Settings of the surfaces' delays.
+
+use serde::{Deserialize, Serialize};
+
+use crate::settings::{settings, single_values};
+
+/// Treatment of a delay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Action {
+    /// The surface is shifted where its delay is sure.
+    Apply,
+    /// The delay is published, and the surface stays as recorded.
+    Report,
+}
+
+settings! {
+    /// Settings of the surfaces' delays. Each is one number for the whole campaign, since all flights
+    /// have the same recorder.
+    pub struct Settings {
+        /// Delays of the surfaces: `apply` shifts surfaces whose delay is sure before the
+        /// derivatives are estimated, `report` only publishes the delays. Either way, what stays
+        /// unknown of a delay is part of `bound_corrected`.
+        pub delay: Action = Action::Apply,
+        /// Smallest delay that is corrected, s. A recorder of ordinary quality has less; the delay
+        /// of a surface that the campaign does not determine is taken as zero with this standard
+        /// deviation. Larger: fewer corrections, wider bounds.
+        pub least_delay_s: f64 = 0.003,
+        /// Size from which a delay is corrected, standard errors. Larger: fewer corrections.
+        pub standard_errors: f64 = 4.0,
+    }
+}
+single_values!(Action);
