@@ -484,6 +484,7 @@ mod tests {
             excitation: None,
             contribution_pct: None,
             equation_error: None,
+            equation_error_bound: None,
             held_because: None,
         };
         let rows = compare_maneuvers(

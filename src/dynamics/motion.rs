@@ -48,6 +48,24 @@ pub struct Motion {
     pub cg: Position,
 }
 
+impl Motion {
+    /// Motion as it would be measured without angular accelerations.
+    #[inline(always)]
+    #[must_use]
+    pub fn without_angular_accelerations(&self, aircraft: &Aircraft) -> Motion {
+        let felt = |i: usize, sensor: Position| {
+            lever(i, sensor.arm(self.cg), [0.0; 3], self.accelerations).value
+        };
+        Motion {
+            accelerations: [0.0; 3],
+            force_x: self.force_x + felt(0, aircraft.sensors.ax),
+            force_y: self.force_y + felt(1, aircraft.sensors.ay),
+            force_z: self.force_z + felt(2, aircraft.sensors.an),
+            ..*self
+        }
+    }
+}
+
 /// Mass, c.g. and inertias: sample by sample, or their means over the maneuver (the paper's
 /// choice).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

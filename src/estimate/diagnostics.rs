@@ -1,5 +1,4 @@
-//! Diagnostics of a fit: excitation, correlations, variance inflation, near-collinear groups, and the
-//! same derivatives by equation error.
+//! Diagnostics of a fit: excitation, correlations, variance inflation, near-collinear groups.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +10,7 @@ use crate::dynamics::motion::Window;
 use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
-use crate::output_error::{Case, Fit, Model, cost, equation_error};
+use crate::output_error::{Case, Fit, Model, cost};
 use crate::tables::{CorrelationKind, CorrelationRow, EstimateRow};
 
 /// History of a derivative's regressor.
@@ -36,15 +35,6 @@ impl Task<'_> {
         let flown = self.regressor_histories::<NX, E>(case, window, model);
         estimated.correlations = self.regressor_correlations(&flown, window);
         self.add_excitation(&flown, &mut estimated.estimates);
-        for (name, value) in case.names.iter().zip(equation_error::regression(case)) {
-            if let Some(row) = estimated
-                .estimates
-                .iter_mut()
-                .find(|row| row.derivative == *name)
-            {
-                row.equation_error = value;
-            }
-        }
         if fit.final_cost.is_none() {
             return;
         }

@@ -13,6 +13,7 @@ mod rows;
 mod calibration_effect;
 mod diagnostics;
 mod held_by_evidence;
+mod second_opinion;
 mod single;
 pub mod joint;
 pub mod prediction;

@@ -113,6 +113,7 @@ impl<'a> Task<'a> {
             excitation: None,
             contribution_pct: None,
             equation_error: None,
+            equation_error_bound: None,
             held_because: None,
         }
     }

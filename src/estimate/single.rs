@@ -2,13 +2,14 @@
 
 use super::context::Context;
 use super::estimated::{Covariance, Estimated};
+use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
 use super::task::{Task, values_by_name};
 use crate::aero::Axis;
 use crate::dynamics::{Equations, Lateral, Longitudinal};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
-use crate::output_error::consider;
+use crate::output_error::{consider, equation_error};
 
 /// Estimates one maneuver. The outcome has any failure.
 #[must_use]
@@ -75,13 +76,9 @@ impl Task<'_> {
         }
         let with_held_free = self.with_held_free(&prepared);
         let values = values_by_name(&prepared.model, &case.names, &fit.values);
-        consider::consider(
-            case,
-            &with_held_free,
-            &values,
-            &self.held_uncertainties(&prepared.model),
-            &mut fit,
-        );
+        let uncertainties = self.held_uncertainties(&prepared.model);
+        consider::consider(case, &with_held_free, &values, &uncertainties, &mut fit);
+        let second = equation_error::regression(case, &with_held_free, &uncertainties);
         self.add_calibration_errors(&prepared, &mut fit);
         let history = self.history(
             &case.measurements,
@@ -97,6 +94,7 @@ impl Task<'_> {
             history: Some(history),
             fit: self.fit_row(&fit, prepared.left_out, start.into()),
         };
+        add_second_opinion(&case.names, &second, &mut estimated.estimates);
         self.add_diagnostics(
             case,
             &prepared.window,

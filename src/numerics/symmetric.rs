@@ -31,3 +31,23 @@ pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         &scale,
     ))
 }
+
+/// Raises the variances of a covariance that are below those of another one; correlations stay.
+#[must_use]
+pub fn raise_variances(mut covariance: DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
+    for j in 0..covariance.nrows() {
+        let (variance, least) = (covariance[(j, j)], other[(j, j)]);
+        if variance < least {
+            if variance > 0.0 {
+                let factor = (least / variance).sqrt();
+                covariance.row_mut(j).scale_mut(factor);
+                covariance.column_mut(j).scale_mut(factor);
+            } else {
+                covariance.row_mut(j).copy_from(&other.row(j));
+                covariance.column_mut(j).copy_from(&other.column(j));
+            }
+            covariance[(j, j)] = least;
+        }
+    }
+    covariance
+}

@@ -229,6 +229,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             excitation: Some(1.5),
             contribution_pct: Some(40.0),
             equation_error: Some(0.05),
+            equation_error_bound: Some(0.01),
             held_because: None,
         });
     }

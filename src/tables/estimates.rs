@@ -141,10 +141,16 @@ table! {
         /// Root mean square of derivative × regressor about its mean over that of the whole
         /// coefficient. Parts that cancel make more than 100.
         pub contribution_pct: Option<f64> ["%"],
-        /// Same derivative by least squares on the measured accelerations, in the column `unit`: a
-        /// check without integration, weights or a bound. Noise in the regressors draws it towards
+        /// Second opinion: the same derivative by equation error in the frequency domain, in the
+        /// column `unit`. It regresses the coefficients that the measured accelerations imply, from
+        /// 0.1 to 2.5 Hz, without integration and without the table's weights. None for constants and
+        /// biases, and where the data do not determine it. Noise in the regressors draws it towards
         /// zero.
         pub equation_error: Option<f64>,
+        /// Standard error of `equation_error`, in the column `unit`: the half width of a 95 % interval
+        /// over 1.96. It counts the residuals' spectrum and the uncertainty of held values, but no
+        /// errors of calibration.
+        pub equation_error_bound: Option<f64>,
         /// Reason why the maneuver holds it, with `hold: evidence`; empty where the class's table
         /// decides.
         pub held_because: Option<String>,

@@ -30,6 +30,7 @@ pub(super) fn estimate(
         excitation: None,
         contribution_pct: None,
         equation_error: None,
+        equation_error_bound: None,
         held_because: None,
     }
 }

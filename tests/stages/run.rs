@@ -54,7 +54,8 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "estimate",
         "estimates",
         "maneuver_id flight_id class alpha_deg mach derivative unit status value bound bound_corrected wind_tunnel \
-         variance_inflation excitation contribution_pct equation_error held_because",
+         variance_inflation excitation contribution_pct equation_error \
+         equation_error_bound held_because",
     ),
     (
         "estimate",

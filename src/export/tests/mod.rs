@@ -117,6 +117,7 @@ fn estimate(maneuver_id: &str, class: &str, derivative: &str) -> EstimateRow {
         excitation: None,
         contribution_pct: None,
         equation_error: None,
+        equation_error_bound: None,
         held_because: None,
     }
 }

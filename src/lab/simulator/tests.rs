@@ -376,6 +376,12 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
                 "{class} at {alpha}°: {name} is off by {:.3}%",
                 100.0 * off
             );
+            let off = row.equation_error.unwrap() / truth - 1.0;
+            assert!(
+                off.abs() < 5e-2,
+                "{class} at {alpha}°: {name} by equation error is off by {:.3}%",
+                100.0 * off
+            );
         }
     }
 }

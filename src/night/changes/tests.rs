@@ -66,6 +66,7 @@ impl Campaign {
             excitation: None,
             contribution_pct: None,
             equation_error: None,
+            equation_error_bound: None,
             held_because: None,
         });
     }

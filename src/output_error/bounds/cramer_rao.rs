@@ -12,6 +12,7 @@ use nalgebra::DMatrix;
 use super::bounded::Bounded;
 use super::coloured::{self, ResidualNoise};
 use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::symmetric::raise_variances;
 use crate::output_error::likelihood::information::Identification;
 use crate::output_error::likelihood::outcome::Fit;
 
@@ -31,7 +32,7 @@ pub fn bounds<D: Bounded>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
     let residuals = coloured::covariance(&inverse, &series).widened();
     let corrected =
-        raise_to_white(residuals, &covariance) + estimates_covariance(&inverse, &inputs);
+        raise_variances(residuals, &covariance) + estimates_covariance(&inverse, &inputs);
     Bounds {
         covariance,
         corrected,
@@ -60,23 +61,4 @@ pub fn residual_noise<D: Bounded>(
         }
         Identification::Undetermined { .. } => None,
     }
-}
-
-/// Raises corrected variances that are below the white ones; correlations stay.
-fn raise_to_white(mut corrected: DMatrix<f64>, white: &DMatrix<f64>) -> DMatrix<f64> {
-    for j in 0..corrected.nrows() {
-        let (variance, least) = (corrected[(j, j)], white[(j, j)]);
-        if variance < least {
-            if variance > 0.0 {
-                let factor = (least / variance).sqrt();
-                corrected.row_mut(j).scale_mut(factor);
-                corrected.column_mut(j).scale_mut(factor);
-            } else {
-                corrected.row_mut(j).copy_from(&white.row(j));
-                corrected.column_mut(j).copy_from(&white.column(j));
-            }
-            corrected[(j, j)] = least;
-        }
-    }
-    corrected
 }

@@ -94,6 +94,8 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(crate) states: Vec<SVector<f64, NX>>,
     /// Coefficients that the measured motion implies at every sample.
     pub(crate) implied: Vec<[f64; COEFFICIENTS]>,
+    /// The same without the part that is proportional to the angular accelerations.
+    pub(crate) implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
     /// Surfaces whose noise the corrected bounds count; empty by default.
     pub noisy_surfaces: Vec<NoisySurface>,
     pub measurements: Measurements,
@@ -147,6 +149,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             initial_state: model.initial_state,
             states: motion.states,
             implied: motion.implied,
+            implied_without_accelerations: motion.without_accelerations,
             noisy_surfaces: vec![],
             measurements,
             names: model.parameter_names(&free, &E::STATES),

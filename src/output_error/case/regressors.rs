@@ -23,6 +23,7 @@ pub(super) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
     pub sensor_inputs: Vec<E::SensorInputs>,
     pub states: Vec<SVector<f64, NX>>,
     pub implied: Vec<[f64; COEFFICIENTS]>,
+    pub without_accelerations: Vec<[f64; COEFFICIENTS]>,
 }
 
 impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
@@ -34,6 +35,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
             sensor_inputs: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),
             implied: Vec::with_capacity(samples),
+            without_accelerations: Vec::with_capacity(samples),
         };
         Arch::new().dispatch(Preparation {
             aircraft,
@@ -76,6 +78,9 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
                 prepared.states.push(E::measured_state(&motion));
                 let implied = E::implied_coefficients(aircraft, &motion, &inputs);
                 prepared.implied.push(implied);
+                let rest = motion.without_angular_accelerations(aircraft);
+                let rest = E::implied_coefficients(aircraft, &rest, &inputs);
+                prepared.without_accelerations.push(rest);
             }
             prepared.rate_inputs.push(inputs);
         }

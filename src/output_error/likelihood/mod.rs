@@ -11,3 +11,4 @@ pub mod mean;
 pub mod newton_raphson;
 pub mod outcome;
 pub mod theil;
+mod whittle;

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod coarse;
+mod equation_error;
 mod joint;
 mod width;
 
@@ -12,9 +13,7 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use super::case::blocks::BlockSums;
 use super::estimation::{Weights, estimate};
 use super::newton_raphson::Settings;
-use super::{
-    Case, Fit, InitialState, Measurements, Model, Outcome, consider, cost, equation_error,
-};
+use super::{Case, Fit, InitialState, Measurements, Model, Outcome, consider, cost};
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Regressor};
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::tests::aircraft;
@@ -584,55 +583,4 @@ fn the_consider_covariance_is_the_effect_of_a_held_value_s_error() {
         assert!(!name.is_empty());
     }
     assert!(considered.diagonal().max() > 0.0);
-}
-
-#[test]
-fn equation_error_starts_near_the_truth() {
-    // The record's motion is not the response: the response replaces it first.
-    let truth = truth(Axis::Longitudinal);
-    let (case, parameters) = case::<3, Longitudinal>(&truth, &[]);
-    let mut response = case.response();
-    case.respond(&parameters, &mut response).unwrap();
-    let mut record = record();
-    for (o, name) in [
-        signal::ALPHA_VANE,
-        signal::Q,
-        signal::THETA,
-        signal::AN,
-        signal::AX,
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let values = response.outputs.iter().map(|y| y[o]).collect();
-        record.signals.insert(
-            name.into(),
-            Series {
-                values,
-                marks: vec![Mark::Measured; SAMPLES],
-            },
-        );
-    }
-    let window = Window::cut(
-        &record,
-        0..SAMPLES,
-        ["de_deg", "dpv_deg"],
-        MassProperties::Recorded,
-    )
-    .unwrap();
-    let model = Model {
-        free: truth.iter().map(|(d, _)| d).collect(),
-        ..Model::default()
-    };
-    let case = Case::<3, Longitudinal>::new(&aircraft(), &window, nothing_measured(), &model);
-    let start = equation_error::start(&case, &case.starting_values(|_| 0.0));
-    for (name, factor) in [
-        ("CN_alpha", 0.3),
-        ("Cm_de", 0.3),
-        ("Cm_alpha", 0.5),
-        ("Cm_dpv", 0.3),
-    ] {
-        let j = case.names.iter().position(|n| n == name).unwrap();
-        assert_relative_eq!(start[j], parameters[j], max_relative = factor);
-    }
 }

@@ -214,11 +214,20 @@ fn estimate(row: &EstimateRow) -> Vec<String> {
         number(row.bound, 2),
         number(row.bound_corrected, 2),
         digits.write(row.wind_tunnel),
-        digits.write(row.equation_error),
+        second_opinion(row, &digits),
         number(row.variance_inflation, 2),
         row.contribution_pct
             .map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0)),
     ]
+}
+
+/// Estimate by equation error with its standard error.
+fn second_opinion(row: &EstimateRow, digits: &Digits) -> String {
+    let value = digits.write(row.equation_error);
+    match row.equation_error_bound {
+        Some(bound) => format!("{value} ± {}", number(Some(bound), 2)),
+        None => value,
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,108 @@
+//! Fourier sums of several series at once, at some harmonics of their length.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+use pulp::Arch;
+
+/// Series that are summed side by side, so that their sums fill the vector registers.
+const SIDE_BY_SIDE: usize = 8;
+
+/// Harmonics of a length: frequencies of a whole number of periods over the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonics {
+    numbers: Range<usize>,
+    /// Cosine and sine of each sample's share of a turn.
+    turn: Vec<[f64; 2]>,
+}
+
+impl Harmonics {
+    #[must_use]
+    pub fn new(samples: usize, numbers: Range<usize>) -> Harmonics {
+        let angle = |n: usize| TAU * n as f64 / samples as f64;
+        Harmonics {
+            numbers,
+            turn: (0..samples)
+                .map(|n| [angle(n).cos(), angle(n).sin()])
+                .collect(),
+        }
+    }
+
+    /// Number of harmonics.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// Sums Σ x(n) e^(−2πi k n / N): a column for each series, real parts of all harmonics above their
+    /// imaginary parts.
+    #[must_use]
+    pub fn sums(&self, series: &[Vec<f64>]) -> DMatrix<f64> {
+        let mut sums = DMatrix::zeros(2 * self.len(), series.len());
+        for (block, series) in series.chunks(SIDE_BY_SIDE).enumerate() {
+            let rows: Vec<[f64; SIDE_BY_SIDE]> = (0..self.turn.len())
+                .map(|n| std::array::from_fn(|i| series.get(i).map_or(0.0, |x| x[n])))
+                .collect();
+            for (row, number) in self.numbers.clone().enumerate() {
+                let [real, imaginary] = Arch::new().dispatch(|| self.sum(&rows, number));
+                for i in 0..series.len() {
+                    let column = block * SIDE_BY_SIDE + i;
+                    sums[(row, column)] = real[i];
+                    sums[(self.len() + row, column)] = imaginary[i];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Real and imaginary parts of one harmonic of series side by side.
+    #[inline(always)]
+    fn sum(&self, rows: &[[f64; SIDE_BY_SIDE]], number: usize) -> [[f64; SIDE_BY_SIDE]; 2] {
+        let (mut real, mut imaginary) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+        let mut place = 0;
+        for row in rows {
+            let [cosine, sine] = self.turn[place];
+            for i in 0..SIDE_BY_SIDE {
+                real[i] += cosine * row[i];
+                imaginary[i] -= sine * row[i];
+            }
+            place += number;
+            if place >= rows.len() {
+                place -= rows.len();
+            }
+        }
+        [real, imaginary]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn sums_of_many_series_are_those_of_the_definition() {
+        let samples = 57;
+        let series: Vec<Vec<f64>> = (0..11)
+            .map(|i| {
+                (0..samples)
+                    .map(|n| (0.37 * (n * (i + 1)) as f64).sin() + i as f64)
+                    .collect()
+            })
+            .collect();
+        let sums = Harmonics::new(samples, 3..9).sums(&series);
+        for (column, x) in series.iter().enumerate() {
+            for (row, k) in (3..9).enumerate() {
+                let part = |of: fn(f64) -> f64| -> f64 {
+                    let terms = x.iter().enumerate();
+                    terms
+                        .map(|(n, x)| x * of(-TAU * (k * n) as f64 / samples as f64))
+                        .sum()
+                };
+                assert_relative_eq!(sums[(row, column)], part(f64::cos), epsilon = 1e-11);
+                assert_relative_eq!(sums[(6 + row, column)], part(f64::sin), epsilon = 1e-11);
+            }
+        }
+    }
+}
