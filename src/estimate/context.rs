@@ -14,7 +14,7 @@ pub struct Context<'a> {
     /// Table of starting values: the tunnel's, except in studies of the iteration.
     pub start: &'a WindTunnel,
     pub settings: &'a Settings,
-    /// What stays unknown of the surfaces' delays, common to all maneuvers; the records are corrected.
+    /// Delays of the surfaces: the records are corrected, uncertainties are common to all maneuvers.
     pub delays: &'a [DelayCorrection],
 }
 
