@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lab::simulator::{DerivativeLookup, Instruments, Program, Settings, Turbulence};
+use crate::lab::simulator::{
+    DerivativeLookup, DiscreteGusts, FlightCondition, Instruments, Program, Settings, Turbulence,
+};
 
 /// A file of test cards. Paths are relative to the working directory.
 #[derive(Clone, Debug, Deserialize)]
@@ -83,7 +85,25 @@ pub struct FlightCard {
     pub heading_deg: f64,
     #[serde(default)]
     pub turbulence: Option<Turbulence>,
+    #[serde(default)]
+    pub discrete_gusts: Option<DiscreteGusts>,
+    /// Time by which surfaces are recorded late.
+    #[serde(default)]
+    pub surface_delay_s: f64,
     pub points: Vec<TestPoint>,
+}
+
+impl FlightCard {
+    /// Condition of the flight's maneuvers.
+    #[must_use]
+    pub fn condition(&self, derivatives: DerivativeLookup) -> FlightCondition {
+        FlightCondition {
+            derivatives,
+            turbulence: self.turbulence,
+            discrete_gusts: self.discrete_gusts,
+            surface_delay_s: self.surface_delay_s,
+        }
+    }
 }
 
 /// A maneuver class at several angles of attack.

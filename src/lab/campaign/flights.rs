@@ -75,8 +75,7 @@ fn cards(
             heading_deg: flight.heading_deg,
             mass_slug: flight.mass_slug - flight.burnt_slug * k as f64,
             start_s: 0.0,
-            derivatives: campaign.cards.derivatives,
-            turbulence: flight.turbulence,
+            condition: flight.condition(campaign.cards.derivatives),
             seed: derived_seed(seed, &format!("air {k}")),
             program: campaign
                 .cards

@@ -7,7 +7,7 @@ use super::cards::Cards;
 use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
-use crate::lab::simulator::{Card, DerivativeLookup, Program, Simulator};
+use crate::lab::simulator::{Card, FlightCondition, Program, Simulator};
 use crate::store::files::{self, TunnelRow};
 
 /// Test cards with their pipeline and simulator, checked.
@@ -56,13 +56,14 @@ impl SimulatedCampaign {
         };
         campaign.check_programs(&source)?;
         campaign.check_flights(&source)?;
+        campaign.check_conditions(&source)?;
         campaign.check_channels(&source)?;
         campaign.check_instruments(&source)?;
         Ok(campaign)
     }
 
-    /// Card of one maneuver in still air with frozen derivatives, for studies. `None` for a class
-    /// without program.
+    /// Card of one maneuver as the estimator assumes it, for studies: in still air, with frozen
+    /// derivatives. `None` for a class without program.
     #[must_use]
     pub fn card(&self, class: &str, alpha_deg: f64) -> Option<Card> {
         let axis = self.config.class(class)?.axis;
@@ -76,8 +77,7 @@ impl SimulatedCampaign {
             heading_deg: conditions.heading_deg,
             mass_slug: conditions.mass_slug,
             start_s: 0.0,
-            derivatives: DerivativeLookup::Frozen,
-            turbulence: None,
+            condition: FlightCondition::default(),
             seed: self.cards.seed,
             program: self.cards.programs.get(class)?.clone(),
         })
@@ -158,6 +158,16 @@ impl SimulatedCampaign {
                     return Err(source.error_under("flights", &point.class, message));
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Checks air and delays of the flights.
+    fn check_conditions(&self, source: &Source) -> Result<()> {
+        for (flight, card) in &self.cards.flights {
+            card.condition(self.cards.derivatives)
+                .check()
+                .map_err(|what| source.error_under("flights", flight, what))?;
         }
         Ok(())
     }

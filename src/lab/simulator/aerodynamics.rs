@@ -70,7 +70,7 @@ impl Aerodynamics {
         self.buildup.derivatives.iter().map(value).collect()
     }
 
-    /// Force, lbf, and moment about the c.g., ft lbf, in body axes.
+    /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air.
     #[must_use]
     pub fn loads(
         &self,

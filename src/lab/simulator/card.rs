@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::discrete_gusts::DiscreteGusts;
 use super::inputs::TestInput;
 use super::turbulence::Turbulence;
 use crate::aero::Axis;
@@ -18,6 +19,40 @@ pub enum DerivativeLookup {
     Frozen,
     /// From the tables at the present α and Mach number.
     Varying,
+}
+
+/// Air, aerodynamics and surface recorder of a maneuver. Default: the estimator's assumptions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FlightCondition {
+    pub derivatives: DerivativeLookup,
+    /// Continuous turbulence; `None` in still air.
+    pub turbulence: Option<Turbulence>,
+    pub discrete_gusts: Option<DiscreteGusts>,
+    /// Time by which surfaces are recorded late.
+    pub surface_delay_s: f64,
+}
+
+impl FlightCondition {
+    /// `true` where every flight of a card is another: the air is random.
+    #[must_use]
+    pub fn is_random(&self) -> bool {
+        self.turbulence.is_some() || self.discrete_gusts.is_some()
+    }
+
+    /// Checks the air and the delay.
+    ///
+    /// # Errors
+    /// The message for the first setting that is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        self.turbulence.as_ref().map_or(Ok(()), Turbulence::check)?;
+        self.discrete_gusts
+            .as_ref()
+            .map_or(Ok(()), DiscreteGusts::check)?;
+        if !(self.surface_delay_s >= 0.0 && self.surface_delay_s.is_finite()) {
+            return Err("`surface_delay_s` must not be negative".into());
+        }
+        Ok(())
+    }
 }
 
 /// Actions of a maneuver on a clock that begins at 0: control law, flags, test inputs.
@@ -61,9 +96,8 @@ pub struct Card {
     pub mass_slug: f64,
     /// Record time at which the card begins.
     pub start_s: f64,
-    pub derivatives: DerivativeLookup,
-    pub turbulence: Option<Turbulence>,
-    /// Seed of the turbulence.
+    pub condition: FlightCondition,
+    /// Seed of turbulence and gusts.
     pub seed: u64,
     pub program: Program,
 }

@@ -2,18 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Vector3;
-
 use super::actuators::SurfaceState;
 use super::body::BodyState;
-use super::card::{Card, DerivativeLookup};
+use super::card::{Card, DerivativeLookup, FlightCondition};
 use super::control::Feedback;
 use super::flown::{FlownManeuver, TrueDerivative};
+use super::gust::Gust;
 use super::law::ControlLaw;
 use super::plant::{Plant, PlantInputs, PlantOutputs};
+use super::sensors;
 use super::settings::Settings;
+use super::surface_history::SurfaceHistory;
 use super::trim::{self, Trim, TrimPoint};
-use super::{sensors, turbulence};
 use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
@@ -41,7 +41,7 @@ struct CardFlight<'a> {
     trim: Trim,
     feedback: Feedback,
     frozen: Option<Vec<f64>>,
-    gusts: Vec<Vector3<f64>>,
+    gusts: Vec<Gust>,
     step_s: f64,
 }
 
@@ -56,15 +56,17 @@ pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeu
     let mut state = flight.initial_state();
     let mut signals: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut alphas_deg = Vec::with_capacity(samples);
+    let mut surfaces = SurfaceHistory::new(card.condition.surface_delay_s / flight.step_s);
     for step in 0..samples * per_sample {
         let outputs = flight.evaluate(&state);
         if has_departed(&state, &outputs) {
             let time_s = step as f64 * flight.step_s;
             return Err(format!("the aircraft departs at {time_s:.1} s of the card"));
         }
+        surfaces.push(&state.inputs.surfaces);
         if step % per_sample == 0 {
             alphas_deg.push(outputs.air.alpha * DEG);
-            for (name, value) in flight.signals(&state, &outputs, step) {
+            for (name, value) in flight.signals(&state, &outputs, &surfaces.recorded(), step) {
                 signals.entry(name).or_default().push(value);
             }
         }
@@ -74,6 +76,27 @@ pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeu
         unwrap_heading(heading);
     }
     Ok(flight.flown(signals, &alphas_deg))
+}
+
+/// Gusts of turbulence and discrete gusts together, for an airspeed and span.
+fn gusts(
+    condition: &FlightCondition,
+    (speed_ft_s, span_ft): (f64, f64),
+    (step_s, steps): (f64, usize),
+    seed: u64,
+) -> Vec<Gust> {
+    let mut sum = vec![Gust::default(); steps];
+    let turbulence = condition.turbulence.iter();
+    let discrete = condition.discrete_gusts.iter();
+    let parts = turbulence
+        .map(|t| t.gusts((speed_ft_s, span_ft), (step_s, steps), seed))
+        .chain(discrete.map(|d| d.gusts(speed_ft_s, (step_s, steps), seed)));
+    for part in parts {
+        for (total, gust) in sum.iter_mut().zip(&part) {
+            *total = total.plus(gust);
+        }
+    }
+    sum
 }
 
 /// Rounds a non-negative count that is whole but for rounding errors.
@@ -129,11 +152,9 @@ impl<'a> CardFlight<'a> {
         let step_s = 1.0 / settings.control_hz;
         let steps = (rounded_count(card.program.duration_s * settings.rate_hz) + 2)
             * settings.steps_per_sample();
-        let gusts = card.turbulence.as_ref().map_or_else(
-            || vec![Vector3::zeros(); steps],
-            |t| turbulence::gusts(t, trim.air.velocity_ft_s, step_s, steps, card.seed),
-        );
-        let frozen = (card.derivatives == DerivativeLookup::Frozen).then_some(at_trim);
+        let flow = (trim.air.velocity_ft_s, plant.aircraft.span_ft);
+        let gusts = gusts(&card.condition, flow, (step_s, steps), card.seed);
+        let frozen = (card.condition.derivatives == DerivativeLookup::Frozen).then_some(at_trim);
         Ok(CardFlight {
             plant,
             settings,
@@ -152,7 +173,7 @@ impl<'a> CardFlight<'a> {
         let mut inputs = self.trim.inputs.clone();
         inputs.gust = self.gust(0);
         let body = BodyState {
-            velocity: self.trim.state.velocity + inputs.gust,
+            velocity: self.trim.state.velocity + inputs.gust.velocity,
             ..self.trim.state
         };
         let surfaces = inputs
@@ -171,7 +192,7 @@ impl<'a> CardFlight<'a> {
         }
     }
 
-    fn gust(&self, step: usize) -> Vector3<f64> {
+    fn gust(&self, step: usize) -> Gust {
         self.gusts.get(step).copied().unwrap_or_default()
     }
 
@@ -292,6 +313,7 @@ impl<'a> CardFlight<'a> {
         &self,
         state: &AircraftState,
         outputs: &PlantOutputs,
+        surfaces: &[f64],
         step: usize,
     ) -> Vec<(String, f64)> {
         let time_s = step as f64 * self.step_s;
@@ -300,7 +322,7 @@ impl<'a> CardFlight<'a> {
             .settings
             .surface_names
             .iter()
-            .zip(&state.inputs.surfaces)
+            .zip(surfaces)
             .map(|(name, deg)| (name.clone(), *deg));
         let laws = self.settings.laws.values();
         let sticks: BTreeSet<&String> = laws.flat_map(|law| law.gearing.keys()).collect();

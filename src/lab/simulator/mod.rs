@@ -6,7 +6,10 @@
 //! ([`crate::dynamics`]), so that each checks the other.
 
 pub mod random;
+mod gust;
+mod shaping_filter;
 pub mod turbulence;
+pub mod discrete_gusts;
 pub mod inputs;
 pub mod instruments;
 pub mod card;
@@ -23,17 +26,19 @@ pub mod plant;
 pub mod sensors;
 pub mod trim;
 pub mod control;
+mod surface_history;
 mod flight;
 
 use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::error::{Problem, ProblemStage};
 
-pub use card::{Card, DerivativeLookup, Program};
+pub use card::{Card, DerivativeLookup, FlightCondition, Program};
+pub use discrete_gusts::DiscreteGusts;
 pub use flown::{FlownManeuver, TrueDerivative};
 pub use instruments::{Instrument, Instruments};
 pub use settings::Settings;
-pub use turbulence::Turbulence;
+pub use turbulence::{Turbulence, TurbulenceModel};
 
 /// The simulated aircraft.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::aerodynamics::Aerodynamics;
 use super::air_data::AirData;
 use super::body::{self, BodyState, Loads, StateRate};
+use super::gust::Gust;
 use super::loading::Loading;
 use crate::aircraft::Aircraft;
 use crate::earth::gravity_ft_s2;
@@ -20,8 +21,7 @@ pub struct PlantInputs {
     pub thrust_lbf: f64,
     /// Sum of the engine speeds, 1/min.
     pub rpm: f64,
-    /// Velocity of the air over the ground in body axes, ft/s.
-    pub gust: Vector3<f64>,
+    pub gust: Gust,
     pub mass_slug: f64,
 }
 
@@ -38,7 +38,7 @@ impl PlantInputs {
                 .collect(),
             thrust_lbf: mix(self.thrust_lbf, end.thrust_lbf),
             rpm: mix(self.rpm, end.rpm),
-            gust: self.gust.lerp(&end.gust, fraction),
+            gust: self.gust.interpolated(&end.gust, fraction),
             mass_slug: mix(self.mass_slug, end.mass_slug),
         }
     }
@@ -74,7 +74,7 @@ impl Plant {
         frozen: Option<&[f64]>,
     ) -> PlantOutputs {
         let loading = Loading::at_mass(&self.loadings, inputs.mass_slug);
-        let air = AirData::new(&(state.velocity - inputs.gust), state.position.z);
+        let air = AirData::new(&(state.velocity - inputs.gust.velocity), state.position.z);
         let values = frozen.map_or_else(
             || Cow::Owned(self.aerodynamics.values(air.alpha * DEG, air.mach)),
             Cow::Borrowed,
@@ -83,7 +83,7 @@ impl Plant {
             &self.aircraft,
             &values,
             &air,
-            &state.rates,
+            &(state.rates - inputs.gust.rates),
             &inputs.surfaces,
         );
         let force = aerodynamic + Vector3::new(inputs.thrust_lbf, 0.0, 0.0);

@@ -1,7 +1,7 @@
 //! Sensors: readings of perfect instruments at their positions.
 //!
 //! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r); a vane measures the local
-//! flow.
+//! flow, which turns about the c.g. with the aircraft's rates relative to the air.
 
 use nalgebra::Vector3;
 
@@ -22,11 +22,12 @@ pub fn readings(
 ) -> Vec<(&'static str, f64)> {
     let (air, loading, sensors) = (&outputs.air, &outputs.loading, &aircraft.sensors);
     let w = state.rates;
+    let relative = w - inputs.gust.rates;
     let flow = Flow {
         alpha: air.alpha,
         beta: air.beta,
         velocity: air.velocity_ft_s,
-        rates: [w.x, w.y, w.z],
+        rates: relative.into(),
     };
     let cg = loading.cg();
     let acceleration_g = |position: Position, axis: usize| {

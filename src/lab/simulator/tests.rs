@@ -8,10 +8,14 @@ use nalgebra::{SVector, Vector3};
 
 use super::air_data::AirData;
 use super::body::{BodyState, Euler};
+use super::gust::Gust;
 use super::plant::{PlantInputs, PlantOutputs};
 use super::random::RandomStream;
 use super::trim::{self, Trim, TrimPoint};
-use super::{Card, FlownManeuver, Instrument, Instruments, Program, Simulator, sensors};
+use super::{
+    Card, FlownManeuver, Instrument, Instruments, Program, Simulator, Turbulence, TurbulenceModel,
+    sensors,
+};
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Context, Estimated};
@@ -51,7 +55,7 @@ fn random_instant(random: &mut RandomStream, surfaces: usize) -> (BodyState, Pla
         surfaces: (0..surfaces).map(|_| within(-10.0, 10.0)).collect(),
         thrust_lbf: within(2000.0, 14_000.0),
         rpm: within(20_000.0, 26_000.0),
-        gust: Vector3::zeros(),
+        gust: Gust::default(),
         mass_slug: within(985.0, 1065.0),
     };
     (state, inputs)
@@ -298,6 +302,146 @@ fn aft_stick_raises_the_nose_and_right_controls_turn_right() {
             "{stick}"
         );
     }
+}
+
+/// Reading of a signal.
+fn reading(
+    campaign: &SimulatedCampaign,
+    state: &BodyState,
+    inputs: &PlantInputs,
+    name: &str,
+) -> f64 {
+    let outputs = campaign.simulator.plant.evaluate(state, inputs, None);
+    let aircraft = &campaign.config.aircraft;
+    let readings = sensors::readings(aircraft, state, inputs, &outputs);
+    readings.iter().find(|(n, _)| *n == name).unwrap().1
+}
+
+#[test]
+fn air_that_turns_with_the_aircraft_damps_nothing_and_gyros_do_not_feel_it() {
+    let campaign = shipped_campaign();
+    let trim = trimmed(&campaign.simulator, &campaign.card("OLAT", 20.0).unwrap());
+    let rates = Vector3::new(0.3, 0.1, -0.2);
+    let turning = BodyState {
+        rates,
+        ..trim.state
+    };
+    let mut inputs = trim.inputs.clone();
+    inputs.gust.rates = rates;
+    let plant = &campaign.simulator.plant;
+    let still = plant.evaluate(&trim.state, &trim.inputs, None);
+    let carried = plant.evaluate(&turning, &inputs, None);
+    let damped = plant.evaluate(&turning, &trim.inputs, None);
+    assert_abs_diff_eq!(
+        carried.specific_force,
+        still.specific_force,
+        epsilon = 1e-12
+    );
+    assert!((damped.specific_force - still.specific_force).norm() > 1e-3);
+    // Roll damping alone tells the two apart in ṗ: gyroscopic terms are in both.
+    let relative = carried.rate.rates - damped.rate.rates;
+    assert!(relative.x > 0.0 && relative.y > 0.0, "{relative}");
+    for (name, rate) in [
+        (signal::P, rates.x),
+        (signal::Q, rates.y),
+        (signal::R, rates.z),
+    ] {
+        assert_abs_diff_eq!(
+            reading(&campaign, &turning, &inputs, name),
+            DEG * rate,
+            epsilon = 1e-12
+        );
+    }
+    // The vanes stand ahead of the c.g.; turning with the air they read the flow of the c.g.
+    for name in [signal::ALPHA_VANE, signal::BETA_VANE] {
+        let expected = reading(&campaign, &trim.state, &trim.inputs, name);
+        assert_abs_diff_eq!(
+            reading(&campaign, &turning, &inputs, name),
+            expected,
+            epsilon = 1e-12
+        );
+        let alone = reading(&campaign, &turning, &trim.inputs, name);
+        assert!((alone - expected).abs() > 0.1);
+    }
+}
+
+#[test]
+fn an_updraught_raises_the_vane_s_angle_and_the_normal_acceleration_before_the_aircraft_moves() {
+    let campaign = shipped_campaign();
+    let trim = trimmed(&campaign.simulator, &campaign.card("OLON", 10.0).unwrap());
+    let mut inputs = trim.inputs.clone();
+    inputs.gust.velocity.z = -10.0;
+    let change = |name: &str| {
+        reading(&campaign, &trim.state, &inputs, name)
+            - reading(&campaign, &trim.state, &trim.inputs, name)
+    };
+    let expected = DEG * 10.0 / trim.air.velocity_ft_s * trim.air.alpha.cos();
+    assert_abs_diff_eq!(
+        change(signal::ALPHA_VANE),
+        expected,
+        epsilon = 0.02 * expected
+    );
+    assert!(change(signal::AN) > 0.02);
+    for name in [signal::Q, signal::THETA, signal::ALTITUDE] {
+        assert_abs_diff_eq!(change(name), 0.0);
+    }
+    // A gust to the left, as a wind from the right, is sideslip to the right.
+    inputs.gust.velocity = Vector3::new(0.0, -10.0, 0.0);
+    assert!(reading(&campaign, &trim.state, &inputs, signal::BETA_VANE) > 1.0);
+}
+
+#[test]
+fn late_surfaces_are_those_of_one_delay_before_and_nothing_else_changes() {
+    let campaign = shipped_campaign();
+    let mut card = campaign.card("3211", 20.0).unwrap();
+    card.program.duration_s = 6.0;
+    card.program.maneuver_s = (0.0, 5.0);
+    let exact = campaign.simulator.fly(&card).unwrap().record;
+    card.condition.surface_delay_s = exact.step_s;
+    let late = campaign.simulator.fly(&card).unwrap().record;
+    for (name, series) in &late.signals {
+        let expected = exact.values(name).unwrap();
+        if campaign.simulator.settings().surfaces.contains_key(name) {
+            let pairs = series.values[1..].iter().zip(expected);
+            assert!(
+                pairs
+                    .clone()
+                    .all(|(late, exact)| (late - exact).abs() < 1e-12)
+            );
+        } else {
+            assert_eq!(series.values, expected, "{name}");
+        }
+    }
+}
+
+#[test]
+fn turbulence_of_one_seed_is_flown_again_and_of_another_is_not() {
+    let campaign = shipped_campaign();
+    let mut card = campaign.card("PPSS", 20.0).unwrap();
+    card.program.duration_s = 4.0;
+    card.program.maneuver_s = (0.0, 4.0);
+    card.program.inputs.clear();
+    card.condition.turbulence = Some(Turbulence {
+        model: TurbulenceModel::VonKarman,
+        sigma_ft_s: 3.0,
+        length_ft: None,
+    });
+    let fly = |seed: u64| {
+        let card = Card {
+            seed,
+            ..card.clone()
+        };
+        campaign.simulator.fly(&card).unwrap().record
+    };
+    let first = fly(1);
+    assert_eq!(first, fly(1));
+    assert_ne!(first, fly(2));
+    // 3 ft/s at some 330 ft/s move the vane by half a degree rms.
+    let alpha = first.values(signal::ALPHA_VANE).unwrap();
+    let spread = alpha
+        .iter()
+        .fold(0.0_f64, |most, a| most.max((a - alpha[0]).abs()));
+    assert!((0.1..3.0).contains(&spread), "{spread}");
 }
 
 fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {

@@ -10,6 +10,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::air_data::AirData;
 use super::body::{BodyState, Euler};
 use super::card::Card;
+use super::gust::Gust;
 use super::plant::{Plant, PlantInputs};
 use super::settings::Settings;
 use crate::earth::air;
@@ -190,7 +191,7 @@ impl TrimProblem<'_> {
                 surfaces,
                 thrust_lbf,
                 rpm: 2.0 * self.settings.engine.rpm(thrust_lbf),
-                gust: Vector3::zeros(),
+                gust: Gust::default(),
                 mass_slug: self.point.mass_slug,
             },
             air: AirData::new(&velocity, self.point.altitude_ft),

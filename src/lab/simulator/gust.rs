@@ -1,0 +1,36 @@
+//! Motion of the air at the aircraft.
+
+use nalgebra::Vector3;
+
+/// Velocity and rotation of the air over the ground in body axes. The aerodynamics feel the
+/// velocities and rates of the aircraft less these; gyros and attitudes do not.
+///
+/// The air turns as a rigid body about the c.g. does whose velocity has the gradients of the gusts:
+/// `p_g` = ∂w/∂y, `q_g` = −∂w/∂x, `r_g` = ∂v/∂x, with x forward, y right and w down.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gust {
+    /// u, v, w, ft/s.
+    pub velocity: Vector3<f64>,
+    /// `p_g`, `q_g`, `r_g`, rad/s.
+    pub rates: Vector3<f64>,
+}
+
+impl Gust {
+    /// Sum of two gusts.
+    #[must_use]
+    pub fn plus(&self, other: &Gust) -> Gust {
+        Gust {
+            velocity: self.velocity + other.velocity,
+            rates: self.rates + other.rates,
+        }
+    }
+
+    /// Interpolates linearly between this gust (0) and another (1).
+    #[must_use]
+    pub fn interpolated(&self, end: &Gust, fraction: f64) -> Gust {
+        Gust {
+            velocity: self.velocity.lerp(&end.velocity, fraction),
+            rates: self.rates.lerp(&end.rates, fraction),
+        }
+    }
+}
