@@ -21,8 +21,8 @@ const REJECTED: u8 = 2;
 pub enum LabCommand {
     /// Fly a campaign of test cards: archive, wind-tunnel database, true derivatives
     Simulate(SimulateOptions),
-    /// Measure how often the intervals hold the truth: simulated maneuvers, recorded many times with
-    /// fresh noise and estimated
+    /// Measure how often the intervals hold the truth: simulated maneuvers, flown and recorded many times
+    /// under the cards' conditions and estimated
     Validate(ValidateOptions),
     /// Time the estimate of a maneuver given as JSON with its record as CSV beside it
     Bench(BenchOptions),
@@ -43,9 +43,10 @@ pub struct SimulateOptions {
 
 #[derive(Args, Debug)]
 pub struct ValidateOptions {
-    /// Test cards, YAML; their key `study` sets the number of records and of test points
+    /// Test cards, YAML; their key `study` lists the conditions and sets the number of records and of
+    /// test points
     cards: PathBuf,
-    /// Folder for the tables `coverage` and `starts`
+    /// Folder for the tables `conditions`, `coverage` and `starts`
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Page to write, Markdown
@@ -138,6 +139,11 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     }
     let realisations = simulated.cards.study.realisations;
     anyhow::ensure!(realisations > 1, "a scatter needs two realisations or more");
+    let conditions = &simulated.cards.study.conditions;
+    anyhow::ensure!(
+        !conditions.is_empty(),
+        "`study: conditions:` of the cards lists no condition"
+    );
     let bars = Bars::new(options.execution.quiet, None);
     let command = format!(
         "harvest lab validate {} --realisations {realisations}",

@@ -3,17 +3,44 @@
 use crate::schema::{table, words};
 
 table! {
-    /// Coverage of the bounds: one simulated maneuver recorded many times with other noise.
+    /// Errors of all estimates of a condition. Constants are left out.
+    pub struct ConditionRow in "conditions" per "condition and class" {
+        /// Condition of the study, by its name in the cards.
+        pub condition: String,
+        /// Class of the maneuvers; `all` for the classes together.
+        pub class: String,
+        /// Number of records.
+        pub records: usize ["records"],
+        /// Number of records whose estimation converged; only these count below.
+        pub converged: usize ["records"],
+        /// Median number of steps of the iteration.
+        pub iterations: Option<f64> ["1"],
+        /// Number of estimated derivatives in all records.
+        pub estimates: usize ["estimates"],
+        /// Share of the estimates whose interval ±1.96 `bound` contains the truth.
+        pub coverage_95: f64 ["1"],
+        /// Share of the estimates whose interval ±1.96 `bound_corrected` contains the truth.
+        pub corrected_coverage_95: f64 ["1"],
+        /// Median magnitude of the error over the derivative's size: the root mean square of its true
+        /// table.
+        pub error_pct: Option<f64> ["%"],
+        /// Median of `bound_corrected` over the derivative's size.
+        pub corrected_bound_pct: Option<f64> ["%"],
+        /// Median of `bound_corrected` over `bound`.
+        pub correction: Option<f64> ["1"],
+    }
+}
+
+table! {
+    /// Coverage of the bounds: one simulated maneuver flown and recorded many times.
     pub struct CoverageRow in "coverage"
-        per "class, angle of attack, noise, weights and derivative" {
+        per "condition, class, angle of attack and derivative" {
         /// Class of the maneuver.
         pub class: String,
         /// Mean angle of attack of the maneuver.
         pub alpha_deg: f64 ["deg"],
-        /// Noise of the records.
-        pub residuals: Residuals,
-        /// Weights of the cost.
-        pub weights: Weights,
+        /// Condition of the study, by its name in the cards.
+        pub condition: String,
         /// Name of the derivative in the model.
         pub derivative: String,
         /// Unit of the derivative.
@@ -61,19 +88,6 @@ table! {
         /// Number of records that reached the minimum with the other start tried as well: the
         /// equation-error solution where the first does not converge.
         pub reached: usize ["records"],
-    }
-}
-
-words! {
-    /// Noise of the records in the study of bounds.
-    pub enum Residuals {
-        /// White noise of the outputs.
-        White = "white",
-        /// Coloured noise of the outputs with the same standard deviation.
-        Coloured = "coloured",
-        /// White noise of every channel, including those that the estimator takes as exact:
-        /// surfaces, airspeed, the other axis.
-        EveryChannel = "noise on every channel",
     }
 }
 

@@ -15,7 +15,7 @@ mod predictions;
 mod published;
 mod trends;
 
-pub use bounds_study::{CoverageRow, Residuals, StartRow, StartVariant, Weights};
+pub use bounds_study::{ConditionRow, CoverageRow, StartRow, StartVariant, Weights};
 pub use comparison::{
     ChangeRow, ChangeVerdict, ComparisonRow, DisagreementRow, ExtrapolationRow,
     ManeuverComparisonRow, Treatment, TunnelDifference, TunnelVerdict, Verdict, VerdictRow,

@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use super::{
-    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, CoverageRow, DisagreementRow,
-    EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, InstrumentRow, JointRow,
-    ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow, VerdictRow,
+    ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, CorrelationRow, CoverageRow,
+    DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, InstrumentRow,
+    JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow,
+    VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -79,6 +80,7 @@ pub fn page() -> String {
     table::<InstrumentRow>(&mut page);
     table::<EventRow>(&mut page);
     table::<Problem>(&mut page);
+    table::<ConditionRow>(&mut page);
     table::<CoverageRow>(&mut page);
     table::<StartRow>(&mut page);
     page

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{Campaign, files, harvest, number, run, table};
+use crate::support::{Campaign, Row, files, harvest, number, run, table};
 
 /// The cards of the shipped campaign with other flights.
 fn cards(flights: &str) -> String {
@@ -97,15 +97,21 @@ fn a_wrong_card_is_named_with_its_line() {
     }
 }
 
+/// Conditions of the study: noise as the theory assumes and not, and air that moves.
+const STUDY: &str = "
+study:
+  conditions:
+    - { name: white, noise: white, weights: table }
+    - { name: coloured, noise: coloured, weights: table }
+    - { name: gusts, turbulence: { model: von_karman, sigma_ft_s: 3 }, tables: varying, surface_delay_s: 0.01 }
+    - { name: discrete, discrete_gusts: { size_ft_s: 10, gradient_ft: 200, per_s: 0.3 } }";
+
 #[test]
-fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
+fn the_study_of_the_bounds_does_not_depend_on_the_threads_and_finds_wrong_bounds() {
     let campaign = Campaign::new();
     let file = campaign.path("cards.yaml");
-    fs::write(
-        &file,
-        cards("  one: { altitude_ft: 25000, mass_slug: 1050, points: [ { class: PPSS, alpha_deg: [20] } ] }"),
-    )
-    .unwrap();
+    let flights = "  one: { altitude_ft: 25000, mass_slug: 1050, points: [ { class: PPSS, alpha_deg: [20] } ] }";
+    fs::write(&file, cards(flights) + STUDY).unwrap();
     let validate = |name: &str, threads: &str| {
         let (out, page) = (campaign.path(name), campaign.path(name).join("coverage.md"));
         let mut command = harvest();
@@ -129,22 +135,40 @@ fn bounds_are_put_to_the_test_with_the_same_result_whatever_the_threads() {
             written.display()
         );
     }
-    let rows = table(&once.join("coverage.csv"));
-    let settings: std::collections::BTreeSet<(&str, &str)> = rows
+    let conditions = table(&once.join("conditions.csv"));
+    let names: Vec<(&str, &str)> = conditions
         .iter()
-        .map(|r| (r["residuals"].as_str(), r["weights"].as_str()))
+        .map(|r| (r["condition"].as_str(), r["class"].as_str()))
         .collect();
-    assert_eq!(settings.len(), 5);
+    let expected = ["white", "coloured", "gusts", "discrete"];
+    assert_eq!(
+        names,
+        expected
+            .map(|name| [(name, "all"), (name, "PPSS")])
+            .concat()
+    );
+    assert!(conditions.iter().all(|r| r["records"] == "8"));
+    let error = |row: usize| number(&conditions[row], "error_pct");
+    assert!(
+        error(4) > error(0),
+        "gusts add errors: {} {}",
+        error(4),
+        error(0)
+    );
+
+    let rows = table(&once.join("coverage.csv"));
+    let still = |r: &&Row| r["condition"] == "white" || r["condition"] == "coloured";
     assert!(
         rows.iter()
+            .filter(still)
             .all(|r| r["class"] == "PPSS" && r["converged"] == "8")
     );
     // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far
     // more.
-    let ratio = |residuals: &str, column: &str| {
+    let ratio = |condition: &str, column: &str| {
         let mut ratios: Vec<f64> = rows
             .iter()
-            .filter(|r| r["residuals"] == residuals)
+            .filter(|r| r["condition"] == condition)
             .map(|r| number(r, column))
             .collect();
         ratios.sort_by(f64::total_cmp);

@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::recordings::{Scenario, StudyManeuver};
-use crate::estimate::Estimated;
-use crate::lab::simulator::TrueDerivative;
+use super::recordings::{Realisation, StudyManeuver};
+use crate::error::Problem;
 use crate::lab::simulator::random::derived_seed;
 use crate::maneuver::Status;
 use crate::output_error::Outcome;
@@ -12,68 +11,134 @@ use crate::tables::{CoverageRow, EstimateRow};
 
 /// Half widths of the intervals that contain a normal deviate with probability 0.68 and 0.95.
 const HALF_68: f64 = 0.994_458;
-const HALF_95: f64 = 1.959_964;
+pub const HALF_95: f64 = 1.959_964;
 
-/// Estimates a maneuver from many recordings: a row per estimated derivative.
-#[must_use]
-pub fn coverage(
-    maneuver: &StudyManeuver,
-    scenario: Scenario,
-    realisations: usize,
-    seed: u64,
-) -> Vec<CoverageRow> {
-    let estimated: Vec<Estimated> = (0..realisations)
-        .into_par_iter()
-        .map(|i| maneuver.estimate(scenario, derived_seed(seed, &format!("realisation {i}"))))
-        .collect();
-    let converged: Vec<&Estimated> = estimated
-        .iter()
-        .filter(|e| e.fit.outcome == Outcome::Converged)
-        .collect();
-    let row = |truth: &TrueDerivative| {
-        let rows: Vec<&EstimateRow> = converged
-            .iter()
-            .filter_map(|e| row_of(e, &truth.derivative))
-            .collect();
-        (!rows.is_empty()).then(|| {
-            let errors: Vec<f64> = rows
-                .iter()
-                .filter_map(|r| Some(r.value? - truth.value))
-                .collect();
-            let statistics = ErrorStatistics::of(&errors);
-            let white = Intervals::new(&errors, &statistics, rows.iter().map(|r| r.bound));
-            let corrected =
-                Intervals::new(&errors, &statistics, rows.iter().map(|r| r.bound_corrected));
-            CoverageRow {
-                class: maneuver.class.name.clone(),
-                alpha_deg: maneuver.flown.maneuver.alpha_deg,
-                residuals: scenario.residuals,
-                weights: scenario.weights,
-                derivative: truth.derivative.clone(),
-                unit: truth.unit.to_owned(),
-                truth: truth.value,
-                realisations,
-                converged: converged.len(),
-                bias: statistics.mean,
-                scatter: statistics.deviation,
-                bias_over_scatter: statistics.mean / statistics.deviation,
-                scatter_over_bound: white.ratio,
-                coverage_68: white.share_68,
-                coverage_95: white.share_95,
-                scatter_over_corrected: corrected.ratio,
-                corrected_coverage_68: corrected.share_68,
-                corrected_coverage_95: corrected.share_95,
-            }
-        })
-    };
-    maneuver.flown.truth.iter().filter_map(row).collect()
+/// Estimates of one maneuver under one condition.
+pub struct MeasuredPoint {
+    pub class: String,
+    pub realisations: Vec<Realisation>,
 }
 
-fn row_of<'a>(estimated: &'a Estimated, derivative: &str) -> Option<&'a EstimateRow> {
-    estimated
-        .estimates
-        .iter()
-        .find(|r| r.derivative == derivative && r.status == Status::Estimated)
+impl MeasuredPoint {
+    /// Estimates a maneuver from many recordings. Returns also the problem of the first record whose
+    /// flight departs; such records are left out.
+    pub fn measure(
+        maneuver: &StudyManeuver,
+        count: usize,
+        seed: u64,
+    ) -> (MeasuredPoint, Option<Problem>) {
+        let results: Vec<Result<Realisation, Problem>> = (0..count)
+            .into_par_iter()
+            .map(|i| maneuver.realise(derived_seed(seed, &format!("realisation {i}"))))
+            .collect();
+        let mut realisations = Vec::with_capacity(count);
+        let mut first_problem = None;
+        for result in results {
+            match result {
+                Ok(realisation) => realisations.push(realisation),
+                Err(problem) => {
+                    first_problem.get_or_insert(problem);
+                }
+            }
+        }
+        let class = maneuver.class.name.clone();
+        (
+            MeasuredPoint {
+                class,
+                realisations,
+            },
+            first_problem,
+        )
+    }
+
+    /// Realisations whose estimation converged.
+    pub fn converged(&self) -> impl Iterator<Item = &Realisation> {
+        let realisations = self.realisations.iter();
+        realisations.filter(|r| r.estimated.fit.outcome == Outcome::Converged)
+    }
+
+    /// A row per estimated derivative.
+    pub fn rows(&self, condition: &str) -> Vec<CoverageRow> {
+        let Some(first) = self.realisations.first() else {
+            return Vec::new();
+        };
+        let derivatives = first.truth.iter();
+        derivatives
+            .filter_map(|d| self.row(condition, &d.derivative, d.unit))
+            .collect()
+    }
+
+    fn row(&self, condition: &str, derivative: &str, unit: &str) -> Option<CoverageRow> {
+        let estimates: Vec<TrueAndEstimated> = self
+            .converged()
+            .flat_map(Realisation::estimates)
+            .filter(|e| e.row.derivative == derivative)
+            .collect();
+        if estimates.is_empty() {
+            return None;
+        }
+        let errors: Vec<f64> = estimates
+            .iter()
+            .filter_map(TrueAndEstimated::error)
+            .collect();
+        let statistics = ErrorStatistics::of(&errors);
+        let bounds = estimates.iter().map(|e| e.row.bound);
+        let white = Intervals::new(&errors, &statistics, bounds);
+        let bounds = estimates.iter().map(|e| e.row.bound_corrected);
+        let corrected = Intervals::new(&errors, &statistics, bounds);
+        Some(CoverageRow {
+            class: self.class.clone(),
+            alpha_deg: mean(self.realisations.iter().map(|r| r.alpha_deg)),
+            condition: condition.to_owned(),
+            derivative: derivative.to_owned(),
+            unit: unit.to_owned(),
+            truth: mean(estimates.iter().map(|e| e.truth)),
+            realisations: self.realisations.len(),
+            converged: self.converged().count(),
+            bias: statistics.mean,
+            scatter: statistics.deviation,
+            bias_over_scatter: statistics.mean / statistics.deviation,
+            scatter_over_bound: white.ratio,
+            coverage_68: white.share_68,
+            coverage_95: white.share_95,
+            scatter_over_corrected: corrected.ratio,
+            corrected_coverage_68: corrected.share_68,
+            corrected_coverage_95: corrected.share_95,
+        })
+    }
+}
+
+/// An estimated derivative with its true value.
+pub struct TrueAndEstimated<'a> {
+    pub row: &'a EstimateRow,
+    pub truth: f64,
+}
+
+impl TrueAndEstimated<'_> {
+    pub fn error(&self) -> Option<f64> {
+        Some(self.row.value? - self.truth)
+    }
+}
+
+impl Realisation {
+    /// Estimated derivatives, in the order of the truth.
+    pub fn estimates(&self) -> impl Iterator<Item = TrueAndEstimated<'_>> {
+        self.truth.iter().filter_map(|truth| {
+            let rows = &self.estimated.estimates;
+            let row = rows
+                .iter()
+                .find(|r| r.derivative == truth.derivative && r.status == Status::Estimated)?;
+            Some(TrueAndEstimated {
+                row,
+                truth: truth.value,
+            })
+        })
+    }
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
 }
 
 /// Mean and standard deviation of errors.

@@ -1,49 +1,42 @@
-//! Study of the bounds: simulated maneuvers with known derivatives are recorded many times, each time
-//! with fresh noise, and estimated. The scatter of the estimates is compared with their bounds.
+//! Study of the bounds: simulated maneuvers with known derivatives are flown and recorded many times
+//! under several conditions, and estimated with the campaign's settings. Errors of the estimates are
+//! compared with their bounds.
 //!
-//! Instruments have noise only, and held values are true. Writes the tables `coverage` and `starts`
-//! and a page of the documentation.
+//! The conditions of the cards (`study: conditions:`) say what is flown, in which air, and how it is
+//! recorded. Instruments have noise only, and held values are true. Writes the tables `conditions`,
+//! `coverage` and `starts` and a page of the documentation.
 
 mod recordings;
 mod coverage;
+mod condition_rows;
 mod starts;
 mod page;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::aero::WindTunnel;
 use crate::error::{Problem, Result};
-use crate::estimate::{self, Context};
-use crate::lab::campaign::SimulatedCampaign;
-use crate::lab::simulator::FlownManeuver;
+use crate::lab::campaign::{RecordNoise, SimulatedCampaign, StudyCondition};
 use crate::lab::simulator::random::derived_seed;
+use crate::lab::simulator::{Card, DerivativeLookup};
 use crate::maneuver::Class;
 use crate::output_error::estimation::Weights;
 use crate::pipeline::Progress;
 use crate::store::{atomic, table};
-use crate::tables::{CoverageRow, StartRow};
+use crate::tables::{ConditionRow, CoverageRow, StartRow};
 
-use crate::tables::Residuals;
-use recordings::{Scenario, StudyManeuver};
+use condition_rows::Scales;
+use coverage::MeasuredPoint;
+use recordings::StudyManeuver;
 
 /// Tables of a study.
 #[derive(Clone, Debug, Default)]
 pub struct BoundsStudy {
+    pub conditions: Vec<ConditionRow>,
     pub coverage: Vec<CoverageRow>,
     pub starts: Vec<StartRow>,
     /// Test points that could not be flown.
     pub problems: Vec<Problem>,
 }
-
-/// Combinations of residuals and weights in the study of coverage.
-const COMBINATIONS: [(Residuals, Weights); 5] = [
-    (Residuals::White, Weights::Table),
-    (Residuals::White, Weights::Estimated),
-    (Residuals::Coloured, Weights::Table),
-    (Residuals::Coloured, Weights::Estimated),
-    (Residuals::EveryChannel, Weights::Table),
-];
 
 /// Records of the coverage study per record of the study of starting values, which estimates each
 /// record six times.
@@ -61,68 +54,128 @@ pub fn run(
     progress: &dyn Progress,
 ) -> Result<BoundsStudy> {
     let mut study = BoundsStudy::default();
-    let flown = fly_test_points(campaign, &mut study.problems);
-    progress.begin("validate", flown.len() * (COMBINATIONS.len() + 1));
-    for (residuals, weights) in COMBINATIONS {
-        let scenario = Scenario {
-            residuals,
-            coloured_time_s: campaign.cards.study.coloured_time_s,
-            weights,
-        };
-        for maneuver in &flown {
-            study
-                .coverage
-                .extend(study_coverage(campaign, maneuver, scenario));
-            progress.advance(maneuver.name());
-        }
+    let points = test_points(campaign);
+    let conditions = &campaign.cards.study.conditions;
+    progress.begin("validate", points.len() * (conditions.len() + 1));
+    for condition in conditions {
+        study.measure(campaign, &points, condition, progress);
     }
-    for maneuver in &flown {
-        study.starts.extend(study_starts(campaign, maneuver));
-        progress.advance(maneuver.name());
-    }
+    study.vary_starts(campaign, &points, progress);
     progress.end();
     let shelf = table::Shelf::of(out);
+    table::publish(&shelf, &study.conditions)?;
     table::publish(&shelf, &study.coverage)?;
     table::publish(&shelf, &study.starts)?;
-    let text = page::page(command, &study.coverage, &study.starts);
+    let text = page::page(command, conditions, &study);
     atomic::place(page, text.as_bytes())?;
     Ok(study)
 }
 
-/// A flown test point with its class and true derivatives.
+/// A card to be flown under every condition.
 struct TestPoint<'a> {
     class: &'a Class,
-    flown: FlownManeuver,
-    truth: WindTunnel,
+    card: Card,
 }
 
 impl TestPoint<'_> {
-    fn name(&self) -> &str {
-        &self.flown.maneuver.flight_id
+    fn seed(&self, campaign: &SimulatedCampaign) -> u64 {
+        derived_seed(campaign.cards.seed, &self.card.flight_id)
     }
 }
 
-fn fly_test_points<'a>(
-    campaign: &'a SimulatedCampaign,
-    problems: &mut Vec<Problem>,
-) -> Vec<TestPoint<'a>> {
-    let mut points = Vec::new();
-    for class in &campaign.config.classes {
-        for alpha_deg in angles_of_attack(campaign, &class.name) {
-            let Some(card) = campaign.card(&class.name, alpha_deg) else {
-                continue;
-            };
-            match campaign.simulator.fly(&card) {
-                Ok(flown) => points.push(TestPoint {
-                    class,
-                    truth: recordings::true_tables(&flown.truth),
-                    flown,
-                }),
-                Err(problem) => problems.push(problem),
+impl BoundsStudy {
+    /// Measures one condition at every test point.
+    fn measure(
+        &mut self,
+        campaign: &SimulatedCampaign,
+        points: &[TestPoint],
+        condition: &StudyCondition,
+        progress: &dyn Progress,
+    ) {
+        let count = campaign.cards.study.realisations;
+        let mut measured = Vec::with_capacity(points.len());
+        for point in points {
+            match StudyManeuver::new(campaign, point.class, &point.card, condition) {
+                Ok(maneuver) => {
+                    let seed = point.seed(campaign);
+                    let (result, problem) = MeasuredPoint::measure(&maneuver, count, seed);
+                    measured.push(result);
+                    problem.into_iter().for_each(|p| self.note(p));
+                }
+                Err(problem) => self.note(problem),
             }
+            progress.advance(&point.card.flight_id);
+        }
+        let scales = Scales {
+            buildup: &campaign.config.buildup,
+            truth: &campaign.config.tunnel,
+        };
+        let rows = condition_rows::condition_rows(&condition.name, &measured, scales);
+        self.conditions.extend(rows);
+        let rows = measured.iter().flat_map(|m| m.rows(&condition.name));
+        self.coverage.extend(rows);
+    }
+
+    /// Estimates maneuvers as the theory assumes them from other starting values.
+    fn vary_starts(
+        &mut self,
+        campaign: &SimulatedCampaign,
+        points: &[TestPoint],
+        progress: &dyn Progress,
+    ) {
+        let condition = assumed_condition();
+        let count = campaign
+            .cards
+            .study
+            .realisations
+            .div_ceil(RECORDS_PER_START);
+        for point in points {
+            let starts = StudyManeuver::new(campaign, point.class, &point.card, &condition)
+                .and_then(|maneuver| {
+                    let buildup = &campaign.config.buildup;
+                    starts::starts(&maneuver, buildup, count, point.seed(campaign))
+                });
+            match starts {
+                Ok(rows) => self.starts.extend(rows),
+                Err(problem) => self.note(problem),
+            }
+            progress.advance(&point.card.flight_id);
         }
     }
-    points
+
+    /// Notes a problem once.
+    fn note(&mut self, problem: Problem) {
+        if !self.problems.contains(&problem) {
+            self.problems.push(problem);
+        }
+    }
+}
+
+/// Still air and white noise of the outputs, weighted by the tables: what the theory assumes.
+fn assumed_condition() -> StudyCondition {
+    StudyCondition {
+        name: String::new(),
+        turbulence: None,
+        discrete_gusts: None,
+        derivatives: DerivativeLookup::Frozen,
+        surface_delay_s: 0.0,
+        noise: RecordNoise::White,
+        weights: Some(Weights::Table),
+    }
+}
+
+fn test_points(campaign: &SimulatedCampaign) -> Vec<TestPoint<'_>> {
+    let classes = campaign.config.classes.iter();
+    classes
+        .flat_map(|class| {
+            angles_of_attack(campaign, &class.name)
+                .into_iter()
+                .filter_map(move |alpha_deg| {
+                    let card = campaign.card(&class.name, alpha_deg)?;
+                    Some(TestPoint { class, card })
+                })
+        })
+        .collect()
 }
 
 /// Angles of attack of a class's study, spread over those of its cards.
@@ -137,59 +190,4 @@ fn angles_of_attack(campaign: &SimulatedCampaign, class: &str) -> Vec<f64> {
     (0..count.min(angles.len()))
         .map(|k| angles[index(k)])
         .collect()
-}
-
-/// Settings of the estimates: no uncertainty of held values and instruments, which the study does not
-/// vary.
-fn study_settings(campaign: &SimulatedCampaign) -> estimate::Settings {
-    estimate::Settings {
-        held_uncertainty_pct: 0.0,
-        calibration: BTreeMap::new(),
-        ..campaign.config.estimate.clone()
-    }
-}
-
-fn study_coverage(
-    campaign: &SimulatedCampaign,
-    point: &TestPoint,
-    scenario: Scenario,
-) -> Vec<CoverageRow> {
-    let settings = study_settings(campaign);
-    let maneuver = study_maneuver(campaign, point, &settings);
-    let realisations = campaign.cards.study.realisations;
-    coverage::coverage(&maneuver, scenario, realisations, seed(campaign, point))
-}
-
-fn study_starts(campaign: &SimulatedCampaign, point: &TestPoint) -> Vec<StartRow> {
-    let settings = study_settings(campaign);
-    let maneuver = study_maneuver(campaign, point, &settings);
-    let scenario = Scenario {
-        residuals: Residuals::White,
-        coloured_time_s: 0.0,
-        weights: Weights::Table,
-    };
-    let records = campaign
-        .cards
-        .study
-        .realisations
-        .div_ceil(RECORDS_PER_START);
-    starts::starts(&maneuver, scenario, records, seed(campaign, point))
-}
-
-fn seed(campaign: &SimulatedCampaign, point: &TestPoint) -> u64 {
-    derived_seed(campaign.cards.seed, point.name())
-}
-
-fn study_maneuver<'a>(
-    campaign: &'a SimulatedCampaign,
-    point: &'a TestPoint,
-    settings: &'a estimate::Settings,
-) -> StudyManeuver<'a> {
-    let config = &campaign.config;
-    StudyManeuver {
-        class: point.class,
-        flown: &point.flown,
-        instruments: &campaign.cards.instruments,
-        context: Context::new(&config.aircraft, &config.buildup, &point.truth, settings),
-    }
 }

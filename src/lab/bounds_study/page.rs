@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use super::BoundsStudy;
+use super::condition_rows::ALL_CLASSES;
+use crate::lab::campaign::StudyCondition;
 use crate::numerics::order_statistics::upper_median;
-use crate::tables::{CoverageRow, Residuals, StartRow, StartVariant, Weights};
+use crate::tables::{ConditionRow, CoverageRow, StartRow, StartVariant};
 
 /// Criterion for the bias of a derivative: below this share of the scatter.
 const BIAS: f64 = 0.1;
@@ -14,16 +17,18 @@ const COVERED: std::ops::RangeInclusive<f64> = 0.92..=0.98;
 
 /// Page of a study; `command` repeats it.
 #[must_use]
-pub fn page(command: &str, coverage: &[CoverageRow], starts: &[StartRow]) -> String {
-    let mut page = introduction(command, coverage);
-    page += &summary(coverage);
-    page += &starts_table(starts);
-    for (residuals, weights) in scenarios(coverage) {
-        let rows = coverage
-            .iter()
-            .filter(|r| r.residuals == residuals && r.weights == weights);
-        let _ = write!(page, "\n## {residuals} residuals, weights: {weights}\n\n");
-        page += &derivatives_table(rows);
+pub fn page(command: &str, conditions: &[StudyCondition], study: &BoundsStudy) -> String {
+    let mut page = introduction(command, &study.coverage);
+    page += &conditions_table(conditions);
+    page += &errors_table(&study.conditions);
+    page += &summary(conditions, &study.coverage);
+    page += &starts_table(&study.starts);
+    for condition in conditions {
+        let _ = write!(page, "\n## {}\n\n{condition}.\n\n", condition.name);
+        page += &classes_table(of_condition(&study.conditions, &condition.name));
+        page.push('\n');
+        let rows = study.coverage.iter();
+        page += &derivatives_table(rows.filter(|r| r.condition == condition.name));
     }
     page
 }
@@ -32,15 +37,15 @@ fn introduction(command: &str, coverage: &[CoverageRow]) -> String {
     format!(
         "# Coverage of the bounds\n\n\
          Made by `{command}`, harvest {version}, sources {sources}.\n\n\
-         Simulated maneuvers with known derivatives are recorded {records} times each, with fresh noise, and \
-         estimated. Held derivatives have their true values. *White* and *coloured* noise act on the five \
-         outputs, as the theory assumes; coloured noise is a first-order process with the same standard \
-         deviation. *Noise on every channel* is white and acts also on surfaces, airspeed and the other axis, \
-         which the estimator takes as exact.\n\n\
+         Simulated maneuvers with known derivatives are flown and recorded {records} times under each \
+         condition, and estimated with the campaign's settings. In turbulence and gusts each record is of a \
+         flight of its own; in still air only the noise differs. Instruments have noise and no other errors; \
+         held derivatives have their true values. Coloured noise is a first-order process with the standard \
+         deviation of the white noise.\n\n\
          *Scatter* is the standard deviation of the estimates, *bound* the root mean square of their bounds. \
          *Coverage* is the share of the intervals that contain the truth. The number of records leaves a \
-         standard error of {error:.1} % in a coverage of 95 %, and of {bias:.2} in a ratio of bias to \
-         scatter.\n\n",
+         standard error of {error:.1} % in a coverage of 95 % of one derivative, and of {bias:.2} in a ratio of \
+         bias to scatter.\n",
         version = env!("CARGO_PKG_VERSION"),
         sources = env!("HARVEST_SOURCE"),
         records = coverage.iter().map(|r| r.realisations).max().unwrap_or(0),
@@ -65,16 +70,66 @@ fn bias_error(coverage: &[CoverageRow]) -> f64 {
     1.0 / least_converged(coverage).sqrt()
 }
 
-/// Pairs of residuals and weights, in order of appearance.
-fn scenarios(coverage: &[CoverageRow]) -> Vec<(Residuals, Weights)> {
-    let mut found = Vec::new();
-    for row in coverage {
-        let scenario = (row.residuals, row.weights);
-        if !found.contains(&scenario) {
-            found.push(scenario);
-        }
+fn conditions_table(conditions: &[StudyCondition]) -> String {
+    let mut text = String::from("\n| condition | what is flown and recorded |\n|---|---|\n");
+    for condition in conditions {
+        let _ = writeln!(text, "| {} | {condition} |", condition.name);
     }
-    found
+    text
+}
+
+/// Rows of a condition, that of all classes first.
+fn of_condition<'a>(
+    rows: &'a [ConditionRow],
+    name: &'a str,
+) -> impl Iterator<Item = &'a ConditionRow> {
+    rows.iter().filter(move |row| row.condition == name)
+}
+
+/// Heads of the columns about all estimates of a condition or class.
+const ERROR_HEADS: &str = "records, converged | median steps | estimates | 95 % intervals of `bound`, of \
+    `bound_corrected` that hold the truth | median error, median `bound_corrected`, % of the size | median \
+    `bound_corrected` / `bound` |";
+
+/// Cells of the columns about all estimates of a condition or class.
+fn error_cells(row: &ConditionRow) -> String {
+    let number = |value: Option<f64>, digits: usize| {
+        let value = value.filter(|v| v.is_finite());
+        value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
+    };
+    format!(
+        "{}, {} | {} | {} | {}, {} % | {}, {} | {} |",
+        row.records,
+        row.converged,
+        number(row.iterations, 0),
+        row.estimates,
+        number(Some(100.0 * row.coverage_95), 1),
+        number(Some(100.0 * row.corrected_coverage_95), 1),
+        number(row.error_pct, 1),
+        number(row.corrected_bound_pct, 1),
+        number(row.correction, 2),
+    )
+}
+
+/// Error and coverage of all estimates: a row per condition.
+fn errors_table(rows: &[ConditionRow]) -> String {
+    let mut text = format!(
+        "\n## All estimates\n\nConstants are left out. The size of a derivative is the root mean square of \
+         its true table.\n\n| condition | {ERROR_HEADS}\n|---|---|---|---|---|---|---|\n"
+    );
+    for row in rows.iter().filter(|r| r.class == ALL_CLASSES) {
+        let _ = writeln!(text, "| {} | {}", row.condition, error_cells(row));
+    }
+    text
+}
+
+/// Error and coverage of one condition: a row per class.
+fn classes_table<'a>(rows: impl Iterator<Item = &'a ConditionRow>) -> String {
+    let mut text = format!("| class | {ERROR_HEADS}\n|---|---|---|---|---|---|---|\n");
+    for row in rows {
+        let _ = writeln!(text, "| {} | {}", row.class, error_cells(row));
+    }
+    text
 }
 
 /// Percentage of rows that satisfy a condition.
@@ -85,21 +140,21 @@ fn share<'a>(
     100.0 * rows.clone().filter(|r| holds(r)).count() as f64 / rows.count().max(1) as f64
 }
 
-/// Medians over maneuvers and derivatives: a row per scenario.
-fn summary(coverage: &[CoverageRow]) -> String {
+/// Medians over maneuvers and derivatives: a row per condition.
+fn summary(conditions: &[StudyCondition], coverage: &[CoverageRow]) -> String {
     let mut text = String::from(
-        "| residuals | weights | maneuvers × derivatives | `bound`: scatter / bound, coverage of 95 % | \
+        "\n## Each derivative\n\nRatios and coverages are medians over maneuvers and derivatives.\n\n\
+         | condition | maneuvers × derivatives | `bound`: scatter / bound, coverage of 95 % | \
          `bound_corrected`: scatter / bound, coverage of 68 %, of 95 % | coverage of 95 % between 92 and 98 % | \
-         bias below 0.1 scatter |\n|---|---|---|---|---|---|---|\n",
+         bias below 0.1 scatter |\n|---|---|---|---|---|---|\n",
     );
-    for (residuals, weights) in scenarios(coverage) {
-        let rows = coverage
-            .iter()
-            .filter(|r| r.residuals == residuals && r.weights == weights);
+    for condition in conditions {
+        let rows = coverage.iter().filter(|r| r.condition == condition.name);
         let of = |f: fn(&CoverageRow) -> f64| upper_median(rows.clone().map(f)).unwrap_or(f64::NAN);
         let _ = writeln!(
             text,
-            "| {residuals} | {weights} | {} | {:.2}, {:.1} % | {:.2}, {:.1} %, {:.1} % | {:.0} % | {:.0} % |",
+            "| {} | {} | {:.2}, {:.1} % | {:.2}, {:.1} %, {:.1} % | {:.0} % | {:.0} % |",
+            condition.name,
             rows.clone().count(),
             of(|r| r.scatter_over_bound),
             100.0 * of(|r| r.coverage_95),
@@ -110,7 +165,7 @@ fn summary(coverage: &[CoverageRow]) -> String {
             share(rows.clone(), |r| r.bias_over_scatter.abs() < BIAS),
         );
     }
-    text + "\nRatios and coverages are medians over maneuvers and derivatives.\n"
+    text
 }
 
 /// Minima reached from other starting values: a row per kind of start.
@@ -181,13 +236,26 @@ fn derivatives_table<'a>(rows: impl Iterator<Item = &'a CoverageRow>) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::campaign::RecordNoise;
+    use crate::lab::simulator::DerivativeLookup;
 
-    fn row(residuals: Residuals, alpha_deg: f64, covered: f64) -> CoverageRow {
+    fn condition(name: &str) -> StudyCondition {
+        StudyCondition {
+            name: name.into(),
+            turbulence: None,
+            discrete_gusts: None,
+            derivatives: DerivativeLookup::Frozen,
+            surface_delay_s: 0.0,
+            noise: RecordNoise::EveryChannel,
+            weights: None,
+        }
+    }
+
+    fn coverage_row(condition: &str, alpha_deg: f64, covered: f64) -> CoverageRow {
         CoverageRow {
             class: "class".into(),
             alpha_deg,
-            residuals,
-            weights: Weights::Table,
+            condition: condition.into(),
             derivative: "derivative".into(),
             unit: "1/deg".into(),
             truth: 1.0,
@@ -205,37 +273,59 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_page_counts_the_derivatives_that_meet_the_criteria() {
-        let rows = [
-            row(Residuals::White, 10.0, 0.95),
-            row(Residuals::White, 20.0, 0.90),
-            row(Residuals::Coloured, 10.0, 0.93),
-        ];
-        let starts = [StartRow {
-            class: "class".into(),
-            alpha_deg: 10.0,
-            start: StartVariant::Half,
+    fn condition_row(condition: &str, class: &str) -> ConditionRow {
+        ConditionRow {
+            condition: condition.into(),
+            class: class.into(),
             records: 200,
-            alone: 150,
-            reached: 199,
-        }];
-        let page = page("make validate", &rows, &starts);
-        assert!(
-            page.contains(
-                "| white | table | 2 | 2.00, 70.0 % | 1.00, 68.0 %, 95.0 % | 50 % | 100 % |"
-            ),
-            "{page}"
-        );
-        assert!(
-            page.contains("| half the truth | 200 | 75.0 % | 99.5 % |"),
-            "{page}"
-        );
-        assert!(
-            page.contains(
-                "| class | derivative | 10, 20 | 0.05, 0.05 | 2.00, 2.00 | 1.00, 1.00 | 68, 68 | 95.0, 90.0 |"
-            )
-        );
-        assert!(page.contains("\n## coloured residuals, weights: table\n"));
+            converged: 190,
+            iterations: Some(6.0),
+            estimates: 2850,
+            coverage_95: 0.812,
+            corrected_coverage_95: 0.951,
+            error_pct: Some(4.04),
+            corrected_bound_pct: Some(6.0),
+            correction: None,
+        }
+    }
+
+    fn study() -> BoundsStudy {
+        BoundsStudy {
+            conditions: vec![
+                condition_row("still", ALL_CLASSES),
+                condition_row("still", "OLAT"),
+            ],
+            coverage: vec![
+                coverage_row("still", 10.0, 0.95),
+                coverage_row("still", 20.0, 0.90),
+                coverage_row("gusts", 10.0, 0.93),
+            ],
+            starts: vec![StartRow {
+                class: "class".into(),
+                alpha_deg: 10.0,
+                start: StartVariant::Half,
+                records: 200,
+                alone: 150,
+                reached: 199,
+            }],
+            problems: vec![],
+        }
+    }
+
+    #[test]
+    fn the_page_has_rows_for_conditions_and_classes_and_counts_what_meets_the_criteria() {
+        let conditions = [condition("still"), condition("gusts")];
+        let page = page("make validate", &conditions, &study());
+        for line in [
+            "| still | still air; noise on every channel |",
+            "| still | 200, 190 | 6 | 2850 | 81.2, 95.1 % | 4.0, 6.0 | – |",
+            "| OLAT | 200, 190 | 6 | 2850 | 81.2, 95.1 % | 4.0, 6.0 | – |",
+            "| still | 2 | 2.00, 70.0 % | 1.00, 68.0 %, 95.0 % | 50 % | 100 % |",
+            "| half the truth | 200 | 75.0 % | 99.5 % |",
+            "| class | derivative | 10, 20 | 0.05, 0.05 | 2.00, 2.00 | 1.00, 1.00 | 68, 68 | 95.0, 90.0 |",
+            "## gusts",
+        ] {
+            assert!(page.lines().any(|l| l == line), "{line}\n{page}");
+        }
     }
 }

@@ -1,28 +1,37 @@
-//! Recordings of one maneuver with fresh noise, and the estimate from each.
+//! Recordings of one maneuver under one condition, each with fresh noise and, where the air is random,
+//! from a flight of its own; and the estimate from each.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Output, WindTunnel};
+use crate::error::Problem;
 use crate::estimate::{self, Context, Estimated};
-use crate::lab::simulator::{FlownManeuver, Instrument, Instruments, TrueDerivative};
+use crate::lab::campaign::{RecordNoise, SimulatedCampaign, StudyCondition};
+use crate::lab::simulator::random::derived_seed;
+use crate::lab::simulator::{Card, FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::maneuver::Class;
-use crate::tables::{Residuals, Weights};
 
-/// A maneuver to be recorded many times.
+/// A test point of the study under one condition.
 #[derive(Clone, Debug)]
 pub struct StudyManeuver<'a> {
+    campaign: &'a SimulatedCampaign,
     pub class: &'a Class,
-    pub flown: &'a FlownManeuver,
-    /// Instruments with the noise of each signal.
-    pub instruments: &'a Instruments,
-    pub context: Context<'a>,
+    card: Card,
+    noise: RecordNoise,
+    /// Settings of the estimates.
+    pub settings: estimate::Settings,
+    /// Flight of all records; `None` where each record has its own.
+    common_flight: Option<FlownManeuver>,
 }
 
-/// Noise of the recordings and weights of the estimates; the time constant is that of coloured noise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scenario {
-    pub residuals: Residuals,
-    pub coloured_time_s: f64,
-    pub weights: Weights,
+/// Estimate from one record, with the derivatives that were true in it.
+#[derive(Clone, Debug)]
+pub struct Realisation {
+    pub estimated: Estimated,
+    pub alpha_deg: f64,
+    pub truth: Vec<TrueDerivative>,
 }
 
 /// Tunnel tables that hold given derivatives at every angle of attack.
@@ -44,40 +53,117 @@ pub fn true_tables(derivatives: &[TrueDerivative]) -> WindTunnel {
     tables
 }
 
-impl StudyManeuver<'_> {
-    /// Records the maneuver once and estimates it.
-    pub fn estimate(&self, scenario: Scenario, seed: u64) -> Estimated {
-        let record = self.flown.recorded(&self.noise_only(scenario), seed);
-        let settings = estimate::Settings {
-            weights: scenario.weights,
-            ..self.context.settings.clone()
+/// Settings of the estimates under a condition: the campaign's without uncertainty of held values and
+/// instruments, which the study does not vary.
+fn settings(campaign: &SimulatedCampaign, condition: &StudyCondition) -> estimate::Settings {
+    let own = &campaign.config.estimate;
+    estimate::Settings {
+        held_uncertainty_pct: 0.0,
+        calibration: BTreeMap::new(),
+        weights: condition.weights.unwrap_or(own.weights),
+        ..own.clone()
+    }
+}
+
+impl<'a> StudyManeuver<'a> {
+    /// Prepares a card under a condition; flies it where the air is not random.
+    ///
+    /// # Errors
+    /// The card cannot be flown.
+    pub fn new(
+        campaign: &'a SimulatedCampaign,
+        class: &'a Class,
+        card: &Card,
+        condition: &StudyCondition,
+    ) -> Result<StudyManeuver<'a>, Problem> {
+        let card = Card {
+            condition: condition.flown(),
+            ..card.clone()
         };
-        let context = Context {
-            settings: &settings,
-            ..self.context
+        let common_flight = if card.condition.is_random() {
+            None
+        } else {
+            Some(campaign.simulator.fly(&card)?)
         };
-        estimate::maneuver(&record, &self.flown.maneuver, self.class, &context)
+        Ok(StudyManeuver {
+            campaign,
+            class,
+            card,
+            noise: condition.noise,
+            settings: settings(campaign, condition),
+            common_flight,
+        })
     }
 
-    /// Instruments with the noise of a scenario and no other errors.
-    fn noise_only(&self, scenario: Scenario) -> Instruments {
+    /// Flies the maneuver once, records and estimates it.
+    ///
+    /// # Errors
+    /// The aircraft departs in the air of this seed.
+    pub fn realise(&self, seed: u64) -> Result<Realisation, Problem> {
+        let flown = self.flown(seed)?;
+        let truth = true_tables(&flown.truth);
+        Ok(Realisation {
+            estimated: self.estimate(&flown, &truth, seed),
+            alpha_deg: flown.maneuver.alpha_deg,
+            truth: flown.truth.clone(),
+        })
+    }
+
+    /// Flight of a record.
+    ///
+    /// # Errors
+    /// The aircraft departs in the air of this seed.
+    pub fn flown(&self, seed: u64) -> Result<Cow<'_, FlownManeuver>, Problem> {
+        if let Some(flown) = &self.common_flight {
+            return Ok(Cow::Borrowed(flown));
+        }
+        let card = Card {
+            seed: derived_seed(seed, "air"),
+            ..self.card.clone()
+        };
+        self.campaign.simulator.fly(&card).map(Cow::Owned)
+    }
+
+    /// Records a flight once and estimates it from starting values; held values are true.
+    pub fn estimate(&self, flown: &FlownManeuver, start: &WindTunnel, seed: u64) -> Estimated {
+        let config = &self.campaign.config;
+        let record = flown.recorded(&self.noise_only(), seed);
+        let truth = true_tables(&flown.truth);
+        let context = Context {
+            start,
+            ..Context::new(&config.aircraft, &config.buildup, &truth, &self.settings)
+        };
+        estimate::maneuver(&record, &flown.maneuver, self.class, &context)
+    }
+
+    /// Instruments with the condition's noise and no other errors.
+    fn noise_only(&self) -> Instruments {
         let outputs = self.class.axis.outputs().map(Output::signal);
+        let coloured_time_s = self.campaign.cards.study.coloured_time_s;
         let noise_only = |(signal, instrument): (&String, &Instrument)| {
             let is_output = outputs.contains(&signal.as_str());
             let noise = instrument.noise;
             let perfect = Instrument::default();
-            let instrument = match scenario.residuals {
-                Residuals::Coloured if is_output => Instrument {
+            let instrument = match self.noise {
+                RecordNoise::Coloured if is_output => Instrument {
                     coloured: noise,
-                    coloured_time_s: scenario.coloured_time_s,
+                    coloured_time_s,
                     ..perfect
                 },
-                Residuals::White if is_output => Instrument { noise, ..perfect },
-                Residuals::EveryChannel => Instrument { noise, ..perfect },
-                Residuals::White | Residuals::Coloured => perfect,
+                RecordNoise::White if is_output => Instrument { noise, ..perfect },
+                RecordNoise::EveryChannel => Instrument { noise, ..perfect },
+                RecordNoise::White | RecordNoise::Coloured => perfect,
             };
             (signal.clone(), instrument)
         };
-        Instruments(self.instruments.0.iter().map(noise_only).collect())
+        Instruments(
+            self.campaign
+                .cards
+                .instruments
+                .0
+                .iter()
+                .map(noise_only)
+                .collect(),
+        )
     }
 }

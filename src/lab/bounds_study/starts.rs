@@ -3,11 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::recordings::{Scenario, StudyManeuver, true_tables};
+use super::recordings::{StudyManeuver, true_tables};
 use crate::aero::{Buildup, WindTunnel};
-use crate::estimate::{self, Context, Estimated, Start};
-use crate::lab::simulator::TrueDerivative;
+use crate::error::Problem;
+use crate::estimate::{Estimated, Start};
 use crate::lab::simulator::random::derived_seed;
+use crate::lab::simulator::{FlownManeuver, TrueDerivative};
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, StartRow, StartVariant, StartingValues};
 
@@ -49,48 +50,53 @@ struct Reached {
 }
 
 /// Estimates a maneuver from each kind of starting values: a row per kind.
-#[must_use]
+///
+/// # Errors
+/// The maneuver cannot be flown.
 pub fn starts(
     maneuver: &StudyManeuver,
-    scenario: Scenario,
+    buildup: &Buildup,
     realisations: usize,
     seed: u64,
-) -> Vec<StartRow> {
+) -> Result<Vec<StartRow>, Problem> {
+    let flown = maneuver.flown(seed)?;
+    let mut maneuver = maneuver.clone();
+    maneuver.settings.start = Start::WindTunnel;
     let row = |values: StartVariant| {
-        let reached = reached(maneuver, scenario, values, realisations, seed);
+        let start = start_tables(values, &flown.truth, buildup);
+        let reached = reached(&maneuver, &flown, &start, realisations, seed);
         StartRow {
             class: maneuver.class.name.clone(),
-            alpha_deg: maneuver.flown.maneuver.alpha_deg,
+            alpha_deg: flown.maneuver.alpha_deg,
             start: values,
             records: realisations,
             alone: reached.iter().filter(|r| r.unaided).count(),
             reached: reached.iter().filter(|r| r.same).count(),
         }
     };
-    [
+    Ok([
         StartVariant::Double,
         StartVariant::Half,
         StartVariant::NoSurfaces,
     ]
     .map(row)
-    .into()
+    .into())
 }
 
 fn reached(
     maneuver: &StudyManeuver,
-    scenario: Scenario,
-    values: StartVariant,
+    flown: &FlownManeuver,
+    start: &WindTunnel,
     realisations: usize,
     seed: u64,
 ) -> Vec<Reached> {
-    let truth = true_tables(&maneuver.flown.truth);
-    let start = start_tables(values, &maneuver.flown.truth, maneuver.context.buildup);
+    let truth = true_tables(&flown.truth);
     (0..realisations)
         .into_par_iter()
         .map(|i| {
             let seed = derived_seed(seed, &format!("start {i}"));
-            let reference = estimate_from(maneuver, &truth, scenario, seed);
-            let estimated = estimate_from(maneuver, &start, scenario, seed);
+            let reference = maneuver.estimate(flown, &truth, seed);
+            let estimated = maneuver.estimate(flown, start, seed);
             let same = is_same_minimum(&reference, &estimated);
             Reached {
                 same,
@@ -98,29 +104,6 @@ fn reached(
             }
         })
         .collect()
-}
-
-/// Estimates one record from the values of given tables.
-fn estimate_from(
-    maneuver: &StudyManeuver,
-    start: &WindTunnel,
-    scenario: Scenario,
-    seed: u64,
-) -> Estimated {
-    let settings = estimate::Settings {
-        start: Start::WindTunnel,
-        ..maneuver.context.settings.clone()
-    };
-    let context = Context {
-        settings: &settings,
-        start,
-        ..maneuver.context
-    };
-    StudyManeuver {
-        context,
-        ..maneuver.clone()
-    }
-    .estimate(scenario, seed)
 }
 
 /// Compares two estimates of one record.

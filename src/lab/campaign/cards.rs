@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::study_condition::StudyCondition;
 use crate::lab::simulator::{
     DerivativeLookup, DiscreteGusts, FlightCondition, Instruments, Program, Settings, Turbulence,
 };
@@ -38,7 +39,7 @@ pub struct Cards {
 }
 
 /// Settings of the study of the bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StudySettings {
     /// Number of records of each maneuver.
@@ -47,6 +48,8 @@ pub struct StudySettings {
     pub points: usize,
     /// Time constant of the coloured noise; its standard deviation is that of the white noise.
     pub coloured_time_s: f64,
+    /// Conditions of the study, in the order of its page.
+    pub conditions: Vec<StudyCondition>,
 }
 
 impl Default for StudySettings {
@@ -55,6 +58,7 @@ impl Default for StudySettings {
             realisations: 200,
             points: 3,
             coloured_time_s: 0.5,
+            conditions: Vec::new(),
         }
     }
 }

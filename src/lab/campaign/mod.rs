@@ -4,6 +4,7 @@
 //! The recorder is off between two cards of a flight. The random numbers of a flight follow from the
 //! seed and its name: the same cards give the same bytes for any number of threads.
 
+mod study_condition;
 mod cards;
 mod simulated_campaign;
 mod flights;
@@ -21,6 +22,7 @@ use crate::store::{atomic, files, recorder};
 
 pub use flights::FlownFlight;
 pub use simulated_campaign::SimulatedCampaign;
+pub use study_condition::{RecordNoise, StudyCondition};
 
 /// Flies all cards and writes the campaign into a folder.
 ///

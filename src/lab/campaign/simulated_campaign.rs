@@ -162,12 +162,18 @@ impl SimulatedCampaign {
         Ok(())
     }
 
-    /// Checks air and delays of the flights.
+    /// Checks air and delays of the flights, then those of the study.
     fn check_conditions(&self, source: &Source) -> Result<()> {
         for (flight, card) in &self.cards.flights {
             card.condition(self.cards.derivatives)
                 .check()
                 .map_err(|what| source.error_under("flights", flight, what))?;
+        }
+        for condition in &self.cards.study.conditions {
+            condition
+                .flown()
+                .check()
+                .map_err(|what| source.error_under("study", &condition.name, what))?;
         }
         Ok(())
     }
