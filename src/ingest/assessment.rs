@@ -1,5 +1,5 @@
-//! Assessment of a stretch after all of its channels are read: counts, kinematic relations and
-//! instrument errors.
+//! Assessment of a stretch after all of its channels are read: counts, kinematic relations, gusts
+//! and instrument errors.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -10,8 +10,8 @@ use super::channel::{
     ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel,
 };
 use super::checks::{
-    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, check_relations,
-    confirmed_signals, find_faulty_channels, report,
+    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, check_relations,
+    confirmed_signals, find_faulty_channels, measure_gusts, report,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, Findings, OnFault};
@@ -20,7 +20,7 @@ use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
 use crate::error::Problem;
 use crate::flight::{Channel, Correction, Mark, Record, signal};
-use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, InstrumentRow};
+use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, FlightRow, InstrumentRow};
 
 /// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
 /// that memory does not grow with the record.
@@ -29,6 +29,8 @@ const PART_SAMPLES: usize = 1 << 17;
 /// Results of ingest for one stretch, besides its record.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Assessment {
+    /// Times and gusts; `None` for a rejected stretch.
+    pub flight: Option<FlightRow>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,
@@ -77,7 +79,9 @@ pub fn assess(
         return Err(joined(&faults, flight_id));
     }
     problems.extend(faults);
+    let gusts = measure_gusts(&blocks, context.aircraft, &context.settings.checks);
     Ok(Assessment {
+        flight: Some(flight_row(stretch, &gusts)),
         channels: channel_rows(
             stretch,
             context.channels,
@@ -302,6 +306,21 @@ fn joined(problems: &[Problem], flight_id: &str) -> Problem {
         reason: reasons.join(". "),
     };
     refusal.into_problem(flight_id)
+}
+
+/// Row of the table `flights`.
+fn flight_row(stretch: &Stretch, gusts: &Gusts) -> FlightRow {
+    let clock = &stretch.clock;
+    let [gust_u_ft_s, gust_v_ft_s, gust_w_ft_s] =
+        gusts.0.map(|axis| axis.and_then(|axis| axis.rms_ft_s));
+    FlightRow {
+        flight_id: stretch.flight_id.clone(),
+        start_s: clock.start_s,
+        duration_s: clock.samples.saturating_sub(1) as f64 * clock.step_s,
+        gust_u_ft_s,
+        gust_v_ft_s,
+        gust_w_ft_s,
+    }
 }
 
 /// Rows of the table `channels`: one for each channel read and one for the clock, in the order of

@@ -12,12 +12,14 @@ use crate::aircraft::Aircraft;
 use crate::error::Problem;
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark, RawFlight, Record};
-use crate::tables::{ChannelRow, CheckRow, InstrumentRow};
+use crate::tables::{ChannelRow, CheckRow, FlightRow, InstrumentRow};
 
 /// One stretch of a flight after ingest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ingested {
     pub record: Record,
+    /// Times and gusts.
+    pub flight: Option<FlightRow>,
     /// Repairs of each channel.
     pub channels: Vec<ChannelRow>,
     /// Outcome of each kinematic relation.
@@ -116,6 +118,7 @@ fn ingest_stretch(
         correction.apply(&mut record);
     }
     let Assessment {
+        flight,
         channels,
         checks,
         instruments,
@@ -124,6 +127,7 @@ fn ingest_stretch(
     } = assessment;
     Ok(Ingested {
         record,
+        flight,
         channels,
         checks,
         instruments,

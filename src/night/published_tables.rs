@@ -37,6 +37,7 @@ pub fn publish_tables(
 }
 
 fn publish_ingest(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    table::publish(shelf, &campaign.flight_rows)?;
     table::publish(shelf, &campaign.channels)?;
     table::publish(shelf, &campaign.checks)?;
     table::publish(shelf, &campaign.instruments)

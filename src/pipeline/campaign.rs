@@ -13,8 +13,8 @@ use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
-    EventRow, ExtrapolationRow, FitRow, InstrumentRow, ManeuverComparisonRow, OutlierRow,
-    PredictionRow, TrendRow, VerdictRow,
+    EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, ManeuverComparisonRow,
+    OutlierRow, PredictionRow, TrendRow, VerdictRow,
 };
 
 /// A flight, maneuver or group whose artefact the store lacks.
@@ -62,6 +62,8 @@ pub struct Campaign {
     /// Flights that could not be read this time, with the reason.
     pub unread: BTreeMap<String, String>,
     pub repeated_rows: Vec<RepeatedRows>,
+    /// Times and gusts of the accepted flights.
+    pub flight_rows: Vec<FlightRow>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,

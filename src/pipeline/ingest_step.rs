@@ -49,7 +49,7 @@ impl<'a> Step for IngestStep<'a> {
     type Artefact = IngestedFlight;
 
     const KIND: Kind = Kind::Ingest;
-    const VERSION: u32 = 10;
+    const VERSION: u32 = 11;
 
     fn item(&self) -> &str {
         &self.files.flight_id
@@ -214,6 +214,7 @@ fn collect_rows(campaign: &mut Campaign) {
     let mut failed = Vec::new();
     for flight in &campaign.flights {
         let found = &flight.ingested.assessment;
+        campaign.flight_rows.extend(found.flight.clone());
         campaign.channels.extend_from_slice(&found.channels);
         campaign.checks.extend_from_slice(&found.checks);
         campaign.instruments.extend_from_slice(&found.instruments);

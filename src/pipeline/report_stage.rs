@@ -73,6 +73,7 @@ pub fn make_report(
         limits: &config.estimate.identifiability,
         trends: &campaign.trends,
         comparison: &campaign.comparison,
+        flights: &campaign.flight_rows,
         channels: &campaign.channels,
         checks: &campaign.checks,
         instruments: &campaign.instruments,

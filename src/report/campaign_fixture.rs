@@ -11,8 +11,8 @@ use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
     ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow, CorrelationRow, EstimateRow,
-    EventRow, EventVerdict, FitRow, History, HistoryOutput, InstrumentRow, Outcome, PredictionRow,
-    TrendRow, TunnelDifference, TunnelVerdict,
+    EventRow, EventVerdict, FitRow, FlightRow, History, HistoryOutput, InstrumentRow, Outcome,
+    PredictionRow, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -26,6 +26,7 @@ pub struct Campaign {
     pub limits: Limits,
     pub trends: Vec<TrendRow>,
     pub comparison: Vec<ComparisonRow>,
+    pub flights: Vec<FlightRow>,
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,
@@ -54,6 +55,7 @@ impl Campaign {
             limits: &self.limits,
             trends: &self.trends,
             comparison: &self.comparison,
+            flights: &self.flights,
             channels: &self.channels,
             checks: &self.checks,
             instruments: &self.instruments,
@@ -130,6 +132,14 @@ pub fn campaign() -> Campaign {
         slope: Some(-1.0),
         correlation: None,
         verdict: CheckVerdict::WrongSign,
+    });
+    campaign.flights.push(FlightRow {
+        flight_id: "flight_1".into(),
+        start_s: 0.0,
+        duration_s: 1500.0,
+        gust_u_ft_s: None,
+        gust_v_ft_s: Some(6.62),
+        gust_w_ft_s: Some(0.3),
     });
     campaign.channels.push(ChannelRow {
         flight_id: "1".into(),

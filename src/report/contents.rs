@@ -9,8 +9,8 @@ use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, History,
-    InstrumentRow, PredictionRow, TrendRow,
+    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, FlightRow,
+    History, InstrumentRow, PredictionRow, TrendRow,
 };
 
 /// A maneuver class of the configuration.
@@ -40,6 +40,7 @@ pub struct Contents<'a> {
     pub limits: &'a Limits,
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
+    pub flights: &'a [FlightRow],
     pub channels: &'a [ChannelRow],
     pub checks: &'a [CheckRow],
     pub instruments: &'a [InstrumentRow],

@@ -1,6 +1,29 @@
-//! Tables of flights: channels, relations between channels, instruments, events.
+//! Tables of flights: times and gusts, channels, relations between channels, instruments, events.
 
 use crate::schema::{table, words};
+
+table! {
+    /// Flights that ingest accepted, with the gusts of each.
+    ///
+    /// The gusts are the difference between the motion through the air and the inertial motion,
+    /// without what changes more slowly than in some eight seconds. In still air, imperfections of
+    /// the instruments appear as gusts of up to half a foot per second.
+    pub struct FlightRow in "flights" per "flight" {
+        /// Flight, or stretch of a flight.
+        pub flight_id: String,
+        /// First sample.
+        pub start_s: f64 ["s"],
+        /// Time from the first sample to the last.
+        pub duration_s: f64 ["s"],
+        /// Gusts along the body's forward axis, root mean square; empty for a short flight, as in
+        /// the two columns that follow.
+        pub gust_u_ft_s: Option<f64> ["ft/s"],
+        /// Gusts to the side, root mean square.
+        pub gust_v_ft_s: Option<f64> ["ft/s"],
+        /// Gusts along the body's downward axis, root mean square.
+        pub gust_w_ft_s: Option<f64> ["ft/s"],
+    }
+}
 
 table! {
     /// Repairs of the channels, and their verdicts.
@@ -73,7 +96,8 @@ table! {
         /// Signals of the relation, separated by spaces.
         pub signals: String,
         /// Least-squares slope of the measured side on the side predicted from the other signals:
-        /// 1 where units and signs are right.
+        /// 1 where units and signs are right. Of the side force against side gusts, the aircraft's side
+        /// force by sideslip over −0.6 per rad.
         pub slope: Option<f64> ["1"],
         /// Correlation of the two sides.
         pub correlation: Option<f64> ["1"],

@@ -27,7 +27,7 @@ pub use estimates::{
 pub use export::ExportRow;
 pub use flights::{
     ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict,
-    InstrumentRow, InstrumentVerdict,
+    FlightRow, InstrumentRow, InstrumentVerdict,
 };
 pub use history::{History, HistoryOutput};
 pub use page::page;

@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::{
     ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, CorrelationRow, CoverageRow,
-    DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, InstrumentRow,
-    JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow, StartRow, TrendRow,
-    VerdictRow,
+    DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, FlightRow,
+    InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow,
+    StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -75,6 +75,7 @@ pub fn page() -> String {
     table::<ChangeRow>(&mut page);
     table::<ExtrapolationRow>(&mut page);
     table::<ExportRow>(&mut page);
+    table::<FlightRow>(&mut page);
     table::<ChannelRow>(&mut page);
     table::<CheckRow>(&mut page);
     table::<InstrumentRow>(&mut page);

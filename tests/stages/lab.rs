@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::support::{Campaign, Row, files, harvest, number, run, table};
 
 /// The cards of the shipped campaign with other flights.
-fn cards(flights: &str) -> String {
+pub fn cards(flights: &str) -> String {
     let shipped = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     let (head, _) = shipped.split_once("\nflights:\n").unwrap();
     format!("{head}\nflights:\n{flights}\n")

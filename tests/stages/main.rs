@@ -29,3 +29,4 @@ mod sources;
 mod support;
 mod surfaces;
 mod trend;
+mod weather;

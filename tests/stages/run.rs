@@ -13,6 +13,11 @@ use crate::support::{Campaign, demo, files, flight, pitch_steps, run, yaw_and_ro
 const PUBLISHED: &[(&str, &str, &str)] = &[
     (
         "ingest",
+        "flights",
+        "flight_id start_s duration_s gust_u_ft_s gust_v_ft_s gust_w_ft_s",
+    ),
+    (
+        "ingest",
         "channels",
         "flight_id channel signal samples bridged despiked missing verdict",
     ),

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::block_means::BlockMeans;
-use super::relations::{self, Relation, Selection};
+use super::gusts::Gusts;
+use super::relations::{self, GustEffect, Relation, Selection};
 use super::windows::{WindowPair, window_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
@@ -17,6 +18,13 @@ const LEAST_SELECTED: usize = 5;
 /// Distance of a window from the line through all windows, in robust standard deviations, from
 /// which it holds a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
+
+/// Least change of the gusts' velocity with which a relation that they excite is checked, ft/s²:
+/// that of turbulence of 1 ft/s, ten times what still air appears to have.
+const LEAST_GUST_FT_S2: f64 = 0.75;
+
+/// The same distance for a relation that gusts excite: from there on it holds a motion of a control.
+const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Error of a relation that biases may cause, as a share of the level from which it counts as
 /// excited. The levels of [`crate::ingest::Excitation`] are twice that error.
@@ -63,19 +71,45 @@ pub struct Fit {
 
 /// Checks all relations whose signals the record has.
 pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
-    let has_signals = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
-    let relations: Vec<Relation> = relations::all(settings)
-        .into_iter()
-        .filter(has_signals)
-        .collect();
-    let pairs = window_pairs(&relations, blocks, aircraft, settings);
+    let Sides { relations, windows } = Sides::of(blocks, aircraft, settings);
+    let gusts = Gusts::of(&relations, &windows, settings.window_s);
     let windows: Vec<RelationWindows> = relations
         .into_iter()
-        .zip(pairs)
-        .map(|(relation, pairs)| RelationWindows::of(relation, pairs, settings))
+        .zip(windows)
+        .map(|(relation, pairs)| RelationWindows::of(relation, pairs, &gusts, settings))
         .collect();
-    let jumped: BTreeSet<usize> = windows.iter().flat_map(|w| &w.jumps).copied().collect();
+    // A relation that gusts excite takes a maneuver for a jump.
+    let jumped: BTreeSet<usize> = windows
+        .iter()
+        .filter(|w| w.relation.gusts != GustEffect::Excite)
+        .flat_map(|w| &w.jumps)
+        .copied()
+        .collect();
     windows.iter().map(|w| w.check(&jumped, settings)).collect()
+}
+
+/// Gusts of a record.
+pub fn measure_gusts(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Gusts {
+    let Sides { relations, windows } = Sides::of(blocks, aircraft, settings);
+    Gusts::of(&relations, &windows, settings.window_s)
+}
+
+/// Relations whose signals a record has, with their sides in every window.
+struct Sides {
+    relations: Vec<Relation>,
+    windows: Vec<Vec<WindowPair>>,
+}
+
+impl Sides {
+    fn of(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Sides {
+        let has_signals = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
+        let relations: Vec<Relation> = relations::all(settings)
+            .into_iter()
+            .filter(has_signals)
+            .collect();
+        let windows = window_pairs(&relations, blocks, aircraft, settings);
+        Sides { relations, windows }
+    }
 }
 
 /// Signals that some relation confirms.
@@ -91,16 +125,46 @@ struct RelationWindows {
     pairs: Vec<WindowPair>,
     /// Numbers of the windows in which the record jumps.
     jumps: Vec<usize>,
+    disturbance: Disturbance,
+}
+
+/// Disturbance of a relation by gusts, in the unit of its sides.
+#[derive(Clone, Copy, Debug, Default)]
+struct Disturbance {
+    /// Root mean square of the gusts on the measured side.
+    gust: f64,
+    /// Root mean square of the predicted side that may be the aircraft's response to gusts.
+    response: f64,
+}
+
+impl Disturbance {
+    /// Error of a slope that gusts may cause. The response correlates with the gust, at most
+    /// entirely (Cauchy and Schwarz), and no number of windows averages it out.
+    fn slope_error(self, predicted_rms: f64) -> f64 {
+        self.gust * self.response.min(predicted_rms) / (predicted_rms * predicted_rms)
+    }
 }
 
 impl RelationWindows {
-    fn of(relation: Relation, pairs: Vec<WindowPair>, settings: &Checks) -> RelationWindows {
-        let pairs = select_excited(&relation, pairs, settings);
+    fn of(
+        relation: Relation,
+        pairs: Vec<WindowPair>,
+        gusts: &Gusts,
+        settings: &Checks,
+    ) -> RelationWindows {
+        let disturbance = disturbance(&relation, &pairs, gusts);
+        let is_blown = gusts.largest_change_ft_s2() > LEAST_GUST_FT_S2;
+        let pairs = if relation.gusts == GustEffect::Excite && !is_blown {
+            Vec::new()
+        } else {
+            select_excited(&relation, pairs, settings)
+        };
         let jumps = find_jumps(&relation, &pairs, settings);
         RelationWindows {
             relation,
             pairs,
             jumps,
+            disturbance,
         }
     }
 
@@ -129,7 +193,7 @@ impl RelationWindows {
         // A side of nothing but zeros has no slope. Where the other side exceeds a level, its
         // channel is dead.
         let verdict = match (fit, self.relation.selection) {
-            (Some(fit), _) => verdict_of(&fit, &self.relation, settings),
+            (Some(fit), _) => verdict_of(&fit, &self.relation, self.disturbance, settings),
             (None, Selection::Above(_)) if is_excited => CheckVerdict::DoesNotAgree,
             (None, _) => CheckVerdict::NotExcited,
         };
@@ -140,6 +204,31 @@ impl RelationWindows {
             jumps: self.jumps.len(),
         }
     }
+}
+
+/// Disturbance of a relation by the gusts of a flight; `pairs` are all its windows.
+///
+/// Most windows are quiet, so the predicted side moves in them as the aircraft responds to gusts.
+/// Where the largest windows are selected they may be those of the strongest gusts: all of their
+/// motion counts as response.
+fn disturbance(relation: &Relation, pairs: &[WindowPair], gusts: &Gusts) -> Disturbance {
+    let Some((_, per_ft_s2)) = relation.disturbed_by_gusts() else {
+        return Disturbance::default();
+    };
+    let response = match relation.selection {
+        Selection::Above(_) => spread(pairs.iter().map(|p| p.predicted)),
+        Selection::Largest { .. } => f64::INFINITY,
+    };
+    Disturbance {
+        gust: per_ft_s2 * gusts.largest_change_ft_s2(),
+        response,
+    }
+}
+
+/// Robust standard deviation.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let middle = upper_median(values.clone()).unwrap_or_default();
+    SIGMA_PER_MAD * upper_median(values.map(|v| (v - middle).abs())).unwrap_or_default()
 }
 
 /// Selects the windows in which a relation is excited. Where they are the largest of the predicted
@@ -181,7 +270,12 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
     let distance =
         |p: &WindowPair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
     let spread = SIGMA_PER_MAD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
-    let limit = (JUMP_DEVIATIONS * spread).max(relation.selection.level());
+    let limit = match relation.gusts {
+        GustEffect::Excite => MANEUVER_DEVIATIONS * spread,
+        GustEffect::Slight | GustEffect::Disturb { .. } => {
+            (JUMP_DEVIATIONS * spread).max(relation.selection.level())
+        }
+    };
     let jumps: Vec<usize> = pairs
         .iter()
         .filter(|p| distance(p) > limit)
@@ -243,20 +337,27 @@ fn sum(pairs: &[WindowPair], term: impl Fn(f64, f64) -> f64) -> f64 {
 }
 
 /// Verdict on a fit. It needs the slope to be wrong by several standard errors and by more than
-/// biases can make it. Correlation counts only where windows are selected by a level that noise does
-/// not reach.
-fn verdict_of(fit: &Fit, relation: &Relation, settings: &Checks) -> CheckVerdict {
+/// biases and gusts can make it. Correlation counts only where windows are selected by a level that
+/// neither noise nor gusts reach.
+fn verdict_of(
+    fit: &Fit,
+    relation: &Relation,
+    disturbance: Disturbance,
+    settings: &Checks,
+) -> CheckVerdict {
     let bias = BIAS_SHARE * relation.selection.level() / fit.predicted_rms;
-    let margin = settings.standard_errors * fit.standard_error + bias;
+    let gusts = disturbance.slope_error(fit.predicted_rms);
+    let margin = settings.standard_errors * fit.standard_error + bias + gusts;
     let (low, high) = (fit.slope - margin, fit.slope + margin);
-    let by_level = matches!(relation.selection, Selection::Above(_));
+    let by_level =
+        matches!(relation.selection, Selection::Above(level) if disturbance.gust < level);
     if by_level && fit.correlation.abs() < relation.correlation {
         CheckVerdict::DoesNotAgree
     } else if high < 0.0 {
         CheckVerdict::WrongSign
     } else if fit.slope < 0.0 {
         CheckVerdict::NotExcited
-    } else if low > settings.slope_factor || high < 1.0 / settings.slope_factor {
+    } else if low > relation.slope_factor || high < 1.0 / relation.slope_factor {
         CheckVerdict::WrongScale
     } else if low <= 0.0 {
         CheckVerdict::NotExcited
@@ -269,7 +370,8 @@ fn verdict_of(fit: &Fit, relation: &Relation, settings: &Checks) -> CheckVerdict
 mod tests {
     use super::*;
 
-    fn verdict(
+    fn verdict_in(
+        disturbance: Disturbance,
         selection: Selection,
         slope: f64,
         standard_error: f64,
@@ -290,8 +392,36 @@ mod tests {
                 misfit: 0.1,
             },
             &relation,
+            disturbance,
             &settings,
         )
+    }
+
+    fn verdict(
+        selection: Selection,
+        slope: f64,
+        standard_error: f64,
+        correlation: f64,
+    ) -> CheckVerdict {
+        let still = Disturbance::default();
+        verdict_in(still, selection, slope, standard_error, correlation)
+    }
+
+    #[test]
+    fn a_slope_that_gusts_may_make_is_no_fault_and_a_larger_error_is() {
+        let gusts = |gust, response| Disturbance { gust, response };
+        let level = Selection::Above(1.0);
+        // The predicted side has an rms of 10: gusts of 20 turn its slope by 2 at most.
+        let weak = gusts(20.0, f64::INFINITY);
+        let of = |slope| verdict_in(weak, level, slope, 0.01, -0.1);
+        assert_eq!(of(-1.0), CheckVerdict::NotExcited);
+        assert_eq!(of(-9.8), CheckVerdict::WrongSign);
+        assert_eq!(of(9.8), CheckVerdict::WrongScale);
+        // Of the predicted side a tenth is response to gusts: they turn the slope by 0.2.
+        let strong = |slope| verdict_in(gusts(20.0, 1.0), level, slope, 0.01, 0.4);
+        assert_eq!(strong(-1.0), CheckVerdict::WrongSign);
+        assert_eq!(strong(1.0), CheckVerdict::Ok);
+        assert_eq!(verdict(level, 1.0, 0.01, 0.4), CheckVerdict::DoesNotAgree);
     }
 
     #[test]
@@ -384,6 +514,7 @@ mod tests {
                 } else {
                     pairs(&sides)
                 },
+                &Gusts::default(),
                 &settings,
             )
         };

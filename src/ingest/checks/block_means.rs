@@ -25,6 +25,7 @@ const USED: &[&str] = &[
     signal::AX,
     signal::AY,
     signal::QBAR,
+    signal::MASS,
     signal::X_CG,
     signal::Y_CG,
     signal::Z_CG,

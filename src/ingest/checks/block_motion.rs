@@ -32,6 +32,8 @@ pub struct BlockMotion {
     pub ay: f64,
     pub mach: f64,
     pub qbar: f64,
+    /// Side force that the lateral accelerometer reads, over dynamic pressure and wing area.
+    pub side_force: f64,
     /// Standard atmosphere at the altitude.
     pub air: Air,
     /// Arms from the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and
@@ -71,6 +73,7 @@ impl BlockMotion {
         let (sin_beta, cos_beta) = flow.beta.sin_cos();
         let (theta, phi) = (angle(signal::THETA), angle(signal::PHI));
         let altitude = mean(signal::ALTITUDE);
+        let qbar = mean(signal::QBAR);
         Some(BlockMotion {
             rates,
             theta,
@@ -88,7 +91,9 @@ impl BlockMotion {
             ax: mean(signal::AX),
             ay: mean(signal::AY),
             mach: mean(signal::MACH),
-            qbar: mean(signal::QBAR),
+            qbar,
+            side_force: mean(signal::MASS) * mean(signal::AY) * G0_FT_S2
+                / (qbar * aircraft.wing_area_ft2),
             air: air(altitude),
             arms: [sensors.an.arm(cg), sensors.ax.arm(cg), sensors.ay.arm(cg)],
         })

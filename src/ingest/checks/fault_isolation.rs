@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::agreement::{Check, check_relations, confirmed_signals};
 use super::block_means::BlockMeans;
-use super::relations;
+use super::relations::{self, GustEffect};
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, signal};
 use crate::ingest::settings::Checks;
@@ -191,11 +191,13 @@ impl<'a> Isolation<'a> {
         trials
     }
 
-    /// Recorded channels in a failed relation.
+    /// Recorded channels in a failed relation. The mass is in one relation only, so nothing could
+    /// tell its fault from one of the accelerometer beside it: it is not suspected.
     fn suspects(&self, checks: &[Check]) -> Vec<(&'a str, &'a Channel)> {
-        let is_suspect = |signal: &str| {
-            self.is_recorded(signal)
-                && failed(checks).any(|check| check.relation.signals.contains(&signal))
+        let is_suspect = |name: &str| {
+            name != signal::MASS
+                && self.is_recorded(name)
+                && failed(checks).any(|check| check.relation.signals.contains(&name))
         };
         let suspects = self.channels.iter().filter(|(_, c)| is_suspect(&c.signal));
         suspects.map(|(name, c)| (name.as_str(), c)).collect()
@@ -306,8 +308,11 @@ fn corrections(channel: &Channel) -> Vec<(f64, String)> {
 
 /// Number of relations that fail, or that are no longer excited though they were before.
 fn failures(checks: &[Check], before: &[Check]) -> usize {
+    // A faulty channel may look like gusts, so one that gusts excite may fall silent.
     let is_silenced = |c: &Check, b: &Check| {
-        c.verdict == CheckVerdict::NotExcited && b.verdict != CheckVerdict::NotExcited
+        c.relation.gusts != GustEffect::Excite
+            && c.verdict == CheckVerdict::NotExcited
+            && b.verdict != CheckVerdict::NotExcited
     };
     checks
         .iter()

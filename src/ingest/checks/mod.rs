@@ -4,11 +4,13 @@ mod agreement;
 mod block_means;
 mod block_motion;
 mod fault_isolation;
+mod gusts;
 mod relations;
 mod windows;
 
-pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
+pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals, measure_gusts};
 pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};
 pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,
 };
+pub(in crate::ingest) use gusts::Gusts;

@@ -8,6 +8,12 @@
 //! - θ̇ = q cos φ − r sin φ, φ̇ = p + tan θ (q sin φ + r cos φ), ψ̇ = (q sin φ + r cos φ)/cos θ
 //! - v̇ + ω × v − g = f at the c.g.; a sensor adds the acceleration of its arm
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ, q̄ = ρ V²/2, M = V/a
+//!
+//! `v` is relative to the air, so its rate contains the gusts', and `f` the aircraft's response to
+//! them. `f` and what follows from it is the predicted side, which noise must not disturb.
+//!
+//! One relation is not kinematic, because a fighter's lateral acceleration is lost among gusts: the
+//! side force that a gust causes opposes the sideslip that it makes.
 
 use super::block_motion::BlockMotion;
 use crate::flight::signal as s;
@@ -31,6 +37,24 @@ impl Selection {
             Selection::Above(level) | Selection::Largest { level, .. } => level,
         }
     }
+}
+
+/// Number of body axes: forward, right, down.
+pub const BODY_AXES: usize = 3;
+
+/// Effect of gusts on a relation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GustEffect {
+    /// Both sides feel the gusts alike, or hardly.
+    Slight,
+    /// Gusts along a body axis disturb the measured side.
+    Disturb {
+        axis: usize,
+        /// Unit of the sides per ft/s².
+        per_ft_s2: f64,
+    },
+    /// Gusts excite the relation; without them it is not checked.
+    Excite,
 }
 
 /// A quantity of the motion in one block.
@@ -58,12 +82,23 @@ pub struct Relation {
     pub selection: Selection,
     /// Least correlation that counts as agreement.
     pub correlation: f64,
+    /// Largest factor between the slope and one.
+    pub slope_factor: f64,
+    pub gusts: GustEffect,
 }
 
 impl Relation {
     /// Signals that the relation confirms when it holds.
     pub fn dominant(&self) -> &'static [&'static str] {
         self.signals.get(..self.dominant).unwrap_or(self.signals)
+    }
+
+    /// Body axis whose gusts disturb the measured side, and the sides' unit per ft/s².
+    pub fn disturbed_by_gusts(&self) -> Option<(usize, f64)> {
+        match self.gusts {
+            GustEffect::Disturb { axis, per_ft_s2 } => Some((axis, per_ft_s2)),
+            GustEffect::Slight | GustEffect::Excite => None,
+        }
     }
 }
 
@@ -94,6 +129,7 @@ pub fn all(settings: &Checks) -> Vec<Relation> {
     relations.extend(accelerations(settings));
     relations.extend(velocities(settings));
     relations.extend(air_data(settings));
+    relations.push(side_force());
     relations
 }
 
@@ -108,6 +144,8 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
         unit: DEG,
         selection,
         correlation: settings.least_attitude_correlation,
+        slope_factor: settings.slope_factor,
+        gusts: GustEffect::Slight,
     };
     vec![
         relation(
@@ -132,7 +170,7 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
 }
 
 fn accelerations(settings: &Checks) -> Vec<Relation> {
-    let relation = |name, signals, measured, predicted, selection| Relation {
+    let relation = |axis, name, signals, measured, predicted, selection| Relation {
         name,
         signals,
         dominant: 1,
@@ -141,10 +179,16 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         unit: 1.0,
         selection,
         correlation: settings.least_correlation,
+        slope_factor: settings.slope_factor,
+        gusts: GustEffect::Disturb {
+            axis,
+            per_ft_s2: 1.0 / G0_FT_S2,
+        },
     };
     vec![
         relation(
-            "normal acceleration against the motion",
+            2,
+            "normal acceleration of the motion against an",
             &[
                 s::AN,
                 s::THETA,
@@ -155,15 +199,16 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
                 s::BETA_VANE,
                 s::VELOCITY,
             ],
-            integral(|m| m.an),
             both(
                 |m| -(m.uvw[2] + m.arm_velocity(m.arms[0])[2]) / G0_FT_S2,
                 |m| -(m.turning_acceleration()[2] + m.centripetal(m.arms[0])[2]) / G0_FT_S2,
             ),
+            integral(|m| m.an),
             Selection::Above(settings.excitation.normal_g),
         ),
         relation(
-            "axial acceleration against the motion",
+            0,
+            "axial acceleration of the motion against ax",
             &[
                 s::AX,
                 s::THETA,
@@ -173,15 +218,15 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
                 s::BETA_VANE,
                 s::VELOCITY,
             ],
-            integral(|m| m.ax),
             both(
                 |m| (m.uvw[0] + m.arm_velocity(m.arms[1])[0]) / G0_FT_S2,
                 |m| (m.turning_acceleration()[0] + m.centripetal(m.arms[1])[0]) / G0_FT_S2,
             ),
+            integral(|m| m.ax),
             Selection::Above(settings.excitation.axial_g),
         ),
-        // The sensor is far less noisy than the motion here, so it is the predicted side.
         relation(
+            1,
             "lateral acceleration of the motion against ay",
             &[
                 s::AY,
@@ -208,7 +253,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
 
 fn velocities(settings: &Checks) -> Vec<Relation> {
     let selection = Selection::Above(settings.excitation.velocity_ft_s2);
-    let relation = |name, signals, dominant, measured, predicted| Relation {
+    let relation = |axis, name, signals, dominant, measured, predicted| Relation {
         name,
         signals,
         dominant,
@@ -217,9 +262,15 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         unit: 1.0,
         selection,
         correlation: settings.least_correlation,
+        slope_factor: settings.slope_factor,
+        gusts: GustEffect::Disturb {
+            axis,
+            per_ft_s2: 1.0,
+        },
     };
     vec![
         relation(
+            0,
             "forward velocity against ax and theta",
             &[
                 s::VELOCITY,
@@ -235,6 +286,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
             integral(|m| m.specific_force()[0] - m.turning_acceleration()[0]),
         ),
         relation(
+            1,
             "side velocity against r, p and phi",
             &[
                 s::BETA_VANE,
@@ -251,6 +303,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
             integral(|m| m.specific_force()[1] - m.turning_acceleration()[1]),
         ),
         relation(
+            2,
             "downward velocity against q and an",
             &[
                 s::ALPHA_VANE,
@@ -279,6 +332,8 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
         unit: 1.0,
         selection,
         correlation: settings.least_correlation,
+        slope_factor: settings.slope_factor,
+        gusts: GustEffect::Slight,
     };
     vec![
         relation(
@@ -313,4 +368,45 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
             Selection::Above(settings.excitation.mach),
         ),
     ]
+}
+
+/// Side force by sideslip, per rad, of wing area: the geometric middle of aircraft (Roskam, *Airplane
+/// Flight Dynamics*: −0.2 to −1.5).
+const TYPICAL_CY_BETA: f64 = -0.6;
+
+/// Largest factor between the side force by sideslip of an aircraft and the typical one.
+const CY_BETA_FACTOR: f64 = 4.0;
+
+/// Least rate of sideslip, deg/s: twice what an error of 0.2 deg in bank makes at 400 ft/s.
+const SIDESLIP_DEG_S: f64 = 0.03;
+
+/// Side force against the sideslip that gusts make. The predicted side is the lateral acceleration of
+/// the motion over V: in gusts it is the gusts', to which no control of the aircraft contributes.
+fn side_force() -> Relation {
+    Relation {
+        name: "side force against side gusts",
+        signals: &[
+            s::AY,
+            s::BETA_VANE,
+            s::R,
+            s::PHI,
+            s::P,
+            s::THETA,
+            s::ALPHA_VANE,
+            s::VELOCITY,
+            s::QBAR,
+            s::MASS,
+        ],
+        dominant: 1,
+        measured: change(|m| m.side_force / TYPICAL_CY_BETA),
+        predicted: both(
+            |m| (m.uvw[1] + m.arm_velocity(m.arms[2])[1]) / m.velocity,
+            |m| (m.turning_acceleration()[1] + m.centripetal(m.arms[2])[1]) / m.velocity,
+        ),
+        unit: DEG,
+        selection: Selection::Above(SIDESLIP_DEG_S),
+        correlation: 0.0,
+        slope_factor: CY_BETA_FACTOR,
+        gusts: GustEffect::Excite,
+    }
 }

@@ -1,4 +1,4 @@
-//! Tables of failures and their reasons: problems, fits, events, checks between channels,
+//! Tables of failures and their reasons: problems, fits, events, checks between channels, turbulence,
 //! instruments, repaired channels.
 
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use crate::report::notation::{NOTHING, angle, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::schema::Words;
 use crate::tables::{
-    ALL_FLIGHTS, ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, InstrumentRow,
+    ALL_FLIGHTS, ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, FlightRow, InstrumentRow,
     InstrumentVerdict, Outcome,
 };
 
@@ -22,6 +22,7 @@ pub fn tables(contents: &Contents) -> Vec<TableView> {
         fits(contents),
         events(contents),
         checks(contents),
+        flights(contents),
         instruments(contents),
         channels(contents),
     ];
@@ -152,6 +153,38 @@ fn checks(contents: &Contents) -> TableView {
     let note = "Slope of the measured signal on its prediction from the other signals: 1 when \
                 units and signs are right.";
     TableView::new("Checks between channels that failed", note, &heads, rows)
+}
+
+/// Gusts of each flight.
+fn flights(contents: &Contents) -> TableView {
+    let row = |f: &FlightRow| {
+        let maneuvers = contents.maneuvers.iter();
+        let count = maneuvers.filter(|m| m.flight_id == f.flight_id).count();
+        vec![
+            f.flight_id.clone(),
+            fixed(f.duration_s / 60.0, 1),
+            count.to_string(),
+            gust(f.gust_u_ft_s),
+            gust(f.gust_v_ft_s),
+            gust(f.gust_w_ft_s),
+        ]
+    };
+    let rows = contents.flights.iter().map(row).collect();
+    let heads = [
+        "flight",
+        "minutes",
+        "maneuvers",
+        "gusts forward, ft/s",
+        "sideways, ft/s",
+        "downward, ft/s",
+    ];
+    let note = "Root mean square of the gusts along the body axes; up to half a foot per second is the \
+                instruments' own.";
+    TableView::new("Flights and their turbulence", note, &heads, rows)
+}
+
+fn gust(rms_ft_s: Option<f64>) -> String {
+    rms_ft_s.map_or_else(|| NOTHING.to_owned(), |rms| fixed(rms, 1))
 }
 
 /// Calibration errors of the instruments, summarised over the flights.
