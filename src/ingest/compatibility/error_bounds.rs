@@ -1,10 +1,10 @@
-//! Standard deviations of the instruments' errors: from the information and from the scatter
-//! between windows, and those that a fault is compared with.
+//! Standard deviations of the instruments' errors: from the information, from the scatter between
+//! windows, and from gusts.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::joint_state::JointState;
-use super::parameters::{INPUTS, Kind, OUTPUTS, Parameters, place};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
 use super::window::{Window, input_factor};
 use super::window_fit::squares_about_mean;
 use crate::numerics::student;
@@ -19,21 +19,39 @@ const GUST_RESPONSE: f64 = 0.5;
 
 impl JointState<'_> {
     /// Standard deviations of the shared parameters: of the information or of the scatter between
-    /// windows, whichever is larger.
+    /// windows, whichever is larger, with the effects of gusts and of the equations' own error.
     pub fn bounds(&self, windows: &[Window]) -> Option<Parameters> {
         let inverse = self.inverse(&self.information())?;
         let jackknife = self.jackknife();
-        let mut bounds = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]).sqrt());
+        let mut variances = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]));
         for (i, ratio) in turning_over_force(windows).into_iter().enumerate() {
             let j = place(FIRST_ACCELEROMETER + i, Kind::Scale);
-            bounds[j] = bounds[j].hypot(MODEL_SCALE * ratio);
+            variances[j] += (MODEL_SCALE * ratio).powi(2);
         }
-        Some(bounds)
+        self.add_gust_errors(&inverse, &mut variances);
+        Some(variances.map(f64::sqrt))
     }
 
-    /// The bounds with the effect of gusts on the scale of an output.
-    pub fn fault_bounds(&self, bounds: &Parameters) -> Parameters {
-        let mut wider = *bounds;
+    /// Adds the variances that [`Self::gust_errors`] cause. An error of one parameter moves the
+    /// others by their regression on it.
+    fn add_gust_errors(&self, inverse: &DMatrix<f64>, variances: &mut Parameters) {
+        for (scale, error) in self.gust_errors().into_iter().enumerate() {
+            let own = inverse[(scale, scale)];
+            if error > 0.0 && own > 0.0 {
+                // The prior holds the rest of the error back.
+                let data_share = 1.0 - own / self.prior[scale].powi(2);
+                for (j, variance) in variances.iter_mut().enumerate() {
+                    *variance += (data_share * error * inverse[(j, scale)] / own).powi(2);
+                }
+            }
+        }
+    }
+
+    /// Errors of the outputs' scales that gusts cause; zero for the other parameters. The aircraft
+    /// turns into a gust, so the gusts correlate with the motion, and no number of windows averages
+    /// that out.
+    pub fn gust_errors(&self) -> Parameters {
+        let mut errors = [0.0; PARAMETERS];
         for output in 0..OUTPUTS {
             let (mut residuals, mut motion) = (0.0, 0.0);
             for window in &self.windows {
@@ -41,12 +59,12 @@ impl JointState<'_> {
                 residuals += slow;
                 motion += moved;
             }
-            let j = place(INPUTS + output, Kind::Scale);
             if motion > 0.0 {
-                wider[j] = wider[j].hypot(GUST_RESPONSE * (residuals / motion).sqrt());
+                let j = place(INPUTS + output, Kind::Scale);
+                errors[j] = GUST_RESPONSE * (residuals / motion).sqrt();
             }
         }
-        wider
+        errors
     }
 
     /// Variances of the shared parameters from the scatter between windows: each left out in turn.

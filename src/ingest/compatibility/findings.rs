@@ -200,8 +200,7 @@ fn estimate(
     }
     let bound = errors.bounds[j].hypot(model);
     let limit = settings.faulty.of(instrument, kind);
-    let surely =
-        settings.standard_errors_of_fault(kind, value) * errors.fault_bounds[j].hypot(model);
+    let surely = settings.standard_errors_of_fault(kind, value) * bound;
     let fault = value.abs() > limit && value.abs() > surely;
     let action = match kind {
         Kind::Bias => settings.bias,
@@ -335,12 +334,11 @@ mod tests {
     use super::*;
 
     /// Estimate of the first vane's error of a kind.
-    fn estimated(kind: Kind, value: f64, bound: f64, fault_bound: f64) -> ErrorEstimate {
+    fn estimated(kind: Kind, value: f64, bound: f64) -> ErrorEstimate {
         let j = place(6, kind);
         let mut errors = FittedErrors {
             values: [0.0; PARAMETERS],
             bounds: [bound; PARAMETERS],
-            fault_bounds: [fault_bound; PARAMETERS],
             prior: [1.0; PARAMETERS],
         };
         errors.values[j] = value;
@@ -349,16 +347,16 @@ mod tests {
 
     #[test]
     fn a_channel_ahead_of_all_others_needs_more_evidence_than_one_that_is_late() {
-        assert!(estimated(Kind::Delay, 0.1, 0.02, 0.02).fault);
-        let ahead = estimated(Kind::Delay, -0.1, 0.02, 0.02);
+        assert!(estimated(Kind::Delay, 0.1, 0.02).fault);
+        let ahead = estimated(Kind::Delay, -0.1, 0.02);
         assert!(!ahead.fault && ahead.doubtful && !ahead.applied);
-        assert!(estimated(Kind::Delay, -0.1, 0.01, 0.01).fault);
+        assert!(estimated(Kind::Delay, -0.1, 0.01).fault);
     }
 
     #[test]
     fn a_scale_error_that_gusts_may_cause_is_neither_named_nor_corrected() {
-        assert!(estimated(Kind::Scale, -0.35, 0.05, 0.05).fault);
-        let gusts = estimated(Kind::Scale, -0.35, 0.05, 0.2);
+        assert!(estimated(Kind::Scale, -0.35, 0.05).fault);
+        let gusts = estimated(Kind::Scale, -0.35, 0.2);
         assert!(!gusts.fault && gusts.doubtful && !gusts.applied);
     }
 }

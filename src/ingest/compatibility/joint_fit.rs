@@ -51,9 +51,6 @@ pub struct FittedErrors {
     pub values: Parameters,
     /// Standard deviations; zero for what is not estimated.
     pub bounds: Parameters,
-    /// Standard deviations that a fault is compared with: the bounds, and for an output's scale the
-    /// effect of gusts.
-    pub fault_bounds: Parameters,
     /// Standard deviations of the prior, √P.
     pub prior: Parameters,
 }
@@ -87,7 +84,7 @@ pub fn fit(
     reweight(&mut state)?;
     free_surest(&mut state)?;
     let mut bounds = state.bounds(windows)?;
-    let doubtful = doubtful(&state, &state.fault_bounds(&bounds));
+    let doubtful = doubtful(&state, &bounds);
     if !doubtful.is_empty() {
         for j in doubtful {
             state.prior[j] = size_of(&settings.ordinary, j);
@@ -98,7 +95,6 @@ pub fn fit(
     Some(FittedErrors {
         values: state.shared,
         bounds,
-        fault_bounds: state.fault_bounds(&bounds),
         prior: state.prior,
     })
 }
@@ -138,10 +134,11 @@ fn reweight(state: &mut JointState) -> Option<()> {
 /// √P of each parameter for its present value.
 fn reweighted_prior(state: &JointState) -> Option<Parameters> {
     let inverse = state.inverse(&state.information())?;
+    let gusts = state.gust_errors();
     Some(std::array::from_fn(|j| {
         let ordinary = size_of(&state.context.settings.ordinary, j);
         let value = state.shared[j];
-        if value.abs() > SURELY * inverse[(j, j)].sqrt() {
+        if value.abs() > SURELY * inverse[(j, j)].sqrt().hypot(gusts[j]) {
             ordinary.hypot(value)
         } else {
             ordinary
@@ -164,13 +161,14 @@ fn free_surest(state: &mut JointState) -> Option<()> {
 /// The parameter that the data alone put most surely beyond the ordinary, and its new prior.
 fn surest(state: &JointState) -> Option<(usize, f64)> {
     let inverse = state.inverse(&state.information())?;
+    let gusts = state.gust_errors();
     let freed = |j: usize| {
         let ordinary = size_of(&state.context.settings.ordinary, j);
         let (variance, prior) = (inverse[(j, j)], state.prior[j]);
         let data_share = 1.0 - variance / (prior * prior);
         // Value and bound as they would be without the prior.
         let value = state.shared[j] / data_share;
-        let bound = (variance / data_share).sqrt();
+        let bound = (variance / data_share).sqrt().hypot(gusts[j]);
         let is_freed = state.estimated[j]
             && data_share > LEAST_DATA_SHARE
             && prior <= ordinary
@@ -186,14 +184,14 @@ fn surest(state: &JointState) -> Option<(usize, f64)> {
 
 /// Parameters with a widened prior that came out as large as a fault but not as sure as one. No
 /// ordinary error is that large.
-fn doubtful(state: &JointState, fault_bounds: &Parameters) -> Vec<usize> {
+fn doubtful(state: &JointState, bounds: &Parameters) -> Vec<usize> {
     let settings = state.context.settings;
     let is_doubtful = |j: &usize| {
         let (j, value) = (*j, state.shared[*j]);
         let is_widened = state.prior[j] > size_of(&settings.ordinary, j);
         let is_large = value.abs() > size_of(&settings.faulty, j);
         let needed = settings.standard_errors_of_fault(kind_of(j), value);
-        state.estimated[j] && is_widened && is_large && value.abs() <= needed * fault_bounds[j]
+        state.estimated[j] && is_widened && is_large && value.abs() <= needed * bounds[j]
     };
     (0..PARAMETERS).filter(is_doubtful).collect()
 }

@@ -165,14 +165,19 @@ impl<'a> WindowFit<'a> {
     }
 }
 
-/// Sum of squares without that of white noise, which does not continue from sample to sample.
+/// Standard deviations of chance by which the squares must exceed those of white noise.
+const CHANCE: f64 = 3.0;
+
+/// Sum of squares without that of white noise, which does not continue from sample to sample, and
+/// without what chance adds to it: the sum of v(k) v(k + 1) has a variance of N s⁴.
 fn slow_squares(values: &[f64]) -> f64 {
     let noise = values
         .windows(2)
         .map(|w| (w[1] - w[0]).powi(2))
         .sum::<f64>()
         / 2.0;
-    (values.iter().map(|v| v * v).sum::<f64>() - noise).max(0.0)
+    let chance = CHANCE / (values.len().max(1) as f64).sqrt();
+    (values.iter().map(|v| v * v).sum::<f64>() - noise * (1.0 + chance)).max(0.0)
 }
 
 /// Sum of squared deviations from the mean.
