@@ -26,6 +26,7 @@ use crate::tables::{ConditionRow, CoverageRow, StartRow};
 
 use condition_rows::Scales;
 use coverage::MeasuredPoint;
+use page::StudyTables;
 use recordings::StudyManeuver;
 
 /// Tables of a study.
@@ -66,7 +67,12 @@ pub fn run(
     table::publish(&shelf, &study.conditions)?;
     table::publish(&shelf, &study.coverage)?;
     table::publish(&shelf, &study.starts)?;
-    let text = page::page(command, conditions, &study);
+    let tables = StudyTables {
+        conditions: &study.conditions,
+        coverage: &study.coverage,
+        starts: &study.starts,
+    };
+    let text = page::page(command, conditions, tables);
     atomic::place(page, text.as_bytes())?;
     Ok(study)
 }

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use super::BoundsStudy;
 use super::condition_rows::ALL_CLASSES;
 use crate::lab::campaign::StudyCondition;
 use crate::numerics::order_statistics::upper_median;
@@ -15,17 +14,25 @@ const BIAS: f64 = 0.1;
 /// Criterion for the coverage of the 95% interval of a derivative.
 const COVERED: std::ops::RangeInclusive<f64> = 0.92..=0.98;
 
+/// Tables of a study, for its page.
+#[derive(Clone, Copy)]
+pub struct StudyTables<'a> {
+    pub conditions: &'a [ConditionRow],
+    pub coverage: &'a [CoverageRow],
+    pub starts: &'a [StartRow],
+}
+
 /// Page of a study; `command` repeats it.
 #[must_use]
-pub fn page(command: &str, conditions: &[StudyCondition], study: &BoundsStudy) -> String {
-    let mut page = introduction(command, &study.coverage);
+pub fn page(command: &str, conditions: &[StudyCondition], study: StudyTables) -> String {
+    let mut page = introduction(command, study.coverage);
     page += &conditions_table(conditions);
-    page += &errors_table(&study.conditions);
-    page += &summary(conditions, &study.coverage);
-    page += &starts_table(&study.starts);
+    page += &errors_table(study.conditions);
+    page += &summary(conditions, study.coverage);
+    page += &starts_table(study.starts);
     for condition in conditions {
         let _ = write!(page, "\n## {}\n\n{condition}.\n\n", condition.name);
-        page += &classes_table(of_condition(&study.conditions, &condition.name));
+        page += &classes_table(of_condition(study.conditions, &condition.name));
         page.push('\n');
         let rows = study.coverage.iter();
         page += &derivatives_table(rows.filter(|r| r.condition == condition.name));
@@ -289,18 +296,20 @@ mod tests {
         }
     }
 
-    fn study() -> BoundsStudy {
-        BoundsStudy {
-            conditions: vec![
+    #[test]
+    fn the_page_has_rows_for_conditions_and_classes_and_counts_what_meets_the_criteria() {
+        let conditions = [condition("still"), condition("gusts")];
+        let tables = StudyTables {
+            conditions: &[
                 condition_row("still", ALL_CLASSES),
                 condition_row("still", "OLAT"),
             ],
-            coverage: vec![
+            coverage: &[
                 coverage_row("still", 10.0, 0.95),
                 coverage_row("still", 20.0, 0.90),
                 coverage_row("gusts", 10.0, 0.93),
             ],
-            starts: vec![StartRow {
+            starts: &[StartRow {
                 class: "class".into(),
                 alpha_deg: 10.0,
                 start: StartVariant::Half,
@@ -308,14 +317,8 @@ mod tests {
                 alone: 150,
                 reached: 199,
             }],
-            problems: vec![],
-        }
-    }
-
-    #[test]
-    fn the_page_has_rows_for_conditions_and_classes_and_counts_what_meets_the_criteria() {
-        let conditions = [condition("still"), condition("gusts")];
-        let page = page("make validate", &conditions, &study());
+        };
+        let page = page("make validate", &conditions, tables);
         for line in [
             "| still | still air; noise on every channel |",
             "| still | 200, 190 | 6 | 2850 | 81.2, 95.1 % | 4.0, 6.0 | – |",
