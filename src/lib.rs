@@ -51,6 +51,7 @@ pub mod dynamics;
 
 // Method: how derivatives follow from motion.
 pub mod output_error;
+pub mod filter_error;
 
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;

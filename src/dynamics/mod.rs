@@ -10,12 +10,14 @@
 //! g.
 
 mod equations;
+mod gusts;
 mod lateral;
 mod lever;
 mod longitudinal;
 pub mod motion;
 
 pub use equations::{COEFFICIENTS, Equations, OUTPUTS, Outputs, Rates};
+pub use gusts::{InGusts, LateralInGusts, LongitudinalInGusts};
 pub use lateral::Lateral;
 pub(crate) use lever::lever;
 pub use longitudinal::Longitudinal;

@@ -195,6 +195,15 @@ impl Window {
         window
     }
 
+    /// Window with a further signal, given at the samples.
+    #[must_use]
+    pub fn with_samples(&self, name: &str, values: &[f64]) -> Window {
+        let mut window = self.clone();
+        let points = Arc::new(with_half_samples(values));
+        window.points.insert(name.to_owned(), points);
+        window
+    }
+
     /// Window with a further, constant signal.
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {

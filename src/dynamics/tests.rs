@@ -3,7 +3,10 @@
 use approx::assert_abs_diff_eq;
 use nalgebra::SVector;
 
-use super::{COEFFICIENTS, Equations, Lateral, Longitudinal, Motion, OUTPUTS};
+use super::{
+    COEFFICIENTS, Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts,
+    Motion, OUTPUTS,
+};
 use crate::aero::Regressor;
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
@@ -153,6 +156,12 @@ fn lateral_slopes_are_those_of_finite_differences() {
     slopes_match::<4, Lateral>();
 }
 
+#[test]
+fn slopes_in_gusts_are_those_of_finite_differences() {
+    slopes_match::<4, LongitudinalInGusts>();
+    slopes_match::<6, LateralInGusts>();
+}
+
 /// Checks that slopes differ from zero only at the declared entries, those through coefficients
 /// included.
 fn assert_slopes_at_declared_entries<const NX: usize, E: Equations<NX>>() {
@@ -210,6 +219,54 @@ fn assert_slopes_at_declared_entries<const NX: usize, E: Equations<NX>>() {
 fn slopes_differ_from_zero_only_at_declared_entries() {
     assert_slopes_at_declared_entries::<3, Longitudinal>();
     assert_slopes_at_declared_entries::<4, Lateral>();
+    assert_slopes_at_declared_entries::<4, LongitudinalInGusts>();
+    assert_slopes_at_declared_entries::<6, LateralInGusts>();
+}
+
+/// Checks that rates and outputs with a felt rate equal to the gyro's are those of still air, and
+/// that the regressors of rates follow the felt rates.
+fn assert_still_air<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>() {
+    let motion = general_motion();
+    let (inputs, sensors) = (
+        E::rate_inputs(&aircraft(), &motion),
+        E::sensor_inputs(&aircraft(), &motion),
+    );
+    let still = E::rates(&inputs, &E::measured_state(&motion), &C).rates;
+    let read = E::outputs(&inputs, &sensors, &E::measured_state(&motion), &C).outputs;
+    let (inputs, sensors) = (
+        G::rate_inputs(&aircraft(), &motion),
+        G::sensor_inputs(&aircraft(), &motion),
+    );
+    let x = G::measured_state(&motion);
+    let rates = G::rates(&inputs, &x, &C).rates;
+    assert_eq!(G::own_states(), NX);
+    assert_eq!(rates.rows(0, NX), still.rows(0, NX));
+    assert_eq!(G::outputs(&inputs, &sensors, &x, &C).outputs, read);
+    let mut gust = x;
+    for &(rate, felt) in G::FELT_RATES {
+        assert_eq!((x[felt], rates[felt]), (x[rate], rates[rate]));
+        gust[felt] += 0.1;
+        assert_abs_diff_eq!(
+            G::decayed(gust, 0.75)[felt] - x[rate],
+            0.075,
+            epsilon = 1e-15
+        );
+    }
+    for regressor in [
+        Regressor::RollRate,
+        Regressor::PitchRate,
+        Regressor::YawRate,
+    ] {
+        let felt = |state| G::FELT_RATES.iter().find(|(rate, _)| *rate == state);
+        let expected = E::state_of(&regressor).map(|state| felt(state).unwrap().1);
+        assert_eq!(G::state_of(&regressor), expected);
+    }
+}
+
+#[test]
+fn without_a_gust_the_equations_in_gusts_are_those_of_still_air() {
+    assert_still_air::<3, Longitudinal, 4, LongitudinalInGusts>();
+    assert_still_air::<4, Lateral, 6, LateralInGusts>();
 }
 
 fn longitudinal(motion: &Motion, c: [f64; 3]) -> (SVector<f64, 3>, SVector<f64, 5>) {

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::prepared_case::PreparedCase;
 use super::task::Task;
+use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::calibration_errors::{Fitted, Misreading};
 use crate::output_error::{Diverged, Fit, calibration_errors};
@@ -30,6 +31,18 @@ impl<'a> Task<'a> {
         }
     }
 
+    /// Errors of one standard deviation each of the signals of a window.
+    pub(super) fn misreadings(&self, window: &Window) -> Vec<Misreading<'a>> {
+        // A signal that the maneuver does not use has no effect.
+        let is_used = |signal: &str| !window.signal(signal).is_empty();
+        let calibration = self.context.settings.calibration.iter();
+        let used = calibration.filter(|(signal, _)| is_used(signal));
+        let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
+        let delays = self.context.delays.iter().filter(|d| is_used(&d.surface));
+        let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
+        readings.chain(late).collect()
+    }
+
     /// Change of the gradient with one standard deviation of each calibration error, in the order of
     /// the maneuver's parameters.
     pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
@@ -38,14 +51,7 @@ impl<'a> Task<'a> {
         values: &[f64],
         weights: &[f64; OUTPUTS],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let calibration = self.context.settings.calibration.iter();
-        // A signal that the maneuver does not use has no effect.
-        let is_used = |signal: &str| !prepared.window.signal(signal).is_empty();
-        let used = calibration.filter(|(signal, _)| is_used(signal));
-        let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
-        let delays = self.context.delays.iter().filter(|d| is_used(&d.surface));
-        let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
-        let errors: Vec<Misreading> = readings.chain(late).collect();
+        let errors = self.misreadings(&prepared.window);
         let aircraft = self.context.aircraft;
         let PreparedCase {
             window,

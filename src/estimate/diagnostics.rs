@@ -10,7 +10,7 @@ use crate::dynamics::motion::Window;
 use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
-use crate::output_error::{Case, Fit, Model, cost};
+use crate::output_error::{Case, Model};
 use crate::tables::{CorrelationKind, CorrelationRow, EstimateRow};
 
 /// History of a derivative's regressor.
@@ -23,29 +23,26 @@ struct RegressorHistory<'a> {
 }
 
 impl Task<'_> {
-    /// Adds the diagnostics of a fit of `model` to its rows.
+    /// Adds the diagnostics of a fit of `model` to its rows; `information` is that of its parameters.
     pub(super) fn add_diagnostics<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,
         window: &Window,
         model: &Model,
-        fit: &Fit,
+        information: Option<&DMatrix<f64>>,
         estimated: &mut Estimated,
     ) {
         let flown = self.regressor_histories::<NX, E>(case, window, model);
         estimated.correlations = self.regressor_correlations(&flown, window);
         self.add_excitation(&flown, &mut estimated.estimates);
-        if fit.final_cost.is_none() {
+        let Some(information) = information else {
             return;
-        }
-        let information = cost::sums(&fit.response, &fit.weights).information;
+        };
         let settings = self.context.settings;
         let limits = &settings.identifiability;
-        let Some(measured) = collinearity(
-            &information,
-            settings.iteration.max_condition_number,
-            limits,
-        ) else {
+        let Some(measured) =
+            collinearity(information, settings.iteration.max_condition_number, limits)
+        else {
             return;
         };
         for (name, inflation) in case.names.iter().zip(&measured.inflation) {

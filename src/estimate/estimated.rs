@@ -80,5 +80,11 @@ pub(super) fn rejected_fit(maneuver: &Maneuver, reason: String) -> FitRow {
         left_out: None,
         largest_condition_index: None,
         confounded: None,
+        method: None,
+        gust_ft_s: None,
+        rotary_gust_deg_s: None,
+        gust_corner_rad_s: None,
+        autocorrelation: None,
+        likelihood_gain: None,
     }
 }

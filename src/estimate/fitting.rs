@@ -3,7 +3,6 @@
 use super::settings::Start;
 use super::task::Task;
 use crate::dynamics::Equations;
-use crate::maneuver::Maneuver;
 use crate::output_error::{Case, Fit, Outcome, equation_error, estimation};
 
 impl Task<'_> {
@@ -17,16 +16,7 @@ impl Task<'_> {
             return Err("nothing is free to be estimated".to_owned());
         }
         let settings = self.context.settings;
-        let Maneuver {
-            alpha_deg, mach, ..
-        } = *self.maneuver;
-        let value = |name: &str| {
-            self.context
-                .start
-                .value(name, alpha_deg, mach)
-                .map_or(0.0, |v| v.value)
-        };
-        let tunnel = case.starting_values(value);
+        let tunnel = self.tunnel_start(case);
         let implied = equation_error::start(case, &tunnel);
         let (first, second, other_start) = match settings.start {
             Start::EquationError => (implied, tunnel, Start::WindTunnel),

@@ -14,6 +14,8 @@ mod calibration_effect;
 mod diagnostics;
 mod held_by_evidence;
 mod second_opinion;
+mod alpha_slopes;
+mod in_gusts;
 mod single;
 pub mod joint;
 pub mod prediction;
@@ -22,5 +24,7 @@ mod tests;
 
 pub use context::Context;
 pub use estimated::{Covariance, Estimated};
-pub use settings::{Hold, InactiveSurfaces, JointSettings, PredictionSettings, Settings, Start};
+pub use settings::{
+    Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings, Settings, Start,
+};
 pub use single::maneuver;

@@ -101,17 +101,21 @@ impl<'a> Task<'a> {
             case,
             ..
         } = prepared;
-        let held = model.held.iter().map(|(d, _)| *d);
-        let all = Model {
-            free: model.free.iter().copied().chain(held).collect(),
-            held: vec![],
-            ..model.clone()
-        };
         Case::new(
             self.context.aircraft,
             window,
             case.measurements.clone(),
-            &all,
+            &all_free(model),
         )
+    }
+}
+
+/// Model with the held derivatives free as well.
+pub(super) fn all_free<'a>(model: &Model<'a>) -> Model<'a> {
+    let held = model.held.iter().map(|(d, _)| *d);
+    Model {
+        free: model.free.iter().copied().chain(held).collect(),
+        held: vec![],
+        ..model.clone()
     }
 }

@@ -133,6 +133,12 @@ impl<'a> Task<'a> {
             left_out: Some(left_out),
             largest_condition_index: None,
             confounded: None,
+            method: None,
+            gust_ft_s: None,
+            rotary_gust_deg_s: None,
+            gust_corner_rad_s: None,
+            autocorrelation: None,
+            likelihood_gain: None,
         }
     }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::aero::Output;
 use crate::dynamics::motion::MassProperties;
+use crate::filter_error::scoring;
 use crate::output_error::calibration_errors::Calibration;
 use crate::output_error::estimation::Weights;
 use crate::output_error::identifiability;
@@ -49,6 +50,19 @@ pub enum Hold {
     Evidence,
 }
 
+/// Method of estimation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Filter error: the air moves.
+    #[default]
+    FilterError,
+    /// Output error, and filter error where its residuals are coloured.
+    Auto,
+    /// Output error: the air is still (the paper).
+    OutputError,
+}
+
 impl Hold {
     /// Warning that goes with a choice.
     #[must_use]
@@ -71,6 +85,10 @@ impl From<Start> for StartingValues {
 settings! {
     /// Settings of the estimation, of all classes.
     pub struct Settings {
+        /// Method: `filter_error` estimates the air's motion with the derivatives, `output_error`
+        /// takes the air as still, as in the paper, and `auto` takes filter error where the residuals
+        /// of output error are coloured. In gusts `output_error` charges them to the derivatives.
+        pub method: Method = Method::default(),
         /// Weights of the residuals: `table` takes each class's own (Tables 2 and 4), `estimated` the
         /// inverse of the residuals' variances. `estimated` changes every estimate and its bound.
         pub weights: Weights = Weights::default(),
@@ -117,6 +135,8 @@ settings! {
         /// zero error of vanes and surfaces to the slopes; `false` lets each maneuver keep its own.
         #[serde(skip_serializing)]
         pub share_constants: bool = false,
+        /// End of the iteration of filter error.
+        pub filter: scoring::Settings = scoring::Settings::default(),
         /// Limits of the identifiability measures.
         pub identifiability: identifiability::Limits = identifiability::Limits::default(),
     }
@@ -129,7 +149,7 @@ settings! {
         pub max_marked_share: f64 = 0.2,
     }
 }
-single_values!(Weights, InitialState, MassProperties, InactiveSurfaces, Start, Hold, BTreeMap<Output, f64>);
+single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, BTreeMap<Output, f64>);
 
 settings! {
     /// Settings of joint estimation.

@@ -1,15 +1,23 @@
 //! Estimation of one maneuver by itself.
 
+use nalgebra::DMatrix;
+
 use super::context::Context;
 use super::estimated::{Covariance, Estimated};
+use super::in_gusts::{Filtered, is_white};
+use super::prepared_case::PreparedCase;
 use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
 use super::task::{Task, values_by_name};
 use crate::aero::Axis;
-use crate::dynamics::{Equations, Lateral, Longitudinal};
+use crate::dynamics::{
+    Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts,
+};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
-use crate::output_error::{consider, equation_error};
+use crate::output_error::equation_error::{self, Regression};
+use crate::output_error::{Fit, Measurements, Outcome, consider, cost};
+use crate::tables::StartingValues;
 
 /// Estimates one maneuver. The outcome has any failure.
 #[must_use]
@@ -38,8 +46,8 @@ impl Task<'_> {
     /// Estimates with the derivatives held that the class holds.
     fn estimate_by_class(&self) -> Estimated {
         let estimated = match self.class.axis {
-            Axis::Longitudinal => self.estimate::<3, Longitudinal>(),
-            Axis::Lateral => self.estimate::<4, Lateral>(),
+            Axis::Longitudinal => self.estimate::<3, Longitudinal, 4, LongitudinalInGusts>(),
+            Axis::Lateral => self.estimate::<4, Lateral, 6, LateralInGusts>(),
         };
         estimated.unwrap_or_else(|reason| self.rejected(reason))
     }
@@ -66,42 +74,88 @@ impl Task<'_> {
         estimated
     }
 
-    fn estimate<const NX: usize, E: Equations<NX>>(&self) -> Result<Estimated, String> {
+    fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+    ) -> Result<Estimated, String> {
         let prepared = self.prepare::<NX, E>(self.class_model()?)?;
         let case = &prepared.case;
         let (mut fit, start) = self.fit(case)?;
+        let with_held_free = self.with_held_free(&prepared);
+        let uncertainties = self.held_uncertainties(&prepared.model);
+        let second = equation_error::regression(case, &with_held_free, &uncertainties);
+        if self.needs_filter(&case.measurements, &fit)
+            && let Some(filtered) = self.filtered::<NX, E, NG, G>(&prepared, &fit)
+        {
+            return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
+        }
+        if self.needs_filter(&case.measurements, &fit) {
+            discard_in_gusts(&case.measurements, &mut fit);
+        }
         if self.context.settings.hold == Hold::Evidence {
             fit.reason
                 .push_str(&self.undetermined_without_tunnel(case, &fit));
         }
-        let with_held_free = self.with_held_free(&prepared);
         let values = values_by_name(&prepared.model, &case.names, &fit.values);
-        let uncertainties = self.held_uncertainties(&prepared.model);
         consider::consider(case, &with_held_free, &values, &uncertainties, &mut fit);
-        let second = equation_error::regression(case, &with_held_free, &uncertainties);
         self.add_calibration_errors(&prepared, &mut fit);
-        let history = self.history(
-            &case.measurements,
-            &fit,
-            &prepared.window,
-            &prepared.surfaces,
-        );
-        let mut estimated = Estimated {
-            estimates: self.estimate_rows(Some((&case.names, &fit))),
-            combined: self.combined_rows(&case.names, &fit),
-            covariance: Covariance::of_fit(&case.names, &fit),
-            correlations: vec![],
-            history: Some(history),
-            fit: self.fit_row(&fit, prepared.left_out, start.into()),
-        };
-        add_second_opinion(&case.names, &second, &mut estimated.estimates);
-        self.add_diagnostics(
-            case,
-            &prepared.window,
-            &prepared.model,
-            &fit,
-            &mut estimated,
-        );
+        let information = fit
+            .final_cost
+            .map(|_| cost::sums(&fit.response, &fit.weights).information);
+        let mut estimated =
+            self.estimated(&prepared, &fit, start.into(), information.as_ref(), &second);
+        Self::add_still_air(&case.measurements, &fit, &mut estimated.fit);
         Ok(estimated)
+    }
+
+    fn estimated_in_gusts<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<NX, E>,
+        filtered: &Filtered,
+        second: &Regression,
+    ) -> Estimated {
+        let start = StartingValues::EquationError;
+        let information = Some(&filtered.information);
+        let mut estimated = self.estimated(prepared, &filtered.fit, start, information, second);
+        self.add_gusts(filtered, prepared.case.step_s, &mut estimated.fit);
+        estimated
+    }
+
+    /// Rows of a fit with its diagnostics.
+    fn estimated<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<NX, E>,
+        fit: &Fit,
+        start: StartingValues,
+        information: Option<&DMatrix<f64>>,
+        second: &Regression,
+    ) -> Estimated {
+        let PreparedCase {
+            case,
+            window,
+            model,
+            surfaces,
+            left_out,
+        } = prepared;
+        let mut estimated = Estimated {
+            estimates: self.estimate_rows(Some((&case.names, fit))),
+            combined: self.combined_rows(&case.names, fit),
+            covariance: Covariance::of_fit(&case.names, fit),
+            correlations: vec![],
+            history: Some(self.history(&case.measurements, fit, window, surfaces)),
+            fit: self.fit_row(fit, *left_out, start),
+        };
+        add_second_opinion(&case.names, second, &mut estimated.estimates);
+        self.add_diagnostics(case, window, model, information, &mut estimated);
+        estimated
+    }
+}
+
+/// Takes back a fit by output error in moving air, which charges the gusts to the derivatives.
+fn discard_in_gusts(measurements: &Measurements, fit: &mut Fit) {
+    if fit.outcome == Outcome::Converged && !is_white(measurements, fit) {
+        fit.outcome = Outcome::NotConverged;
+        fit.reason = "filter error does not converge, and the residuals of output error show that \
+                      the air moved"
+            .to_owned();
     }
 }

@@ -214,6 +214,12 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         left_out: Some(0.0),
         largest_condition_index: Some(12.2),
         confounded: None,
+        method: None,
+        gust_ft_s: None,
+        rotary_gust_deg_s: None,
+        gust_corner_rad_s: None,
+        autocorrelation: None,
+        likelihood_gain: None,
     });
     for (name, unit) in if axis == Axis::Longitudinal {
         LONGITUDINAL

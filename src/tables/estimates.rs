@@ -40,6 +40,31 @@ table! {
         /// parameters (Belsley). A constant with its slope, biases and initial states are
         /// collinear by nature; a group of control derivatives calls for other inputs.
         pub confounded: Option<String>,
+        /// Method of the estimates.
+        pub method: Option<EstimationMethod>,
+        /// Speed of the gusts across the flight path, rms, as filter error found them: `w_g` of
+        /// a longitudinal, `v_g` of a lateral maneuver. Found from the gusts' fast part, for a scale
+        /// of turbulence of 1,750 ft.
+        pub gust_ft_s: Option<f64> ["ft/s"],
+        /// Rotary gust, rms: `q_g`, or the larger one of `p_g` and `r_g`.
+        pub rotary_gust_deg_s: Option<f64> ["deg/s"],
+        /// Corner of the rotary gusts.
+        pub gust_corner_rad_s: Option<f64> ["rad/s"],
+        /// Correlation of neighbouring residuals, or innovations, of the output with the largest one.
+        /// White noise has none.
+        pub autocorrelation: Option<f64> ["1"],
+        /// Log-likelihood that filter error gained over output error.
+        pub likelihood_gain: Option<f64> ["1"],
+    }
+}
+
+words! {
+    /// Method of estimation.
+    pub enum EstimationMethod {
+        /// Still air: the outputs of the integrated equations are matched to the measured ones.
+        OutputError = "output error",
+        /// Moving air: the states are corrected by the measurements, sample by sample.
+        FilterError = "filter error",
     }
 }
 

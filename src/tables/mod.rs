@@ -21,8 +21,8 @@ pub use comparison::{
     ManeuverComparisonRow, Treatment, TunnelDifference, TunnelVerdict, Verdict, VerdictRow,
 };
 pub use estimates::{
-    CorrelationKind, CorrelationRow, EstimateRow, FitRow, JOINT_FLIGHT, JointRow, Outcome,
-    Participation, StartingValues,
+    CorrelationKind, CorrelationRow, EstimateRow, EstimationMethod, FitRow, JOINT_FLIGHT, JointRow,
+    Outcome, Participation, StartingValues,
 };
 pub use export::ExportRow;
 pub use flights::{

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
-use crate::estimate::{self, Context, Estimated};
+use crate::estimate::{self, Context, Estimated, Method};
 use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
 use crate::maneuver::Maneuver;
@@ -446,12 +446,12 @@ fn turbulence_of_one_seed_is_flown_again_and_of_another_is_not() {
 
 fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
     let config = &campaign.config;
-    let context = Context::new(
-        &config.aircraft,
-        &config.buildup,
-        &config.tunnel,
-        &config.estimate,
-    );
+    // The simulated air is still, and the records are without noise.
+    let settings = estimate::Settings {
+        method: Method::OutputError,
+        ..config.estimate.clone()
+    };
+    let context = Context::new(&config.aircraft, &config.buildup, &config.tunnel, &settings);
     estimate::maneuver(
         &flown.record,
         &flown.maneuver,

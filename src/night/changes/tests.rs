@@ -86,6 +86,12 @@ fn fit(maneuver_id: &str, class: &str) -> FitRow {
         left_out: None,
         largest_condition_index: None,
         confounded: None,
+        method: None,
+        gust_ft_s: None,
+        rotary_gust_deg_s: None,
+        gust_corner_rad_s: None,
+        autocorrelation: None,
+        likelihood_gain: None,
     }
 }
 

@@ -68,7 +68,7 @@ impl CovarianceEstimate {
 
 /// Covariance of the parameters from H⁻¹ and the outputs' residuals, whose noise is independent.
 #[must_use]
-pub(super) fn covariance(inverse: &AlignedMatrix, outputs: &[BlockSeries]) -> CovarianceEstimate {
+pub(crate) fn covariance(inverse: &AlignedMatrix, outputs: &[BlockSeries]) -> CovarianceEstimate {
     let outputs = settle_noise(inverse, outputs);
     let mut estimates = VarianceEstimates::zero(inverse.columns());
     for output in &outputs {

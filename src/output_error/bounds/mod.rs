@@ -3,7 +3,7 @@
 //! ([`consider`]).
 
 mod autoregression;
-mod block_series;
+pub(crate) mod block_series;
 pub mod bounded;
 pub mod calibration_errors;
 pub mod coloured;

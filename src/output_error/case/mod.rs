@@ -53,7 +53,7 @@ pub struct Model<'a> {
 
 impl Model<'_> {
     /// Names of the parameters in order, given the free derivatives sorted by coefficient.
-    fn parameter_names(&self, free: &[&Derivative], states: &[&str]) -> Vec<String> {
+    pub(crate) fn parameter_names(&self, free: &[&Derivative], states: &[&str]) -> Vec<String> {
         let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
         names.extend(self.biases.iter().map(|b| b.name.clone()));
         if self.initial_state == InitialState::Estimated {
@@ -63,7 +63,7 @@ impl Model<'_> {
     }
 
     /// Outputs that the biases shift.
-    fn biased_outputs<const NX: usize, E: Equations<NX>>(&self) -> Vec<usize> {
+    pub(crate) fn biased_outputs<const NX: usize, E: Equations<NX>>(&self) -> Vec<usize> {
         let outputs = E::AXIS.outputs();
         let place = |bias: &&Bias| outputs.iter().position(|o| *o == bias.output);
         self.biases.iter().filter_map(place).collect()

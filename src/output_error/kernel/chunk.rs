@@ -14,6 +14,7 @@ use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{PADDED_POINTS, POINTS, Strided};
+use crate::output_error::case::layout::LaneLayout;
 
 /// Build-up at the points of a chunk: c = offset + slope · x.
 #[repr(align(64))]
@@ -95,13 +96,14 @@ impl<const NX: usize> ChunkBuildUp<NX> {
 #[inline(always)]
 pub(crate) fn fill_regressor_rows<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
+    layout: &LaneLayout,
     points: Strided,
     rows: &mut [f64],
 ) {
-    for &(place, column) in &case.layout.columns {
+    for &(place, column) in &layout.columns {
         let column = &case.columns[column][points.first..][..=points.stride * (POINTS - 1)];
         for k in 0..POINTS {
-            rows[k * case.layout.row + place] = column[k * points.stride];
+            rows[k * layout.row + place] = column[k * points.stride];
         }
     }
 }

@@ -240,7 +240,53 @@ impl Sink for NormalAccumulator<'_> {
         rows: &mut [f64],
         interleaved: &mut impl Interleaved,
     ) {
-        self.complete_rows(samples, outputs, rows);
+        let Measurements { values, used } = self.measurements;
+        let residual = |k: usize, o: usize| {
+            let sample = samples.index(k);
+            used[sample][o].then(|| values[sample][o] - outputs[k][o])
+        };
+        self.sums.complete_rows(outputs.len(), rows, residual);
+        self.sums
+            .add_rows(simd, samples.first, outputs.len(), rows, interleaved);
+    }
+}
+
+impl NormalSums {
+    /// Writes residual and one into the rows of a chunk's samples that count, and clears the other
+    /// rows. `residual` is that of a sample and output, `None` where it does not count.
+    #[inline(always)]
+    pub fn complete_rows(
+        &mut self,
+        samples: usize,
+        rows: &mut [f64],
+        residual: impl Fn(usize, usize) -> Option<f64>,
+    ) {
+        let NormalSums { counts, layout, .. } = self;
+        let width = layout.width();
+        for k in 0..samples {
+            for o in 0..OUTPUTS {
+                let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
+                if let Some(residual) = residual(k, o) {
+                    row[layout.residual] = residual;
+                    row[layout.one] = 1.0;
+                    counts[o] += 1;
+                } else {
+                    row.fill(0.0);
+                }
+            }
+        }
+    }
+
+    /// Adds the complete rows of a chunk, which begins at the sample `first`.
+    #[inline(always)]
+    pub fn add_rows<S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        samples: usize,
+        rows: &[f64],
+        interleaved: &mut impl Interleaved,
+    ) {
         let NormalSums {
             gram,
             moments,
@@ -249,15 +295,15 @@ impl Sink for NormalAccumulator<'_> {
             blocks,
             samples_per_block,
             ..
-        } = &mut *self.sums;
+        } = self;
         let width = layout.width();
         if *stride == 1 {
             add_to_blocks(
                 simd,
-                samples.first,
+                first,
                 *samples_per_block,
                 rows,
-                outputs.len(),
+                samples,
                 blocks.slice_mut(),
             );
         }
@@ -265,32 +311,10 @@ impl Sink for NormalAccumulator<'_> {
             let own = StridedRows {
                 values: &rows[o * width..],
                 stride: OUTPUTS * width,
-                count: outputs.len(),
+                count: samples,
             };
             own.add_weighted_sum(simd, layout.residual, moments[o].slice_mut());
             own.add_gram_interleaved(simd, &layout.used, gram[o].slice_mut(), width, interleaved);
-        }
-    }
-}
-
-impl NormalAccumulator<'_> {
-    /// Writes residual and one into the rows of samples that count, and clears the other rows.
-    #[inline(always)]
-    fn complete_rows(&mut self, samples: Strided, outputs: &[[f64; OUTPUTS]], rows: &mut [f64]) {
-        let NormalSums { counts, layout, .. } = &mut *self.sums;
-        let width = layout.width();
-        for (k, y) in outputs.iter().enumerate() {
-            let sample = samples.index(k);
-            for o in 0..OUTPUTS {
-                let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
-                if self.measurements.used[sample][o] {
-                    row[layout.residual] = self.measurements.values[sample][o] - y[o];
-                    row[layout.one] = 1.0;
-                    counts[o] += 1;
-                } else {
-                    row.fill(0.0);
-                }
-            }
         }
     }
 }

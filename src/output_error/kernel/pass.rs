@@ -155,7 +155,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             }
             for k in 0..count {
                 let sample = stride * (first + k);
-                let y = propagators.read_outputs(case, &build_up, history, sample, k);
+                let y = propagators.read_outputs(case, &build_up, &history.states[k], sample, k);
                 for o in 0..OUTPUTS {
                     self.outputs[first + k][o] = y[o] + self.biases[o];
                 }
@@ -165,7 +165,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 first: 2 * stride * first,
                 stride,
             };
-            fill_regressor_rows(case, points, regressors);
+            fill_regressor_rows(case, layout, points, regressors);
             let next = first + count;
             let next_count = if next < samples { length(next) } else { 0 };
             let next_points = Strided {
@@ -184,6 +184,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 history,
                 propagators: &propagators,
                 count,
+                correction: Uncorrected,
             };
             propagation.run::<E>();
             let samples = Strided {
@@ -214,25 +215,65 @@ fn initial_sensitivities<const NX: usize>(
     sensitivities
 }
 
-/// Propagation of all sensitivities over a chunk.
-struct Propagation<'a, S: Simd, const NX: usize> {
-    simd: S,
-    layout: &'a LaneLayout,
-    /// Rows of regressors, point by point.
-    regressors: &'a [S::f64s],
-    sensitivities: &'a mut [S::f64s],
-    /// Sensitivities of the outputs: sample by sample, output by output a row of lanes.
-    rows: &'a mut [S::f64s],
-    history: &'a StageHistory<NX>,
-    propagators: &'a Propagators<NX>,
-    count: usize,
+/// Correction of the states by the measurements between a sample's outputs and the step that follows.
+pub(crate) trait Correction<const NX: usize> {
+    /// Returns the factors of the first vector's regressors in the outputs, where they are not those
+    /// of the step's first stage.
+    fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
+
+    /// Corrects the sensitivities `s` of the states in the vector at a lane, after those of the
+    /// outputs, `y`, were taken at the chunk's sample k. `y` becomes what the sink receives.
+    fn correct<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        lane: usize,
+        s: &mut [S::f64s; NX],
+        y: &mut [S::f64s; OUTPUTS],
+    );
 }
 
-impl<S: Simd, const NX: usize> Propagation<'_, S, NX> {
+/// No correction: output error.
+struct Uncorrected;
+
+impl<const NX: usize> Correction<NX> for Uncorrected {
+    #[inline(always)]
+    fn output_factors(&self, _: usize) -> Option<&[f64; VECTOR]> {
+        None
+    }
+
+    #[inline(always)]
+    fn correct<S: Simd>(
+        &self,
+        _: S,
+        _: usize,
+        _: usize,
+        _: &mut [S::f64s; NX],
+        _: &mut [S::f64s; OUTPUTS],
+    ) {
+    }
+}
+
+/// Propagation of all sensitivities over a chunk.
+pub(crate) struct Propagation<'a, S: Simd, const NX: usize, K> {
+    pub simd: S,
+    pub layout: &'a LaneLayout,
+    /// Rows of regressors, point by point.
+    pub regressors: &'a [S::f64s],
+    pub sensitivities: &'a mut [S::f64s],
+    /// Sensitivities of the outputs: sample by sample, output by output a row of lanes.
+    pub rows: &'a mut [S::f64s],
+    pub history: &'a StageHistory<NX>,
+    pub propagators: &'a Propagators<NX>,
+    pub count: usize,
+    pub correction: K,
+}
+
+impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
     /// Propagates the groups of all coefficients side by side, so that the processor has several
     /// independent sums, then the group of the initial states.
     #[inline(always)]
-    fn run<E: Equations<NX>>(&mut self) {
+    pub fn run<E: Equations<NX>>(&mut self) {
         let (from, end) = (self.layout.groups[0].start, self.layout.groups[0].end);
         for lane in (from..end).step_by(S::F64_LANES) {
             self.propagate::<E, COEFFICIENTS>(lane, [0, 1, 2]);
@@ -256,20 +297,19 @@ impl<S: Simd, const NX: usize> Propagation<'_, S, NX> {
         }
         for k in 0..self.count {
             let r = self.regressors_at::<N>(lane, groups, k);
-            let rows = &mut self.rows[k * OUTPUTS * width / S::F64_LANES..]
-                [..OUTPUTS * width / S::F64_LANES];
             for n in 0..N {
-                let y = output_sensitivities::<S, NX, E>(
+                let mut y = output_sensitivities::<S, NX, E>(
                     self.simd,
                     groups[n],
                     self.propagators,
                     k,
                     &s[n],
-                    r[n][0],
+                    self.output_regressor(lane, groups[n], k).unwrap_or(r[n][0]),
                 );
+                let at = self.layout.groups[groups[n]].start + lane;
+                self.correction.correct(self.simd, k, at, &mut s[n], &mut y);
                 for o in 0..OUTPUTS {
-                    rows[(o * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES] =
-                        y[o];
+                    self.rows[((k * OUTPUTS + o) * width + at) / S::F64_LANES] = y[o];
                 }
             }
             s = next_sensitivities::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
@@ -281,6 +321,20 @@ impl<S: Simd, const NX: usize> Propagation<'_, S, NX> {
                     s[n][i];
             }
         }
+    }
+
+    /// Regressor of a group's lanes in the outputs, where it is not that of the step's first stage.
+    #[inline(always)]
+    fn output_regressor(&self, lane: usize, group: usize, k: usize) -> Option<S::f64s> {
+        if lane >= VECTOR || group == COEFFICIENTS {
+            return None;
+        }
+        let factors = load::<S>(self.correction.output_factors(k)?, lane);
+        let place = 2 * k * self.layout.row + self.layout.regressors[group] + lane;
+        Some(
+            self.simd
+                .mul_f64s(self.regressors[place / S::F64_LANES], factors),
+        )
     }
 
     /// Regressors of some groups' lanes at the stages of a step; zero for initial states.

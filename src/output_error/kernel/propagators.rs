@@ -14,6 +14,7 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
+use nalgebra::SVector;
 use pulp::Simd;
 
 use super::chunk::ChunkBuildUp;
@@ -45,18 +46,17 @@ impl<const NX: usize> Propagators<NX> {
         d: [[[0.0; CHUNK]; COEFFICIENTS]; OUTPUTS],
     };
 
-    /// Computes the outputs at a sample of the chunk and records their slopes. `sample` counts in the
-    /// maneuver, `k` in the chunk.
+    /// Computes the outputs at a sample of the chunk and its state, and records their slopes. `sample`
+    /// counts in the maneuver, `k` in the chunk.
     #[inline(always)]
     pub fn read_outputs<E: Equations<NX>>(
         &mut self,
         case: &Case<NX, E>,
         build_up: &ChunkBuildUp<NX>,
-        history: &StageHistory<NX>,
+        x: &SVector<f64, NX>,
         sample: usize,
         k: usize,
     ) -> [f64; OUTPUTS] {
-        let x = &history.states[k];
         let c = build_up.coefficients::<E>(2 * k, x);
         let inputs = &case.rate_inputs[2 * sample];
         let read = E::outputs(inputs, &case.sensor_inputs[sample], x, &c);

@@ -97,6 +97,17 @@ impl Sink for SensitivityRecorder<'_> {
     }
 }
 
+impl Response {
+    /// Response of known outputs, without sums.
+    #[must_use]
+    pub fn of_outputs(outputs: Vec<[f64; OUTPUTS]>) -> Response {
+        Response {
+            outputs,
+            sums: NormalSums::default(),
+        }
+    }
+}
+
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Allocates a response of this case's size.
     #[must_use]

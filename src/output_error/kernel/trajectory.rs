@@ -20,7 +20,7 @@ use crate::output_error::case::Case;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 
 /// Bound of a state, rad or rad/s. No flight reaches it, and numbers do not overflow below it.
-const STATE_BOUND: f64 = 50.0;
+pub(crate) const STATE_BOUND: f64 = 50.0;
 
 /// States and slopes of a chunk at every stage: entry by entry, sample after sample.
 #[derive(Clone, Copy)]
@@ -101,6 +101,18 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         };
         trajectory.enter_stage(x);
         trajectory
+    }
+
+    /// Takes the step from the next sample, whose state is corrected to `x`, and returns the state at
+    /// its end.
+    #[inline(always)]
+    pub fn step_from(&mut self, x: SVector<f64, NX>) -> SVector<f64, NX> {
+        (self.x, self.next) = (x, x);
+        self.enter_stage(x);
+        for _ in 0..STAGES {
+            self.advance();
+        }
+        self.x
     }
 
     /// Integrates to the end of the chunk and returns the state there.

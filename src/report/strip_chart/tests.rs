@@ -86,6 +86,12 @@ fn fit(outcome: Outcome, reason: &str) -> FitRow {
         left_out: Some(0.01),
         largest_condition_index: None,
         confounded: None,
+        method: None,
+        gust_ft_s: None,
+        rotary_gust_deg_s: None,
+        gust_corner_rad_s: None,
+        autocorrelation: None,
+        likelihood_gain: None,
     }
 }
 

@@ -1,0 +1,266 @@
+//! Equations of an axis in moving air: its states, and the rates that the aerodynamics feel.
+//!
+//! The first state is the angle that the air makes, gusts included: it is what the vane and the
+//! aerodynamics read. A rotary gust g makes the aerodynamics feel the rate q + g, while the gyro and
+//! the kinematics keep q. The felt rates stand behind the axis's own states. A gust is constant
+//! during a step of the integration, so a felt rate has the acceleration of its own rate; between
+//! steps gusts decay and grow ([`InGusts::decayed`]).
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the kernel for the processor at hand"
+)]
+
+use nalgebra::{SMatrix, SVector};
+
+use super::equations::{COEFFICIENTS, Equations, OUTPUTS, Outputs, Rates};
+use super::lateral::Lateral;
+use super::longitudinal::Longitudinal;
+use super::motion::Motion;
+use crate::aero::{Axis, Regressor};
+use crate::aircraft::Aircraft;
+
+/// Equations of an axis whose last states are the rates that the aerodynamics feel.
+pub trait InGusts<const NX: usize>: Equations<NX> {
+    /// State that is the angle of the air.
+    const ANGLE: usize = 0;
+    /// Pairs of states (rate of the gyro, rate that the aerodynamics feel), one for each rotary gust.
+    const FELT_RATES: &'static [(usize, usize)];
+
+    /// Number of states without the felt rates.
+    #[must_use]
+    fn own_states() -> usize {
+        NX - Self::FELT_RATES.len()
+    }
+
+    /// State after the rotary gusts have decayed to a share of themselves.
+    #[inline(always)]
+    #[must_use]
+    fn decayed(mut x: SVector<f64, NX>, share: f64) -> SVector<f64, NX> {
+        for &(rate, felt) in Self::FELT_RATES {
+            x[felt] = x[rate] + share * (x[felt] - x[rate]);
+        }
+        x
+    }
+}
+
+/// The longitudinal axis with the pitch rate that the aerodynamics feel.
+#[derive(Clone, Copy, Debug)]
+pub struct LongitudinalInGusts;
+
+/// The lateral-directional axis with the roll and yaw rates that the aerodynamics feel.
+#[derive(Clone, Copy, Debug)]
+pub struct LateralInGusts;
+
+impl InGusts<4> for LongitudinalInGusts {
+    const FELT_RATES: &'static [(usize, usize)] = &[(1, 3)];
+}
+
+impl InGusts<6> for LateralInGusts {
+    const FELT_RATES: &'static [(usize, usize)] = &[(1, 4), (2, 5)];
+}
+
+/// States of an axis out of those with felt rates.
+#[inline(always)]
+fn own<const N: usize, const M: usize>(x: &SVector<f64, M>) -> SVector<f64, N> {
+    SVector::from_fn(|i, _| x[i])
+}
+
+/// State with the felt rates equal to the gyro's.
+#[inline(always)]
+fn with_felt<const N: usize, const M: usize>(
+    x: &SVector<f64, N>,
+    felt: &[(usize, usize)],
+) -> SVector<f64, M> {
+    let mut wide = SVector::zeros();
+    for i in 0..N {
+        wide[i] = x[i];
+    }
+    for &(rate, felt) in felt {
+        wide[felt] = x[rate];
+    }
+    wide
+}
+
+/// Rates of all states: a felt rate accelerates as its own rate does.
+#[inline(always)]
+fn wide_rates<const N: usize, const M: usize>(own: &Rates<N>, felt: &[(usize, usize)]) -> Rates<M> {
+    let (mut by_state, mut by_coefficient) = (SMatrix::zeros(), SMatrix::zeros());
+    let mut copy_row = |from: usize, to: usize| {
+        for j in 0..N {
+            by_state[(to, j)] = own.by_state[(from, j)];
+        }
+        for k in 0..COEFFICIENTS {
+            by_coefficient[(to, k)] = own.by_coefficient[(from, k)];
+        }
+    };
+    for i in 0..N {
+        copy_row(i, i);
+    }
+    for &(rate, felt) in felt {
+        copy_row(rate, felt);
+    }
+    Rates {
+        rates: with_felt(&own.rates, felt),
+        by_state,
+        by_coefficient,
+    }
+}
+
+/// Outputs, which read no felt rate.
+#[inline(always)]
+fn wide_outputs<const N: usize, const M: usize>(own: &Outputs<N>) -> Outputs<M> {
+    let mut by_state = SMatrix::<f64, OUTPUTS, M>::zeros();
+    for o in 0..OUTPUTS {
+        for j in 0..N {
+            by_state[(o, j)] = own.by_state[(o, j)];
+        }
+    }
+    Outputs {
+        outputs: own.outputs,
+        by_state,
+        by_coefficient: own.by_coefficient,
+    }
+}
+
+/// Implements the equations of an axis in gusts by those of the axis.
+macro_rules! in_gusts {
+    (
+        $name:ident: $own:ident, $own_states:literal, $states:literal, $names:expr,
+        regressors $regressors:expr, rates by state $by_state:expr, by coefficient $by_coefficient:expr
+    ) => {
+        impl Equations<$states> for $name {
+            type RateInputs = <$own as Equations<$own_states>>::RateInputs;
+            type SensorInputs = <$own as Equations<$own_states>>::SensorInputs;
+
+            const AXIS: Axis = <$own as Equations<$own_states>>::AXIS;
+            const STATES: [&'static str; $states] = $names;
+            const REGRESSOR_STATES: &'static [usize] = $regressors;
+            const RATES_BY_STATE: &'static [(usize, usize)] = $by_state;
+            const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = $by_coefficient;
+            const OUTPUTS_BY_STATE: &'static [(usize, usize)] = Self::OUTPUT_SLOPES;
+            const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] =
+                <$own as Equations<$own_states>>::OUTPUTS_BY_COEFFICIENT;
+
+            #[inline(always)]
+            fn rate_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::RateInputs {
+                $own::rate_inputs(aircraft, motion)
+            }
+
+            #[inline(always)]
+            fn sensor_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::SensorInputs {
+                $own::sensor_inputs(aircraft, motion)
+            }
+
+            #[inline(always)]
+            fn measured_state(motion: &Motion) -> SVector<f64, $states> {
+                with_felt(&$own::measured_state(motion), Self::FELT_RATES)
+            }
+
+            fn state_of(regressor: &Regressor) -> Option<usize> {
+                $own::state_of(regressor).map(felt_state::<$states, Self>)
+            }
+
+            fn state_regressor(
+                aircraft: &Aircraft,
+                velocity: f64,
+                regressor: &Regressor,
+            ) -> Option<(usize, f64)> {
+                let (state, factor) = $own::state_regressor(aircraft, velocity, regressor)?;
+                Some((felt_state::<$states, Self>(state), factor))
+            }
+
+            #[inline(always)]
+            fn implied_coefficients(
+                aircraft: &Aircraft,
+                motion: &Motion,
+                inputs: &Self::RateInputs,
+            ) -> [f64; COEFFICIENTS] {
+                $own::implied_coefficients(aircraft, motion, inputs)
+            }
+
+            #[inline(always)]
+            fn rates(
+                inputs: &Self::RateInputs,
+                x: &SVector<f64, $states>,
+                c: &[f64; COEFFICIENTS],
+            ) -> Rates<$states> {
+                wide_rates(&$own::rates(inputs, &own(x), c), Self::FELT_RATES)
+            }
+
+            #[inline(always)]
+            fn outputs(
+                inputs: &Self::RateInputs,
+                sensors: &Self::SensorInputs,
+                x: &SVector<f64, $states>,
+                c: &[f64; COEFFICIENTS],
+            ) -> Outputs<$states> {
+                wide_outputs(&$own::outputs(inputs, sensors, &own(x), c))
+            }
+        }
+    };
+}
+
+/// State that a regressor along an own state follows: the felt rate in place of the gyro's.
+fn felt_state<const NX: usize, E: InGusts<NX>>(state: usize) -> usize {
+    let felt = E::FELT_RATES.iter().find(|(rate, _)| *rate == state);
+    felt.map_or(state, |(_, felt)| *felt)
+}
+
+impl LongitudinalInGusts {
+    /// The axis's own entries, and those of `a_n` and `a_x` through the pitching moment.
+    const OUTPUT_SLOPES: &'static [(usize, usize)] = &[
+        (0, 0),
+        (0, 1),
+        (1, 1),
+        (2, 2),
+        (3, 0),
+        (3, 1),
+        (3, 3),
+        (4, 0),
+        (4, 1),
+        (4, 3),
+    ];
+}
+
+impl LateralInGusts {
+    /// The axis's own entries, and those of `a_y` through the moments.
+    const OUTPUT_SLOPES: &'static [(usize, usize)] = &[
+        (0, 0),
+        (0, 1),
+        (0, 2),
+        (1, 1),
+        (2, 2),
+        (3, 3),
+        (4, 0),
+        (4, 1),
+        (4, 2),
+        (4, 4),
+        (4, 5),
+    ];
+}
+
+in_gusts!(
+    LongitudinalInGusts: Longitudinal, 3, 4, ["alpha", "q", "theta", "felt q"],
+    regressors &[0, 3],
+    rates by state &[
+        (0, 0), (0, 1), (0, 2), (0, 3),
+        (1, 0), (1, 1), (1, 3),
+        (2, 1),
+        (3, 0), (3, 1), (3, 3),
+    ],
+    by coefficient &[(0, 0), (0, 2), (1, 1), (3, 1)]
+);
+
+in_gusts!(
+    LateralInGusts: Lateral, 4, 6, ["beta", "p", "r", "phi", "felt p", "felt r"],
+    regressors &[0, 4, 5],
+    rates by state &[
+        (0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5),
+        (1, 0), (1, 1), (1, 2), (1, 4), (1, 5),
+        (2, 0), (2, 1), (2, 2), (2, 4), (2, 5),
+        (3, 1), (3, 2), (3, 3),
+        (4, 0), (4, 1), (4, 2), (4, 4), (4, 5),
+        (5, 0), (5, 1), (5, 2), (5, 4), (5, 5),
+    ],
+    by coefficient &[(0, 0), (1, 1), (1, 2), (2, 1), (2, 2), (4, 1), (4, 2), (5, 1), (5, 2)]
+);

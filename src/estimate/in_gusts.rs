@@ -1,0 +1,436 @@
+//! Filter error on one maneuver, and the choice between it and output error.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alpha_slopes::AlphaSlopes;
+use super::prepared_case::{PreparedCase, all_free};
+use super::settings::Method;
+use super::task::{Task, values_by_name};
+use crate::aero::Axis;
+use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::filter_error::bounds::{self, Bounds, WidePass};
+use crate::filter_error::filter::Filter;
+use crate::filter_error::noise::Noise;
+use crate::filter_error::scoring::{Scored, minimise};
+use crate::filter_error::slopes::SlopeEffect;
+use crate::flight::signal;
+use crate::numerics::order_statistics::median;
+use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::{Case, Fit, Measurements, Model, Outcome, Response, equation_error};
+use crate::tables::{EstimationMethod, FitRow};
+use crate::units::DEG;
+
+/// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden): with it the random walk of the angle
+/// is the high-frequency part of a gust of some speed.
+const GUST_SCALE_FT: f64 = 1750.0;
+
+/// Correlation of neighbouring residuals from which the air is taken to move: white residuals of a
+/// short maneuver stay below it.
+const COLOURED: f64 = 0.3;
+
+/// Change by slopes over α, in bounds, up to which they are not held in a second fit.
+const SMALL_CHANGE: f64 = 0.3;
+
+/// Least output noise as a share of the noise seen in the samples.
+const LEAST_SHARE: f64 = 0.5;
+
+/// Filter error's result on a maneuver.
+pub(super) struct Filtered {
+    pub fit: Fit,
+    /// Information of derivatives, biases and initial states.
+    pub information: DMatrix<f64>,
+    noise: Noise,
+    /// Lag-one correlation of each output's innovations.
+    autocorrelation: [f64; OUTPUTS],
+    /// Log-likelihood gained over output error.
+    likelihood_gain: Option<f64>,
+}
+
+impl<'a> Task<'a> {
+    /// Returns true if filter error is to estimate a maneuver with this fit by output error.
+    pub(super) fn needs_filter(&self, measurements: &Measurements, fit: &Fit) -> bool {
+        match self.context.settings.method {
+            Method::OutputError => false,
+            Method::FilterError => true,
+            Method::Auto => !is_white(measurements, fit),
+        }
+    }
+
+    /// Estimates a maneuver by filter error, from still or from moving air as the residuals of output
+    /// error are, then from the other; `None` where neither converges or the data determine no
+    /// covariance.
+    pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        output_error: &Fit,
+    ) -> Option<Filtered> {
+        let case = &prepared.case;
+        let resolution = self.least_deviations(&case.measurements);
+        let implied = equation_error::start(case, &self.tunnel_start(case));
+        let moving = (implied, Noise::starting(resolution));
+        let still = (output_error.values.clone(), Noise::slight(resolution));
+        let (first, second) = if is_white(&case.measurements, output_error) {
+            (still, moving)
+        } else {
+            (moving, still)
+        };
+        let slopes = self.alpha_slopes(&prepared.window, &self.with_held_free(prepared));
+        let mut sweep = Sweep::constant(slopes);
+        let from = |(own, noise): &(Vec<f64>, Noise)| {
+            self.fit_filter::<NX, E, NG, G>(prepared, &sweep, own, noise, &resolution)
+        };
+        let mut fitted = from(&first).or_else(|| from(&second))?;
+        let mut pass = self.wide_pass(prepared, &sweep, &fitted)?;
+        let mut effect = pass.slope_effect(&fitted.bounds, &sweep.slopes.sizes, &sweep.values);
+        if let Some(found) = &effect
+            && fitted.bounds.are_exceeded_by(&found.change, SMALL_CHANGE)
+        {
+            let changed = sweep.at(&found.slopes);
+            let (own, noise) = (fitted.own().to_vec(), fitted.noise());
+            let again = self.fit_filter(prepared, &changed, &own, &noise, &resolution);
+            if let Some(again) = again
+                && let Some(wide) = self.wide_pass(prepared, &changed, &again)
+            {
+                (sweep, fitted, pass) = (changed, again, wide);
+                effect = pass.slope_effect(&fitted.bounds, &sweep.slopes.sizes, &sweep.values);
+            }
+        }
+        let mut fit = fitted.fit();
+        self.add_held(prepared, &pass, &fitted.bounds, effect.as_ref(), &mut fit);
+        self.add_calibration(prepared, &sweep, &fitted, &mut fit);
+        Some(Filtered {
+            information: fitted.information(),
+            noise: fitted.noise(),
+            autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
+            likelihood_gain: white_cost(&case.measurements, output_error)
+                .map(|cost| cost - fitted.scored.response.cost),
+            fit,
+        })
+    }
+
+    /// Fits the filter with slopes over α held; `None` where it does not converge.
+    fn fit_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+        own: &[f64],
+        noise: &Noise,
+        resolution: &[f64; OUTPUTS],
+    ) -> Option<FilterFit<NG, G>> {
+        let settings = self.context.settings;
+        let model = sweep.held_in(&prepared.model);
+        let measurements = &prepared.case.measurements;
+        let filter = self.filter::<NG, G>(&sweep.slopes.window, measurements, &model);
+        let start = filter.with_noise(own, noise);
+        let floors = resolution.map(|deviation| LEAST_SHARE * deviation);
+        let scored = minimise(&filter, start, &floors, &settings.filter)?;
+        if !scored.converged {
+            return None;
+        }
+        let limit = settings.iteration.max_condition_number;
+        let bounds = bounds::bounds(&filter, &scored, limit).ok()?;
+        Some(FilterFit {
+            filter,
+            scored,
+            bounds,
+        })
+    }
+
+    /// Pass at a fit with the held derivatives and the slopes free as well.
+    fn wide_pass<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+        fitted: &FilterFit<NG, G>,
+    ) -> Option<WidePass> {
+        let model = sweep.held_in(&prepared.model);
+        let all = all_free(&model);
+        let all = if sweep.is_constant() {
+            sweep.slopes.added_to(&all)
+        } else {
+            all
+        };
+        let measurements = &prepared.case.measurements;
+        let wide = self.filter::<NG, G>(&sweep.slopes.window, measurements, &all);
+        let values = values_by_name(&model, fitted.filter.names(), fitted.own());
+        WidePass::of(&fitted.filter, &fitted.scored.parameters, &wide, &values)
+    }
+
+    fn filter<const NG: usize, G: InGusts<NG>>(
+        &self,
+        window: &crate::dynamics::motion::Window,
+        measurements: &Measurements,
+        model: &Model,
+    ) -> Filter<NG, G> {
+        let calibration = &self.context.settings.calibration;
+        let uncertainty = |output: crate::aero::Output| {
+            let known = calibration.get(output.signal())?;
+            (known.bias > 0.0).then_some(known.bias)
+        };
+        let biases: Vec<Option<f64>> = model.biases.iter().map(|b| uncertainty(b.output)).collect();
+        Filter::new(
+            self.context.aircraft,
+            window,
+            measurements.clone(),
+            model,
+            &biases,
+        )
+    }
+
+    /// Standard deviations of the outputs' own noise: of the second differences of the measured
+    /// values, and at least the configured resolution.
+    fn least_deviations(&self, measurements: &Measurements) -> [f64; OUTPUTS] {
+        let resolution = self.resolution();
+        std::array::from_fn(|o| sample_noise(measurements, o).max(resolution[o]))
+    }
+
+    /// Adds the effect of the tunnel's errors on the estimates, and that of the derivatives' change
+    /// over the angles of attack of the maneuver.
+    fn add_held<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        pass: &WidePass,
+        bounds: &Bounds,
+        effect: Option<&SlopeEffect>,
+        fit: &mut Fit,
+    ) {
+        let uncertainties = self.held_uncertainties(&prepared.model);
+        let mut held = bounds.covariance_of(&pass.held_shifts(&uncertainties));
+        if let Some(effect) = effect {
+            for (value, change) in fit.values.iter_mut().zip(effect.change.iter()) {
+                *value += change;
+            }
+            held += &effect.covariance;
+        }
+        add(&mut fit.covariance, &held);
+        add(&mut fit.covariance_corrected, &held);
+        fit.covariance_held = Some(held);
+    }
+
+    /// Adds the effect of calibration errors. The estimates move by H⁻¹ times the gradient of the
+    /// maneuver as an instrument in error would have recorded it.
+    fn add_calibration<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+        fitted: &FilterFit<NG, G>,
+        fit: &mut Fit,
+    ) {
+        let model = sweep.held_in(&prepared.model);
+        let window = &sweep.slopes.window;
+        let errors = self.misreadings(window);
+        if self.context.settings.calibration.is_empty() && errors.is_empty() {
+            return;
+        }
+        let cases = errors.iter().map(|error| {
+            let misread_window = error.of_window(window);
+            let measured = misread(&prepared.case, error);
+            Filter::<NG, G>::case_of(self.context.aircraft, &misread_window, measured, &model)
+        });
+        let parameters = &fitted.scored.parameters;
+        let Ok(shifts) = fitted.filter.gradient_shifts(parameters, cases) else {
+            fit.reason.push_str(super::calibration_effect::NOT_COUNTED);
+            return;
+        };
+        let common = fitted.bounds.covariance_of(&shifts);
+        add(&mut fit.covariance_corrected, &common);
+        fit.covariance_calibration = Some(common);
+    }
+
+    /// Adds what the filter found of the air to the row of `fits`.
+    pub(super) fn add_gusts(&self, filtered: &Filtered, step_s: f64, row: &mut FitRow) {
+        let noise = &filtered.noise;
+        let maneuver = self.record.values(signal::VELOCITY).unwrap_or_default();
+        let velocities = maneuver.get(self.range()).unwrap_or_default();
+        let velocity = velocities.iter().sum::<f64>() / velocities.len().max(1) as f64;
+        let steps = GUST_SCALE_FT / (2.0 * velocity * step_s);
+        let rotary = match self.class.axis {
+            Axis::Longitudinal => noise.gusts[0],
+            Axis::Lateral => noise.gusts[0].max(noise.gusts[1]),
+        };
+        row.method = Some(EstimationMethod::FilterError);
+        row.gust_ft_s = Some(velocity * noise.angle * steps.sqrt());
+        row.rotary_gust_deg_s = Some(rotary * DEG);
+        row.gust_corner_rad_s = Some(noise.corner);
+        row.autocorrelation = largest(filtered.autocorrelation);
+        row.likelihood_gain = filtered.likelihood_gain;
+    }
+
+    /// Adds the residuals' correlation to the row of a fit by output error.
+    pub(super) fn add_still_air(measurements: &Measurements, fit: &Fit, row: &mut FitRow) {
+        row.method = Some(EstimationMethod::OutputError);
+        row.autocorrelation = largest(lag_one(measurements, &fit.response.outputs));
+    }
+
+    /// Starting values with the tunnel's derivatives.
+    pub(super) fn tunnel_start<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+    ) -> Vec<f64> {
+        let maneuver = self.maneuver;
+        case.starting_values(|name| {
+            self.context
+                .start
+                .value(name, maneuver.alpha_deg, maneuver.mach)
+                .map_or(0.0, |v| v.value)
+        })
+    }
+}
+
+fn add(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
+    if let Some(sum) = sum {
+        *sum += part;
+    }
+}
+
+/// Slopes of the derivatives over α, and the values at which a fit holds them.
+struct Sweep {
+    slopes: AlphaSlopes,
+    values: Vec<f64>,
+}
+
+impl Sweep {
+    /// Derivatives that do not change over α.
+    fn constant(slopes: AlphaSlopes) -> Self {
+        let values = vec![0.0; slopes.sizes.len()];
+        Sweep { slopes, values }
+    }
+
+    fn at(&self, values: &DVector<f64>) -> Self {
+        Sweep {
+            slopes: self.slopes.clone(),
+            values: values.as_slice().to_vec(),
+        }
+    }
+
+    fn is_constant(&self) -> bool {
+        self.values.iter().all(|v| *v == 0.0)
+    }
+
+    fn held_in<'s>(&'s self, model: &Model<'s>) -> Model<'s> {
+        if self.is_constant() {
+            model.clone()
+        } else {
+            self.slopes.held_in(model, &self.values)
+        }
+    }
+}
+
+/// Converged filter with its bounds.
+struct FilterFit<const NG: usize, G: InGusts<NG>> {
+    filter: Filter<NG, G>,
+    scored: Scored,
+    bounds: Bounds,
+}
+
+impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
+    /// Derivatives, biases and initial states.
+    fn own(&self) -> &[f64] {
+        &self.scored.parameters[..self.filter.first_noise()]
+    }
+
+    fn noise(&self) -> Noise {
+        self.filter.noise(&self.scored.parameters)
+    }
+
+    /// Information of derivatives, biases and initial states.
+    fn information(&self) -> DMatrix<f64> {
+        let n = self.filter.first_noise();
+        let all = self.scored.response.information();
+        all.view((0, 0), (n, n)).into_owned()
+    }
+
+    /// Fit in the form of output error: the noise's parameters are left out, and the outputs are the
+    /// predicted ones.
+    fn fit(&self) -> Fit {
+        let response = &self.scored.response;
+        Fit {
+            outcome: Outcome::Converged,
+            reason: self.scored.reason.clone(),
+            iterations: self.scored.iterations,
+            initial_cost: Some(self.scored.initial_cost),
+            final_cost: Some(response.cost),
+            values: self.own().to_vec(),
+            weights: self.noise().outputs.map(|deviation| deviation.powi(-2)),
+            response: Response::of_outputs(response.predicted.clone()),
+            condition_number: Some(self.bounds.condition_number),
+            undetermined: vec![],
+            covariance: Some(self.bounds.covariance.clone()),
+            covariance_held: None,
+            covariance_calibration: None,
+            covariance_corrected: Some(self.bounds.corrected.clone()),
+        }
+    }
+}
+
+/// Measurements as an instrument in error would have recorded them.
+fn misread<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    error: &Misreading,
+) -> Measurements {
+    let mut measured = case.measurements.clone();
+    let outputs = E::AXIS.outputs();
+    if let Some(o) = outputs.iter().position(|o| o.signal() == error.signal) {
+        for values in &mut measured.values {
+            values[o] += error.scale * values[o] + error.bias;
+        }
+    }
+    measured
+}
+
+/// Standard deviation of an output's white noise: the second difference of white noise has six times
+/// its variance, and that of the motion is small.
+fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
+    const NORMAL_MEDIAN: f64 = 0.674_489_75;
+    let both = measurements
+        .values
+        .windows(3)
+        .zip(measurements.used.windows(3));
+    let differences = both
+        .filter(|(_, used)| used.iter().all(|used| used[output]))
+        .map(|(z, _)| (z[0][output] - 2.0 * z[1][output] + z[2][output]).abs());
+    median(differences).unwrap_or(0.0) / (NORMAL_MEDIAN * 6f64.sqrt())
+}
+
+/// True for a fit by output error whose residuals show no motion of the air.
+pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
+    let correlations = lag_one(measurements, &fit.response.outputs);
+    fit.outcome == Outcome::Converged && correlations.iter().all(|r| *r < COLOURED)
+}
+
+/// Correlation of neighbouring residuals, output by output.
+fn lag_one(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> [f64; OUTPUTS] {
+    let residual = |k: usize, o: usize| {
+        let (z, y) = (measurements.values.get(k)?, computed.get(k)?);
+        measurements.used[k][o].then(|| z[o] - y[o])
+    };
+    std::array::from_fn(|o| {
+        let (mut square, mut product) = (0.0, 0.0);
+        for k in 1..measurements.values.len() {
+            if let (Some(before), Some(now)) = (residual(k - 1, o), residual(k, o)) {
+                square += 0.5 * (before * before + now * now);
+                product += before * now;
+            }
+        }
+        if square > 0.0 { product / square } else { 0.0 }
+    })
+}
+
+fn largest(values: [f64; OUTPUTS]) -> Option<f64> {
+    values.into_iter().reduce(f64::max)
+}
+
+/// Cost of output error's residuals as white noise of their own variances.
+fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> {
+    fit.final_cost?;
+    let mut cost = 0.0;
+    for o in 0..OUTPUTS {
+        let both = measurements.values.iter().zip(&fit.response.outputs);
+        let counted = both.zip(&measurements.used).filter(|(_, used)| used[o]);
+        let squares: Vec<f64> = counted.map(|((z, y), _)| (z[o] - y[o]).powi(2)).collect();
+        let count = squares.len() as f64;
+        let variance = squares.iter().sum::<f64>() / count.max(1.0);
+        cost += 0.5 * count * (variance.ln() + 1.0);
+    }
+    cost.is_finite().then_some(cost)
+}

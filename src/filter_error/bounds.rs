@@ -1,0 +1,230 @@
+//! Covariance of the estimates of filter error, with the effects of held values and of calibration
+//! errors through the filter's own weights.
+//!
+//! The white covariance is H⁻¹. The corrected one takes the innovations' autocovariance as that of
+//! output error takes the residuals', and is never below the white one.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::filter::{Filter, Response};
+use super::scoring::Scored;
+use super::slopes::{SlopeEffect, SlopeInformation};
+use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::symmetric;
+
+use crate::output_error::bounds::block_series::BlockSeries;
+use crate::output_error::bounds::coloured;
+use crate::output_error::likelihood::information::Identification;
+
+/// Covariances of a filter's own parameters: derivatives, biases and initial states.
+#[derive(Clone, Debug)]
+pub struct Bounds {
+    pub covariance: DMatrix<f64>,
+    pub corrected: DMatrix<f64>,
+    pub condition_number: f64,
+    /// H⁻¹ of the filter's own parameters at known noise.
+    inverse: DMatrix<f64>,
+}
+
+/// Computes the bounds of a fit.
+///
+/// # Errors
+/// Condition number and parameters of the least determined direction, where the data determine no
+/// covariance.
+pub fn bounds<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    scored: &Scored,
+    max_condition_number: f64,
+) -> Result<Bounds, (Option<f64>, Vec<usize>)> {
+    let free: Vec<usize> = (0..filter.parameters())
+        .filter(|j| scored.free[*j])
+        .collect();
+    let information = scored.response.information();
+    let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        information[(free[i], free[j])]
+    });
+    let (of_free, condition_number) = match Identification::of(&of_free, max_condition_number) {
+        Identification::Determined {
+            inverse,
+            condition_number,
+        } => (inverse, condition_number),
+        Identification::Undetermined {
+            condition_number,
+            parameters,
+        } => {
+            let named = parameters.into_iter().map(|j| free[j]);
+            let own = named.filter(|j| *j < filter.first_noise());
+            return Err((condition_number, own.collect()));
+        }
+    };
+    let mut inverse = DMatrix::zeros(filter.parameters(), filter.parameters());
+    for (i, &row) in free.iter().enumerate() {
+        for (j, &column) in free.iter().enumerate() {
+            inverse[(row, column)] = of_free[(i, j)];
+        }
+    }
+    let own = |matrix: &DMatrix<f64>| {
+        let n = filter.first_noise();
+        matrix.view((0, 0), (n, n)).into_owned()
+    };
+    let covariance = own(&inverse);
+    let at_known_noise = symmetric::inverse(&own(&information));
+    let at_known_noise = at_known_noise.unwrap_or_else(|| covariance.clone());
+    let corrected = corrected(filter, &scored.response, &at_known_noise);
+    Ok(Bounds {
+        corrected: symmetric::raise_variances(corrected, &covariance),
+        covariance,
+        condition_number,
+        inverse: at_known_noise,
+    })
+}
+
+/// Covariance of a filter's own parameters from H⁻¹ and the innovations'
+/// autocovariance, at known noise: the noise's parameters hardly correlate with the others.
+fn corrected<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    response: &Response,
+    inverse: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let aligned = AlignedMatrix::from_symmetric(inverse);
+    let innovations = coloured::covariance(&aligned, &filter.series(response)).widened();
+    let n = inverse.nrows();
+    let others = response.other_information().view((0, 0), (n, n));
+    innovations + inverse * others * inverse
+}
+
+impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
+    /// Whitened innovations with their sensitivities to the filter's own parameters, one series per
+    /// output.
+    fn series(&self, response: &Response) -> Vec<BlockSeries> {
+        let (sums, n) = (&response.sums, self.first_noise());
+        let length = sums.samples_per_block();
+        let mut all = vec![0.0; self.parameters()];
+        let series = (0..OUTPUTS).map(|o| {
+            let squares = sums.squares(o).view((0, 0), (n, n)).into_owned();
+            let sums_of = |samples: Range<usize>, row: &mut [f64]| {
+                let block = sums.block(samples.start / length, o, &mut all);
+                row[..n].copy_from_slice(&all[..n]);
+                block
+            };
+            let samples = self.samples();
+            BlockSeries::new(
+                self.case.step_s,
+                1.0,
+                samples,
+                sums.square(o),
+                &squares,
+                sums_of,
+            )
+        });
+        series.collect()
+    }
+}
+
+impl Bounds {
+    /// Returns true if a change of the parameters is large beside their bounds.
+    #[must_use]
+    pub fn are_exceeded_by(&self, change: &DVector<f64>, share: f64) -> bool {
+        let variances = self.covariance.diagonal();
+        let mut both = change.iter().zip(variances.iter());
+        both.any(|(change, variance)| change.powi(2) > share * share * variance)
+    }
+
+    /// Covariance of the filter's own parameters from changes of the gradient, each by one standard
+    /// deviation of an independent error.
+    #[must_use]
+    pub fn covariance_of(&self, gradient_shifts: &[DVector<f64>]) -> DMatrix<f64> {
+        let n = self.covariance.nrows();
+        let mut sum = DMatrix::zeros(n, n);
+        for shift in gradient_shifts {
+            let change = &self.inverse * shift.rows(0, n);
+            sum += &change * change.transpose();
+        }
+        sum
+    }
+}
+
+/// Pass with the held derivatives, and slopes over α, free as well, at a fit.
+#[derive(Debug)]
+pub struct WidePass {
+    /// Names of the filter's own parameters.
+    own: Vec<String>,
+    /// Names of the wide filter's own parameters.
+    names: Vec<String>,
+    information: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl WidePass {
+    /// Computes the pass of `wide` at the fit of `filter`. `values` has every parameter by name;
+    /// those without a value are zero. `None` where the wide filter diverges.
+    #[must_use]
+    pub fn of<const NX: usize, E: InGusts<NX>>(
+        filter: &Filter<NX, E>,
+        parameters: &[f64],
+        wide: &Filter<NX, E>,
+        values: &BTreeMap<&str, f64>,
+    ) -> Option<Self> {
+        let value = |name: &String| values.get(name.as_str()).copied().unwrap_or(0.0);
+        let own: Vec<f64> = wide.names().iter().map(value).collect();
+        let at = wide.with_noise(&own, &filter.noise(parameters));
+        let response = wide.respond(&at).ok()?;
+        Some(WidePass {
+            own: filter.names().to_vec(),
+            names: wide.names().to_vec(),
+            information: response.information(),
+            gradient: response.gradient(),
+        })
+    }
+
+    fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|n| n == name)
+    }
+
+    /// Column of the information along a parameter, for the filter's own parameters.
+    fn cross(&self, along: Option<usize>) -> DVector<f64> {
+        let entry = |name: &String| match (self.place(name), along) {
+            (Some(row), Some(column)) => self.information[(row, column)],
+            _ => 0.0,
+        };
+        DVector::from_iterator(self.own.len(), self.own.iter().map(entry))
+    }
+
+    /// Changes of the gradient by one standard uncertainty of each held value.
+    #[must_use]
+    pub fn held_shifts(&self, uncertainties: &BTreeMap<&str, f64>) -> Vec<DVector<f64>> {
+        let shift =
+            |(name, uncertainty): (&&str, &f64)| self.cross(self.place(name)) * *uncertainty;
+        uncertainties.iter().map(shift).collect()
+    }
+
+    /// Effect of slopes of these sizes on the estimates; `values` has those at which the fit held
+    /// them.
+    #[must_use]
+    pub fn slope_effect(
+        &self,
+        bounds: &Bounds,
+        sizes: &BTreeMap<String, f64>,
+        values: &[f64],
+    ) -> Option<SlopeEffect> {
+        let places: Vec<usize> = sizes.keys().filter_map(|name| self.place(name)).collect();
+        if places.len() != sizes.len() || places.is_empty() {
+            return None;
+        }
+        let columns: Vec<DVector<f64>> = places.iter().map(|p| self.cross(Some(*p))).collect();
+        let n = places.len();
+        let information = SlopeInformation {
+            inverse: bounds.inverse.clone(),
+            cross: DMatrix::from_columns(&columns),
+            slopes: DMatrix::from_fn(n, n, |i, j| self.information[(places[i], places[j])]),
+            gradient: DVector::from_iterator(n, places.iter().map(|p| self.gradient[*p])),
+            sizes: DVector::from_iterator(n, sizes.values().copied()),
+            held_at: DVector::from_iterator(n, values.iter().copied()),
+        };
+        information.effect()
+    }
+}

@@ -1,0 +1,183 @@
+//! Gain of the filter and covariance of its innovations, for each pattern of outputs that count.
+
+use nalgebra::{Cholesky, SMatrix};
+
+use super::noise::{Noise, NoiseParameter};
+use super::riccati::{NoisySystem, Observation, States, SteadyFilter, SystemSlope};
+use crate::dynamics::OUTPUTS;
+
+/// Square matrix of the outputs.
+pub(super) type Outputs = SMatrix<f64, OUTPUTS, OUTPUTS>;
+/// Gain: states by outputs.
+pub(super) type Gain<const NX: usize> = SMatrix<f64, NX, OUTPUTS>;
+
+/// Outputs that count at some samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pattern {
+    pub used: [bool; OUTPUTS],
+    pub samples: usize,
+}
+
+/// Filter of the samples of one pattern.
+#[derive(Clone, Debug)]
+pub(super) struct PatternGain<const NX: usize> {
+    pub gain: Gain<NX>,
+    /// S⁻¹; zero along outputs that do not count.
+    pub inverse: Outputs,
+    /// L⁻¹ with S = L Lᵀ, which makes the innovations white; zero likewise.
+    pub whitening: Outputs,
+    pub log_determinant: f64,
+    /// Slopes of gain and S along each parameter that has any.
+    pub slopes: Vec<GainSlope<NX>>,
+}
+
+/// Slope of a gain along a parameter.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GainSlope<const NX: usize> {
+    pub parameter: usize,
+    pub gain: Gain<NX>,
+    pub innovations: Outputs,
+}
+
+/// Change of the system along a parameter, numbered as in the filter.
+pub(super) struct ParameterSlope<const NX: usize> {
+    pub parameter: usize,
+    pub system: SystemSlope<NX>,
+}
+
+/// Variances of the outputs as the steady filter has them: an output that counts only in a share of
+/// the samples has as much larger a variance.
+pub(super) fn steady_variances(noise: &Noise, patterns: &[Pattern]) -> [f64; OUTPUTS] {
+    let all: usize = patterns.iter().map(|p| p.samples).sum();
+    std::array::from_fn(|o| noise.outputs[o].powi(2) / share(o, patterns, all))
+}
+
+/// Slope of [`steady_variances`] along a parameter.
+pub(super) fn steady_variance_slopes(
+    noise: &Noise,
+    patterns: &[Pattern],
+    parameter: NoiseParameter,
+) -> [f64; OUTPUTS] {
+    let variances = steady_variances(noise, patterns);
+    std::array::from_fn(|o| match parameter {
+        NoiseParameter::Output(own) if own == o => 2.0 * variances[o],
+        _ => 0.0,
+    })
+}
+
+/// Share of the samples in which an output counts.
+fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
+    let own = patterns.iter().filter(|p| p.used[output]);
+    let own: usize = own.map(|p| p.samples).sum();
+    own.max(1) as f64 / all.max(1) as f64
+}
+
+/// Gains of all patterns; `None` where the filter has no finite covariance.
+pub(super) fn gains<const NX: usize>(
+    system: NoisySystem<NX>,
+    noise: &Noise,
+    slopes: &[ParameterSlope<NX>],
+    noise_parameters: &[(usize, NoiseParameter)],
+    patterns: &[Pattern],
+) -> Option<Vec<PatternGain<NX>>> {
+    let filter = if noise.is_still() {
+        SteadyFilter::still(system)
+    } else {
+        SteadyFilter::of(system)?
+    };
+    let changes: Vec<(usize, Observation<NX>, States<NX>)> = slopes
+        .iter()
+        .map(|s| (s.parameter, s.system.c, filter.slope(&s.system)))
+        .collect();
+    let pattern_gain = |pattern: &Pattern| {
+        let mut own = PatternGain::of(&filter.prediction, &system.c, noise, pattern)?;
+        own.slopes = own.slopes_along(&filter.prediction, &system.c, &changes, pattern);
+        own.add_output_noise(noise, noise_parameters, pattern);
+        Some(own)
+    };
+    patterns.iter().map(pattern_gain).collect()
+}
+
+impl<const NX: usize> PatternGain<NX> {
+    fn of(
+        prediction: &States<NX>,
+        c: &Observation<NX>,
+        noise: &Noise,
+        pattern: &Pattern,
+    ) -> Option<Self> {
+        let mut s = c * prediction * c.transpose();
+        for o in 0..OUTPUTS {
+            s[(o, o)] += noise.outputs[o].powi(2);
+        }
+        // An output that does not count stands by itself with a unit variance, and is cleared.
+        for o in (0..OUTPUTS).filter(|o| !pattern.used[*o]) {
+            s.row_mut(o).fill(0.0);
+            s.column_mut(o).fill(0.0);
+            s[(o, o)] = 1.0;
+        }
+        let root = Cholesky::new(s)?;
+        let (mut inverse, mut whitening) = (root.inverse(), root.l().try_inverse()?);
+        for o in (0..OUTPUTS).filter(|o| !pattern.used[*o]) {
+            inverse[(o, o)] = 0.0;
+            whitening[(o, o)] = 0.0;
+        }
+        Some(PatternGain {
+            gain: prediction * c.transpose() * inverse,
+            inverse,
+            whitening,
+            log_determinant: 2.0 * root.l().diagonal().map(f64::ln).sum(),
+            slopes: vec![],
+        })
+    }
+
+    /// Slopes through the prediction's covariance and the outputs' slopes: dK = (dP Cᵀ + P dCᵀ −
+    /// K dS) S⁻¹.
+    fn slopes_along(
+        &self,
+        prediction: &States<NX>,
+        c: &Observation<NX>,
+        changes: &[(usize, Observation<NX>, States<NX>)],
+        pattern: &Pattern,
+    ) -> Vec<GainSlope<NX>> {
+        let slope = |(parameter, c_slope, p_slope): &(usize, Observation<NX>, States<NX>)| {
+            let cross = p_slope * c.transpose() + prediction * c_slope.transpose();
+            let mut innovations = c * cross + c_slope * prediction * c.transpose();
+            clear_unused(&mut innovations, pattern);
+            GainSlope {
+                parameter: *parameter,
+                gain: (cross - self.gain * innovations) * self.inverse,
+                innovations,
+            }
+        };
+        changes.iter().map(slope).collect()
+    }
+
+    /// Adds the direct effect of the outputs' own noise on S.
+    fn add_output_noise(
+        &mut self,
+        noise: &Noise,
+        parameters: &[(usize, NoiseParameter)],
+        pattern: &Pattern,
+    ) {
+        for slope in &mut self.slopes {
+            for (parameter, kind) in parameters {
+                let NoiseParameter::Output(o) = *kind else {
+                    continue;
+                };
+                if *parameter == slope.parameter && pattern.used[o] {
+                    let change = 2.0 * noise.outputs[o].powi(2);
+                    slope.innovations[(o, o)] += change;
+                    let column = self.gain.column(o) * change;
+                    slope.gain -= column * self.inverse.row(o);
+                }
+            }
+        }
+    }
+}
+
+fn clear_unused(matrix: &mut Outputs, pattern: &Pattern) {
+    for o in (0..OUTPUTS).filter(|o| !pattern.used[*o]) {
+        matrix.row_mut(o).fill(0.0);
+        matrix.column_mut(o).fill(0.0);
+    }
+}

@@ -1,0 +1,189 @@
+//! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and these in
+//! the derivatives, so its slopes are affine in the derivatives: A = A₀ + Σ ξ_j A_j.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::output_error::Case;
+
+/// Samples between two at which the slopes are taken: the mean needs no more.
+const STRIDE: usize = 4;
+
+/// Slopes of the rates and outputs along the states, means along the measured motion.
+#[derive(Clone, Debug)]
+pub(super) struct Linearised<const NX: usize> {
+    step_s: f64,
+    held: Slopes<NX>,
+    /// Slopes per unit of each free derivative.
+    free: Vec<Slopes<NX>>,
+}
+
+/// Slopes of rates (1/s) and of outputs along the states.
+#[derive(Clone, Copy, Debug)]
+struct Slopes<const NX: usize> {
+    rates: SMatrix<f64, NX, NX>,
+    outputs: SMatrix<f64, OUTPUTS, NX>,
+}
+
+/// System of one step: x(k+1) = Φ x(k), y(k) = C x(k).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Discrete<const NX: usize> {
+    pub step: SMatrix<f64, NX, NX>,
+    pub outputs: SMatrix<f64, OUTPUTS, NX>,
+}
+
+impl<const NX: usize> Slopes<NX> {
+    fn zeros() -> Self {
+        Slopes {
+            rates: SMatrix::zeros(),
+            outputs: SMatrix::zeros(),
+        }
+    }
+
+    fn add(&mut self, other: &Slopes<NX>, factor: f64) {
+        self.rates += other.rates * factor;
+        self.outputs += other.outputs * factor;
+    }
+}
+
+impl<const NX: usize> Linearised<NX> {
+    pub fn of<E: Equations<NX>>(case: &Case<NX, E>) -> Self {
+        let mut linearised = Linearised {
+            step_s: case.step_s,
+            held: Slopes::zeros(),
+            free: vec![Slopes::zeros(); case.derivatives()],
+        };
+        let samples = (0..case.samples()).step_by(STRIDE);
+        let share = 1.0 / samples.len().max(1) as f64;
+        for sample in samples {
+            linearised.add_sample(case, sample, share);
+        }
+        linearised
+    }
+
+    fn add_sample<E: Equations<NX>>(&mut self, case: &Case<NX, E>, sample: usize, share: f64) {
+        let x = &case.states[sample];
+        let unit = UnitSlopes::at(case, sample, x);
+        let held = case.held.at(2 * sample);
+        let mut whole = unit.still;
+        for (k, value) in held.coefficients(x).into_iter().enumerate() {
+            whole.add(&unit.along_coefficient(k), value);
+            for i in 0..NX {
+                whole.add(&unit.through_coefficient(k, i), held.slope[k][i]);
+            }
+        }
+        self.held.add(&whole, share);
+        for (term, sum) in case.terms.iter().zip(&mut self.free) {
+            let column = case.columns[term.column][2 * sample];
+            let regressor = column * term.state.map_or(1.0, |i| x[i]);
+            sum.add(&unit.along_coefficient(term.coefficient), share * regressor);
+            if let Some(state) = term.state {
+                let through = unit.through_coefficient(term.coefficient, state);
+                sum.add(&through, share * column);
+            }
+        }
+    }
+
+    /// System of one step with these derivatives.
+    pub fn discrete(&self, derivatives: &[f64]) -> Discrete<NX> {
+        let slopes = self.slopes(derivatives);
+        Discrete {
+            step: exponential(&(slopes.rates * self.step_s)),
+            outputs: slopes.outputs,
+        }
+    }
+
+    /// Slope of [`Linearised::discrete`] along each derivative.
+    pub fn discrete_slopes(&self, derivatives: &[f64]) -> Vec<Discrete<NX>> {
+        let rates = self.slopes(derivatives).rates * self.step_s;
+        let slope = |free: &Slopes<NX>| Discrete {
+            step: exponential_slope(&rates, &(free.rates * self.step_s)),
+            outputs: free.outputs,
+        };
+        self.free.iter().map(slope).collect()
+    }
+
+    fn slopes(&self, derivatives: &[f64]) -> Slopes<NX> {
+        let mut sum = self.held;
+        for (free, value) in self.free.iter().zip(derivatives) {
+            sum.add(free, *value);
+        }
+        sum
+    }
+}
+
+/// Slopes of rates and outputs at one sample, by coefficient.
+struct UnitSlopes<const NX: usize> {
+    /// At zero coefficients.
+    still: Slopes<NX>,
+    /// Changes of the slopes at constant coefficients, per unit of each coefficient.
+    changes: [Slopes<NX>; COEFFICIENTS],
+    rates: SMatrix<f64, NX, COEFFICIENTS>,
+    outputs: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
+}
+
+impl<const NX: usize> UnitSlopes<NX> {
+    fn at<E: Equations<NX>>(case: &Case<NX, E>, sample: usize, x: &SVector<f64, NX>) -> Self {
+        let (inputs, sensors) = (&case.rate_inputs[2 * sample], &case.sensor_inputs[sample]);
+        let slopes = |c: &[f64; COEFFICIENTS]| Slopes {
+            rates: E::rates(inputs, x, c).by_state,
+            outputs: E::outputs(inputs, sensors, x, c).by_state,
+        };
+        let still = slopes(&[0.0; COEFFICIENTS]);
+        let changes = std::array::from_fn(|k| {
+            let mut c = [0.0; COEFFICIENTS];
+            c[k] = 1.0;
+            let mut change = slopes(&c);
+            change.add(&still, -1.0);
+            change
+        });
+        UnitSlopes {
+            still,
+            changes,
+            rates: E::rates(inputs, x, &[0.0; COEFFICIENTS]).by_coefficient,
+            outputs: E::outputs(inputs, sensors, x, &[0.0; COEFFICIENTS]).by_coefficient,
+        }
+    }
+
+    /// Slopes per unit of a coefficient that does not depend on the state.
+    fn along_coefficient(&self, k: usize) -> Slopes<NX> {
+        self.changes[k]
+    }
+
+    /// Slopes per unit of a coefficient's slope along a state.
+    fn through_coefficient(&self, k: usize, state: usize) -> Slopes<NX> {
+        let mut slopes = Slopes::<NX>::zeros();
+        slopes
+            .rates
+            .column_mut(state)
+            .copy_from(&self.rates.column(k));
+        slopes
+            .outputs
+            .column_mut(state)
+            .copy_from(&self.outputs.column(k));
+        slopes
+    }
+}
+
+/// exp A to fourth order, as a Runge-Kutta step has it.
+fn exponential<const N: usize>(a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    let mut sum = SMatrix::identity();
+    for order in (1..=4).rev() {
+        sum = SMatrix::identity() + a * sum / f64::from(order);
+    }
+    sum
+}
+
+/// Slope of [`exponential`] along dA.
+fn exponential_slope<const N: usize>(
+    a: &SMatrix<f64, N, N>,
+    change: &SMatrix<f64, N, N>,
+) -> SMatrix<f64, N, N> {
+    let (mut sum, mut slope) = (SMatrix::<f64, N, N>::identity(), SMatrix::zeros());
+    for order in (1..=4).rev() {
+        let share = 1.0 / f64::from(order);
+        slope = (change * sum + a * slope) * share;
+        sum = SMatrix::identity() + a * sum * share;
+    }
+    slope
+}

@@ -1,0 +1,41 @@
+//! Filter error: maximum likelihood in moving air (Maine and Iliff 1981; Jategaonkar 2015,
+//! chapter 5).
+//!
+//! Output error charges a gust to the derivatives. Here the air adds noise to the states between
+//! samples, and a filter of steady gain corrects the states by the measurements:
+//!
+//! ```text
+//! prediction   x̂(k+1) = f(T x̃(k))
+//! innovation   v(k) = z(k) − h(x̂(k))
+//! correction   x̃(k) = x̂(k) + K v(k)
+//! cost         J = ½ Σ (v' S⁻¹ v + log|S|) + priors
+//! ```
+//!
+//! f is the step of output error, and T lets the rotary gusts decay. Derivatives, biases, initial
+//! states, process noise and output noise are estimated together. Without process noise K is zero,
+//! and the innovations are the residuals of output error.
+//!
+//! | file | content |
+//! |---|---|
+//! | [`noise`] | parameters of the noise, their priors and floors |
+//! | `linearised` | mean system of a maneuver, as a function of its derivatives |
+//! | `riccati` | covariance of the prediction, and its slopes |
+//! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
+//! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
+//! | [`filter`] | a maneuver prepared: cost, gradient and information |
+//! | [`scoring`] | the iteration |
+//! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
+//! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
+
+pub mod bounds;
+pub mod filter;
+mod gains;
+mod linearised;
+pub mod noise;
+mod pass;
+mod riccati;
+pub mod scoring;
+pub mod slopes;
+
+#[cfg(test)]
+mod tests;

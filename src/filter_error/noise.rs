@@ -1,0 +1,308 @@
+//! Noise of the process and of the outputs, and its parameters.
+//!
+//! A gust's angle is a random walk: white noise of one standard deviation per sample. A rotary gust
+//! is of first order, with one corner for all. Angle and rotary gusts correlate, because a rotary
+//! gust is the angle's change along the body (MIL-F-8785C). Parameters are logarithms of sizes and
+//! inverse hyperbolic tangents of correlations: any value is possible.
+
+use nalgebra::SMatrix;
+
+use crate::dynamics::{InGusts, OUTPUTS};
+use crate::units::RAD;
+
+/// Rotary gusts of an axis at most.
+const MOST_GUSTS: usize = 2;
+
+/// Standard deviations from which the iteration starts: light turbulence.
+const START_ANGLE: f64 = 0.05 * RAD;
+const START_GUST: f64 = 0.4 * RAD;
+/// Corner of the rotary gusts, rad/s: the span's over the airspeed of a fighter, and the spread of
+/// its logarithm. A maneuver of some ten seconds hardly determines it.
+const USUAL_CORNER: f64 = 4.0;
+const CORNER_SPREAD: f64 = 0.7;
+/// Spread of the correlations' parameters: two thirds of the correlations are below 0.46. A maneuver
+/// of some ten seconds hardly determines them, and close to one they would leave a combination of
+/// the moments without noise.
+const CORRELATION_SPREAD: f64 = 0.5;
+/// Spread of the logarithm of a rotary gust below the size that belongs to the angle's walk. A
+/// maneuver of some ten seconds may show none by chance, and bounds without it would be too small.
+const ROTARY_SPREAD: f64 = 0.5;
+/// Standard deviations of severe turbulence (30 ft/s rms at 300 ft/s), beyond which no air is.
+const SEVERE_ANGLE: f64 = 0.7 * RAD;
+const SEVERE_GUST: f64 = 6.0 * RAD;
+/// Standard deviations below which a gust has no effect on any output.
+const LEAST_ANGLE: f64 = 1e-4 * RAD;
+const LEAST_GUST: f64 = 1e-3 * RAD;
+
+/// Noise of a maneuver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Angle of the air, rad per sample.
+    pub angle: f64,
+    /// Rotary gusts, rad/s rms.
+    pub gusts: [f64; MOST_GUSTS],
+    /// Corner of the rotary gusts, rad/s.
+    pub corner: f64,
+    /// Correlation of each rotary gust's changes with the angle's, −1 to 1.
+    pub correlations: [f64; MOST_GUSTS],
+    /// Outputs, in their units.
+    pub outputs: [f64; OUTPUTS],
+}
+
+/// One parameter of the noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoiseParameter {
+    Angle,
+    Gust(usize),
+    Corner,
+    Correlation(usize),
+    Output(usize),
+}
+
+/// Prior of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Prior {
+    /// Normal, with mean and standard deviation.
+    Normal(f64, f64),
+    /// Normal of the size whose logarithm the parameter is, about zero, with the logarithm of its
+    /// standard deviation: it holds down what has no effect on any output.
+    Size(f64),
+}
+
+impl Prior {
+    /// Cost at a value, its slope, and its expected curvature.
+    #[must_use]
+    pub fn cost(self, value: f64) -> [f64; 3] {
+        match self {
+            Prior::Normal(mean, deviation) => {
+                let z = (value - mean) / deviation;
+                [0.5 * z * z, z / deviation, deviation.powi(-2)]
+            }
+            Prior::Size(size) => {
+                let square = (2.0 * (value - size)).exp();
+                [0.5 * square, square, 2.0 * square]
+            }
+        }
+    }
+}
+
+/// Cost of a rotary gust that is smaller than the angle's walk makes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotaryCost {
+    pub cost: f64,
+    /// Slope and curvature along the logarithm of the gust's excess.
+    pub slope: f64,
+    pub curvature: f64,
+    /// Slope of that logarithm along each parameter that acts on it.
+    pub along: [(NoiseParameter, f64); 3],
+}
+
+impl NoiseParameter {
+    /// Parameters of an axis in order.
+    #[must_use]
+    pub fn all(gusts: usize) -> Vec<NoiseParameter> {
+        let mut all = vec![NoiseParameter::Angle];
+        all.extend((0..gusts).map(NoiseParameter::Gust));
+        all.push(NoiseParameter::Corner);
+        all.extend((0..gusts).map(NoiseParameter::Correlation));
+        all.extend((0..OUTPUTS).map(NoiseParameter::Output));
+        all
+    }
+
+    /// Parameter's prior.
+    #[must_use]
+    pub fn prior(self) -> Option<Prior> {
+        match self {
+            NoiseParameter::Angle => Some(Prior::Size(SEVERE_ANGLE.ln())),
+            NoiseParameter::Gust(_) => Some(Prior::Size(SEVERE_GUST.ln())),
+            NoiseParameter::Corner => Some(Prior::Normal(USUAL_CORNER.ln(), CORNER_SPREAD)),
+            NoiseParameter::Correlation(_) => Some(Prior::Normal(0.0, CORRELATION_SPREAD)),
+            NoiseParameter::Output(_) => None,
+        }
+    }
+
+    /// Least value of the parameter; `resolution` is the least standard deviation of each output.
+    #[must_use]
+    pub fn floor(self, resolution: &[f64; OUTPUTS]) -> f64 {
+        match self {
+            NoiseParameter::Angle => LEAST_ANGLE.ln(),
+            NoiseParameter::Gust(_) => LEAST_GUST.ln(),
+            NoiseParameter::Output(o) => resolution[o].ln(),
+            NoiseParameter::Corner | NoiseParameter::Correlation(_) => f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Noise {
+    /// Noise from which the iteration starts, with these standard deviations of the outputs.
+    #[must_use]
+    pub fn starting(outputs: [f64; OUTPUTS]) -> Noise {
+        Noise {
+            angle: START_ANGLE,
+            gusts: [START_GUST; MOST_GUSTS],
+            corner: USUAL_CORNER,
+            correlations: [0.0; MOST_GUSTS],
+            outputs,
+        }
+    }
+
+    /// Noise of still air, with these standard deviations of the outputs.
+    #[must_use]
+    pub fn still(outputs: [f64; OUTPUTS]) -> Noise {
+        Noise {
+            angle: LEAST_ANGLE,
+            gusts: [LEAST_GUST; MOST_GUSTS],
+            ..Noise::starting(outputs)
+        }
+    }
+
+    /// Noise of hardly moving air, from which the iteration finds out whether it moves.
+    #[must_use]
+    pub fn slight(outputs: [f64; OUTPUTS]) -> Noise {
+        Noise {
+            angle: 10.0 * LEAST_ANGLE,
+            gusts: [10.0 * LEAST_GUST; MOST_GUSTS],
+            ..Noise::starting(outputs)
+        }
+    }
+
+    /// Noise of these parameters, in the order of [`NoiseParameter::all`].
+    #[must_use]
+    pub fn of_parameters(parameters: &[f64], gusts: usize) -> Noise {
+        // Gusts that the axis does not have are still.
+        let mut noise = Noise::still([1.0; OUTPUTS]);
+        for (parameter, value) in NoiseParameter::all(gusts).into_iter().zip(parameters) {
+            match parameter {
+                NoiseParameter::Angle => noise.angle = value.exp(),
+                NoiseParameter::Gust(g) => noise.gusts[g] = value.exp(),
+                NoiseParameter::Corner => noise.corner = value.exp(),
+                NoiseParameter::Correlation(g) => noise.correlations[g] = value.tanh(),
+                NoiseParameter::Output(o) => noise.outputs[o] = value.exp(),
+            }
+        }
+        noise
+    }
+
+    /// Parameters in the order of [`NoiseParameter::all`].
+    #[must_use]
+    pub fn parameters(&self, gusts: usize) -> Vec<f64> {
+        let value = |parameter| match parameter {
+            NoiseParameter::Angle => self.angle.ln(),
+            NoiseParameter::Gust(g) => self.gusts[g].ln(),
+            NoiseParameter::Corner => self.corner.ln(),
+            NoiseParameter::Correlation(g) => self.correlations[g].atanh(),
+            NoiseParameter::Output(o) => self.outputs[o].ln(),
+        };
+        NoiseParameter::all(gusts).into_iter().map(value).collect()
+    }
+
+    /// Returns true if all noise of the process is at its floor.
+    #[must_use]
+    pub fn is_still(&self) -> bool {
+        // Parameters are logarithms, whose rounding the factor covers.
+        const AT: f64 = 1.0 + 1e-9;
+        self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
+    }
+
+    /// Logarithm of a rotary gust over the size that belongs to the angle's walk. The gust is the
+    /// angle's rate, low-passed at the corner ω: white of intensity σ²/Δt becomes σ²ω/(2Δt)
+    /// (MIL-F-8785C).
+    fn rotary_excess(&self, gust: usize, step_s: f64) -> f64 {
+        let expected = self.angle * (self.corner / (2.0 * step_s)).sqrt();
+        (self.gusts[gust] / expected).ln()
+    }
+
+    /// Cost of rotary gusts below the size that belongs to the angle's walk, with its slopes and
+    /// expected curvatures along the parameters that act on it: (parameter, slope along the excess).
+    #[must_use]
+    pub fn rotary_cost(&self, gust: usize, step_s: f64) -> Option<RotaryCost> {
+        let excess = self.rotary_excess(gust, step_s);
+        (excess < 0.0).then(|| {
+            let [cost, slope, curvature] = Prior::Normal(0.0, ROTARY_SPREAD).cost(excess);
+            RotaryCost {
+                cost,
+                slope,
+                curvature,
+                along: [
+                    (NoiseParameter::Gust(gust), 1.0),
+                    (NoiseParameter::Angle, -1.0),
+                    (NoiseParameter::Corner, -0.5),
+                ],
+            }
+        })
+    }
+
+    /// Share of a rotary gust that is left after a step.
+    #[must_use]
+    pub fn decay(&self, step_s: f64) -> f64 {
+        (-self.corner * step_s).exp()
+    }
+
+    /// Slope of [`Noise::decay`] along a parameter.
+    #[must_use]
+    pub fn decay_slope(&self, parameter: NoiseParameter, step_s: f64) -> f64 {
+        match parameter {
+            NoiseParameter::Corner => -self.corner * step_s * self.decay(step_s),
+            _ => 0.0,
+        }
+    }
+
+    /// Variance of a rotary gust's change in a step, (rad/s)²: with it the gust keeps its size.
+    fn gust_variance(&self, gust: usize, step_s: f64) -> f64 {
+        self.gusts[gust].powi(2) * (1.0 - self.decay(step_s).powi(2))
+    }
+
+    /// Covariance of the states' noise in a step.
+    #[must_use]
+    pub fn covariance<const NX: usize, E: InGusts<NX>>(&self, step_s: f64) -> SMatrix<f64, NX, NX> {
+        let mut q = SMatrix::zeros();
+        q[(E::ANGLE, E::ANGLE)] = self.angle.powi(2);
+        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+            let variance = self.gust_variance(g, step_s);
+            // With a share for each gust the matrix stays positive for any correlations.
+            let share = self.correlations[g] / (E::FELT_RATES.len() as f64).sqrt();
+            let cross = share * self.angle * variance.sqrt();
+            q[(felt, felt)] = variance;
+            q[(E::ANGLE, felt)] = cross;
+            q[(felt, E::ANGLE)] = cross;
+        }
+        q
+    }
+
+    /// Slope of [`Noise::covariance`] along a parameter.
+    #[must_use]
+    pub fn covariance_slope<const NX: usize, E: InGusts<NX>>(
+        &self,
+        parameter: NoiseParameter,
+        step_s: f64,
+    ) -> SMatrix<f64, NX, NX> {
+        let q = self.covariance::<NX, E>(step_s);
+        let mut slope = SMatrix::zeros();
+        if parameter == NoiseParameter::Angle {
+            slope[(E::ANGLE, E::ANGLE)] = 2.0 * q[(E::ANGLE, E::ANGLE)];
+        }
+        let decay = self.decay(step_s);
+        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+            // Relative slopes of the gust's standard deviation and of the correlation.
+            let (of_gust, of_angle) = match parameter {
+                NoiseParameter::Gust(other) if other == g => (1.0, 0.0),
+                NoiseParameter::Corner => {
+                    let left = decay * decay;
+                    (left * self.corner * step_s / (1.0 - left), 0.0)
+                }
+                NoiseParameter::Angle => (0.0, 1.0),
+                _ => (0.0, 0.0),
+            };
+            let mut cross = (of_gust + of_angle) * q[(E::ANGLE, felt)];
+            if parameter == NoiseParameter::Correlation(g) {
+                let unit = self.angle * self.gust_variance(g, step_s).sqrt();
+                let share = 1.0 / (E::FELT_RATES.len() as f64).sqrt();
+                cross = (1.0 - self.correlations[g].powi(2)) * share * unit;
+            }
+            slope[(felt, felt)] = 2.0 * of_gust * q[(felt, felt)];
+            slope[(E::ANGLE, felt)] = cross;
+            slope[(felt, E::ANGLE)] = cross;
+        }
+        slope
+    }
+}

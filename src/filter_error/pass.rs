@@ -1,0 +1,355 @@
+//! One pass of the filter over a maneuver, in the kernel of output error: the same steps, with a
+//! correction of states and sensitivities between them.
+//!
+//! With s the sensitivities of the predicted state and y those of the predicted outputs,
+//! s̃ = T (s − K y + dK v) + dT x̃, because an innovation falls as its prediction rises. The sums
+//! receive L⁻¹ y and L⁻¹ v: with S = L Lᵀ the innovations are white with unit variance.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into one loop for the processor at hand"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
+
+use nalgebra::SVector;
+use pulp::{Simd, WithSimd};
+
+use super::gains::{Gain, Outputs, Pattern, PatternGain};
+use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::row_products::Idle;
+use crate::numerics::simd::{AlignedBuffer, VECTOR, load};
+use crate::output_error::case::Case;
+use crate::output_error::case::build_up::ValuedTerm;
+use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};
+use crate::output_error::case::layout::LaneLayout;
+use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
+use crate::output_error::kernel::normal_equations::NormalSums;
+use crate::output_error::kernel::pass::{Correction, Diverged, Propagation};
+use crate::output_error::kernel::propagators::Propagators;
+use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory};
+
+/// Gain of a pattern with its slopes in the lanes of the parameters.
+pub(super) struct LaneGain<const NX: usize> {
+    gain: Gain<NX>,
+    whitening: Outputs,
+    /// Slopes of the gain: state by state, output by output a row of lanes.
+    slopes: AlignedBuffer,
+}
+
+impl<const NX: usize> LaneGain<NX> {
+    pub fn new(pattern: &PatternGain<NX>, layout: &LaneLayout) -> Self {
+        let width = layout.width();
+        let mut slopes = AlignedBuffer::zeros(NX * OUTPUTS * width);
+        for slope in &pattern.slopes {
+            let lane = layout.parameter_lanes[slope.parameter];
+            for i in 0..NX {
+                for o in 0..OUTPUTS {
+                    slopes.slice_mut()[(i * OUTPUTS + o) * width + lane] = slope.gain[(i, o)];
+                }
+            }
+        }
+        LaneGain {
+            gain: pattern.gain,
+            whitening: pattern.whitening,
+            slopes,
+        }
+    }
+}
+
+/// Values of a pass that do not change within it.
+pub(super) struct Corrections<'a, const NX: usize> {
+    pub gains: Vec<LaneGain<NX>>,
+    pub patterns: &'a [Pattern],
+    /// Pattern of each sample.
+    pub pattern_of: &'a [u8],
+    pub biases: [f64; OUTPUTS],
+    /// Lanes of the biases: output by output a row, one where a bias shifts the output.
+    pub bias_rows: AlignedBuffer,
+    /// Share of a rotary gust that is left after a step, and its slope in each lane.
+    pub decay: f64,
+    pub decay_row: AlignedBuffer,
+}
+
+/// Results of a pass besides the sums.
+pub(super) struct PassOutputs<'a> {
+    /// Predicted outputs.
+    pub predicted: &'a mut [[f64; OUTPUTS]],
+    pub innovations: &'a mut [[f64; OUTPUTS]],
+    /// Innovations made white.
+    pub whitened: &'a mut [[f64; OUTPUTS]],
+}
+
+/// Consumer of the rows of whitened sensitivities.
+pub(super) trait RowSink {
+    /// Takes the rows of a chunk that begins at the sample `first`: sample by sample, output by
+    /// output. `white` has the whitened innovations, and `used` the outputs that count.
+    fn take<'a, S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        white: &[[f64; OUTPUTS]],
+        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
+        rows: &mut [f64],
+    );
+}
+
+impl RowSink for NormalSums {
+    #[inline(always)]
+    fn take<'a, S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        white: &[[f64; OUTPUTS]],
+        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
+        rows: &mut [f64],
+    ) {
+        let residual = |k: usize, o: usize| used(k)[o].then(|| white[k][o]);
+        self.complete_rows(white.len(), rows, residual);
+        self.add_rows(simd, first, white.len(), rows, &mut Idle);
+    }
+}
+
+/// Rows of all samples; zero where an output does not count.
+pub(super) struct RecordedRows {
+    rows: AlignedBuffer,
+    width: usize,
+}
+
+impl RecordedRows {
+    pub fn new(samples: usize, width: usize) -> Self {
+        RecordedRows {
+            rows: AlignedBuffer::zeros(samples * OUTPUTS * width),
+            width,
+        }
+    }
+
+    /// Σ s u over all samples and outputs, lane by lane.
+    pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.width];
+        let rows = self.rows.slice().chunks_exact(self.width);
+        for (row, u) in rows.zip(values.iter().flatten()) {
+            for (sum, s) in sum.iter_mut().zip(row) {
+                *sum += s * u;
+            }
+        }
+        sum
+    }
+}
+
+impl RowSink for RecordedRows {
+    #[inline(always)]
+    fn take<'a, S: Simd>(
+        &mut self,
+        _: S,
+        first: usize,
+        white: &[[f64; OUTPUTS]],
+        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
+        rows: &mut [f64],
+    ) {
+        let width = self.width;
+        for k in 0..white.len() {
+            for o in (0..OUTPUTS).filter(|o| used(k)[*o]) {
+                let (from, to) = (k * OUTPUTS + o, (first + k) * OUTPUTS + o);
+                self.rows.slice_mut()[to * width..][..width]
+                    .copy_from_slice(&rows[from * width..][..width]);
+            }
+        }
+    }
+}
+
+/// One pass; without a sink no sensitivities are computed.
+pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
+    pub case: &'a Case<NX, E>,
+    pub layout: &'a LaneLayout,
+    pub terms: Vec<ValuedTerm>,
+    pub start: SVector<f64, NX>,
+    /// Sensitivities of the first state: state by state a row of lanes.
+    pub start_sensitivities: AlignedBuffer,
+    pub corrections: &'a Corrections<'a, NX>,
+    pub outputs: PassOutputs<'a>,
+    pub sink: Option<&'a mut K>,
+}
+
+/// Samples of a chunk as the filter meets them.
+struct ChunkCorrections<'a, const NX: usize, E> {
+    corrections: &'a Corrections<'a, NX>,
+    width: usize,
+    /// Factors of the first vector's regressors at the predicted states.
+    factors: [[f64; VECTOR]; CHUNK],
+    innovations: [[f64; OUTPUTS]; CHUNK],
+    patterns: [u8; CHUNK],
+    /// Rotary gusts of the corrected states.
+    gusts: [[f64; NX]; CHUNK],
+    equations: std::marker::PhantomData<E>,
+}
+
+impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, NX, E> {
+    #[inline(always)]
+    fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]> {
+        Some(&self.factors[k])
+    }
+
+    #[inline(always)]
+    fn correct<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        lane: usize,
+        s: &mut [S::f64s; NX],
+        y: &mut [S::f64s; OUTPUTS],
+    ) {
+        let Corrections {
+            gains,
+            bias_rows,
+            decay,
+            decay_row,
+            ..
+        } = self.corrections;
+        let gain = &gains[usize::from(self.patterns[k])];
+        let slopes = gain.slopes.slice();
+        for o in 0..OUTPUTS {
+            y[o] = simd.add_f64s(y[o], load::<S>(bias_rows.slice(), o * self.width + lane));
+            let v = simd.splat_f64s(self.innovations[k][o]);
+            for i in 0..NX {
+                let slope = load::<S>(slopes, (i * OUTPUTS + o) * self.width + lane);
+                s[i] = simd.mul_add_f64s(slope, v, s[i]);
+                s[i] = simd.mul_add_f64s(simd.splat_f64s(-gain.gain[(i, o)]), y[o], s[i]);
+            }
+        }
+        let decay_slope = load::<S>(decay_row.slice(), lane);
+        for &(rate, felt) in E::FELT_RATES {
+            let gust = simd.sub_f64s(s[felt], s[rate]);
+            s[felt] = simd.mul_add_f64s(simd.splat_f64s(*decay), gust, s[rate]);
+            let gust = simd.splat_f64s(self.gusts[k][felt]);
+            s[felt] = simd.mul_add_f64s(decay_slope, gust, s[felt]);
+        }
+        let read = *y;
+        for o in 0..OUTPUTS {
+            let mut white = simd.splat_f64s(0.0);
+            for p in 0..=o {
+                let factor = simd.splat_f64s(gain.whitening[(o, p)]);
+                white = simd.mul_add_f64s(factor, read[p], white);
+            }
+            y[o] = white;
+        }
+    }
+}
+
+impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
+    fn new(corrections: &'a Corrections<'a, NX>, width: usize) -> Self {
+        ChunkCorrections {
+            corrections,
+            width,
+            factors: [[1.0; VECTOR]; CHUNK],
+            innovations: [[0.0; OUTPUTS]; CHUNK],
+            patterns: [0; CHUNK],
+            gusts: [[0.0; NX]; CHUNK],
+            equations: std::marker::PhantomData,
+        }
+    }
+
+    /// Corrects the predicted state of a sample with the outputs `y`, and returns it with its
+    /// whitened innovation.
+    #[inline(always)]
+    fn correct_state(
+        &mut self,
+        sample: usize,
+        k: usize,
+        x: &SVector<f64, NX>,
+        y: &[f64; OUTPUTS],
+        measured: &[f64; OUTPUTS],
+    ) -> (SVector<f64, NX>, [f64; OUTPUTS]) {
+        for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
+            self.factors[k][slot] = x[state];
+        }
+        let pattern = self.corrections.pattern_of[sample];
+        let used = &self.corrections.patterns[usize::from(pattern)].used;
+        let gain = &self.corrections.gains[usize::from(pattern)];
+        let (mut corrected, mut white) = (*x, [0.0; OUTPUTS]);
+        for o in 0..OUTPUTS {
+            let v = if used[o] { measured[o] - y[o] } else { 0.0 };
+            self.innovations[k][o] = v;
+            for i in 0..NX {
+                corrected[i] = gain.gain[(i, o)].mul_add(v, corrected[i]);
+            }
+            for p in 0..=o {
+                white[o] = gain.whitening[(o, p)].mul_add(self.innovations[k][p], white[o]);
+            }
+        }
+        self.patterns[k] = pattern;
+        for &(rate, felt) in E::FELT_RATES {
+            self.gusts[k][felt] = corrected[felt] - corrected[rate];
+        }
+        (E::decayed(corrected, self.corrections.decay), white)
+    }
+}
+
+impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX, E, K> {
+    type Output = Result<(), Diverged>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> Result<(), Diverged> {
+        let (case, layout) = (self.case, self.layout);
+        let samples = case.samples();
+        let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
+        let rows = rows.slice_mut();
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
+        let regressors = regressors.slice_mut();
+        let mut build_up = ChunkBuildUp::<NX>::ZERO;
+        let mut history = StageHistory::<NX>::EMPTY;
+        let mut propagators = Propagators::<NX>::ZERO;
+        let mut chunk = ChunkCorrections::<NX, E>::new(self.corrections, layout.width());
+        let mut x = self.start;
+        for first in (0..samples).step_by(CHUNK) {
+            let count = CHUNK.min(samples - first);
+            let points = Strided {
+                first: 2 * first,
+                stride: 1,
+            };
+            build_up.set(case, &self.terms, points);
+            let mut trajectory = Trajectory::new(case, &build_up, &mut history, x, points, count);
+            for k in 0..count {
+                let sample = first + k;
+                if !x.iter().all(|x| x.abs() < STATE_BOUND) {
+                    return Err(Diverged { sample });
+                }
+                let mut y = propagators.read_outputs(case, &build_up, &x, sample, k);
+                for o in 0..OUTPUTS {
+                    y[o] += self.corrections.biases[o];
+                }
+                let (corrected, white) =
+                    chunk.correct_state(sample, k, &x, &y, &case.measurements.values[sample]);
+                self.outputs.predicted[sample] = y;
+                self.outputs.innovations[sample] = chunk.innovations[k];
+                self.outputs.whitened[sample] = white;
+                x = trajectory.step_from(corrected);
+            }
+            let Some(sink) = self.sink.as_deref_mut() else {
+                continue;
+            };
+            propagators.set_steps::<S, E>(simd, &history, count, case.step_s);
+            fill_regressor_rows(case, layout, points, regressors);
+            let mut propagation = Propagation {
+                simd,
+                layout,
+                regressors: S::as_simd_f64s(regressors).0,
+                sensitivities: S::as_mut_simd_f64s(self.start_sensitivities.slice_mut()).0,
+                rows: S::as_mut_simd_f64s(rows).0,
+                history: &history,
+                propagators: &propagators,
+                count,
+                correction: &chunk,
+            };
+            propagation.run::<E>();
+            let white = &self.outputs.whitened[first..first + count];
+            let used = |k: usize| {
+                let pattern = usize::from(chunk.patterns[k]);
+                &self.corrections.patterns[pattern].used
+            };
+            sink.take(simd, first, white, used, rows);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,230 @@
+//! Minimisation of the filter's cost: scoring steps, damped where a full step does not lower the
+//! cost.
+//!
+//! A logarithm of a noise that is zero has no minimum. A noise at its floor whose gradient points
+//! below is fixed there; the corner and the correlation of a fixed rotary gust are fixed with it.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::filter::{Filter, Response};
+use super::noise::NoiseParameter;
+use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::symmetric::{scale, scaled};
+use crate::settings::settings;
+
+settings! {
+    /// End of the iteration of filter error.
+    #[derive(Copy)]
+    pub struct Settings {
+        /// Most iterations; a maneuver that needs more does not converge.
+        pub max_iterations: usize = 60,
+        /// Half square of a full step in bounds of the estimates, below which the iteration has
+        /// converged. At 1e-3 estimates are within a twentieth of their bounds. Larger: fewer
+        /// iterations.
+        pub tolerance: f64 = 1e-3,
+    }
+}
+
+/// First damping after a full step fails, and the one at which no step lowers the cost.
+const FIRST_DAMPING: f64 = 1e-4;
+const MOST_DAMPING: f64 = 1e8;
+/// Largest growth of a noise in a step, a factor of 4.5, and largest fall, of 50: noise that is not
+/// there falls to its floor in few steps.
+const LARGEST_GROWTH: f64 = 1.5;
+const LARGEST_FALL: f64 = 4.0;
+/// Decrease of J by a full step below which the noise may still move: it wanders along valleys in
+/// which no estimate changes.
+const NOISE_TOLERANCE: f64 = 0.1;
+
+/// Steps in a row that lower J by less than the tolerance after which the iteration ends: it follows
+/// a valley across which the second gradient is not exact.
+const SLOW_STEPS: usize = 3;
+
+/// End of the iteration.
+#[derive(Clone, Debug)]
+pub struct Scored {
+    pub converged: bool,
+    pub reason: String,
+    pub iterations: usize,
+    pub initial_cost: f64,
+    pub parameters: Vec<f64>,
+    /// Parameters that are not fixed at a floor.
+    pub free: Vec<bool>,
+    pub response: Response,
+}
+
+/// Minimises the cost from a start; `None` where the filter diverges there. `resolution` is the least
+/// standard deviation of each output's noise.
+#[must_use]
+pub fn minimise<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    start: Vec<f64>,
+    resolution: &[f64; OUTPUTS],
+    settings: &Settings,
+) -> Option<Scored> {
+    let floors = floors(filter, resolution);
+    let response = filter.respond(&start).ok()?;
+    let mut scored = Scored {
+        converged: false,
+        reason: format!("not converged after {} iterations", settings.max_iterations),
+        iterations: 0,
+        initial_cost: response.cost,
+        free: vec![true; start.len()],
+        parameters: start,
+        response,
+    };
+    let (mut damping, mut slow_steps) = (0.0, 0);
+    while scored.iterations < settings.max_iterations {
+        scored.free = free(filter, &scored, &floors);
+        let (gradient, information) = scored.free_system();
+        let Some(full) = step(&information, &gradient, 0.0) else {
+            "the information matrix is singular".clone_into(&mut scored.reason);
+            break;
+        };
+        let gain = 0.5 * gradient.dot(&full);
+        let own_gain = own_gain(&full, &information, filter.first_noise());
+        let settled = gain < NOISE_TOLERANCE && own_gain < settings.tolerance;
+        if settled || slow_steps >= SLOW_STEPS {
+            scored.converged = true;
+            "a further step would not lower the cost".clone_into(&mut scored.reason);
+            break;
+        }
+        scored.iterations += 1;
+        let before = scored.response.cost;
+        if !scored.lower(filter, &floors, &gradient, &information, &mut damping) {
+            "no step lowers the cost".clone_into(&mut scored.reason);
+            break;
+        }
+        let slow = before - scored.response.cost < settings.tolerance;
+        slow_steps = if slow { slow_steps + 1 } else { 0 };
+    }
+    Some(scored)
+}
+
+impl Scored {
+    /// Gradient and information of the free parameters; the others have a unit diagonal.
+    fn free_system(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let (mut gradient, mut information) =
+            (self.response.gradient(), self.response.information());
+        for j in (0..self.free.len()).filter(|j| !self.free[*j]) {
+            gradient[j] = 0.0;
+            information.row_mut(j).fill(0.0);
+            information.column_mut(j).fill(0.0);
+            information[(j, j)] = 1.0;
+        }
+        (gradient, information)
+    }
+
+    /// Tries steps of growing damping until one lowers the cost.
+    fn lower<const NX: usize, E: InGusts<NX>>(
+        &mut self,
+        filter: &Filter<NX, E>,
+        floors: &[f64],
+        gradient: &DVector<f64>,
+        information: &DMatrix<f64>,
+        damping: &mut f64,
+    ) -> bool {
+        while *damping < MOST_DAMPING {
+            if let Some(step) = step(information, gradient, *damping) {
+                let next = moved(&self.parameters, &step, floors, filter.first_noise());
+                if let Ok(response) = filter.respond(&next)
+                    && response.cost < self.response.cost
+                {
+                    let predicted = gradient.dot(&step) - 0.5 * (information * &step).dot(&step);
+                    let kept = (self.response.cost - response.cost) / predicted;
+                    (self.parameters, self.response) = (next, response);
+                    *damping = next_damping(*damping, kept);
+                    return true;
+                }
+            }
+            *damping = (*damping * 10.0).max(FIRST_DAMPING);
+        }
+        false
+    }
+}
+
+/// Damping after a step that gained this share of its prediction.
+fn next_damping(damping: f64, kept: f64) -> f64 {
+    match kept {
+        k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,
+        k if k > 0.75 => 0.0,
+        k if k < 0.25 => (damping * 10.0).max(FIRST_DAMPING),
+        _ => damping,
+    }
+}
+
+/// Half square of the step of the estimates, in units of their bounds at known noise.
+fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, own: usize) -> f64 {
+    let step = step.rows(0, own);
+    0.5 * (information.view((0, 0), (own, own)) * step).dot(&step)
+}
+
+/// Least value of each parameter.
+fn floors<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    resolution: &[f64; OUTPUTS],
+) -> Vec<f64> {
+    let own = vec![f64::NEG_INFINITY; filter.first_noise()];
+    let noise = filter.noise_parameters().iter();
+    let noise = noise.map(|parameter| parameter.floor(resolution));
+    own.into_iter().chain(noise).collect()
+}
+
+/// Parameters that are not fixed at a floor.
+fn free<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    scored: &Scored,
+    floors: &[f64],
+) -> Vec<bool> {
+    let gradient = scored.response.gradient();
+    let at_floor = |j: usize| scored.parameters[j] <= floors[j] && gradient[j] <= 0.0;
+    let mut free: Vec<bool> = (0..floors.len()).map(|j| !at_floor(j)).collect();
+    let first = filter.first_noise();
+    let kinds = filter.noise_parameters();
+    let is_fixed = |free: &[bool], kind: NoiseParameter| {
+        let place = kinds.iter().position(|k| *k == kind);
+        place.is_some_and(|n| !free[first + n])
+    };
+    let gusts = 0..E::FELT_RATES.len();
+    let all_fixed = gusts
+        .clone()
+        .all(|g| is_fixed(&free, NoiseParameter::Gust(g)));
+    for (n, kind) in kinds.iter().enumerate() {
+        let without_effect = match *kind {
+            NoiseParameter::Corner => all_fixed,
+            NoiseParameter::Correlation(g) => {
+                is_fixed(&free, NoiseParameter::Gust(g)) || is_fixed(&free, NoiseParameter::Angle)
+            }
+            _ => false,
+        };
+        if without_effect {
+            free[first + n] = false;
+        }
+    }
+    free
+}
+
+/// Parameters after a step; noise changes by a factor at most, and stays above its floor.
+fn moved(values: &[f64], step: &DVector<f64>, floors: &[f64], first_noise: usize) -> Vec<f64> {
+    let all = values.iter().zip(step.iter()).zip(floors).enumerate();
+    all.map(|(j, ((value, step), floor))| {
+        let step = if j < first_noise {
+            *step
+        } else {
+            step.clamp(-LARGEST_FALL, LARGEST_GROWTH)
+        };
+        (value + step).max(*floor)
+    })
+    .collect()
+}
+
+/// Solves (H + damping · diag H) d = g at unit diagonal.
+fn step(information: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let unit = scale(information);
+    let mut h = scaled(information, &unit);
+    for i in 0..h.nrows() {
+        h[(i, i)] += damping;
+    }
+    let solution = Cholesky::new(h)?.solve(&gradient.component_mul(&unit));
+    Some(solution.component_mul(&unit))
+}

@@ -1,0 +1,179 @@
+//! Slopes of the derivatives over α inside a maneuver, and their effect on the estimates.
+//!
+//! Each slope has a normal prior about zero, of a given size times a common share λ. With information
+//! H and gradient g of −J at the fit, f the filter's own parameters and s the slopes,
+//!
+//! ```text
+//! V = H_ss − H_sf H_ff⁻¹ H_fs        D = λ · diag(sizes)
+//! slopes   ŝ = P g_s                 P = D (1 + D V D)⁻¹ D
+//! estimates move by −G (ŝ − s₀)      with covariance G P G',  G = H_ff⁻¹ H_fs
+//! p(data | λ) ∝ |1 + D V D|^(−½) exp(½ g_s' P g_s)
+//! ```
+//!
+//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the mean over λ, so that a maneuver that hardly sweeps α, or whose derivatives are
+//! constant, is left as it is.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Shares of the sizes: from derivatives that are constant to slopes of twice the size.
+const SHARES: [f64; 7] = [0.0, 0.125, 0.25, 0.5, 1.0, 1.5, 2.0];
+
+/// Effect of the slopes on the estimates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlopeEffect {
+    /// Slopes.
+    pub slopes: DVector<f64>,
+    /// Change of the filter's own parameters.
+    pub change: DVector<f64>,
+    /// Covariance of that change.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Blocks of the information on own parameters and slopes, with the slopes' gradient.
+#[derive(Clone, Debug)]
+pub struct SlopeInformation {
+    /// H_ff⁻¹.
+    pub inverse: DMatrix<f64>,
+    /// H_fs.
+    pub cross: DMatrix<f64>,
+    /// H_ss.
+    pub slopes: DMatrix<f64>,
+    /// Gradient of −J along the slopes.
+    pub gradient: DVector<f64>,
+    /// Size of each slope.
+    pub sizes: DVector<f64>,
+    /// Value s₀ at which the fit held each slope.
+    pub held_at: DVector<f64>,
+}
+
+/// Slopes for one share of the sizes.
+struct ShareEstimate {
+    log_likelihood: f64,
+    slopes: DVector<f64>,
+    change: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl SlopeInformation {
+    /// Computes the slopes' effect; `None` where the information is not positive.
+    #[must_use]
+    pub fn effect(&self) -> Option<SlopeEffect> {
+        let by_slopes = &self.inverse * &self.cross;
+        let left = &self.slopes - self.cross.transpose() * &by_slopes;
+        let gradient = &self.gradient + &left * &self.held_at;
+        let estimates: Vec<ShareEstimate> = SHARES
+            .iter()
+            .map(|share| self.estimate(*share, &gradient, &left, &by_slopes))
+            .collect::<Option<_>>()?;
+        Some(mean(&estimates, by_slopes.nrows()))
+    }
+
+    fn estimate(
+        &self,
+        share: f64,
+        gradient: &DVector<f64>,
+        left: &DMatrix<f64>,
+        by_slopes: &DMatrix<f64>,
+    ) -> Option<ShareEstimate> {
+        let n = self.sizes.len();
+        let sizes = &self.sizes * share;
+        let scaled = DMatrix::from_fn(n, n, |i, j| sizes[i] * left[(i, j)] * sizes[j]);
+        let root = Cholesky::new(DMatrix::identity(n, n) + scaled)?;
+        let gradient = gradient.component_mul(&sizes);
+        let unit = root.solve(&gradient);
+        let log_determinant: f64 = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
+        let slopes = unit.component_mul(&sizes);
+        let scaled_effect = by_slopes * DMatrix::from_diagonal(&sizes);
+        Some(ShareEstimate {
+            log_likelihood: 0.5 * (gradient.dot(&unit) - log_determinant),
+            change: by_slopes * (&self.held_at - &slopes),
+            slopes,
+            covariance: &scaled_effect * root.solve(&scaled_effect.transpose()),
+        })
+    }
+}
+
+/// Mean over the shares, by their likelihoods; the covariance has the scatter between them.
+fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
+    let largest = estimates
+        .iter()
+        .map(|e| e.log_likelihood)
+        .fold(f64::MIN, f64::max);
+    let weights: Vec<f64> = estimates
+        .iter()
+        .map(|e| (e.log_likelihood - largest).exp())
+        .collect();
+    let total: f64 = weights.iter().sum();
+    let slopes = estimates.first().map_or(0, |e| e.slopes.len());
+    let mut effect = SlopeEffect {
+        slopes: DVector::zeros(slopes),
+        change: DVector::zeros(own),
+        covariance: DMatrix::zeros(own, own),
+    };
+    for (estimate, weight) in estimates.iter().zip(&weights) {
+        effect.slopes += &estimate.slopes * (weight / total);
+        effect.change += &estimate.change * (weight / total);
+    }
+    for (estimate, weight) in estimates.iter().zip(&weights) {
+        let off = &estimate.change - &effect.change;
+        effect.covariance += (&estimate.covariance + &off * off.transpose()) * (weight / total);
+    }
+    effect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// One own parameter and one slope: y = f + s x with x = ±1 at 100 and 50 samples of unit noise.
+    fn line(gradient: f64, size: f64) -> SlopeInformation {
+        let scalar = |v: f64| DMatrix::from_element(1, 1, v);
+        SlopeInformation {
+            inverse: scalar(1.0 / 150.0),
+            cross: scalar(50.0),
+            slopes: scalar(150.0),
+            gradient: DVector::from_element(1, gradient),
+            sizes: DVector::from_element(1, size),
+            held_at: DVector::zeros(1),
+        }
+    }
+
+    #[test]
+    fn a_fit_that_holds_the_slope_where_it_is_moves_no_further() {
+        let mut held = line(0.0, 100.0);
+        held.held_at[0] = 2.0;
+        let effect = held.effect().unwrap();
+        assert_relative_eq!(effect.slopes[0], 2.0, max_relative = 1e-3);
+        assert!(effect.change[0].abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_slope_that_the_data_show_moves_the_estimate_as_least_squares_do() {
+        // V = 150 − 50²/150 = 400/3. A slope of 2 leaves the gradient V s; its prior hardly counts.
+        let effect = line(400.0 / 3.0 * 2.0, 100.0).effect().unwrap();
+        assert_relative_eq!(effect.change[0], -2.0 / 3.0, max_relative = 1e-3);
+        let variance = (1.0f64 / 3.0).powi(2) * 3.0 / 400.0;
+        assert_relative_eq!(effect.covariance[(0, 0)], variance, max_relative = 0.02);
+    }
+
+    #[test]
+    fn without_a_sign_of_slopes_the_estimate_stays_and_its_covariance_hardly_grows() {
+        let effect = line(0.0, 100.0).effect().unwrap();
+        assert_relative_eq!(effect.change[0], 0.0);
+        // The least squares of a free slope would add the variance (1/3)² 3/400.
+        assert!(effect.covariance[(0, 0)] < 0.5 * (1.0f64 / 3.0).powi(2) * 3.0 / 400.0);
+    }
+
+    #[test]
+    fn slopes_that_the_data_do_not_determine_leave_the_scatter_of_their_prior() {
+        // No information on the slope: each share is as likely, and the covariance is the mean one.
+        let mut flat = line(0.0, 0.1);
+        flat.cross[(0, 0)] = 1e-6;
+        flat.slopes[(0, 0)] = 1e-9;
+        let squares = SHARES.iter().map(|s| s * s).sum::<f64>() / SHARES.len() as f64;
+        let effect = flat.effect().unwrap();
+        let expected = (1e-6 / 150.0 * 0.1f64).powi(2) * squares;
+        assert_relative_eq!(effect.covariance[(0, 0)], expected, max_relative = 1e-6);
+    }
+}

@@ -1,0 +1,345 @@
+//! The filter against finite differences, closed forms, a plain simulation and Monte Carlo.
+
+use std::collections::BTreeMap;
+
+use approx::{assert_abs_diff_eq, assert_relative_eq};
+use nalgebra::SVector;
+
+use super::filter::Filter;
+use super::noise::{Noise, NoiseParameter};
+use super::scoring::{self, minimise};
+use crate::aero::{Axis, Bias, Derivative};
+use crate::dynamics::tests::aircraft;
+use crate::dynamics::{
+    Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts, OUTPUTS,
+};
+use crate::numerics::runge_kutta::{self, POINT};
+use crate::output_error::tests::{
+    Noise as Draws, SAMPLES, biases, nothing_measured, truth, window,
+};
+use crate::output_error::{Case, InitialState, Model};
+use crate::units::RAD;
+
+/// Noise of light turbulence and ordinary instruments.
+fn light() -> Noise {
+    Noise {
+        angle: 0.06 * RAD,
+        gusts: [0.5 * RAD, 0.3 * RAD],
+        corner: 3.0,
+        correlations: [0.3, -0.4],
+        outputs: [0.05, 0.1, 0.05, 0.005, 0.003],
+    }
+}
+
+struct Simulated<const NX: usize, E: InGusts<NX>> {
+    filter: Filter<NX, E>,
+    /// True derivatives, biases and initial states.
+    own: Vec<f64>,
+}
+
+fn values_by_name(truth: &[(Derivative, f64)]) -> BTreeMap<&str, f64> {
+    truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect()
+}
+
+/// Filter of the test record with everything free and nothing measured, and its true parameters.
+fn prepared<const NX: usize, E: InGusts<NX>>(
+    truth: &[(Derivative, f64)],
+    biases: &[Bias],
+) -> Simulated<NX, E> {
+    let model = Model {
+        free: truth.iter().map(|(d, _)| d).collect(),
+        held: vec![],
+        biases: biases.iter().collect(),
+        initial_state: InitialState::Estimated,
+    };
+    let known: Vec<Option<f64>> = biases.iter().map(|_| Some(0.05)).collect();
+    let filter = Filter::<NX, E>::new(&aircraft(), &window(), nothing_measured(), &model, &known);
+    let values = values_by_name(truth);
+    let mut own: Vec<f64> = filter.case.starting_values(|name| values[name]);
+    own.extend(biases.iter().map(|_| 0.01));
+    own.extend(filter.case.start.iter().take(E::own_states()));
+    Simulated { filter, own }
+}
+
+impl<const NX: usize, E: InGusts<NX>> Simulated<NX, E> {
+    /// Flies the true maneuver through gusts and measures it.
+    fn fly(&mut self, noise: &Noise, draws: &mut Draws) {
+        let (case, step_s) = (&self.filter.case, self.filter.case.step_s);
+        let root = nalgebra::Cholesky::new(
+            noise.covariance::<NX, E>(step_s) + nalgebra::SMatrix::identity() * 1e-24,
+        )
+        .unwrap()
+        .l();
+        let first = self.filter.first_noise() - E::own_states();
+        let mut x = SVector::<f64, NX>::zeros();
+        for i in 0..E::own_states() {
+            x[i] = self.own[first + i];
+        }
+        x = E::decayed(x, 0.0);
+        let mut measured = Vec::new();
+        for sample in 0..case.samples() {
+            let y = plain_outputs(case, &self.own, sample, &x);
+            let biases = self.filter.biases(&self.own);
+            measured.push(std::array::from_fn(|o| {
+                y[o] + biases[o] + noise.outputs[o] * draws.gaussian()
+            }));
+            x = plain_step(case, &self.own, sample, &E::decayed(x, noise.decay(step_s)));
+            let white = SVector::<f64, NX>::from_fn(|_, _| draws.gaussian());
+            x += root * white;
+        }
+        self.filter.case.measurements.values = measured;
+    }
+}
+
+fn plain_outputs<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    parameters: &[f64],
+    sample: usize,
+    x: &SVector<f64, NX>,
+) -> SVector<f64, OUTPUTS> {
+    let c = case.build_up_at(parameters, 2 * sample).coefficients(x);
+    let inputs = &case.rate_inputs[2 * sample];
+    E::outputs(inputs, &case.sensor_inputs[sample], x, &c).outputs
+}
+
+fn plain_step<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    parameters: &[f64],
+    sample: usize,
+    x: &SVector<f64, NX>,
+) -> SVector<f64, NX> {
+    let last = 2 * case.samples() - 2;
+    let slope = |stage: usize, x: &SVector<f64, NX>| {
+        let point = (2 * sample + POINT[stage]).min(last);
+        let c = case.build_up_at(parameters, point).coefficients(x);
+        E::rates(&case.rate_inputs[point], x, &c).rates
+    };
+    runge_kutta::step(x, case.step_s, slope, |x, slope, h| x + slope * h)
+}
+
+/// Compares the slopes of the cost with finite differences, some samples being left out.
+fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>() {
+    let mut simulated = prepared::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
+    simulated.fly(&light(), &mut Draws(20_261_122));
+    let mut measurements = simulated.filter.case.measurements.clone();
+    for k in (0..SAMPLES).filter(|k| k % 7 == 3) {
+        measurements.used[k][k % OUTPUTS] = false;
+    }
+    let truth = truth(E::AXIS);
+    let given = biases(E::AXIS);
+    let model = Model {
+        free: truth.iter().map(|(d, _)| d).collect(),
+        held: vec![],
+        biases: given.iter().collect(),
+        initial_state: InitialState::Estimated,
+    };
+    let filter = Filter::<NX, E>::new(
+        &aircraft(),
+        &window(),
+        measurements,
+        &model,
+        &[Some(0.05), None],
+    );
+    let mut at = filter.with_noise(&simulated.own, &light());
+    for (j, value) in at.iter_mut().enumerate() {
+        *value *= 1.0 + 0.01 * (j % 5) as f64;
+    }
+    let response = filter.respond(&at).unwrap();
+    let (gradient, information) = (response.gradient(), response.information());
+    let cost = |j: usize, d: f64| {
+        let mut moved = at.clone();
+        moved[j] += d;
+        filter.innovations(&moved).unwrap().cost
+    };
+    for j in 0..at.len() {
+        let unit = 1.0 / information[(j, j)].sqrt();
+        let h = 1e-3 * unit;
+        let numeric = -(cost(j, h) - cost(j, -h)) / (2.0 * h);
+        // In units of the parameter's own bound.
+        assert_abs_diff_eq!(gradient[j] * unit, numeric * unit, epsilon = 2e-5);
+    }
+}
+
+#[test]
+fn the_gradient_is_that_of_finite_differences_for_every_parameter() {
+    assert_gradient_matches_differences::<4, LongitudinalInGusts>();
+    assert_gradient_matches_differences::<6, LateralInGusts>();
+}
+
+/// Compares predictions without process noise with the outputs of output error.
+fn assert_still_air_is_output_error<
+    const NX: usize,
+    E: Equations<NX>,
+    const NG: usize,
+    G: InGusts<NG>,
+>() {
+    let (truth, given) = (truth(E::AXIS), biases(E::AXIS));
+    let mut simulated = prepared::<NG, G>(&truth, &given);
+    simulated.fly(&light(), &mut Draws(7));
+    let still = Noise::still(light().outputs);
+    let at = simulated.filter.with_noise(&simulated.own, &still);
+    let predicted = simulated.filter.respond(&at).unwrap();
+    let model = Model {
+        free: truth.iter().map(|(d, _)| d).collect(),
+        held: vec![],
+        biases: given.iter().collect(),
+        initial_state: InitialState::Estimated,
+    };
+    let case = Case::<NX, E>::new(&aircraft(), &window(), nothing_measured(), &model);
+    let mut response = case.response();
+    case.respond(&simulated.own, &mut response).unwrap();
+    for (filter, output_error) in predicted.predicted.iter().zip(&response.outputs) {
+        assert_abs_diff_eq!(filter[..], output_error[..], epsilon = 1e-9);
+    }
+}
+
+#[test]
+fn without_process_noise_predictions_are_the_outputs_of_output_error() {
+    assert_still_air_is_output_error::<3, Longitudinal, 4, LongitudinalInGusts>();
+    assert_still_air_is_output_error::<4, Lateral, 6, LateralInGusts>();
+}
+
+/// Checks at the true parameters that the innovations are white with the computed covariance.
+fn assert_innovations_are_white<const NX: usize, E: InGusts<NX>>() {
+    let mut simulated = prepared::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
+    let (mut squares, mut products, mut count) = ([0.0; OUTPUTS], [0.0; OUTPUTS], 0.0);
+    let mut draws = Draws(3);
+    for _ in 0..30 {
+        simulated.fly(&light(), &mut draws);
+        let at = simulated.filter.with_noise(&simulated.own, &light());
+        let white = simulated.filter.innovations(&at).unwrap().whitened;
+        // The gain is that of the steady filter, which begins with the uncertainty of the steady
+        // state.
+        let white = &white[40..];
+        for pair in white.windows(2) {
+            for o in 0..OUTPUTS {
+                squares[o] += pair[0][o] * pair[0][o];
+                products[o] += pair[0][o] * pair[1][o];
+            }
+        }
+        count += (white.len() - 1) as f64;
+    }
+    for o in 0..OUTPUTS {
+        // 8,400 values: their variance is known to 1.5 %, their correlation to 0.011.
+        assert_relative_eq!(squares[o] / count, 1.0, epsilon = 0.06);
+        assert_abs_diff_eq!(products[o] / squares[o], 0.0, epsilon = 0.04);
+    }
+}
+
+#[test]
+fn innovations_at_the_truth_are_white_with_the_computed_covariance() {
+    assert_innovations_are_white::<4, LongitudinalInGusts>();
+    assert_innovations_are_white::<6, LateralInGusts>();
+}
+
+/// Estimates simulated maneuvers in gusts: the bounds must be the scatter of the estimates.
+fn assert_estimates_scatter_as_bounded<const NX: usize, E: InGusts<NX>>() {
+    const FLIGHTS: usize = 24;
+    let mut simulated = prepared::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
+    let mut draws = Draws(11);
+    let (mut square, mut count, mut within) = (0.0, 0.0, 0.0);
+    for _ in 0..FLIGHTS {
+        simulated.fly(&light(), &mut draws);
+        let start = Noise::starting(light().outputs);
+        let start = simulated.filter.with_noise(&simulated.own, &start);
+        let floors = [1e-6; OUTPUTS];
+        let settings = scoring::Settings::default();
+        let scored = minimise(&simulated.filter, start, &floors, &settings).unwrap();
+        assert!(scored.converged, "{}", scored.reason);
+        let information = scored.response.information();
+        let inverse = information.try_inverse().unwrap();
+        for j in 0..simulated.filter.case.derivatives() {
+            let z = (scored.parameters[j] - simulated.own[j]) / inverse[(j, j)].sqrt();
+            eprintln!(
+                "DBG {j} {:.2} {:?}",
+                z,
+                simulated.filter.noise(&scored.parameters).angle / RAD
+            );
+            square += z * z;
+            count += 1.0;
+            within += f64::from(u8::from(z.abs() < 1.96));
+        }
+    }
+    // Some 300 estimates, which correlate within a flight.
+    assert!(
+        (0.7..1.5).contains(&(square / count)),
+        "mean square of z: {}",
+        square / count
+    );
+    assert!(
+        (0.88..0.99).contains(&(within / count)),
+        "95 % intervals hold {}",
+        within / count
+    );
+}
+
+#[test]
+fn estimates_in_gusts_scatter_as_their_bounds_say() {
+    assert_estimates_scatter_as_bounded::<4, LongitudinalInGusts>();
+    assert_estimates_scatter_as_bounded::<6, LateralInGusts>();
+}
+
+/// In still air the noise of the process goes to its floor and is fixed there.
+#[test]
+fn in_still_air_the_process_noise_is_fixed_at_its_floor() {
+    let axis = Axis::Longitudinal;
+    let mut simulated = prepared::<4, LongitudinalInGusts>(&truth(axis), &biases(axis));
+    let still = Noise {
+        angle: 1e-9,
+        gusts: [1e-9; 2],
+        ..light()
+    };
+    simulated.fly(&still, &mut Draws(5));
+    let start = simulated
+        .filter
+        .with_noise(&simulated.own, &Noise::starting(light().outputs));
+    let scored = minimise(
+        &simulated.filter,
+        start,
+        &[1e-6; OUTPUTS],
+        &scoring::Settings::default(),
+    )
+    .unwrap();
+    assert!(scored.converged, "{}", scored.reason);
+    let noise = simulated.filter.noise(&scored.parameters);
+    assert!(noise.angle < 0.004 * RAD, "{} deg", noise.angle / RAD);
+}
+
+#[test]
+fn slopes_of_the_noise_are_those_of_finite_differences() {
+    let at = light().parameters(2);
+    let step_s = 0.025;
+    for (j, parameter) in NoiseParameter::all(2).into_iter().enumerate() {
+        let h = 1e-6;
+        let moved = |d: f64| {
+            let mut moved = at.clone();
+            moved[j] += d;
+            Noise::of_parameters(&moved, 2)
+        };
+        let q = |d: f64| moved(d).covariance::<6, LateralInGusts>(step_s);
+        let numeric = (q(h) - q(-h)) / (2.0 * h);
+        let slope = light().covariance_slope::<6, LateralInGusts>(parameter, step_s);
+        assert_abs_diff_eq!(slope, numeric, epsilon = 1e-6 * q(0.0).amax());
+        let decay = (moved(h).decay(step_s) - moved(-h).decay(step_s)) / (2.0 * h);
+        assert_abs_diff_eq!(
+            light().decay_slope(parameter, step_s),
+            decay,
+            epsilon = 1e-8
+        );
+    }
+}
+
+#[test]
+fn a_rotary_gust_keeps_its_size_over_the_steps() {
+    // First order: σ² = decay² σ² + variance of the change.
+    let step_s = 0.025;
+    let q = light().covariance::<4, LongitudinalInGusts>(step_s);
+    let left = (-3.0f64 * step_s).exp().powi(2) * (0.5 * RAD).powi(2);
+    assert_relative_eq!(left + q[(3, 3)], (0.5 * RAD).powi(2), max_relative = 1e-12);
+    assert_relative_eq!(q[(0, 0)], (0.06 * RAD).powi(2), max_relative = 1e-12);
+    assert_relative_eq!(
+        q[(0, 3)] / (q[(0, 0)] * q[(3, 3)]).sqrt(),
+        0.3,
+        max_relative = 1e-12
+    );
+}
