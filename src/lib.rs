@@ -18,7 +18,8 @@
 //!    [`output_error::Case`] adds the [`aero::Buildup`]: regressors, free and held derivatives,
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
-//!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. [`estimate::maneuver`] returns
+//!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air
+//!    [`filter_error`] takes its place. [`estimate::maneuver`] returns
 //!    the rows [`tables::FitRow`] and [`tables::EstimateRow`].
 //! 7. **Trend.** [`trend::trends`] fits the estimates of a derivative across angle of attack
 //!    ([`tables::TrendRow`]). [`compare::comparison`] sets the trend against the

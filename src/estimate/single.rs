@@ -154,8 +154,7 @@ impl Task<'_> {
 fn discard_in_gusts(measurements: &Measurements, fit: &mut Fit) {
     if fit.outcome == Outcome::Converged && !is_white(measurements, fit) {
         fit.outcome = Outcome::NotConverged;
-        fit.reason = "filter error does not converge, and the residuals of output error show that \
-                      the air moved"
-            .to_owned();
+        "filter error does not converge, and the residuals of output error show that the air moved"
+            .clone_into(&mut fit.reason);
     }
 }

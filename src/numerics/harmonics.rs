@@ -1,4 +1,5 @@
 //! Fourier sums of several series at once, at some harmonics of their length.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::f64::consts::TAU;
 use std::ops::Range;

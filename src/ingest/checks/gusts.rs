@@ -167,7 +167,7 @@ mod tests {
         let found = of_axis(&[run], 1.0).unwrap();
         // V(1) and V(2) for ρ = e^(−l/4): a² = σ² (8ρ₁ − 10ρ₂ + 2ρ₄)/2.
         let rho = |lag: f64| (-lag / 4.0).exp();
-        let change = 6.0 * ((8.0 * rho(1.0) - 10.0 * rho(2.0) + 2.0 * rho(4.0)) / 2.0).sqrt();
+        let change = 6.0 * (4.0 * rho(1.0) - 5.0 * rho(2.0) + rho(4.0)).sqrt();
         assert!(
             (found.change_ft_s2 / change - 1.0).abs() < 0.05,
             "{found:?} {change}"

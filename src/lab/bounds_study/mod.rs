@@ -106,7 +106,9 @@ impl BoundsStudy {
                     let seed = point.seed(campaign);
                     let (result, problem) = MeasuredPoint::measure(&maneuver, count, seed);
                     measured.push(result);
-                    problem.into_iter().for_each(|p| self.note(p));
+                    if let Some(problem) = problem {
+                        self.note(problem);
+                    }
                 }
                 Err(problem) => self.note(problem),
             }

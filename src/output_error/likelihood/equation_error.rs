@@ -204,6 +204,11 @@ struct Spectra<'a> {
 
 impl<'a> Spectra<'a> {
     /// Fourier sums at the harmonics inside the band; `None` without any.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small positive numbers"
+    )]
     fn of<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
         wide: &'a Case<NX, E>,
@@ -254,7 +259,7 @@ impl<'a> Spectra<'a> {
 fn implied_without_accelerations<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
 ) -> Vec<Vec<f64>> {
-    let mut series = vec![Vec::with_capacity(case.samples()); COEFFICIENTS];
+    let mut series = vec![vec![]; COEFFICIENTS];
     for (sample, state) in case.states.iter().enumerate() {
         let held = case.held.at(2 * sample).coefficients(state);
         let rest = case.implied_without_accelerations[sample];
