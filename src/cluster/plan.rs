@@ -289,7 +289,7 @@ mod tests {
         };
         assert!(refused(&|p| p.items[1].id = "m000".into()).contains("`m000` is dealt twice"));
         assert!(refused(&|p| p.items[1].shard = 3).contains("shard 3 of 2"));
-        assert!(refused(&|p| p.form = 2).contains("form 2"));
+        assert!(refused(&|p| p.form = 1).contains("form 1"));
         assert!(Plan::read("{").unwrap_err().contains("no plan"));
     }
 

@@ -73,9 +73,11 @@ fn scatter_s<'a>(flights: impl Iterator<Item = &'a SurfaceDelay> + Clone) -> f64
     let mean = both.map(|(f, w)| w * f.delay_s).sum::<f64>() / sum;
     let both = flights.clone().zip(weights);
     let distance: f64 = both.map(|(f, w)| w * (f.delay_s - mean).powi(2)).sum();
-    let freedom = flights.count() as f64 - 1.0;
-    let variance = (distance - freedom) / (sum - squares / sum);
-    // Of one flight no scatter is known: the variance is 0/0.
+    let count = flights.count();
+    if count < 2 {
+        return 0.0;
+    }
+    let variance = (distance - (count as f64 - 1.0)) / (sum - squares / sum);
     variance.max(0.0).sqrt()
 }
 
@@ -415,6 +417,12 @@ mod tests {
         };
         let (alike, different) = (of_campaign(&flights(0.1)), of_campaign(&flights(3.0)));
         assert!(of(&alike, "da").bound_s < 0.5e-3, "{alike:?}");
+        // Of one flight no scatter is known, whatever its weight is rounded to.
+        for bound_ms in [0.31, 0.47, 0.53, 0.77] {
+            let one = flight(vec![maneuver(&[("da", 7.3, bound_ms)])]);
+            let delays = of_campaign(&[one]);
+            assert!(of(&delays, "da").bound_s < 2e-3, "{delays:?}");
+        }
         // The standard deviation of six equidistant numbers is 1.87 distances.
         assert!(of(&different, "da").bound_s > 4.5e-3, "{different:?}");
     }
