@@ -5,8 +5,6 @@
 //! along α itself. Filter error estimates these slopes with a prior about zero, whose size is that of
 //! the wind tunnel's own slope ([`filter_error::slopes`](crate::filter_error::slopes)).
 
-use std::collections::BTreeMap;
-
 use super::task::Task;
 use crate::aero::{Condition, Derivative, Regressor};
 use crate::dynamics::Equations;
@@ -23,8 +21,8 @@ pub(super) struct AlphaSlopes {
     /// Derivatives along the products of regressors and α − ᾱ, which are signals of the window.
     pub derivatives: Vec<Derivative>,
     pub window: Window,
-    /// Size of each slope, per deg.
-    pub sizes: BTreeMap<String, f64>,
+    /// Size of each slope, per deg, in the order of the derivatives.
+    pub sizes: Vec<f64>,
 }
 
 impl Task<'_> {
@@ -44,7 +42,7 @@ impl Task<'_> {
         let mut slopes = AlphaSlopes {
             derivatives: vec![],
             window: window.clone(),
-            sizes: BTreeMap::new(),
+            sizes: vec![],
         };
         for (j, name) in wide.names.iter().take(wide.derivatives()).enumerate() {
             let Some(derivative) = self.context.buildup.derivative(name) else {
@@ -85,13 +83,12 @@ impl Task<'_> {
 }
 
 impl AlphaSlopes {
-    /// Model with the slopes held at these values, in the order of their names.
+    /// Model with the slopes held at these values, in their order.
     pub fn held_in<'s>(&'s self, model: &Model<'s>, values: &[f64]) -> Model<'s> {
         let mut held = model.clone();
-        for (name, value) in self.sizes.keys().zip(values) {
-            let derivative = self.derivatives.iter().find(|d| d.name == *name);
-            held.held.extend(derivative.map(|d| (d, *value)));
-        }
+        let both = self.derivatives.iter().zip(values);
+        held.held
+            .extend(both.map(|(derivative, value)| (derivative, *value)));
         held
     }
 
@@ -105,7 +102,7 @@ impl AlphaSlopes {
     fn add(&mut self, derivative: &Derivative, values: &[f64], size: f64) {
         let name = format!("{} over alpha", derivative.name);
         self.window = self.window.with_samples(&name, values);
-        self.sizes.insert(name.clone(), size);
+        self.sizes.push(size);
         self.derivatives.push(Derivative {
             regressor: Regressor::Surface(name.clone()),
             name,

@@ -44,6 +44,8 @@ pub(super) struct Filtered {
     autocorrelation: [f64; OUTPUTS],
     /// Log-likelihood gained over output error.
     likelihood_gain: Option<f64>,
+    /// Cost of output error at its start and end.
+    output_error_costs: [Option<f64>; 2],
 }
 
 impl<'a> Task<'a> {
@@ -81,7 +83,7 @@ impl<'a> Task<'a> {
         };
         let mut fitted = from(&first).or_else(|| from(&second))?;
         let mut pass = self.wide_pass(prepared, &sweep, &fitted)?;
-        let mut effect = pass.slope_effect(&fitted.bounds, &sweep.slopes.sizes, &sweep.values);
+        let mut effect = sweep.effect(&pass, &fitted.bounds);
         if let Some(found) = &effect
             && fitted.bounds.are_exceeded_by(&found.change, SMALL_CHANGE)
         {
@@ -92,7 +94,7 @@ impl<'a> Task<'a> {
                 && let Some(wide) = self.wide_pass(prepared, &changed, &again)
             {
                 (sweep, fitted, pass) = (changed, again, wide);
-                effect = pass.slope_effect(&fitted.bounds, &sweep.slopes.sizes, &sweep.values);
+                effect = sweep.effect(&pass, &fitted.bounds);
             }
         }
         let mut fit = fitted.fit();
@@ -102,6 +104,7 @@ impl<'a> Task<'a> {
             information: fitted.information(),
             noise: fitted.noise(),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
+            output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
                 .map(|cost| cost - fitted.scored.response.cost),
             fit,
@@ -248,6 +251,7 @@ impl<'a> Task<'a> {
             Axis::Longitudinal => noise.gusts[0],
             Axis::Lateral => noise.gusts[0].max(noise.gusts[1]),
         };
+        [row.initial_cost, row.final_cost] = filtered.output_error_costs;
         row.method = Some(EstimationMethod::FilterError);
         row.gust_ft_s = Some(velocity * noise.angle * steps.sqrt());
         row.rotary_gust_deg_s = Some(rotary * DEG);
@@ -301,6 +305,13 @@ impl Sweep {
             slopes: self.slopes.clone(),
             values: values.as_slice().to_vec(),
         }
+    }
+
+    fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
+        let AlphaSlopes {
+            derivatives, sizes, ..
+        } = &self.slopes;
+        pass.slope_effect(bounds, derivatives, sizes, &self.values)
     }
 
     fn is_constant(&self) -> bool {

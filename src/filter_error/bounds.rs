@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::filter::{Filter, Response};
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation};
+use crate::aero::Derivative;
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::symmetric;
@@ -208,10 +209,11 @@ impl WidePass {
     pub fn slope_effect(
         &self,
         bounds: &Bounds,
-        sizes: &BTreeMap<String, f64>,
+        slopes: &[Derivative],
+        sizes: &[f64],
         values: &[f64],
     ) -> Option<SlopeEffect> {
-        let places: Vec<usize> = sizes.keys().filter_map(|name| self.place(name)).collect();
+        let places: Vec<usize> = slopes.iter().filter_map(|d| self.place(&d.name)).collect();
         if places.len() != sizes.len() || places.is_empty() {
             return None;
         }
@@ -222,8 +224,8 @@ impl WidePass {
             cross: DMatrix::from_columns(&columns),
             slopes: DMatrix::from_fn(n, n, |i, j| self.information[(places[i], places[j])]),
             gradient: DVector::from_iterator(n, places.iter().map(|p| self.gradient[*p])),
-            sizes: DVector::from_iterator(n, sizes.values().copied()),
-            held_at: DVector::from_iterator(n, values.iter().copied()),
+            sizes: DVector::from_column_slice(sizes),
+            held_at: DVector::from_column_slice(values),
         };
         information.effect()
     }

@@ -34,9 +34,9 @@ pub(super) type SystemSlope<const NX: usize> = NoisySystem<NX>;
 /// Covariances of the steady filter.
 #[derive(Clone, Debug)]
 pub(super) struct SteadyFilter<const NX: usize> {
-    /// Of the prediction.
+    /// Covariance of the prediction.
     pub prediction: States<NX>,
-    /// Of the corrected state.
+    /// Covariance of the corrected state.
     corrected: States<NX>,
     gain: SMatrix<f64, NX, OUTPUTS>,
     system: NoisySystem<NX>,

@@ -24,9 +24,9 @@ table! {
         pub start: Option<StartingValues>,
         /// Number of steps of the iteration.
         pub iterations: usize ["1"],
-        /// Cost J of eq. 1.2 at the start, weights on residuals in deg, deg/s and g.
+        /// Cost J of eq. 1.2 at the start of output error, weights on residuals in deg, deg/s and g.
         pub initial_cost: Option<f64> ["1"],
-        /// Cost J of eq. 1.2 at the end.
+        /// Cost J of eq. 1.2 at the end of output error, also where filter error follows.
         pub final_cost: Option<f64> ["1"],
         /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
         /// is `unidentifiable`.
