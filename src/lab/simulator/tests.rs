@@ -613,7 +613,7 @@ fn delays_of_a_recorder_s_buses_are_found_within_their_bounds() {
         for (surface, delay_s) in truth {
             let found = delays.iter().find(|d| d.surface == surface).unwrap();
             let off_s = found.delay_s - delay_s;
-            assert!(off_s.abs() < 3e-3 && found.bound_s < 2e-3, "{found:?}");
+            assert!(off_s.abs() < 3e-3 && found.bound_s < 3e-3, "{found:?}");
             squares += (off_s / found.bound_s).powi(2);
             count += 1.0;
         }
