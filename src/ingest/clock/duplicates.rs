@@ -35,11 +35,18 @@ pub fn are_same_rows<S: ColumnSource + ?Sized>(
     let a = Rows::from_time(times, first, from_s)?;
     let b = Rows::from_time(times, second, from_s)?;
     let pairs = simultaneous(&a, &b);
+    if pairs.is_empty() {
+        return Ok(false);
+    }
     let source = times.source;
+    let in_both = |name: &&String| source.has(first.file, name) && source.has(second.file, name);
+    let in_both: Vec<&String> = columns.iter().filter(in_both).collect();
     let (mut equal, mut all) = (0_usize, 0_usize);
-    for name in columns {
-        if !source.has(first.file, name) || !source.has(second.file, name) {
-            continue;
+    for (compared, name) in in_both.iter().enumerate() {
+        // The values of the other columns may be too few, even if all are equal.
+        let pending = pairs.len() * (in_both.len() - compared);
+        if ((equal + pending) as f64) < EQUAL_SHARE * (all + pending) as f64 {
+            return Ok(false);
         }
         let x = a.values(source, first.file, name)?;
         let y = b.values(source, second.file, name)?;

@@ -15,6 +15,13 @@ pub struct PiecePart {
     pub after_s: f64,
 }
 
+impl PiecePart {
+    /// `true` where a part holds later rows of the same file.
+    pub fn is_before(&self, later: &PiecePart) -> bool {
+        self.piece.file == later.piece.file && self.piece.end_row() <= later.piece.row
+    }
+}
+
 /// Rows of a flight on one clock that runs forward without a long gap.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PieceSequence {
@@ -40,6 +47,13 @@ pub struct MergedPieces {
 /// they stand. Two rows have a single step, which an outlier can imitate.
 const LEAST_ROWS: usize = 3;
 
+/// Most sequences of a flight: a recorder that starts for each maneuver makes some hundreds in a day.
+const MOST_SEQUENCES: usize = 1000;
+
+/// Most comparisons of rows in a flight; each reads its files again. Files of five minutes that
+/// overlap make 288 in a day, a clock that starts anew 32 times 496.
+const MOST_COMPARISONS: usize = 512;
+
 /// Share of a step by which a row must be later than the end of a sequence to be a new row.
 const LATER: f64 = 0.5;
 
@@ -49,7 +63,7 @@ type CompareRows<'a> = dyn FnMut(&Piece, &Piece) -> Result<bool, String> + 'a;
 /// Puts the pieces of files that hold the same channels in order. `file_name` names a file.
 ///
 /// # Errors
-/// The reason for which `same_rows` cannot read.
+/// The reason for which `same_rows` cannot read; more sequences or overlaps than a recorder makes.
 pub fn merge_pieces(
     files: &[ScannedFile],
     settings: &Settings,
@@ -67,6 +81,7 @@ pub fn merge_pieces(
         settings,
         file_name,
         same_rows,
+        comparisons: 0,
         merged: MergedPieces::default(),
     };
     for (i, (piece, step_s)) in pieces.iter().enumerate() {
@@ -80,6 +95,7 @@ struct Merger<'a, 'b> {
     settings: &'a Settings,
     file_name: &'a dyn Fn(usize) -> String,
     same_rows: &'a mut CompareRows<'b>,
+    comparisons: usize,
     merged: MergedPieces,
 }
 
@@ -88,9 +104,25 @@ impl Merger<'_, '_> {
         match self.merged.sequences.last() {
             None => self.begin_sequence(piece, step_s, None),
             Some(current) if piece.start_s > current.end_s => self.add_later(piece, step_s, next),
+            Some(current) if piece.rows < LEAST_ROWS && current.ends_in(piece.file) => {
+                self.merged.strays.push(*piece);
+            }
             Some(_) => self.add_overlapping(piece, step_s)?,
         }
+        if self.merged.sequences.len() > MOST_SEQUENCES {
+            return Err(self.too_often("time jumps", MOST_SEQUENCES, piece));
+        }
         Ok(())
+    }
+
+    /// Reason for which a clock with so many jumps is refused. `piece` is the latest of them.
+    fn too_often(&self, event: &str, most: usize, piece: &Piece) -> String {
+        format!(
+            "{event} more than {most} times, the last time in row {} of {}: its rows are out of \
+             order, or its bytes are damaged, or it is not the recorder's time",
+            piece.row + 1,
+            (self.file_name)(piece.file)
+        )
     }
 
     /// Adds a piece that begins after the end of the current sequence.
@@ -160,20 +192,45 @@ impl Merger<'_, '_> {
         &mut self,
         piece: &Piece,
     ) -> Result<Option<&mut PieceSequence>, String> {
-        for sequence in self.merged.sequences.iter_mut().rev() {
-            for part in &sequence.parts {
-                if part.piece.overlaps(piece) && (self.same_rows)(&part.piece, piece)? {
-                    return Ok(Some(sequence));
-                }
+        for index in (0..self.merged.sequences.len()).rev() {
+            if self.holds_rows_of(index, piece)? {
+                return Ok(self.merged.sequences.get_mut(index));
             }
         }
         Ok(None)
+    }
+
+    /// `true` where a sequence holds rows of this piece.
+    fn holds_rows_of(&mut self, index: usize, piece: &Piece) -> Result<bool, String> {
+        let sequence = self.merged.sequences.get(index);
+        let parts = sequence.iter().flat_map(|sequence| &sequence.parts);
+        for part in parts.filter(|part| part.piece.overlaps(piece)) {
+            if self.comparisons == MOST_COMPARISONS {
+                return Err(self.too_often(
+                    "time returns to times before it",
+                    self.comparisons,
+                    piece,
+                ));
+            }
+            self.comparisons += 1;
+            if (self.same_rows)(&part.piece, piece)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 
 impl PieceSequence {
     pub fn length_s(&self) -> f64 {
         self.end_s - self.start_s
+    }
+
+    /// `true` where its last rows are of this file.
+    fn ends_in(&self, file: usize) -> bool {
+        self.parts
+            .last()
+            .is_some_and(|part| part.piece.file == file)
     }
 
     fn append(&mut self, piece: &Piece, after_s: f64) {

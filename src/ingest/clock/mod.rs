@@ -7,6 +7,9 @@ mod sample_clock;
 mod survey;
 mod time_channels;
 
+#[cfg(test)]
+mod tests;
+
 pub use sample_clock::Clock;
 pub(in crate::ingest) use sample_clock::Run;
 pub use survey::{Stretch, Survey, survey};

@@ -21,6 +21,11 @@ impl Piece {
     pub(super) fn overlaps(&self, other: &Piece) -> bool {
         self.start_s <= other.end_s && other.start_s <= self.end_s
     }
+
+    /// Row after its last one.
+    pub(super) fn end_row(&self) -> usize {
+        self.row + self.rows
+    }
 }
 
 /// Count of rows without a usable time, and the first of them.

@@ -39,6 +39,9 @@ pub struct Clock {
 /// the recorder's.
 const SAMPLES_PER_ROW: usize = 10;
 
+/// Bound of a sample's number, which only a damaged time reaches.
+const MOST_SAMPLES: usize = usize::MAX / 2;
+
 /// Largest relative difference between the configured rate and the recorded one.
 const RATE_TOLERANCE: f64 = 0.05;
 
@@ -49,6 +52,10 @@ const PHASE_GAIN: f64 = 0.05;
 /// Share of a step by which a row may be early and still be the next sample. Beyond it the row
 /// repeats a sample.
 const EARLY: f64 = 0.75;
+
+/// Distance of two clocks, in steps of the slower one, beyond which no value of one is interpolated
+/// to the other: more than the interpolation reaches.
+const NEAR_STEPS: f64 = 8.0;
 
 /// Largest scatter of the time stamps, as a share of a step, for which the nearest sample is a
 /// row's own.
@@ -111,7 +118,7 @@ impl ClockBuilder {
     /// Sample of a row that is `steps` after the first one; `None` where the sample has a row
     /// already. A row early by jitter becomes the next sample.
     fn sample_of(&self, steps: f64, time: f64) -> Option<usize> {
-        let sample = nearest(steps - self.phase);
+        let sample = nearest(steps - self.phase).min(MOST_SAMPLES);
         let next = self.clock.samples;
         if sample >= next {
             return Some(sample);
@@ -131,6 +138,9 @@ impl ClockBuilder {
                 "{} rows are no record; at least 2 are needed",
                 clock.rows
             ));
+        }
+        if self.step_s <= 0.0 {
+            return Err("time stands still or runs backwards".to_owned());
         }
         if let Some(rate) = settings.sampling_rate_hz
             && (self.step_s * rate - 1.0).abs() > RATE_TOLERANCE
@@ -170,6 +180,14 @@ impl Clock {
     #[must_use]
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + sample as f64 * self.step_s
+    }
+
+    /// `true` where another clock has a sample within some steps of this one's span, so that a
+    /// value on it can be interpolated to this clock.
+    pub(super) fn is_near(&self, other: &Clock) -> bool {
+        let margin_s = NEAR_STEPS * self.step_s.max(other.step_s);
+        let end_s = |clock: &Clock| clock.time_s(clock.samples) + margin_s;
+        self.start_s <= end_s(other) && other.start_s <= end_s(self)
     }
 
     /// Runs of a range of samples, cut to the range.

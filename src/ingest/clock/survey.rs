@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::duplicates::are_same_rows;
-use super::merge::{MergedPieces, PieceSequence, merge_pieces};
+use super::merge::{MergedPieces, PiecePart, PieceSequence, merge_pieces};
 use super::pieces::{Piece, PieceScanner, ScannedFile, UnusableRows};
 use super::sample_clock::{Clock, ClockBuilder};
 use super::time_channels::TimeChannels;
@@ -286,15 +286,13 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
                     reason: format!("{cause}: what follows is a record of its own, `{flight_id}`"),
                 });
             }
-            // A stream with as many stretches as the main one was interrupted where it was.
-            let beside = |clocks: &Vec<Clock>| match clocks.get(i) {
-                Some(own) if clocks.len() == sequences.len() => vec![own.clone()],
-                _ => clocks.clone(),
-            };
+            let beside = other_clocks
+                .iter()
+                .flat_map(|clocks| clocks_beside(clocks, i, sequences.len()));
             stretches.push(Stretch {
                 flight_id,
+                other_clocks: beside.filter(|own| clock.is_near(own)).cloned().collect(),
                 clock,
-                other_clocks: other_clocks.iter().flat_map(beside).collect(),
             });
         }
         if stretches.is_empty() {
@@ -326,18 +324,49 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
     /// Reads the times of a sequence of pieces again and assigns their rows to samples.
     fn clock(&self, sequence: &PieceSequence) -> Result<Clock, Refusal> {
         let mut builder = ClockBuilder::of(sequence);
-        for part in &sequence.parts {
-            let mut row = part.piece.row;
-            let rows = row..row + part.piece.rows;
-            let mut push = |times: &[f64]| {
-                builder.push(part, row, times);
-                row += times.len();
-            };
-            self.times.read(part.piece.file, rows, &mut push)?;
+        for parts in sequence.parts.chunk_by(PiecePart::is_before) {
+            self.read_parts(parts, &mut builder)?;
         }
         builder
             .finish(self.settings)
             .map_err(|reason| self.times.refusal(reason))
+    }
+
+    /// Reads the times of parts that follow each other in a file, at once: a clock with repeated
+    /// rows has a part for each.
+    fn read_parts(&self, parts: &[PiecePart], builder: &mut ClockBuilder) -> Result<(), Refusal> {
+        let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
+            return Ok(());
+        };
+        let mut pending = parts;
+        let mut row = first.piece.row;
+        let mut push = |times: &[f64]| {
+            let batch = row..row + times.len();
+            while let Some((part, later)) = pending.split_first() {
+                let from = part.piece.row.max(batch.start);
+                let to = part.piece.end_row().min(batch.end);
+                if from < to {
+                    let own = from - batch.start..to - batch.start;
+                    builder.push(part, from, times.get(own).unwrap_or_default());
+                }
+                if part.piece.end_row() > batch.end {
+                    break;
+                }
+                pending = later;
+            }
+            row = batch.end;
+        };
+        let rows = first.piece.row..last.piece.end_row();
+        self.times.read(first.piece.file, rows, &mut push)
+    }
+}
+
+/// Clocks of another stream beside a stretch of the main one. A stream with as many stretches as the
+/// main one was interrupted where it was.
+fn clocks_beside(clocks: &[Clock], stretch: usize, stretches: usize) -> &[Clock] {
+    match clocks.get(stretch) {
+        Some(own) if clocks.len() == stretches => std::slice::from_ref(own),
+        _ => clocks,
     }
 }
 
