@@ -73,11 +73,21 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Memory for reading flights, over all of them, instead of the pipeline's; results do not depend
     /// on it
-    #[arg(long, value_name = "MB")]
+    #[arg(long, value_name = "MB", value_parser = memory)]
     pub memory_mb: Option<f64>,
     /// No progress bars and no summary
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Memory in MB as typed: a number of at least one.
+fn memory(typed: &str) -> Result<f64, String> {
+    let memory_mb: f64 = typed.parse().map_err(|_| "it is no number".to_owned())?;
+    if (1.0..=1e9).contains(&memory_mb) {
+        Ok(memory_mb)
+    } else {
+        Err("it must lie between 1 and 1e9".to_owned())
+    }
 }
 
 impl Options {

@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{check, moved, places};
+use super::{check, moved, places, ranges};
 use crate::error::Result;
 use crate::output_error::calibration_errors::Calibration;
 use crate::{compare, ingest, store};
@@ -93,6 +93,8 @@ impl Config {
         };
         check::whole(&config, &files)?;
         check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
+        files.all().try_for_each(ranges::are_finite)?;
+        ranges::of_pipeline(&files.pipeline)?;
         Ok(config)
     }
 }

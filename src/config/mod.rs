@@ -10,7 +10,9 @@ mod cluster;
 mod instruments;
 mod load;
 mod moved;
+mod nesting;
 mod places;
+mod ranges;
 mod source;
 mod written;
 

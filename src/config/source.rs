@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::nesting;
 use super::written::{AircraftFile, ClassFile, ModelFile};
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
@@ -29,7 +30,11 @@ pub(super) struct Files {
 impl Source {
     pub fn read(path: PathBuf) -> Result<Source> {
         let text = files::text(&path)?;
-        Ok(Source { path, text })
+        let source = Source { path, text };
+        match nesting::too_deep(&source.text) {
+            Some(line) => Err(Error::config(&source.path, Some(line), nesting::REASON)),
+            None => Ok(source),
+        }
     }
 
     #[cfg(test)]
@@ -91,22 +96,17 @@ impl Source {
     /// The first line from number `first` (from 0) on that holds a word, counted from 1.
     fn line_of(&self, name: &str, first: usize) -> Option<usize> {
         let word = |c: char| c.is_alphanumeric() || c == '_';
-        let holds = |line: &str| without_comment(line).split(|c| !word(c)).any(|w| w == name);
+        let holds = |line: &str| {
+            nesting::without_comment(line)
+                .split(|c| !word(c))
+                .any(|w| w == name)
+        };
         self.text
             .lines()
             .enumerate()
             .skip(first)
             .find(|(_, line)| holds(line))
             .map(|(i, _)| i + 1)
-    }
-}
-
-/// A line without what follows a `#` that begins a comment.
-fn without_comment(line: &str) -> &str {
-    if line.trim_start().starts_with('#') {
-        ""
-    } else {
-        line.split(" #").next().unwrap_or_default()
     }
 }
 

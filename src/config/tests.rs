@@ -830,6 +830,63 @@ fn a_third_variable_without_a_column_is_named() {
 }
 
 #[test]
+fn numbers_that_no_campaign_has_are_refused_at_their_line() {
+    let cases = [
+        ("memory_mb: 200 #", "memory_mb", "-1 #"),
+        ("memory_mb: 200 #", "memory_mb", ".nan #"),
+        ("longest_bridge_s: 0.25", "longest_bridge_s", "-0.25"),
+        ("longest_clock_gap_s: 60", "longest_clock_gap_s", ".inf"),
+        ("alpha_step_deg: 5", "alpha_step_deg", "0.00001"),
+        ("marked_share: 0.2", "marked_share", "20"),
+        ("stick_lat_in: 1", "stick_lat_in", "0"),
+        ("standard_errors: 3", "standard_errors", "-3"),
+        (
+            "histories_at_alpha_deg: 30",
+            "histories_at_alpha_deg",
+            ".nan",
+        ),
+        ("max_order: 10", "max_order", "4000000000"),
+    ];
+    for (given, name, wrong) in cases {
+        let copy = Copy::new();
+        let line = copy.spoil("pipeline.yaml", given, &format!("{name}: {wrong}"));
+        let error = copy.error();
+        assert!(
+            error.starts_with(&format!("pipeline.yaml:{line}: `{name}` must ")),
+            "{error}"
+        );
+    }
+    let copy = Copy::new();
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "engine_inertia_slug_ft2: 3.0",
+        "engine_inertia_slug_ft2: .inf",
+    );
+    let error = copy.error();
+    assert!(
+        error.starts_with(&format!(
+            "aircraft.yaml:{line}: `engine_inertia_slug_ft2` must "
+        )),
+        "{error}"
+    );
+}
+
+#[test]
+fn brackets_without_end_are_refused_at_once() {
+    let copy = Copy::new();
+    let path = copy.write(
+        "pipeline.yaml",
+        &format!("title: t\narchive: {}", "[".repeat(100_000)),
+    );
+    let error = copy.error();
+    assert_eq!(
+        error,
+        "pipeline.yaml:2: brackets, dashes or question marks are nested more than 100 deep here"
+    );
+    assert!(path.is_file());
+}
+
+#[test]
 fn settings_of_trends_tunnel_and_export_are_checked_by_line() {
     let copy = Copy::new();
     let line = copy.spoil(

@@ -137,9 +137,10 @@ impl Contents {
         // Anything else, such as a pipe, may block for ever.
         if !metadata.is_file() {
             return Err(if metadata.is_dir() {
-                let why = std::fs::read_dir(path)
-                    .err()
-                    .map_or_else(String::new, |e| format!(" that cannot be read: {e}"));
+                let why = std::fs::read_dir(path).err().map_or_else(
+                    || ", or a link to one that is searched already".to_owned(),
+                    |e| format!(" that cannot be read: {e}"),
+                );
                 format!("is a folder{why}")
             } else {
                 "is no regular file".to_owned()

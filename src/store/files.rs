@@ -1,6 +1,7 @@
 //! Small text files: configuration, wind-tunnel database, the analyst's events, tables read back.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -22,7 +23,36 @@ pub fn text(path: &Path) -> Result<String> {
         let bytes = bytes.ok_or_else(|| Error::not_found(path, "there is no such object"))?;
         return String::from_utf8(bytes).map_err(|_| Error::config(path, None, "it is no text"));
     }
-    std::fs::read_to_string(path).map_err(Error::io(path, "cannot read it"))
+    String::from_utf8(bytes(path)?).map_err(|_| Error::config(path, None, "it is no text"))
+}
+
+/// Largest file that is read whole, bytes: a tunnel database of a million rows has a quarter of it.
+const LARGEST: u64 = 1 << 28;
+
+/// Reads a file whole.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Config`] for what is no file, such as a pipe, or too large: it may
+/// never end.
+pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let unreadable = |cause| Error::io(path, "cannot read it")(cause);
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    let refused = |what: &str| Err(Error::config(path, None, what));
+    if metadata.is_dir() {
+        return refused("it is a folder, not a file");
+    }
+    if !metadata.is_file() {
+        return refused("it is no regular file but a device or a pipe, which may never end");
+    }
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(LARGEST + 1)
+        .read_to_end(&mut bytes)
+        .map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST {
+        return refused("it is larger than 268 MB, more than any such file has");
+    }
+    Ok(bytes)
 }
 
 /// Places a small text file or object, whole or not at all.
@@ -219,4 +249,24 @@ pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> 
         ));
     }
     Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_may_never_end_is_not_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        for path in [Path::new("/dev/zero"), &pipe] {
+            let error = text(path).unwrap_err().to_string();
+            assert!(error.contains("which may never end"), "{error}");
+        }
+        let error = text(folder.path()).unwrap_err().to_string();
+        assert!(error.ends_with("it is a folder, not a file"), "{error}");
+    }
 }

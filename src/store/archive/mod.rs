@@ -5,7 +5,7 @@
 //! of a file is a problem of its flight, never a panic.
 
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::{self, File};
 use std::ops::Range;
 use std::panic::{self, AssertUnwindSafe};
@@ -40,9 +40,6 @@ pub struct FlightFiles {
     pub rivals: Vec<PathBuf>,
 }
 
-/// Deepest tree of folders; a deeper one is a loop of links.
-const DEPTH: usize = 16;
-
 /// Rows decoded at a time: a few MB for row groups of any size.
 const BATCH_ROWS: usize = 16_384;
 
@@ -65,17 +62,18 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     if object::is_object(Path::new(archive)) {
         files = remote::find(archive)?;
     } else if Path::new(archive).is_dir() {
-        walk(Path::new(archive), DEPTH, &mut files)?;
+        Walk::default().add(Path::new(archive), &mut files)?;
     } else {
         let nonsense = |what: String| Error::Archive {
             place: archive.into(),
             what,
         };
         let paths = glob::glob(archive).map_err(|e| nonsense(format!("not a glob: {e}")))?;
+        let mut walk = Walk::default();
         for path in paths {
             let path = path.map_err(|e| nonsense(e.to_string()))?;
             if path.is_dir() {
-                if walk(&path, DEPTH, &mut files).is_err() {
+                if walk.add(&path, &mut files).is_err() {
                     files.insert(path);
                 }
             } else {
@@ -90,29 +88,62 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     Ok(flights(files))
 }
 
-/// Adds the Parquet files below a folder, except names with a leading dot or underscore.
-fn walk(folder: &Path, depth: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-    let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
-    for entry in fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        let hidden = path
-            .file_name()
-            .is_some_and(|n| is_hidden(&n.to_string_lossy()));
-        if hidden {
-            continue;
+/// Search of folders, each entered once whatever links lead to it: folders themselves first, then
+/// links in the order in which they are found.
+#[derive(Debug, Default)]
+struct Walk {
+    /// Folders entered, without links.
+    entered: BTreeSet<PathBuf>,
+    /// Links to folders, not followed yet.
+    links: VecDeque<PathBuf>,
+}
+
+impl Walk {
+    /// Adds the Parquet files below a folder, except names with a leading dot or underscore. A folder
+    /// below it that cannot be read, or that a link leads to again, is added itself.
+    fn add(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+        self.enter(folder, files)?;
+        while let Some(link) = self.links.pop_front() {
+            let target = fs::canonicalize(&link);
+            let is_new = target.is_ok_and(|target| !self.entered.contains(&target));
+            if !is_new || self.enter(&link, files).is_err() {
+                files.insert(link);
+            }
         }
-        if path.is_dir() {
-            if depth > 0 && walk(&path, depth - 1, files).is_err() {
+        Ok(())
+    }
+
+    fn enter(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+        let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
+        self.entered
+            .insert(fs::canonicalize(folder).map_err(unreadable)?);
+        let entries = fs::read_dir(folder).map_err(unreadable)?;
+        let paths = entries.map(|entry| entry.map(|entry| entry.path()));
+        let mut paths: Vec<PathBuf> = paths.collect::<Result<_, _>>().map_err(unreadable)?;
+        paths.sort();
+        for path in paths.into_iter().filter(|path| !has_hidden_name(path)) {
+            if !path.is_dir() {
+                if has_extension_of_flights(&path) {
+                    files.insert(path);
+                }
+            } else if path.is_symlink() {
+                self.links.push_back(path);
+            } else if self.enter(&path, files).is_err() {
                 files.insert(path);
             }
-        } else if path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
-        {
-            files.insert(path);
         }
+        Ok(())
     }
-    Ok(())
+}
+
+fn has_hidden_name(path: &Path) -> bool {
+    let name = path.file_name();
+    name.is_some_and(|name| is_hidden(&name.to_string_lossy()))
+}
+
+fn has_extension_of_flights(path: &Path) -> bool {
+    let extension = path.extension();
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
 }
 
 fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {

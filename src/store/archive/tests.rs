@@ -144,6 +144,33 @@ fn a_second_record_of_one_name_is_the_first_s_rival() {
     assert!(found[1].rivals.is_empty());
 }
 
+#[cfg(unix)]
+#[test]
+fn a_folder_is_entered_once_whatever_links_lead_to_it() {
+    use std::os::unix::fs::symlink;
+    let (folder, place) = archive(&[("a/f1.parquet", b"")]);
+    for link in ["x", "y"] {
+        symlink(folder.path(), folder.path().join(link)).unwrap();
+        symlink(folder.path(), folder.path().join("a").join(link)).unwrap();
+    }
+    // Folders of which each leads to the next by two links: 2^20 paths to the last one.
+    for level in 0..20 {
+        let here = folder.path().join(format!("b{level}"));
+        fs::create_dir(&here).unwrap();
+        for link in ["x", "y"] {
+            symlink(
+                folder.path().join(format!("b{}", level + 1)),
+                here.join(link),
+            )
+            .unwrap();
+        }
+    }
+    let found = find(&place).unwrap();
+    let ids: BTreeSet<&str> = found.iter().map(|f| f.flight_id.as_str()).collect();
+    assert_eq!(ids, ["f1", "x", "y"].into());
+    assert_eq!(found[0].files.len() + found[0].rivals.len(), 1);
+}
+
 #[test]
 fn an_empty_archive_says_what_was_looked_for() {
     let (_folder, text) = archive(&[("notes.txt", b"")]);

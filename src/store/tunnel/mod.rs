@@ -64,7 +64,7 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 }
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
-    let bytes = std::fs::read(path).map_err(Error::io(path, "cannot read it"))?;
+    let bytes = files::bytes(path)?;
     let frame = ParquetReader::new(Cursor::new(bytes))
         .finish()
         .map_err(|e| Error::config(path, None, e.to_string()))?;
