@@ -24,6 +24,7 @@ struct Quiet;
 
 impl Progress for Quiet {
     fn begin(&self, _: &str, _: usize) {}
+    fn start(&self, _: &str) {}
     fn advance(&self, _: &str) {}
     fn end(&self) {}
 }

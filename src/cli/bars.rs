@@ -1,12 +1,13 @@
 //! Progress bars.
 
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::pipeline::Progress;
 use crate::store::Log;
+use crate::store::log::timestamp;
 
 /// A progress bar for each stage on the terminal, and a line for each in the log.
 pub struct Bars<'a> {
@@ -14,6 +15,8 @@ pub struct Bars<'a> {
     log: Option<&'a Log>,
     bar: Mutex<ProgressBar>,
     stage: Mutex<Option<(String, usize, Instant)>>,
+    /// Items in work with the time of day since when, the oldest first.
+    in_work: Mutex<Vec<(String, String)>>,
 }
 
 impl Bars<'_> {
@@ -23,7 +26,22 @@ impl Bars<'_> {
             log,
             bar: Mutex::new(ProgressBar::hidden()),
             stage: Mutex::new(None),
+            in_work: Mutex::new(Vec::new()),
         }
+    }
+
+    /// Shows the item that is in work for the longest time, or else the latest finished one.
+    fn show(&self, finished: &str) {
+        let oldest = self
+            .in_work
+            .lock()
+            .ok()
+            .and_then(|all| all.first().cloned());
+        let message = match oldest {
+            Some((item, since)) => format!("{item} since {since}"),
+            None => finished.to_owned(),
+        };
+        self.with(|bar| bar.set_message(message));
     }
 
     fn with(&self, act: impl FnOnce(&mut ProgressBar)) {
@@ -52,11 +70,22 @@ impl Progress for Bars<'_> {
         self.with(|bar| *bar = new);
     }
 
+    fn start(&self, item: &str) {
+        if let Ok(mut all) = self.in_work.lock() {
+            all.push((item.to_owned(), timestamp(SystemTime::now())));
+        }
+        if let Some(log) = self.log {
+            log.write("flight", &[("flight", item.into())]);
+        }
+        self.show(item);
+    }
+
     fn advance(&self, item: &str) {
-        self.with(|bar| {
-            bar.set_message(item.to_owned());
-            bar.inc(1);
-        });
+        if let Ok(mut all) = self.in_work.lock() {
+            all.retain(|(name, _)| name != item);
+        }
+        self.with(|bar| bar.inc(1));
+        self.show(item);
     }
 
     fn end(&self) {

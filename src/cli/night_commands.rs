@@ -92,6 +92,9 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
             ),
             None => println!("no night is published yet"),
         }
+        for (flight_id, since) in &status.in_work {
+            println!("in work: flight {flight_id} since {since}");
+        }
         println!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
         for stage in &status.stages {
             let stale: usize = stage.stale.values().map(Vec::len).sum();

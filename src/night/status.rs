@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::flight::is_stretch;
 use crate::lineage::{Cause, Lineage, Origin, Stage};
 use crate::pipeline::{Campaign, Conductor, Failure, MissingArtefact, Progress, StageState};
-use crate::store::{ArtefactName, Night, Nights};
+use crate::store::{self, ArtefactName, InWork, Night, Nights};
 
 /// Status of one stage. Its items are flights as far as segment, maneuvers and groups in estimate,
 /// then the whole campaign.
@@ -45,6 +45,8 @@ pub struct Status {
     /// Name of the current night.
     pub night: Option<String>,
     pub stages: Vec<StageStatus>,
+    /// Flights that a run has in work at this moment, and since when.
+    pub in_work: InWork,
 }
 
 impl Status {
@@ -89,6 +91,7 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
     Ok(Status {
         night: comparison.current.map(|night| night.name),
         stages,
+        in_work: store::in_work(&config.store),
     })
 }
 

@@ -49,7 +49,7 @@ impl<'a> Step for IngestStep<'a> {
     type Artefact = IngestedFlight;
 
     const KIND: Kind = Kind::Ingest;
-    const VERSION: u32 = 11;
+    const VERSION: u32 = 12;
 
     fn item(&self) -> &str {
         &self.files.flight_id
@@ -74,7 +74,9 @@ impl<'a> Step for IngestStep<'a> {
             shares: self.shares,
             fingerprint: name.fingerprint(),
         };
+        let in_work = self.runner.start_flight(self.item());
         let ingested = writing.ingest(self.files)?;
+        drop(in_work);
         Ok(match self.passing_fault() {
             None => Made::Settled(ingested),
             Some(fault) => Made::Passing(IngestedFlight::rejected(self.item(), fault)),

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::step::{Brought, Companion, Made, Step};
 use crate::config::Config;
 use crate::error::Result;
-use crate::store::{ArtefactName, Contents, Store};
+use crate::store::{ArtefactName, Contents, Listed, Store};
 
 /// Treatment of an artefact that the store lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,6 +160,13 @@ impl<'a> StepRunner<'a> {
         let result = work();
         self.progress.end();
         result
+    }
+
+    /// Names a flight in work to the progress display and in the store, until the returned value is
+    /// dropped.
+    pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<Listed<'b>> {
+        self.progress.start(flight_id);
+        self.store.list_in_work(flight_id)
     }
 
     pub fn advance(&self, item: &str) {

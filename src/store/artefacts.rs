@@ -15,6 +15,7 @@ use super::artefact_name::{ArtefactName, Kind};
 use super::atomic;
 use super::contents::Contents;
 use super::fingerprint::{Digest, sealed, unsealed};
+use super::in_work::{InWorkList, Listed};
 use super::lock::Lock;
 use super::shared::Shared;
 use crate::error::{Error, Result};
@@ -35,6 +36,8 @@ pub struct Store {
     required: Mutex<BTreeSet<ArtefactName>>,
     /// Number of artefacts that this run made.
     made: Mutex<usize>,
+    /// Flights in work, of a store that this run holds alone.
+    in_work: Option<InWorkList>,
 }
 
 /// File of the remembered digests of input files.
@@ -62,6 +65,7 @@ impl Store {
         }
         Ok(Store {
             _lock: Some(lock),
+            in_work: Some(InWorkList::of(folder)),
             ..Store::look(folder)
         })
     }
@@ -91,7 +95,13 @@ impl Store {
             fetching: Mutex::default(),
             required: Mutex::default(),
             made: Mutex::default(),
+            in_work: None,
         }
+    }
+
+    /// Lists a flight as in work until the returned value is dropped.
+    pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<Listed<'a>> {
+        self.in_work.as_ref().map(|list| list.add(flight_id))
     }
 
     /// Makes the store the cache of one in an object store, if a place there is given.

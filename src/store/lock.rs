@@ -58,6 +58,12 @@ impl Lock {
         Lock::acquire(path, what, wait, File::try_lock_shared)
     }
 
+    /// `true` while any process holds the lock at `path`, alone or shared.
+    #[must_use]
+    pub fn is_held(path: &Path) -> bool {
+        File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+    }
+
     fn acquire(
         path: &Path,
         what: &str,

@@ -1,0 +1,112 @@
+//! List of the flights in work, a file of the store that `harvest status` reads while a run goes on.
+//!
+//! The list is a courtesy: it is not synced, and a failure to write it stops no run.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::SystemTime;
+
+use super::lock::Lock;
+use super::log::timestamp;
+
+/// File of the list.
+const FILE: &str = "in_work.json";
+
+/// Flights in work and the times of day since when.
+pub type InWork = BTreeMap<String, String>;
+
+/// The list of a run.
+#[derive(Debug)]
+pub struct InWorkList {
+    path: PathBuf,
+    flights: Mutex<InWork>,
+}
+
+/// A flight on the list, until it is dropped.
+#[derive(Debug)]
+pub struct Listed<'a> {
+    list: &'a InWorkList,
+    flight_id: &'a str,
+}
+
+impl InWorkList {
+    /// Empty list of a store that this run holds alone. Removes the list of a killed run.
+    pub fn of(folder: &Path) -> InWorkList {
+        let list = InWorkList {
+            path: folder.join(FILE),
+            flights: Mutex::default(),
+        };
+        let _ = std::fs::remove_file(&list.path);
+        list
+    }
+
+    pub fn add<'a>(&'a self, flight_id: &'a str) -> Listed<'a> {
+        self.change(|flights| {
+            flights.insert(flight_id.to_owned(), timestamp(SystemTime::now()));
+        });
+        Listed {
+            list: self,
+            flight_id,
+        }
+    }
+
+    fn change(&self, change: impl FnOnce(&mut InWork)) {
+        let Ok(mut flights) = self.flights.lock() else {
+            return;
+        };
+        change(&mut flights);
+        let _ = if flights.is_empty() {
+            std::fs::remove_file(&self.path)
+        } else {
+            let text = serde_json::to_vec(&*flights).unwrap_or_default();
+            std::fs::write(&self.path, text)
+        };
+    }
+}
+
+impl Drop for Listed<'_> {
+    fn drop(&mut self) {
+        self.list.change(|flights| {
+            flights.remove(self.flight_id);
+        });
+    }
+}
+
+/// Flights that another run has in work; none if no run holds the store.
+#[must_use]
+pub fn in_work(folder: &Path) -> InWork {
+    let list = std::fs::read(folder.join(FILE));
+    let list: Option<InWork> = list
+        .ok()
+        .and_then(|text| serde_json::from_slice(&text).ok());
+    match list {
+        Some(list) if Lock::is_held(&folder.join("lock")) => list,
+        _ => InWork::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn flights_in_work_are_listed_while_the_store_is_held() {
+        let folder = tempfile::tempdir().unwrap();
+        let lock = Lock::take(&folder.path().join("lock"), "store", Duration::ZERO).unwrap();
+        let list = InWorkList::of(folder.path());
+        let first = list.add("007");
+        let second = list.add("008");
+        let listed: Vec<String> = in_work(folder.path()).into_keys().collect();
+        assert_eq!(listed, ["007", "008"]);
+        drop(first);
+        let listed: Vec<String> = in_work(folder.path()).into_keys().collect();
+        assert_eq!(listed, ["008"]);
+        // A killed run leaves its list, and its lock ends with it.
+        drop(lock);
+        assert_eq!(in_work(folder.path()), InWork::new());
+        drop(second);
+        assert!(!folder.path().join(FILE).exists());
+    }
+}
