@@ -21,7 +21,8 @@ table! {
     /// Times are seconds on the record's own clock. The quality measures have limits, which are
     /// settings: `segment: quality:`. A measure that could not be taken is empty.
     pub struct Maneuver in "maneuvers" per "maneuver" {
-        /// Flight, and start in whole seconds: `flight_001_t00118`.
+        /// Flight, and start in whole seconds: `flight_001_t00118`. The second maneuver that begins in
+        /// that second is `flight_001_t00118.2`.
         pub maneuver_id: String,
         /// Flight, or stretch of a flight.
         pub flight_id: String,

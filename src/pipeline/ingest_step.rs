@@ -143,6 +143,7 @@ pub fn ingest(
                 .push(missing(&files.flight_id)),
         }
     }
+    repeated_rows::reject_second_ids(campaign);
     repeated_rows::reject_copies(campaign);
     collect_rows(campaign);
     Ok(())

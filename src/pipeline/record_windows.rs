@@ -1,6 +1,6 @@
 //! Search for maneuvers in windows of a long record.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -60,7 +60,20 @@ pub fn find_maneuvers(
     let mut seen = BTreeSet::new();
     all.problems
         .retain(|p| seen.insert((p.place.clone(), p.reason.clone())));
+    number_ids(&mut all.maneuvers);
     Ok(all)
+}
+
+/// Numbers the ids of maneuvers that begin in one second: `f_t00118`, `f_t00118.2`.
+fn number_ids(maneuvers: &mut [Maneuver]) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for maneuver in maneuvers {
+        let count = counts.entry(maneuver.maneuver_id.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            maneuver.maneuver_id += &format!(".{count}");
+        }
+    }
 }
 
 /// Finds the maneuvers that begin in a range of a record's samples.

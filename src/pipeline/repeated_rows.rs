@@ -1,5 +1,7 @@
 //! Rows that two flights have in common.
 
+use std::collections::BTreeSet;
+
 use super::campaign::{Campaign, RepeatedRows};
 use super::ingested::{Flight, IngestedStretch};
 use super::problems::problem;
@@ -11,6 +13,19 @@ const COPY_SHARE: f64 = 0.9;
 
 /// Signatures compare ten seconds at a time: up to so much more on either side may be repeated, s.
 const SIGNATURE_STEP_S: f64 = 10.0;
+
+/// Rejects flights whose id is another's: `f.2` may be a file and the second stretch of `f`.
+pub fn reject_second_ids(campaign: &mut Campaign) {
+    let mut ids = BTreeSet::new();
+    for flight in &mut campaign.flights {
+        let id = flight.id().to_owned();
+        if !ids.insert(id.clone()) {
+            let reason = "a stretch of another flight has this id already; rename the file";
+            let problem = problem(ProblemStage::Ingest, &id, &id, reason);
+            flight.ingested = IngestedStretch::rejected(&id, problem);
+        }
+    }
+}
 
 /// Rejects flights whose rows are another's, and notes the rows that two flights share.
 pub fn reject_copies(campaign: &mut Campaign) {

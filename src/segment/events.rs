@@ -21,7 +21,8 @@ const REPLACING_SHARE: f64 = 0.5;
 /// Replaces maneuvers by the events given for this flight that cover more than half of one or lie
 /// in one by more than half; compares the two.
 ///
-/// An event of an unknown class or outside the record becomes a problem and replaces nothing.
+/// An event of an unknown class, outside the record, or with samples of an earlier event of its axis
+/// becomes a problem and replaces nothing.
 /// Without events for any flight there is no comparison.
 #[must_use]
 pub fn with_events(
@@ -40,10 +41,11 @@ pub fn with_events(
         unknown,
         mut problems,
     } = segmented;
-    let mut given = Vec::new();
+    let mut given: Vec<Maneuver> = Vec::new();
     let mut rows = Vec::new();
-    for event in events.iter().filter(|e| e.flight_id == record.flight_id) {
-        match maneuver_of_event(event, record, classes, aircraft, limits) {
+    for event in in_order(events, &record.flight_id) {
+        let maneuver = maneuver_of_event(event, record, classes, aircraft, limits);
+        match maneuver.and_then(|maneuver| with_own_samples(maneuver, &given, record.step_s)) {
             Ok(maneuver) => {
                 rows.push(compare(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
@@ -66,6 +68,43 @@ pub fn with_events(
         problems,
     };
     (segmented, rows)
+}
+
+/// Events of a flight by their starts, those with one start in the order of the list.
+fn in_order<'a>(events: &'a [Event], flight_id: &str) -> Vec<&'a Event> {
+    let own = events.iter().filter(|event| event.flight_id == flight_id);
+    let mut own: Vec<&Event> = own.collect();
+    own.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    own
+}
+
+/// Returns a maneuver if no event before it has samples of it: an axis's samples count once.
+///
+/// # Errors
+/// The event that has them, in words.
+fn with_own_samples(
+    maneuver: Maneuver,
+    before: &[Maneuver],
+    step_s: f64,
+) -> Result<Maneuver, String> {
+    // One event may begin at the sample at which another ends.
+    let shares = |other: &&Maneuver| {
+        other.axis == maneuver.axis
+            && overlap_s(other, maneuver.start_s, maneuver.end_s) > step_s / 2.0
+    };
+    match before.iter().find(shares) {
+        None => Ok(maneuver),
+        Some(other) => Err(format!(
+            "the event {} from {:.1} to {:.1} s has samples of the event {} from {:.1} to {:.1} s, \
+             and samples count once; it is left out",
+            maneuver.class,
+            maneuver.start_s,
+            maneuver.end_s,
+            other.class,
+            other.start_s,
+            other.end_s
+        )),
+    }
 }
 
 fn replaces(given: &Maneuver, found: &Maneuver) -> bool {

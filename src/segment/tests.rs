@@ -1247,6 +1247,40 @@ fn events_of_unknown_class_or_outside_the_record_become_problems() {
 }
 
 #[test]
+fn samples_of_one_axis_count_once() {
+    let r = flight(120);
+    let events = [
+        event("PITCH", 40.0, 50.0),
+        event("PITCH", 20.0, 30.0),
+        event("PITCH", 20.0, 30.0),
+        event("PITCH", 29.5, 39.5),
+        event("3211", 45.0, 60.0),
+        event("PITCH", 50.0, 60.0),
+    ];
+    let (segmented, rows) = with_events(
+        Segmented::default(),
+        &r,
+        &events,
+        &classes(),
+        &aircraft(),
+        &settings().quality,
+    );
+    let starts: Vec<f64> = segmented.maneuvers.iter().map(|m| m.start_s).collect();
+    assert_eq!(starts, [20.0, 40.0, 50.0]);
+    assert_eq!(rows.len(), 3);
+    let samples: usize = segmented.maneuvers.iter().map(|m| m.samples).sum();
+    // Neighbours share the sample at which one ends and the other begins.
+    assert_eq!(samples, 3 * 400 + 3);
+    let reasons: Vec<&str> = segmented.problems.iter().map(|p| &p.reason[..]).collect();
+    assert_eq!(reasons.len(), 3);
+    assert_eq!(
+        reasons[0],
+        "the event PITCH from 20.0 to 30.0 s has samples of the event PITCH from 20.0 to 30.0 s, and samples count \
+         once; it is left out"
+    );
+}
+
+#[test]
 fn without_events_nothing_is_compared() {
     let r = flight(10);
     assert_eq!(

@@ -220,6 +220,22 @@ fn time_that_starts_anew_begins_a_stretch_and_says_where() {
 }
 
 #[test]
+fn time_out_of_order_or_started_anew_every_second_is_refused() {
+    // Each row a third of the record after the one before, round and round: every row is there once.
+    let out_of_order = with_values(&pitch_steps(), "time", |row, _| {
+        (row * 1999 % 6007) as f64 * 0.025
+    });
+    let anew = with_values(&pitch_steps(), "time", |row, _| (row % 40) as f64 * 0.025);
+    for record in [out_of_order, anew] {
+        let words = [
+            "time returns to times before it more than 512 times",
+            "rows are out of order",
+        ];
+        record_is_refused(&record, "time", &words);
+    }
+}
+
+#[test]
 fn rows_with_a_time_that_cannot_be_are_left_out_and_named() {
     let record = yaw_and_roll_steps();
     let times = values(&record, "time");

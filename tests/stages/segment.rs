@@ -397,3 +397,33 @@ fn a_maneuver_that_fits_no_class_is_a_problem_with_its_time() {
         "{unknown:?}"
     );
 }
+
+#[test]
+fn an_event_given_again_or_beside_itself_counts_once() {
+    let campaign = Campaign::of_pitch_steps();
+    let estimated = |events: &str| {
+        let path = campaign.path("events.csv");
+        fs::write(&path, format!("flight_id,class,start_s,end_s\n{events}")).unwrap();
+        let outcome = run(campaign.command("estimate").arg("--events").arg(path));
+        let tables = ["maneuvers", "fits", "estimates", "events"].map(|name| campaign.table(name));
+        (outcome.code, tables)
+    };
+    let event = "flight_001,PPSS,118.8,132.5\n";
+    let once = estimated(event);
+    assert_eq!((once.0, once.1[1].len()), (Some(0), 1));
+    let (code, tables) = estimated(&format!("{event}{event}flight_001,PPSS,119.4,133\n"));
+    assert_eq!((code, tables), (Some(2), once.1));
+    let problems = campaign.table("problems");
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    for problem in problems {
+        assert!(
+            problem["reason"].contains("samples count once; it is left out"),
+            "{problem:?}"
+        );
+    }
+    // Events of both axes may share samples; their ids differ.
+    estimated(&format!("{event}flight_001,PYRS,118.8,132.5\n"));
+    let ids = campaign.table("maneuvers").into_iter();
+    let ids: Vec<String> = ids.map(|row| row["maneuver_id"].clone()).collect();
+    assert_eq!(ids, ["flight_001_t00118", "flight_001_t00118.2"]);
+}
