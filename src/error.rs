@@ -103,7 +103,8 @@ impl Error {
 table! {
     /// Everything that was rejected or could not be made, while the rest of the campaign went on.
     ///
-    /// With any row in this table `harvest` exits with 2.
+    /// With a row of another stage than `trend` `harvest` exits with 2: a derivative with too few
+    /// maneuvers for a trend is no rejection.
     pub struct Problem in "problems" per "thing that was rejected or could not be made" {
         /// Stage that found the problem.
         pub stage: ProblemStage,

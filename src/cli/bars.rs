@@ -1,6 +1,6 @@
 //! Progress bars.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,14 +9,56 @@ use crate::pipeline::Progress;
 use crate::store::Log;
 use crate::store::log::timestamp;
 
+/// Stage and items in work at this moment.
+#[derive(Debug, Default)]
+pub struct Work {
+    stage: Mutex<Option<(String, usize, Instant)>>,
+    /// Items in work with the time of day since when, the oldest first.
+    items: Mutex<Vec<(String, String)>>,
+}
+
+impl Work {
+    /// Name of the stage; empty between stages.
+    pub fn stage(&self) -> String {
+        let begun = self.stage.lock().ok();
+        begun
+            .and_then(|begun| begun.as_ref().map(|(stage, ..)| stage.clone()))
+            .unwrap_or_default()
+    }
+
+    /// Items in work, each `item since time`.
+    pub fn items(&self) -> Vec<String> {
+        let items = self.items.lock();
+        items.map_or_else(
+            |_| Vec::new(),
+            |items| {
+                let words = items
+                    .iter()
+                    .map(|(item, since)| format!("{item} since {since}"));
+                words.collect()
+            },
+        )
+    }
+
+    fn add(&self, item: &str) {
+        if let Ok(mut items) = self.items.lock() {
+            items.push((item.to_owned(), timestamp(SystemTime::now())));
+        }
+    }
+
+    fn remove(&self, item: &str) {
+        if let Ok(mut items) = self.items.lock() {
+            items.retain(|(name, _)| name != item);
+        }
+    }
+}
+
 /// A progress bar for each stage on the terminal, and a line for each in the log.
 pub struct Bars<'a> {
     quiet: bool,
     log: Option<&'a Log>,
     bar: Mutex<ProgressBar>,
-    stage: Mutex<Option<(String, usize, Instant)>>,
-    /// Items in work with the time of day since when, the oldest first.
-    in_work: Mutex<Vec<(String, String)>>,
+    work: Arc<Work>,
 }
 
 impl Bars<'_> {
@@ -25,23 +67,19 @@ impl Bars<'_> {
             quiet,
             log,
             bar: Mutex::new(ProgressBar::hidden()),
-            stage: Mutex::new(None),
-            in_work: Mutex::new(Vec::new()),
+            work: Arc::default(),
         }
+    }
+
+    /// The work that the bars show.
+    pub fn work(&self) -> &Arc<Work> {
+        &self.work
     }
 
     /// Shows the item that is in work for the longest time, or else the latest finished one.
     fn show(&self, finished: &str) {
-        let oldest = self
-            .in_work
-            .lock()
-            .ok()
-            .and_then(|all| all.first().cloned());
-        let message = match oldest {
-            Some((item, since)) => format!("{item} since {since}"),
-            None => finished.to_owned(),
-        };
-        self.with(|bar| bar.set_message(message));
+        let oldest = self.work.items().into_iter().next();
+        self.with(|bar| bar.set_message(oldest.unwrap_or_else(|| finished.to_owned())));
     }
 
     fn with(&self, act: impl FnOnce(&mut ProgressBar)) {
@@ -53,7 +91,7 @@ impl Bars<'_> {
 
 impl Progress for Bars<'_> {
     fn begin(&self, stage: &str, items: usize) {
-        if let Ok(mut begun) = self.stage.lock() {
+        if let Ok(mut begun) = self.work.stage.lock() {
             *begun = Some((stage.to_owned(), items, Instant::now()));
         }
         let new = if self.quiet {
@@ -71,9 +109,7 @@ impl Progress for Bars<'_> {
     }
 
     fn start(&self, item: &str) {
-        if let Ok(mut all) = self.in_work.lock() {
-            all.push((item.to_owned(), timestamp(SystemTime::now())));
-        }
+        self.work.add(item);
         if let Some(log) = self.log {
             log.write("flight", &[("flight", item.into())]);
         }
@@ -81,15 +117,14 @@ impl Progress for Bars<'_> {
     }
 
     fn advance(&self, item: &str) {
-        if let Ok(mut all) = self.in_work.lock() {
-            all.retain(|(name, _)| name != item);
-        }
+        self.work.remove(item);
         self.with(|bar| bar.inc(1));
         self.show(item);
     }
 
     fn end(&self) {
-        let begun = self.stage.lock().ok().and_then(|mut begun| begun.take());
+        let begun = self.work.stage.lock();
+        let begun = begun.ok().and_then(|mut begun| begun.take());
         if let (Some(log), Some((stage, items, begun))) = (self.log, begun) {
             let seconds = begun.elapsed().as_secs_f64();
             log.write(

@@ -119,19 +119,18 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-#[expect(clippy::print_stdout, reason = "the output of a plan")]
 fn print_plan(plan: &Plan, file: &Path) {
     let costs = plan.costs();
     let dearest = costs.values().copied().fold(0.0, f64::max);
     let mean = costs.values().sum::<f64>() / costs.len() as f64;
-    println!(
+    out!(
         "{} {} to {} shards, the dearest {:.2} times the mean",
         plan.items.len(),
         plan.of.name(),
         plan.shards,
         dearest / mean
     );
-    println!("plan: {}", file.display());
+    out!("plan: {}", file.display());
 }
 
 impl ShareOptions {
@@ -156,13 +155,11 @@ impl ShareOptions {
     }
 }
 
-#[expect(clippy::print_stderr, reason = "the reason for another try")]
 fn ask_for_another_try(error: &anyhow::Error) -> ExitCode {
-    eprintln!("harvest: {error:#}; another try may go well");
+    err!("harvest: {error:#}; another try may go well");
     ExitCode::from(TRY_AGAIN)
 }
 
-#[expect(clippy::print_stdout, reason = "the output of a shard")]
 fn compute(
     file: &Path,
     shard: Shard,
@@ -191,7 +188,7 @@ fn compute(
     )?;
     if !options.quiet {
         let share = plan.share(shard.number).count();
-        println!(
+        out!(
             "shard {}/{}: {share} {}, {made} artefacts made",
             shard.number,
             shard.of,
@@ -202,17 +199,12 @@ fn compute(
 }
 
 /// Prints the shards with missing artefacts, as schedulers write an array.
-#[expect(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "the array is for a script, the rest for a reader"
-)]
 pub fn missing(options: &Options, file: &Path) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let (config, plan) = (options.load()?, shard::read_plan(file)?);
     let missing = shard::missing_items(&config, &plan, &Bars::new(options.quiet, None))?;
     if !options.quiet {
-        eprintln!(
+        err!(
             "{} of {} {} are missing",
             missing.len(),
             plan.items.len(),
@@ -222,7 +214,7 @@ pub fn missing(options: &Options, file: &Path) -> anyhow::Result<ExitCode> {
     if missing.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{}", array(&plan.shards_of(&missing)));
+    out!("{}", array(&plan.shards_of(&missing)));
     Ok(ExitCode::from(ATTENTION))
 }
 
@@ -245,7 +237,6 @@ pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
 }
 
 /// Writes the scripts of a job array, and submits them if asked for.
-#[expect(clippy::print_stdout, reason = "the output of a submission")]
 pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
@@ -282,11 +273,9 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
     if !options.options.quiet {
         print_plan(&plan, &plan_file(&config, Dealt::Flights));
         if config.cluster.shards > LARGEST_ARRAY {
-            println!(
-                "arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler"
-            );
+            out!("arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler");
         }
-        println!(
+        out!(
             "scripts in {}; bash {} hands them over",
             out.display(),
             submit.display()

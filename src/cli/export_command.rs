@@ -36,7 +36,6 @@ pub struct ExportOptions {
 }
 
 /// Writes the derivatives for simulators and prints the files.
-#[expect(clippy::print_stdout, reason = "the output of an export")]
 pub fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
@@ -46,12 +45,12 @@ pub fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
     let exported = model_export::export(&config, &folder, options.patience.wait(), &bars)?;
     if !options.options.quiet {
         let (values, from_flight) = (exported.values, exported.from_flight);
-        println!("{values} values, {from_flight} of them from flight");
+        out!("{values} values, {from_flight} of them from flight");
         if !exported.missing.is_empty() {
-            println!("without any value: {}", exported.missing.join(" "));
+            out!("without any value: {}", exported.missing.join(" "));
         }
         for file in &exported.files {
-            println!("{}", file.display());
+            out!("{}", file.display());
         }
     }
     Ok(exit_code(has_rejections(&exported.problems), REJECTED))

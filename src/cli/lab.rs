@@ -109,7 +109,6 @@ pub fn run(command: &LabCommand) -> anyhow::Result<ExitCode> {
     }
 }
 
-#[expect(clippy::print_stdout, reason = "the command's output")]
 fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.execution.threads)?;
     let simulated = SimulatedCampaign::load(&options.cards)?;
@@ -118,19 +117,20 @@ fn simulate(options: &SimulateOptions) -> anyhow::Result<ExitCode> {
     let problems: Vec<&Problem> = flights.iter().flat_map(|f| &f.problems).collect();
     if !options.execution.quiet {
         let flown: usize = flights.iter().map(|f| f.flown.len()).sum();
-        println!("{} flights, {flown} maneuvers", flights.len());
+        out!("{} flights, {flown} maneuvers", flights.len());
         for problem in &problems {
-            println!(
+            out!(
                 "  {}: {}: {}",
-                problem.flight_id, problem.place, problem.reason
+                problem.flight_id,
+                problem.place,
+                problem.reason
             );
         }
-        println!("campaign in {}", options.out.display());
+        out!("campaign in {}", options.out.display());
     }
     Ok(exit_code(problems.is_empty()))
 }
 
-#[expect(clippy::print_stdout, reason = "the command's output")]
 fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.execution.threads)?;
     let mut simulated = SimulatedCampaign::load(&options.cards)?;
@@ -152,9 +152,9 @@ fn validate(options: &ValidateOptions) -> anyhow::Result<ExitCode> {
     let study = bounds_study::run(&simulated, &options.out, &options.page, &command, &bars)?;
     if !options.execution.quiet {
         for problem in &study.problems {
-            println!("  {}: {}", problem.place, problem.reason);
+            out!("  {}: {}", problem.place, problem.reason);
         }
-        println!(
+        out!(
             "tables in {}\npage: {}",
             options.out.display(),
             options.page.display()
@@ -176,13 +176,12 @@ fn bench(options: &BenchOptions) -> anyhow::Result<ExitCode> {
     write_or_print(options.out.as_deref(), &text)
 }
 
-#[expect(clippy::print_stdout, reason = "the command's output")]
 fn write_or_print(file: Option<&Path>, text: &str) -> anyhow::Result<ExitCode> {
     match file {
         Some(file) => {
             atomic::place(file, text.as_bytes())?;
         }
-        None => println!("{}", text.trim_end()),
+        None => out!("{}", text.trim_end()),
     }
     Ok(ExitCode::SUCCESS)
 }

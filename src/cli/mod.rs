@@ -1,5 +1,8 @@
 //! The command line: commands and options, progress bars, printed output, exit codes.
 
+#[macro_use]
+mod terminal;
+
 mod bars;
 mod check_command;
 mod cluster_commands;
@@ -10,6 +13,7 @@ mod options;
 mod run_commands;
 mod run_summary;
 mod show_command;
+mod signals;
 
 use std::process::ExitCode;
 
@@ -17,7 +21,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use self::export_command::{EXPORT_HELP, ExportOptions};
-use self::options::Options;
+use self::options::{Options, USAGE};
 use self::run_commands::{RunOptions, StageOptions, run_campaign, run_stage};
 use self::show_command::Show;
 use crate::lineage::Stage;
@@ -62,7 +66,9 @@ Exit codes:
   1  could not run: a fault of the configuration, the archive or the disk, named in the message
   2  ran, and something was rejected: the table `problems` and the end of the report list it; `verify`: what
      is published is no longer valid
+     A derivative with too few maneuvers for a trend is in `problems` as well, and ends with 0
   3  `diff`: a value moved by more than its uncertainty, vanished or changed; `status`: something is stale
+  64 the command as typed is wrong; nothing was done
   75 a shard or a merge that another try may complete: the disk failed, a file could not be read, the store is in use";
 
 #[derive(Debug, Subcommand)]
@@ -119,21 +125,33 @@ enum Command {
 
 /// Runs the program.
 #[must_use]
-#[expect(
-    clippy::print_stderr,
-    reason = "the one place where errors are printed"
-)]
 pub fn main() -> ExitCode {
     crate::memory::keep();
-    match run(Cli::parse().command) {
-        Ok(code) => code,
-        Err(error) => {
-            if let Some(usage) = error.downcast_ref::<clap::Error>() {
-                usage.exit();
-            }
-            eprintln!("harvest: {error:#}");
-            ExitCode::from(1)
-        }
+    let code = match Cli::try_parse() {
+        Ok(cli) => run(cli.command).unwrap_or_else(|error| report(&error)),
+        Err(error) => explain_usage(&error),
+    };
+    terminal::finished(code)
+}
+
+/// Prints an error that stopped a command.
+fn report(error: &anyhow::Error) -> ExitCode {
+    if let Some(usage) = error.downcast_ref::<clap::Error>() {
+        return explain_usage(usage);
+    }
+    err!("harvest: {error:#}");
+    ExitCode::from(1)
+}
+
+/// Prints help that was asked for, or the mistake in the command as typed.
+fn explain_usage(usage: &clap::Error) -> ExitCode {
+    if usage.use_stderr() {
+        // Without a terminal to print on, the exit code remains.
+        let _ = usage.print();
+        ExitCode::from(USAGE)
+    } else {
+        terminal::note(usage.print());
+        ExitCode::SUCCESS
     }
 }
 

@@ -77,7 +77,6 @@ fn bars(options: &Options) -> anyhow::Result<Bars<'static>> {
 }
 
 /// Prints the fresh, stale and failed artefacts of each stage.
-#[expect(clippy::print_stdout, reason = "the output of a status")]
 pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     if let Some(plan) = &options.plan {
         return cluster_commands::missing(&options.options, plan);
@@ -86,19 +85,19 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     let status = status::status(&options.load()?, &bars(options)?)?;
     if !options.quiet {
         match &status.night {
-            Some(night) => println!(
+            Some(night) => out!(
                 "night {night} is published in {}",
                 options.load()?.reports.display()
             ),
-            None => println!("no night is published yet"),
+            None => out!("no night is published yet"),
         }
         for (flight_id, since) in &status.in_work {
-            println!("in work: flight {flight_id} since {since}");
+            out!("in work: flight {flight_id} since {since}");
         }
-        println!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
+        out!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
         for stage in &status.stages {
             let stale: usize = stage.stale.values().map(Vec::len).sum();
-            println!(
+            out!(
                 "{:<9} {:>6} {stale:>6} {:>6}",
                 stage.stage.name(),
                 stage.fresh,
@@ -107,7 +106,7 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
         }
         for stage in &status.stages {
             for (why, items) in &stage.stale {
-                println!(
+                out!(
                     "  {}: stale: {}: {why}",
                     stage.stage.name(),
                     first_items(items)
@@ -115,10 +114,10 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
             }
             for failure in stage.failed.iter().take(MOST) {
                 let (item, why) = (&failure.item, &failure.reason);
-                println!("  {}: failed: {item}: {why}", stage.stage.name());
+                out!("  {}: failed: {item}: {why}", stage.stage.name());
             }
             if stage.failed.len() > MOST {
-                println!(
+                out!(
                     "  {}: and {} more failed",
                     stage.stage.name(),
                     stage.failed.len() - MOST
@@ -150,10 +149,9 @@ fn first_items(items: &[String]) -> String {
 }
 
 /// Prints everything about a maneuver.
-#[expect(clippy::print_stdout, reason = "the output of an explanation")]
 pub fn explain(options: &ExplainOptions) -> anyhow::Result<ExitCode> {
     let bars = bars(&options.options)?;
-    print!(
+    out_text!(
         "{}",
         explain::explain(&options.options.load()?, &options.id, &bars)?
     );
@@ -161,31 +159,29 @@ pub fn explain(options: &ExplainOptions) -> anyhow::Result<ExitCode> {
 }
 
 /// Prints the changes since the night before.
-#[expect(clippy::print_stdout, reason = "the output of a comparison")]
 pub fn diff(options: &DiffOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let found = diff::diff(&config, options.since.as_deref(), options.to.as_deref())?;
     if options.once && diff::mark_reported(&config, &found.night)? {
         if !options.options.quiet {
-            println!("night {}: reported already", found.night);
+            out!("night {}: reported already", found.night);
         }
         return Ok(ExitCode::SUCCESS);
     }
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&found.changes)?);
+        out!("{}", serde_json::to_string_pretty(&found.changes)?);
     } else if !options.options.quiet || found.changes.alert {
         print_changes(&found.night, &found.changes);
     }
     Ok(exit_code(found.changes.alert, ATTENTION))
 }
 
-#[expect(clippy::print_stdout, reason = "the output of a comparison")]
 fn print_changes(night: &str, changes: &Changes) {
     let Some(since) = &changes.since else {
-        println!("night {night} is the first complete one: there is none to compare it with");
+        out!("night {night} is the first complete one: there is none to compare it with");
         return;
     };
-    println!("night {night} since night {since}");
+    out!("night {night} since night {since}");
     print_list("because", &changes.causes, |c| c.words.clone());
     print_list("maneuvers", &changes.maneuvers, |m| {
         let words = if m.words.is_empty() {
@@ -227,33 +223,31 @@ fn print_changes(night: &str, changes: &Changes) {
         )
     });
     if changes.is_empty() {
-        println!("nothing that was published moved by more than its uncertainty");
+        out!("nothing that was published moved by more than its uncertainty");
     }
 }
 
-#[expect(clippy::print_stdout, reason = "the output of a comparison")]
 fn print_list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
     if items.is_empty() {
         return;
     }
-    println!("{title}: {}", items.len());
+    out!("{title}: {}", items.len());
     for item in items.iter().take(MOST) {
-        println!("  {}", words(item));
+        out!("  {}", words(item));
     }
     if items.len() > MOST {
-        println!("  and {} more (all of them: --json)", items.len() - MOST);
+        out!("  and {} more (all of them: --json)", items.len() - MOST);
     }
 }
 
 /// Prints the findings about a published night.
-#[expect(clippy::print_stdout, reason = "the output of a verification")]
 pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
     let (config, bars) = (options.options.load()?, bars(&options.options)?);
     let found = verify::verify(&config, options.night.as_deref(), &options.tables, &bars)?;
     if !options.options.quiet {
-        println!("night {}", found.night);
+        out!("night {}", found.night);
         for file in &found.files {
-            println!(
+            out!(
                 "  {:<22} {}",
                 file.file,
                 if file.reasons.is_empty() {
@@ -263,16 +257,16 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
                 }
             );
             for reason in &file.reasons {
-                println!("    {reason}");
+                out!("    {reason}");
             }
         }
         for artefact in found.artefacts.iter().take(MOST) {
-            println!("  {artefact}: damaged or gone; the next run makes it again");
+            out!("  {artefact}: damaged or gone; the next run makes it again");
         }
         if found.artefacts.len() > MOST {
-            println!("  and {} more artefacts", found.artefacts.len() - MOST);
+            out!("  and {} more artefacts", found.artefacts.len() - MOST);
         }
-        println!(
+        out!(
             "{}",
             if found.is_valid() {
                 "All of it holds."
@@ -285,7 +279,6 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
 }
 
 /// Prints what no published night needs, and removes it if asked for.
-#[expect(clippy::print_stdout, reason = "the output of a removal")]
 pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let unneeded = gc::gc(&config, options.yes, options.patience.wait())?;
@@ -296,7 +289,7 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
             .map(|n| format!("night {n}"))
             .chain(unneeded.artefacts.keys().map(ToString::to_string))
         {
-            println!("  {name}");
+            out!("  {name}");
         }
         let bytes: u64 = unneeded.artefacts.values().sum();
         let (count, kept) = (unneeded.artefacts.len(), unneeded.kept);
@@ -305,13 +298,13 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
         } else {
             "would be removed"
         };
-        println!(
+        out!(
             "{count} artefacts ({} MB) and {} nights {verb}, {kept} artefacts stay",
             bytes / 1_000_000,
             unneeded.nights.len()
         );
         if let Some(shared) = &config.shared_store {
-            println!(
+            out!(
                 "that is the cache in {}; {} is left as it is, for other machines' nights may be made of it: rules of the \
                  bucket's lifecycle remove what is old",
                 config.store.display(),
@@ -319,7 +312,7 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
             );
         }
         if !options.yes && (count > 0 || !unneeded.nights.is_empty()) {
-            println!("harvest gc --yes removes them");
+            out!("harvest gc --yes removes them");
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -16,8 +16,14 @@ pub const REJECTED: u8 = 2;
 /// Exit code of something that moved, is stale or missing.
 pub const ATTENTION: u8 = 3;
 
+/// Exit code of a command as typed that harvest does not have (`EX_USAGE`).
+pub const USAGE: u8 = 64;
+
 /// Exit code of work that another try may complete (`EX_TEMPFAIL`).
 pub const TRY_AGAIN: u8 = 75;
+
+/// Most threads: more than any machine has processors.
+const MOST_THREADS: usize = 4096;
 
 /// Returns `code` if the condition holds, else 0.
 pub fn exit_code(condition: bool, code: u8) -> ExitCode {
@@ -69,7 +75,7 @@ pub struct Options {
     #[arg(long, value_name = "FOLDER")]
     pub reports: Option<PathBuf>,
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N")]
+    #[arg(long, short = 'j', visible_alias = "jobs", value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
     /// Memory for reading flights, over all of them, instead of the pipeline's; results do not depend
     /// on it
@@ -78,6 +84,16 @@ pub struct Options {
     /// No progress bars and no summary
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Number of threads as typed, at least one.
+fn threads(typed: &str) -> Result<usize, String> {
+    match typed.parse() {
+        Ok(threads @ 1..=MOST_THREADS) => Ok(threads),
+        _ => Err(format!(
+            "it must be a whole number from 1 to {MOST_THREADS}"
+        )),
+    }
 }
 
 /// Memory in MB as typed: a number of at least one.
@@ -146,7 +162,6 @@ impl Options {
 /// Starts so many threads, by default one a core.
 pub fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
     if let Some(threads) = threads {
-        anyhow::ensure!(threads > 0, "--threads must be at least 1");
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build_global()

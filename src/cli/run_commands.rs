@@ -2,14 +2,17 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
+use anyhow::Context;
 use clap::Args;
 
 use super::bars::Bars;
 use super::cluster_commands::ShareOptions;
 use super::options::{Options, Patience, REJECTED, start_threads};
 use super::run_summary::print_summary;
+use super::signals::log_signals;
 use crate::config::Config;
 use crate::lineage::Stage;
 use crate::night::{self, RunOutcome};
@@ -47,6 +50,7 @@ pub fn run_stage(until: Stage, options: &StageOptions) -> anyhow::Result<ExitCod
 /// one.
 pub fn run_campaign(until: Stage, options: &RunOptions) -> anyhow::Result<ExitCode> {
     let log = options.log.as_deref().map(Log::open).transpose()?;
+    let log = log.map(Arc::new);
     let result = publish(until, options, log.as_ref());
     if let (Some(log), Err(error)) = (&log, &result) {
         let error = format!("{error:#}");
@@ -59,7 +63,7 @@ pub fn run_campaign(until: Stage, options: &RunOptions) -> anyhow::Result<ExitCo
     }
 }
 
-fn publish(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Result<ExitCode> {
+fn publish(until: Stage, options: &RunOptions, log: Option<&Arc<Log>>) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
     let quiet = options.options.quiet;
     start_threads(options.options.threads)?;
@@ -67,7 +71,10 @@ fn publish(until: Stage, options: &RunOptions, log: Option<&Log>) -> anyhow::Res
     if let Some(log) = log {
         log_begin(log, &config, until);
     }
-    let bars = Bars::new(quiet, log);
+    let bars = Bars::new(quiet, log.map(|log| &**log));
+    if let Some(log) = log {
+        log_signals(log, bars.work()).context("cannot log signals")?;
+    }
     let outcome = night::run(&config, until, options.patience.wait(), &bars)?;
     if !quiet {
         print_summary(&config, &outcome, until);

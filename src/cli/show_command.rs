@@ -55,7 +55,6 @@ pub struct ShowOptions {
 }
 
 /// Draws a flight or a maneuver and prints the file.
-#[expect(clippy::print_stdout, reason = "the output of a chart")]
 pub fn show(command: &Show) -> anyhow::Result<ExitCode> {
     let (subject, options) = match command {
         Show::Flight(options) => (Subject::Flight(options.id.clone()), options),
@@ -67,9 +66,9 @@ pub fn show(command: &Show) -> anyhow::Result<ExitCode> {
     let picture = show::show(&config, &subject, options.out.as_deref(), &bars)?;
     if !options.options.quiet {
         for problem in &picture.problems {
-            println!("  {}: {}: {}", problem.stage, problem.place, problem.reason);
+            out!("  {}: {}: {}", problem.stage, problem.place, problem.reason);
         }
-        println!("picture: {}", picture.path.display());
+        out!("picture: {}", picture.path.display());
     }
     Ok(exit_code(!picture.problems.is_empty(), REJECTED))
 }

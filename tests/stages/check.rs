@@ -1,6 +1,7 @@
 //! Check and help: what the program says before it does anything.
 
 use std::fs;
+use std::process::Stdio;
 
 use crate::support::{Campaign, harvest, run};
 
@@ -149,10 +150,44 @@ fn a_check_sees_an_archive_without_flights() {
 }
 
 #[test]
-fn no_threads_are_too_few() {
+fn a_command_that_harvest_does_not_have_ends_with_64() {
     let campaign = Campaign::of_pitch_steps();
-    let outcome = run(campaign.command("ingest").args(["--threads", "0"]));
-    assert_eq!(outcome.code, Some(1));
-    assert!(outcome.stderr.contains("at least 1"), "{outcome:?}");
-    assert!(fs::read_dir(campaign.path("flights")).unwrap().count() == 1);
+    let mistakes = [
+        (["--quite", "--quiet"], "unexpected argument '--quite'"),
+        (["--threads", "0"], "it must be a whole number from 1"),
+        (["--memory-mb", "NaN"], "it must lie between 1 and 1e9"),
+    ];
+    for (arguments, words) in mistakes {
+        let outcome = run(campaign.command("run").args(arguments));
+        assert_eq!(outcome.code, Some(64), "{outcome:?}");
+        assert!(outcome.stderr.contains(words), "{outcome:?}");
+    }
+    assert!(!campaign.path("store").exists());
+    let former = run(harvest().arg("simulate"));
+    assert_eq!(former.code, Some(64), "{former:?}");
+    let help = run(harvest().arg("--help"));
+    assert_eq!((help.code, &*help.stderr), (Some(0), ""));
+    assert!(help.stdout.contains("64 the command as typed is wrong"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_nobody_takes_ends_no_command_and_output_that_is_lost_is_named() {
+    let campaign = Campaign::of_pitch_steps();
+    let mut command = campaign.command("check");
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), &*output.stderr), (Some(0), &[][..]));
+
+    let full = fs::OpenOptions::new().write(true).open("/dev/full");
+    let mut command = campaign.command("check");
+    let output = command.stdout(full.unwrap()).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(
+        stderr.starts_with("harvest: cannot write the output: "),
+        "{stderr}"
+    );
 }

@@ -661,3 +661,33 @@ fn the_log_has_one_json_object_per_line_and_the_terminal_is_quiet() {
     assert!(of("problem").iter().any(|p| p["flight"] == "spoiled"));
     assert!(of("stage").iter().any(|s| s["stage"] == "estimate"));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_a_line_in_the_log() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let campaign = Campaign::on("data/demo/flights");
+    let log = campaign.path("nightly.jsonl");
+    let mut command = campaign.command("run");
+    command.args(["--quiet", "--jobs", "1", "--log"]).arg(&log);
+    let mut child = command.spawn().unwrap();
+    let has_begun = || fs::read_to_string(&log).is_ok_and(|text| text.contains("\"flight\":"));
+    while !has_begun() {
+        assert_eq!(child.try_wait().unwrap(), None);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let kill = Command::new("kill").arg(child.id().to_string()).status();
+    assert!(kill.unwrap().success());
+    assert_eq!(child.wait().unwrap().signal(), Some(15));
+    let text = fs::read_to_string(&log).unwrap();
+    let last: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+    assert_eq!(
+        (&last["event"], &last["signal"], &last["stage"]),
+        (&"signal".into(), &"SIGTERM".into(), &"ingest".into())
+    );
+    let in_work = last["in_work"][0].as_str().unwrap();
+    assert!(
+        in_work.starts_with("flight_00") && in_work.contains(" since 2"),
+        "{last}"
+    );
+}

@@ -1,0 +1,55 @@
+//! Output on the terminal. A closed pipe or a full disk behind it ends no command: its work is done,
+//! and the first failure decides the exit code at the end.
+
+use std::fmt::Arguments;
+use std::io::{Error, ErrorKind, Write};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+/// First failure to write the output.
+static FAILURE: Mutex<Option<Error>> = Mutex::new(None);
+
+/// Prints a line of output.
+macro_rules! out {
+    ($($text:tt)*) => { $crate::cli::terminal::print(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+/// Prints output as it is, without an end of line.
+macro_rules! out_text {
+    ($($text:tt)*) => { $crate::cli::terminal::print(format_args!($($text)*)) };
+}
+
+/// Prints a line of error output.
+macro_rules! err {
+    ($($text:tt)*) => { $crate::cli::terminal::print_error(format_args!("{}\n", format_args!($($text)*))) };
+}
+
+pub fn print(text: Arguments) {
+    note(std::io::stdout().write_fmt(text));
+}
+
+/// A failure to print an error leaves nowhere to report it.
+pub fn print_error(text: Arguments) {
+    let _ = std::io::stderr().write_fmt(text);
+}
+
+/// Keeps the first failure to write output.
+pub fn note(written: Result<(), Error>) {
+    if let (Err(error), Ok(mut failure)) = (written, FAILURE.lock()) {
+        failure.get_or_insert(error);
+    }
+}
+
+/// Returns the exit code of a command whose output is complete, and 1 if some of it was lost. A reader
+/// that closed its pipe has what it wants.
+pub fn finished(code: ExitCode) -> ExitCode {
+    note(std::io::stdout().flush());
+    let failure = FAILURE.lock().ok().and_then(|mut failure| failure.take());
+    match failure {
+        Some(error) if error.kind() != ErrorKind::BrokenPipe => {
+            err!("harvest: cannot write the output: {error}");
+            ExitCode::from(1)
+        }
+        _ => code,
+    }
+}
