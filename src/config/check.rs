@@ -223,6 +223,12 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
         }
         signals.push(&channel.signal);
     }
+    for name in signal::POSITIVE {
+        if let Some(value) = config.constants.get(*name).filter(|v| !(**v > 0.0)) {
+            let what = format!("`{name}` must be greater than zero, not {value}");
+            return Err(source.error_under("constants", name, what));
+        }
+    }
     for required in std::iter::once(&"time_s").chain(signal::REQUIRED) {
         if !signals.contains(required) {
             let near = did_you_mean(required, signals.iter().copied());

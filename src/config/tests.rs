@@ -872,6 +872,26 @@ fn numbers_that_no_campaign_has_are_refused_at_their_line() {
 }
 
 #[test]
+fn a_constant_mass_is_greater_than_zero() {
+    let copy = Copy::new();
+    copy.spoil(
+        "aircraft.yaml",
+        "  mass: { signal: mass_slug, unit: slug }
+",
+        "",
+    );
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "constants: {}",
+        "constants: { mass_slug: -1111 }",
+    );
+    assert_eq!(
+        copy.error(),
+        format!("aircraft.yaml:{line}: `mass_slug` must be greater than zero, not -1111")
+    );
+}
+
+#[test]
 fn brackets_without_end_are_refused_at_once() {
     let copy = Copy::new();
     let path = copy.write(

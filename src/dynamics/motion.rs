@@ -100,7 +100,7 @@ impl Window {
     /// Cuts `range` out of the record: the named signals besides those the equations need.
     ///
     /// # Errors
-    /// A sentence that names the signal and time where a value is missing.
+    /// A sentence that names the signal and time where a value is missing, or a size is not positive.
     pub fn cut<'a>(
         record: &Record,
         range: Range<usize>,
@@ -117,6 +117,13 @@ impl Window {
                 let time_s = record.time_s(range.start + gap);
                 return Err(format!(
                     "signal `{name}` is missing at {time_s:.3} s, inside the maneuver"
+                ));
+            }
+            let wrong = values.iter().position(|v| *v <= 0.0);
+            if let Some(wrong) = wrong.filter(|_| signal::POSITIVE.contains(&name)) {
+                let (value, time_s) = (values[wrong], record.time_s(range.start + wrong));
+                return Err(format!(
+                    "signal `{name}` is {value} at {time_s:.3} s, inside the maneuver; it must be                      greater than zero"
                 ));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);

@@ -37,6 +37,9 @@ pub const IZ: &str = "iz_slug_ft2";
 /// +∫ x z dm in body axes.
 pub const IXZ: &str = "ixz_slug_ft2";
 
+/// Required signals that are greater than zero in flight.
+pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
+
 /// Signals that the equations of motion need: each must be a channel or a constant.
 pub const REQUIRED: &[&str] = &[
     ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST,

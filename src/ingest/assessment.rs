@@ -10,8 +10,9 @@ use super::channel::{
     ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel,
 };
 use super::checks::{
-    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, check_relations,
-    confirmed_signals, find_faulty_channels, measure_gusts, report,
+    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
+    check_relations, confirmed_signals, find_faulty_channels, impossible_mass, impossible_signals,
+    measure_gusts, report,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, Findings, OnFault};
@@ -66,7 +67,20 @@ pub fn assess(
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
-    let (relations, findings) = examination.reconcile(&blocks);
+    let (mut relations, findings) = examination.reconcile(&blocks);
+    let impossible = examination.impossible(&blocks, &relations.faulty);
+    if !impossible.is_empty() {
+        let found = impossible.iter().map(|one| {
+            let refusal = context.refusal(one.signal, one.reason.clone());
+            refusal.into_problem(flight_id)
+        });
+        let found: Vec<Problem> = found.collect();
+        if context.settings.on_failed_check == OnFailedCheck::Refuse {
+            return Err(joined(&found, flight_id));
+        }
+        problems.extend(found);
+        relations.impossible = impossible;
+    }
     if let Some(report) = &relations.report {
         let problem = relation_problem(report, &findings, flight_id);
         if context.settings.on_failed_check == OnFailedCheck::Refuse && report.required {
@@ -203,6 +217,32 @@ impl Examination<'_> {
         (relations, Findings::default())
     }
 
+    /// Finds signals that no aircraft has. The mass is checked where no relation finds a fault in the
+    /// other signals of the lift.
+    fn impossible(&self, blocks: &BlockMeans, faulty: &[FaultyChannel]) -> Vec<ImpossibleSignal> {
+        const LIFT: [&str; 4] = [
+            signal::AN,
+            signal::ALPHA_VANE,
+            signal::QBAR,
+            signal::VELOCITY,
+        ];
+        let found = impossible_signals(blocks);
+        if !found.is_empty() || faulty.iter().any(|f| LIFT.contains(&f.signal.as_str())) {
+            return found;
+        }
+        let Context {
+            channels,
+            aircraft,
+            settings,
+            ..
+        } = *self.context;
+        let mass = channels.values().find(|c| c.signal == signal::MASS);
+        let unit = mass.map(|channel| channel.unit.as_str());
+        impossible_mass(blocks, aircraft, unit, &settings.checks)
+            .into_iter()
+            .collect()
+    }
+
     /// Checks the kinematic relations and isolates the faulty channels.
     fn check(&self, blocks: &BlockMeans) -> RelationResult {
         let Context {
@@ -225,6 +265,7 @@ impl Examination<'_> {
             report: report(&faulty, &checks),
             checks,
             faulty,
+            impossible: Vec::new(),
         }
     }
 
@@ -268,6 +309,8 @@ struct RelationResult {
     /// Signals that a relation confirms.
     confirmed: Vec<&'static str>,
     report: Option<FaultReport>,
+    /// Signals that no aircraft has, where they do not refuse the flight.
+    impossible: Vec<ImpossibleSignal>,
 }
 
 impl RelationResult {
@@ -276,6 +319,9 @@ impl RelationResult {
     }
 
     fn verdict(&self, signal: &str) -> ChannelVerdict {
+        if let Some(one) = self.impossible.iter().find(|one| one.signal == signal) {
+            return ChannelVerdict::Fault(one.reason.clone());
+        }
         match self.faulty.iter().find(|f| f.signal == signal) {
             Some(fault) => ChannelVerdict::Fault(fault.verdict()),
             None if self.confirmed.contains(&signal) => ChannelVerdict::Ok,

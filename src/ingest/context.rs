@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::refusal::Refusal;
 use super::settings::Settings;
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, signal};
@@ -18,6 +19,18 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
+    /// Refusal at the channel or constant of a signal.
+    pub(super) fn refusal(&self, signal: &str, reason: String) -> Refusal {
+        let of_signal = |(_, channel): &(&String, &Channel)| channel.signal == signal;
+        match self.channels.iter().find(of_signal) {
+            Some((name, _)) => Refusal::of_channel(name, reason),
+            None => Refusal {
+                place: format!("constant `{signal}`"),
+                reason,
+            },
+        }
+    }
+
     /// `true` where a flight can do without the channel of a signal.
     pub(super) fn is_optional(&self, signal: &str) -> bool {
         self.constants.contains_key(signal) || !signal::REQUIRED.contains(&signal)

@@ -67,6 +67,13 @@ fn steady() -> Vec<(&'static str, &'static str, &'static str, f64)> {
         ("de", "de_deg", "deg", -2.0),
         ("flag", "obes", "0/1", 0.0),
     ];
+    channels.extend([
+        ("mass", signal::MASS, "slug", 3000.0),
+        ("Ix", signal::IX, "slug ft2", 23_000.0),
+        ("Iy", signal::IY, "slug ft2", 151_000.0),
+        ("Iz", signal::IZ, "slug ft2", 170_000.0),
+        ("Ixz", signal::IXZ, "slug ft2", -2000.0),
+    ]);
     let given: Vec<&str> = channels.iter().map(|c| c.1).collect();
     let zero = signal::REQUIRED.iter().filter(|s| !given.contains(s));
     let zero: Vec<_> = zero
@@ -453,6 +460,51 @@ fn a_wrong_channel_refuses_the_flight_or_is_reported_as_the_settings_say() {
         verdict(&ingested, "an"),
         ChannelVerdict::Fault("its sign is reversed".into())
     );
+}
+
+#[test]
+fn masses_and_inertias_that_no_aircraft_has_are_named() {
+    let cases = [
+        (
+            "mass",
+            -1.0,
+            "mass",
+            "its median is -3000 slug; it must be greater than zero",
+        ),
+        ("mass", 0.0, "mass", "its median is 0 slug"),
+        (
+            "mass",
+            14.593_9,
+            "mass",
+            "aircraft have 2 to 6: is it in kg?",
+        ),
+        ("mass", 32.174, "mass", "aircraft have 2 to 6: is it in lb?"),
+        (
+            "mass",
+            1.0 / 14.593_9,
+            "mass",
+            "sin alpha; aircraft have 2 to 6",
+        ),
+        ("Iy", -1.0, "Iy", "its median is -151000 slug ft2"),
+        ("Iy", 1.355_8, "Iy", "exceeds the sum of the others"),
+        ("Iz", 1.355_8, "Iz", "exceeds the sum of the others"),
+        ("Ix", 32.174, "Ix", "exceeds the sum of the others"),
+        ("Ixz", 32.174, "Ixz", "its square exceeds their product"),
+    ];
+    for (name, factor, place, words) in cases {
+        let mut flight = Flight::steady();
+        flight.values(name).iter_mut().for_each(|v| *v *= factor);
+        let problem = flight.refused();
+        assert_eq!(problem.place, format!("channel `{place}`"), "{problem:?}");
+        assert!(problem.reason.contains(words), "{}", problem.reason);
+        flight.settings.on_failed_check = OnFailedCheck::Report;
+        let ingested = flight.ingest().unwrap();
+        assert_eq!(ingested.problems, [problem.clone()]);
+        assert_eq!(
+            verdict(&ingested, name),
+            ChannelVerdict::Fault(problem.reason)
+        );
+    }
 }
 
 #[test]

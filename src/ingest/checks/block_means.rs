@@ -8,7 +8,7 @@ use crate::flight::{Correction, signal};
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
 
-/// Signals that the relations use.
+/// Signals that the relations and the checks of mass and inertias use.
 const USED: &[&str] = &[
     signal::ALPHA_VANE,
     signal::BETA_VANE,
@@ -29,6 +29,10 @@ const USED: &[&str] = &[
     signal::X_CG,
     signal::Y_CG,
     signal::Z_CG,
+    signal::IX,
+    signal::IY,
+    signal::IZ,
+    signal::IXZ,
 ];
 
 /// Relative difference below which two means are equal: rounding of sums of one value.

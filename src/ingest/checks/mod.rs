@@ -5,6 +5,7 @@ mod block_means;
 mod block_motion;
 mod fault_isolation;
 mod gusts;
+mod mass_properties;
 mod relations;
 mod windows;
 
@@ -14,3 +15,6 @@ pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,
 };
 pub(in crate::ingest) use gusts::Gusts;
+pub(in crate::ingest) use mass_properties::{
+    ImpossibleSignal, impossible_mass, impossible_signals,
+};

@@ -1,0 +1,148 @@
+//! Checks of signals that no kinematic relation contains: sizes that are positive, inertias that a
+//! body can have, and a mass that the aircraft's lift can carry.
+
+use super::block_means::BlockMeans;
+use crate::aircraft::Aircraft;
+use crate::flight::signal;
+use crate::ingest::settings::Checks;
+use crate::numerics::order_statistics::upper_median;
+use crate::units::{G0_FT_S2, RAD, Unit};
+
+/// A signal that no aircraft has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImpossibleSignal {
+    pub signal: &'static str,
+    pub reason: String,
+}
+
+/// Excess of a principal moment of inertia over the sum of the others that errors of measured
+/// inertias may cause. Those of a flat body are equal.
+const INERTIA_TOLERANCE: f64 = 0.05;
+
+/// Least angle of attack at which the mass is checked, deg: below it the lift at zero angle counts
+/// as much.
+const LEAST_ALPHA_DEG: f64 = 5.0;
+
+/// Normal force coefficient over sin α, per rad, with margins of 2 to 3: aircraft have 2 beyond stall
+/// to 6, those with flaps in landing 10 (Hoerner, *Fluid-Dynamic Lift*). The mass in kg for slug
+/// makes it 14.6 times as large.
+const LIFT_PER_SIN_ALPHA: std::ops::Range<f64> = 0.6..24.0;
+
+/// Middle of the range in the sense of ratios, of aircraft in maneuvers.
+const TYPICAL_LIFT: f64 = 4.0;
+
+/// Fewest blocks from which the mass is checked: ten seconds of a usual setting.
+const FEWEST_BLOCKS: usize = 50;
+
+/// Finds sizes that are not positive, and inertias that no body has. A velocity or dynamic pressure of
+/// zero is that of an aircraft at rest, or of a dead instrument.
+pub fn impossible_signals(blocks: &BlockMeans) -> Vec<ImpossibleSignal> {
+    let sizes = signal::POSITIVE.iter();
+    let found: Vec<ImpossibleSignal> = sizes
+        .filter_map(|name| not_positive(blocks, name))
+        .collect();
+    if found.is_empty() {
+        impossible_inertia(blocks).into_iter().collect()
+    } else {
+        found
+    }
+}
+
+fn not_positive(blocks: &BlockMeans, name: &'static str) -> Option<ImpossibleSignal> {
+    let may_be_zero = [signal::VELOCITY, signal::QBAR].contains(&name);
+    let is_wrong = |median: &f64| *median < 0.0 || *median == 0.0 && !may_be_zero;
+    let median = median(blocks, name).filter(is_wrong)?;
+    let unit = Unit::of_signal(name).name;
+    Some(ImpossibleSignal {
+        signal: name,
+        reason: format!("its median is {median} {unit}; it must be greater than zero"),
+    })
+}
+
+/// Principal moments of inertia that are not positive, or of which one exceeds the sum of the others.
+fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
+    let inertia = [signal::IX, signal::IY, signal::IZ, signal::IXZ];
+    let [x, y, z, xz] = inertia.map(|name| median(blocks, name));
+    let (x, y, z, xz) = (x?, y?, z?, xz?);
+    if xz * xz >= x * z {
+        return Some(ImpossibleSignal {
+            signal: signal::IXZ,
+            reason: format!(
+                "no body has Ixz {xz:.4} with Ix {x:.4} and Iz {z:.4} slug ft2: its square exceeds \
+                 their product"
+            ),
+        });
+    }
+    let spread = (0.5 * (x - z)).hypot(xz);
+    let (smaller, larger) = (0.5 * (x + z) - spread, 0.5 * (x + z) + spread);
+    let of_plane = if x > z { signal::IX } else { signal::IZ };
+    let (largest, others, name) = if y > larger {
+        (y, smaller + larger, signal::IY)
+    } else {
+        (larger, smaller + y, of_plane)
+    };
+    (largest > (1.0 + INERTIA_TOLERANCE) * others).then(|| ImpossibleSignal {
+        signal: name,
+        reason: format!(
+            "no body has moments of inertia Ix {x:.4}, Iy {y:.4}, Iz {z:.4} slug ft2: the largest \
+             principal moment, {largest:.4}, exceeds the sum of the others, {others:.4}; is one in \
+             another unit?"
+        ),
+    })
+}
+
+/// Finds a mass with which the lift would be a multiple of any aircraft's, or a fraction of it.
+pub fn impossible_mass(
+    blocks: &BlockMeans,
+    aircraft: &Aircraft,
+    mass_unit: Option<&str>,
+    settings: &Checks,
+) -> Option<ImpossibleSignal> {
+    let lift = (0..blocks.count).filter_map(|block| lift(blocks, block, aircraft, settings));
+    let lift: Vec<f64> = lift.collect();
+    if lift.len() < FEWEST_BLOCKS {
+        return None;
+    }
+    let median = upper_median(lift.into_iter()).filter(|v| !LIFT_PER_SIN_ALPHA.contains(v))?;
+    let unit = mass_unit.and_then(|unit| probable_unit(unit, median));
+    let unit = unit.map_or_else(String::new, |unit| format!(": is it in {unit}?"));
+    Some(ImpossibleSignal {
+        signal: signal::MASS,
+        reason: format!(
+            "with it, `an` and a wing of {} ft2 the normal force coefficient is {median:.3} sin alpha; \
+             aircraft have 2 to 6{unit}",
+            aircraft.wing_area_ft2
+        ),
+    })
+}
+
+/// Normal force coefficient over sin α in a block of flight at an angle of attack.
+fn lift(blocks: &BlockMeans, block: usize, aircraft: &Aircraft, settings: &Checks) -> Option<f64> {
+    let mean = |name: &str| blocks.mean(name, block);
+    let (alpha_deg, qbar) = (mean(signal::ALPHA_VANE), mean(signal::QBAR));
+    let is_flying = mean(signal::VELOCITY) > settings.least_velocity_ft_s && qbar > 0.0;
+    let force = mean(signal::MASS) * mean(signal::AN) * G0_FT_S2;
+    let lift = force / (qbar * aircraft.wing_area_ft2 * (alpha_deg * RAD).sin());
+    let is_lifting = (LEAST_ALPHA_DEG..90.0).contains(&alpha_deg);
+    (is_flying && is_lifting && lift.is_finite()).then_some(lift)
+}
+
+/// Unit of mass, other than the stated one, in which a record would have the most usual lift.
+fn probable_unit(stated: &str, lift: f64) -> Option<&'static str> {
+    let stated = Unit::parse(stated).ok()?;
+    let strangeness = |unit: &Unit| {
+        let factor = unit.factor_to(stated).unwrap_or(f64::NAN);
+        (lift * factor / TYPICAL_LIFT).ln().abs()
+    };
+    let other = stated.alike().filter(|unit| unit.name != stated.name);
+    other
+        .min_by(|a, b| strangeness(a).total_cmp(&strangeness(b)))
+        .filter(|unit| strangeness(unit) < (lift / TYPICAL_LIFT).ln().abs())
+        .map(|unit| unit.name)
+}
+
+/// Median of a signal's finite block means.
+fn median(blocks: &BlockMeans, name: &str) -> Option<f64> {
+    let means = (0..blocks.count).map(|block| blocks.mean(name, block));
+    upper_median(means.filter(|mean| mean.is_finite()))
+}
