@@ -7,6 +7,7 @@
 
 mod campaign_lineage;
 mod changes;
+mod damaged_artefacts;
 pub mod diff;
 pub mod explain;
 pub mod gc;

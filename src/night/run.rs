@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::campaign_lineage::{campaign_lineage, rejection};
 use super::changes;
+use super::damaged_artefacts::damaged_artefacts;
 use super::published_night::{ManeuverWindow, NightTables, PublishedNight};
 use super::published_tables::publish_tables;
 use crate::config::Config;
@@ -73,6 +74,7 @@ pub fn run(
         until,
     };
     if let Some(night) = run.valid_night() {
+        run.conductor.remember_contents()?;
         return Ok(run.outcome(night, false));
     }
     let outcome = run.publish();
@@ -120,9 +122,8 @@ impl NightRun<'_> {
             .nights
             .current()
             .filter(|night| self.has_same_lineage(night) && night.until >= self.until)?;
-        let stored = self.conductor.runner.store.artefacts();
-        let mut artefacts = night.artefacts.iter();
-        let has_all = artefacts.all(|(name, size)| stored.get(name) == Some(size));
+        let runner = &self.conductor.runner;
+        let has_all = damaged_artefacts(&runner.store, &runner.contents, &night).is_empty();
         (has_all && self.nights.is_whole(&night)).then_some(night)
     }
 
@@ -229,8 +230,8 @@ impl NightRun<'_> {
         }
     }
 
-    /// Puts tonight's files in their place: as a new night, or in the current night of the same
-    /// lineage, which was damaged. A current night that reaches further stays.
+    /// Puts tonight's files in their place: as a new night, or as those that the current night of the
+    /// same lineage has lost. A current night that reaches further stays.
     fn place(&self, tonight: &Night) -> Result<RunOutcome> {
         let current = self.nights.current();
         match current.filter(|night| self.has_same_lineage(night)) {
@@ -238,16 +239,18 @@ impl NightRun<'_> {
                 self.nights.remove_tonight();
                 Ok(self.outcome(night, false))
             }
-            Some(night) if night.until == self.until => {
-                let repaired = self.nights.repair(&night, tonight.clone())?;
-                Ok(self.outcome(repaired, false))
-            }
-            _ => {
-                let keep = self.config().report.keep_nights;
-                let published = self.nights.publish(tonight.clone(), keep)?;
-                Ok(self.outcome(published, true))
-            }
+            Some(night) if night.until == self.until => match self.nights.restore(&night)? {
+                Some(restored) => Ok(self.outcome(restored, false)),
+                None => self.publish_new(tonight),
+            },
+            _ => self.publish_new(tonight),
         }
+    }
+
+    fn publish_new(&self, tonight: &Night) -> Result<RunOutcome> {
+        let keep = self.config().report.keep_nights;
+        let published = self.nights.publish(tonight.clone(), keep)?;
+        Ok(self.outcome(published, true))
     }
 
     fn outcome(&self, night: Night, is_new: bool) -> RunOutcome {

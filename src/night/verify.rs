@@ -1,16 +1,16 @@
 //! Validity of a published night: its bytes, its artefacts, and its input, configuration and code.
 
-use std::collections::BTreeMap;
-
-use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 use super::campaign_lineage::campaign_lineage;
+use super::damaged_artefacts::{damaged_artefacts, fetch_records};
+use super::published_tables::publish_tables;
 use super::table_metadata::read_lineage;
 use crate::config::Config;
-use crate::error::{Error, Result};
+use crate::error::{Error, ProblemStage, Result};
 use crate::lineage::Lineage;
-use crate::pipeline::{Conductor, IngestedFlight, Progress};
-use crate::store::{ArtefactName, Digest, Kind, Night, Nights, Store, files};
+use crate::pipeline::{Conductor, Progress};
+use crate::store::{ArtefactName, Digest, Night, Nights, files};
 
 /// Finding about one published file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,8 +38,8 @@ impl Verified {
 }
 
 /// Digests all input anew and compares it, the configuration and the code with the lineage that the
-/// files of a night state. The night is the one named, by default the current one; with `tables`
-/// only files of these names are compared.
+/// files of a night state. Where they agree, the tables are made again from the artefacts. The night is
+/// the one named, by default the current one; with `tables` only files of these names are compared.
 ///
 /// # Errors
 /// No night, no archive, or a table that the night does not have.
@@ -59,9 +59,19 @@ pub fn verify(
         let what = format!("there is no table `{unknown}`");
         return Err(Error::not_found(&nights.folder(&night.name), what));
     }
+    let lineage = campaign_lineage(&conductor);
+    fetch_records(&conductor.runner.store, &night);
+    let store = &conductor.runner.store;
+    let artefacts = damaged_artefacts(store, &conductor.runner.contents, &night);
+    let other_rows = if artefacts.is_empty() && lineage == night.lineage {
+        tables_with_other_rows(&conductor, &night, &lineage)?
+    } else {
+        BTreeSet::new()
+    };
     let comparison = Comparison {
-        lineage: campaign_lineage(&conductor),
+        lineage,
         damaged: nights.damaged(&night),
+        other_rows,
         nights: &nights,
         night: &night,
     };
@@ -69,9 +79,36 @@ pub fn verify(
     let files = night.files.keys().filter(is_wanted);
     Ok(Verified {
         files: files.map(|file| comparison.finding(file)).collect(),
-        artefacts: damaged_artefacts(&conductor.runner.store, &night),
+        artefacts,
         night: night.name.clone(),
     })
+}
+
+/// Makes the tables of a night again from the artefacts of the store, and returns the files that have
+/// other bytes.
+fn tables_with_other_rows(
+    conductor: &Conductor,
+    night: &Night,
+    lineage: &Lineage,
+) -> Result<BTreeSet<String>> {
+    let campaign = conductor.campaign(night.until)?;
+    if !conductor.runner.missing().is_empty() {
+        return Ok(BTreeSet::new());
+    }
+    let scratch = files::scratch_folder()?;
+    publish_tables(&campaign, night.until, scratch.path(), lineage)?;
+    // A report that could not be printed is a problem of that run; places are of that archive.
+    let archive = &conductor.runner.config.archive;
+    let of_report = |p: &crate::error::Problem| p.stage == ProblemStage::Report;
+    let has_other_problems =
+        night.summary.problems.iter().any(of_report) || night.shown.get("archive") != Some(archive);
+    let is_other = |(file, digest): &(&String, &Digest)| {
+        let made = scratch.path().join(file);
+        let is_table = files::is_file(&made) && !(has_other_problems && is_of(file, "problems"));
+        is_table && Digest::of_file(&made).map_or(true, |made| made != **digest)
+    };
+    let other = night.files.iter().filter(is_other);
+    Ok(other.map(|(file, _)| file.clone()).collect())
 }
 
 fn find_night(config: &Config, nights: &Nights, name: Option<&str>) -> Result<Night> {
@@ -98,6 +135,8 @@ struct Comparison<'a> {
     lineage: Lineage,
     /// Files whose bytes changed since they were published.
     damaged: Vec<String>,
+    /// Tables whose rows are not those that the artefacts make.
+    other_rows: BTreeSet<String>,
     nights: &'a Nights,
     night: &'a Night,
 }
@@ -106,6 +145,8 @@ impl Comparison<'_> {
     fn finding(&self, file: &str) -> Finding {
         let reasons = if self.damaged.iter().any(|damaged| damaged == file) {
             vec!["its bytes are not those that were published".to_owned()]
+        } else if self.other_rows.contains(file) {
+            vec!["the artefacts of the store make other rows of it".to_owned()]
         } else {
             self.differences(file)
         };
@@ -134,33 +175,4 @@ impl Comparison<'_> {
             Err(error) => vec![error.to_string()],
         }
     }
-}
-
-/// Artefacts of a night that are not as they were written. A record has no seal: its digest is in
-/// its flight's artefact.
-fn damaged_artefacts(store: &Store, night: &Night) -> Vec<ArtefactName> {
-    let flights = night.artefacts.keys().filter(|a| a.is_of(Kind::Ingest));
-    let flights = flights.filter_map(|name| store.load::<IngestedFlight>(name));
-    let records: BTreeMap<ArtefactName, Digest> = flights
-        .flat_map(|flight| flight.records().cloned().collect::<Vec<_>>())
-        .map(|record| (record.name, record.digest))
-        .collect();
-    let has_record = |name: &ArtefactName, digest: &Digest| {
-        store.fetch(name, digest).is_ok()
-            && Digest::of_file(&store.path(name)).is_ok_and(|found| found == *digest)
-    };
-    let is_whole = |name: &ArtefactName| {
-        if name.is_of(Kind::Records) {
-            let digest = records.get(name);
-            digest.is_some_and(|digest| has_record(name, digest))
-        } else {
-            store.has_sealed(name)
-        }
-    };
-    let names: Vec<&ArtefactName> = night.artefacts.keys().collect();
-    names
-        .into_par_iter()
-        .filter(|name| !is_whole(name))
-        .cloned()
-        .collect()
 }

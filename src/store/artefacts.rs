@@ -157,10 +157,10 @@ impl Store {
         self.path(name).exists()
     }
 
-    /// Reads an artefact. A damaged one counts as absent and is made again.
+    /// Reads an artefact. A damaged one, or another's, counts as absent and is made again.
     #[must_use]
     pub fn load<T: DeserializeOwned>(&self, name: &ArtefactName) -> Option<T> {
-        let parse = |bytes: &[u8]| serde_json::from_slice(unsealed(bytes)?).ok();
+        let parse = |bytes: &[u8]| serde_json::from_slice(unsealed(name.as_str(), bytes)?).ok();
         let path = self.path(name);
         if let Some(artefact) = std::fs::read(&path).ok().and_then(|bytes| parse(&bytes)) {
             self.note_present(name);
@@ -168,7 +168,7 @@ impl Store {
         }
         let shared = self.shared.as_ref()?;
         let fetched = shared.get(name.as_str()).and_then(|bytes| {
-            let whole = bytes.filter(|bytes| unsealed(bytes).is_some());
+            let whole = bytes.filter(|bytes| unsealed(name.as_str(), bytes).is_some());
             if let Some(bytes) = &whole {
                 atomic::place(&path, bytes)?;
             }
@@ -183,14 +183,14 @@ impl Store {
         }
     }
 
-    /// Saves an artefact whole, sealed with a fingerprint of its bytes.
+    /// Saves an artefact whole, sealed with a fingerprint of its name and bytes.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
     pub fn save(&self, name: &ArtefactName, artefact: &impl Serialize) -> Result<()> {
         let path = self.path(name);
         let text = serde_json::to_vec(artefact).map_err(|e| Error::store(&path, &e))?;
-        atomic::place(&path, &sealed(text))?;
+        atomic::place(&path, &sealed(name.as_str(), text))?;
         self.note_made(name)
     }
 
@@ -287,7 +287,7 @@ impl Store {
     /// `true` if the store has an artefact whose seal fits its bytes. Records have no seal.
     #[must_use]
     pub fn has_sealed(&self, name: &ArtefactName) -> bool {
-        let is_sealed = |bytes: &Vec<u8>| unsealed(bytes).is_some();
+        let is_sealed = |bytes: &Vec<u8>| unsealed(name.as_str(), bytes).is_some();
         if std::fs::read(self.path(name)).is_ok_and(|bytes| is_sealed(&bytes)) {
             self.note_present(name);
             return true;
@@ -298,6 +298,17 @@ impl Store {
             .and_then(shared)
             .as_ref()
             .is_some_and(is_sealed)
+    }
+
+    /// `true` if the folder has an artefact whose seal fits, or only the object store has it, with this
+    /// size.
+    #[must_use]
+    pub fn is_whole(&self, name: &ArtefactName, bytes: u64) -> bool {
+        if self.has_file(name) {
+            self.has_sealed(name)
+        } else {
+            self.is_shared(name, bytes)
+        }
     }
 
     /// Lists a folder of reports as published from this store, so that its artefacts stay.
@@ -385,6 +396,27 @@ mod tests {
             flipped[bit / 8] ^= 1 << (bit % 8);
             std::fs::write(&path, flipped).unwrap();
             assert_eq!(store.load::<Vec<f64>>(&name), None, "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn an_artefact_under_another_s_name_is_absent() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), Duration::ZERO).unwrap();
+        let names = [
+            ArtefactName::new(Kind::Estimate, "m1", "0123"),
+            ArtefactName::new(Kind::Estimate, "m2", "0123"),
+            ArtefactName::new(Kind::Estimate, "m1", "4567"),
+            ArtefactName::new(Kind::History, "m1", "0123"),
+        ];
+        store.save(&names[0], &1.25).unwrap();
+        assert_eq!(store.load::<f64>(&names[0]), Some(1.25));
+        for other in &names[1..] {
+            let path = store.path(other);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::copy(store.path(&names[0]), &path).unwrap();
+            assert_eq!(store.load::<f64>(other), None);
+            assert!(!store.has_sealed(other) && !store.is_whole(other, 23));
         }
     }
 

@@ -26,6 +26,9 @@ use crate::error::Result;
 /// different clock of a file server.
 const SETTLED: Duration = Duration::from_secs(10);
 
+/// Name under which the digests are sealed.
+const SEALED_AS: &str = "contents";
+
 /// State of a file as the file system reports it, as text to be compared.
 type Stamp = String;
 
@@ -50,7 +53,7 @@ impl Contents {
     pub fn load(path: &Path) -> Contents {
         let remembered = std::fs::read(path)
             .ok()
-            .and_then(|bytes| serde_json::from_slice(unsealed(&bytes)?).ok());
+            .and_then(|bytes| serde_json::from_slice(unsealed(SEALED_AS, &bytes)?).ok());
         let remembered = remembered.unwrap_or_default();
         Contents {
             path: path.to_owned(),
@@ -73,7 +76,7 @@ impl Contents {
     /// damaged text.
     #[must_use]
     pub fn with_objects(mut self, text: &[u8]) -> Contents {
-        let shared = unsealed(text).and_then(|text| serde_json::from_slice(text).ok());
+        let shared = unsealed(SEALED_AS, text).and_then(|text| serde_json::from_slice(text).ok());
         let shared: BTreeMap<PathBuf, Remembered> = shared.unwrap_or_default();
         let unknown = shared
             .into_iter()
@@ -95,7 +98,8 @@ impl Contents {
                 .collect()
         };
         let (now, before) = (objects(&now), objects(&self.remembered));
-        (now != before).then(|| sealed(serde_json::to_vec(&now).unwrap_or_default()))
+        let text = || serde_json::to_vec(&now).unwrap_or_default();
+        (now != before).then(|| sealed(SEALED_AS, text()))
     }
 
     /// Digest of an object, which is read unless its digest is remembered.
@@ -212,7 +216,7 @@ impl Contents {
         }
         atomic::place(
             &self.path,
-            &sealed(serde_json::to_vec(&known).unwrap_or_default()),
+            &sealed(SEALED_AS, serde_json::to_vec(&known).unwrap_or_default()),
         )
     }
 
@@ -330,7 +334,11 @@ mod tests {
                 },
             )]
             .into();
-            std::fs::write(&cache, sealed(serde_json::to_vec(&known).unwrap())).unwrap();
+            std::fs::write(
+                &cache,
+                sealed(SEALED_AS, serde_json::to_vec(&known).unwrap()),
+            )
+            .unwrap();
         };
         remember();
         assert_eq!(Contents::load(&cache).of(&file).unwrap(), remembered);

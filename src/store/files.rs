@@ -86,6 +86,17 @@ pub fn working_folder() -> Result<std::path::PathBuf> {
     std::env::current_dir().map_err(Error::io(Path::new("."), "there is no current folder"))
 }
 
+/// A folder for files that nobody keeps, removed when it is dropped.
+///
+/// # Errors
+/// [`Error::Io`]: it cannot be created.
+pub fn scratch_folder() -> Result<tempfile::TempDir> {
+    tempfile::tempdir().map_err(Error::io(
+        Path::new("."),
+        "cannot create a temporary folder",
+    ))
+}
+
 /// Path of the running program.
 ///
 /// # Errors

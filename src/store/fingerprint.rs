@@ -82,21 +82,26 @@ impl Digest {
 /// Digits of the fingerprint that ends a sealed text.
 const SEAL: usize = 16;
 
-/// Seals a text: appends a fingerprint of its bytes as a last line, which reveals damage.
-pub(super) fn sealed(mut text: Vec<u8>) -> Vec<u8> {
-    let seal = seal(&text);
+/// Seals a text under a name: appends a fingerprint of both as a last line, which reveals damage and a
+/// text under another's name.
+pub(super) fn sealed(name: &str, mut text: Vec<u8>) -> Vec<u8> {
+    let seal = seal(name, &text);
     text.extend_from_slice(seal.as_bytes());
     text
 }
 
-/// Text of a sealed text; `None` if the seal does not fit.
-pub(super) fn unsealed(bytes: &[u8]) -> Option<&[u8]> {
+/// Text of a sealed text; `None` if the seal does not fit name and text.
+pub(super) fn unsealed<'a>(name: &str, bytes: &'a [u8]) -> Option<&'a [u8]> {
     let (text, end) = bytes.split_at_checked(bytes.len().checked_sub(SEAL + 1)?)?;
-    (end == seal(text).as_bytes()).then_some(text)
+    (end == seal(name, text).as_bytes()).then_some(text)
 }
 
-fn seal(text: &[u8]) -> String {
-    format!("\n{}", &blake3::hash(text).to_hex()[..SEAL])
+fn seal(name: &str, text: &[u8]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&(name.len() as u64).to_le_bytes());
+    hasher.update(name.as_bytes());
+    hasher.update(text);
+    format!("\n{}", &hasher.finalize().to_hex()[..SEAL])
 }
 
 #[cfg(test)]

@@ -244,29 +244,25 @@ impl Nights {
         Ok(night)
     }
 
-    /// Replaces the files of the damaged `night` by those of tonight's folder, made of the same
-    /// lineage.
+    /// Restores the damaged files of a night from tonight's folder, which was made of the same lineage.
+    /// `None` if tonight's files are others: what was published is never replaced.
     ///
     /// # Errors
     /// [`Error::Io`] when the disk fails.
-    pub fn repair(&self, night: &Night, made: Night) -> Result<Night> {
+    pub fn restore(&self, night: &Night) -> Result<Option<Night>> {
         let tonight = self.tonight_folder();
-        let night = Night {
-            name: night.name.clone(),
-            files: digests(&tonight)?,
-            ..made
+        if digests(&tonight)? != night.files {
+            return Ok(None);
         }
-        .sealed();
         let folder = self.folder(&night.name);
-        for name in night.files.keys() {
-            let path = tonight.join(name);
+        for name in self.damaged(night) {
+            let path = tonight.join(&name);
             let bytes = fs::read(&path).map_err(Error::io(&path, "cannot read it"))?;
-            atomic::place(&folder.join(name), &bytes)?;
+            atomic::place(&folder.join(&name), &bytes)?;
         }
-        write_manifest(&folder, &night)?;
         self.remove_tonight();
-        self.make_current(&night)?;
-        Ok(night)
+        self.make_current(night)?;
+        Ok(Some(night.clone()))
     }
 
     /// Nights that [`Nights::prune`] removes: complete ones before the last `keep`, and incomplete
@@ -527,6 +523,22 @@ mod tests {
         let text = fs::read_to_string(&manifest).unwrap();
         fs::write(&manifest, text.replace("\"refused\":0", "\"refused\":1")).unwrap();
         assert_eq!(nights.night("0001"), None);
+    }
+
+    #[test]
+    fn a_night_is_restored_by_the_files_that_were_published_and_by_no_others() {
+        let (folder, nights) = opened();
+        let night = publish(&nights, "one", Stage::Report);
+        let table = folder.path().join("nights/0001/fits.csv");
+        let tonight =
+            |text: &str| fs::write(nights.tonight().unwrap().join("fits.csv"), text).unwrap();
+        fs::write(&table, "onf").unwrap();
+        tonight("two");
+        assert_eq!(nights.restore(&night).unwrap(), None);
+        assert_eq!(fs::read_to_string(&table).unwrap(), "onf");
+        tonight("one");
+        assert_eq!(nights.restore(&night).unwrap(), Some(night));
+        assert_eq!(fs::read_to_string(&table).unwrap(), "one");
     }
 
     #[test]

@@ -470,6 +470,10 @@ fn published_tables_carry_their_lineage_and_verify_checks_it() {
             .stdout
             .contains("damaged or gone")
     );
+    // The next run makes it again and publishes nothing.
+    let outcome = campaign.finishes("run");
+    assert!(outcome.stdout.contains("nothing new: night 0001 holds"));
+    campaign.ends("verify", 0);
     campaign.add("flight_001", &flight(1, 151));
     assert!(
         campaign
@@ -477,6 +481,34 @@ fn published_tables_carry_their_lineage_and_verify_checks_it() {
             .stdout
             .contains("the file of flight flight_001 changed")
     );
+}
+
+#[test]
+fn an_artefact_under_another_s_name_is_made_again_and_no_published_night_changes() {
+    let campaign = Campaign::of_pitch_steps();
+    campaign.add("flight_004", &yaw_and_roll_steps());
+    campaign.finishes("run");
+    let night = campaign.path("reports/nights/0001");
+    let published = || -> BTreeMap<PathBuf, Vec<u8>> {
+        let all = files(&night).into_iter();
+        all.map(|path| (path.clone(), fs::read(path).unwrap()))
+            .collect()
+    };
+    let before = published();
+    for kind in ["segment", "estimate", "history", "ingest", "records"] {
+        let artefacts = files(&campaign.path("store").join(kind));
+        let own = fs::read(&artefacts[1]).unwrap();
+        fs::copy(&artefacts[0], &artefacts[1]).unwrap();
+        campaign.ends("verify", 2);
+        campaign.finishes("run");
+        assert!(fs::read(&artefacts[1]).unwrap() == own, "{kind}");
+        campaign.ends("verify", 0);
+        assert_eq!(
+            campaign.path("reports/current").read_link().unwrap(),
+            Path::new("nights/0001")
+        );
+    }
+    assert!(published() == before);
 }
 
 fn flip(path: &Path) {

@@ -1,0 +1,52 @@
+//! Artefacts of a night that are not as they were written.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::pipeline::IngestedFlight;
+use crate::store::{ArtefactName, Contents, Digest, Kind, Night, Store};
+
+/// Artefacts of a night that are damaged, gone, or another's under their name. A record has no seal:
+/// its digest is in its flight's artefact.
+pub fn damaged_artefacts(store: &Store, contents: &Contents, night: &Night) -> Vec<ArtefactName> {
+    let records = records(store, night);
+    let has_record = |name: &ArtefactName, digest: &Digest| {
+        let path = store.path(name);
+        contents.of(&path).is_ok_and(|found| found == *digest)
+            || !store.has_file(name) && store.is_shared(name, digest.bytes)
+    };
+    let is_whole = |(name, bytes): &(&ArtefactName, &u64)| {
+        if name.is_of(Kind::Records) {
+            let digest = records.get(*name);
+            digest.is_some_and(|digest| has_record(name, digest))
+        } else {
+            store.is_whole(name, **bytes)
+        }
+    };
+    let artefacts: Vec<(&ArtefactName, &u64)> = night.artefacts.iter().collect();
+    artefacts
+        .into_par_iter()
+        .filter(|artefact| !is_whole(artefact))
+        .map(|(name, _)| name.clone())
+        .collect()
+}
+
+/// Copies the records of a night that only the object store has into the folder, so that all of their
+/// bytes are read. One that cannot be copied stays unread.
+pub fn fetch_records(store: &Store, night: &Night) {
+    for (name, digest) in records(store, night) {
+        // What cannot be fetched is found damaged.
+        let _ = store.fetch(&name, &digest);
+    }
+}
+
+/// Digests of a night's records.
+fn records(store: &Store, night: &Night) -> BTreeMap<ArtefactName, Digest> {
+    let flights = night.artefacts.keys().filter(|a| a.is_of(Kind::Ingest));
+    flights
+        .filter_map(|name| store.load::<IngestedFlight>(name))
+        .flat_map(|flight| flight.records().cloned().collect::<Vec<_>>())
+        .map(|record| (record.name, record.digest))
+        .collect()
+}
