@@ -25,12 +25,26 @@ macro_rules! err {
 }
 
 pub fn print(text: Arguments) {
-    note(std::io::stdout().write_fmt(text));
+    note(std::io::stdout().write_all(visible(text).as_bytes()));
 }
 
 /// A failure to print an error leaves nowhere to report it.
 pub fn print_error(text: Arguments) {
-    let _ = std::io::stderr().write_fmt(text);
+    let _ = std::io::stderr().write_all(visible(text).as_bytes());
+}
+
+/// Text with its control characters as escapes: names of files may hold some that a terminal obeys.
+fn visible(text: Arguments) -> String {
+    let is_obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    let text = text.to_string();
+    if !text.contains(is_obeyed) {
+        return text;
+    }
+    let escaped = |c: char| match c {
+        c if is_obeyed(c) => c.escape_default().to_string(),
+        c => c.to_string(),
+    };
+    text.chars().map(escaped).collect()
 }
 
 /// Keeps the first failure to write output.

@@ -45,5 +45,19 @@ pub fn html(contents: &Contents, template: Option<&str>) -> Result<String, Strin
             template.unwrap_or(include_str!("report.html")),
             Serde(&Page::new(contents)),
         )
+        .map(well_formed)
         .map_err(|error| format!("the report's template: {error:#}"))
+}
+
+/// A page without characters that XML forbids or that reorder a line: names of files may hold them.
+fn well_formed(page: String) -> String {
+    let is_forbidden = |c: char| {
+        c.is_control() && !matches!(c, '\t' | '\n' | '\r')
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
+    };
+    if page.contains(is_forbidden) {
+        page.replace(is_forbidden, "\u{fffd}")
+    } else {
+        page
+    }
 }

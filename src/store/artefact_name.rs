@@ -76,7 +76,7 @@ impl ArtefactName {
             .chars()
             .map(|c| if is_safe(c) { c } else { '_' })
             .collect();
-        let (folder, extension) = (kind.name(), kind.extension());
+        let (item, folder, extension) = (bounded(item), kind.name(), kind.extension());
         ArtefactName(format!("{folder}/{item}-{fingerprint}.{extension}"))
     }
 
@@ -118,6 +118,24 @@ impl ArtefactName {
     }
 }
 
+/// Most bytes of an item in a name: file systems allow 255 for a whole name.
+const LONGEST_ITEM: usize = 160;
+
+/// An item's name, of which a long one ends in a hash of the whole.
+fn bounded(item: String) -> String {
+    if item.len() <= LONGEST_ITEM {
+        return item;
+    }
+    let hash = &blake3::hash(item.as_bytes()).to_hex()[..16];
+    let end = (0..=LONGEST_ITEM - hash.len() - 1)
+        .rev()
+        .find(|end| item.is_char_boundary(*end));
+    format!(
+        "{}_{hash}",
+        item.get(..end.unwrap_or(0)).unwrap_or_default()
+    )
+}
+
 impl fmt::Display for ArtefactName {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.0)
@@ -135,6 +153,19 @@ mod tests {
         assert_eq!(name.file_name(), "joint_OLO_30.00-0123.json");
         assert_eq!(name.fingerprint(), "0123");
         assert!(name.is_of(Kind::Joint) && !name.is_of(Kind::Estimate));
+    }
+
+    #[test]
+    fn a_long_name_is_bounded_and_its_own() {
+        let name = |item: &str| ArtefactName::new(Kind::Estimate, item, "0123456789abcdef");
+        let long = "ü".repeat(120);
+        let (one, other) = (name(&format!("{long}1")), name(&format!("{long}2")));
+        assert!(one != other && one.file_name().len() < 200);
+        assert_eq!(one.fingerprint(), "0123456789abcdef");
+        assert_eq!(
+            name("f_t00118").file_name(),
+            "f_t00118-0123456789abcdef.json"
+        );
     }
 
     #[test]

@@ -492,6 +492,35 @@ fn a_recorder_with_other_names_units_and_signs_is_a_matter_of_its_channel_map() 
     crate::estimate::assert_same_estimates(&shipped.table("estimates"), &other.table("estimates"));
 }
 
+#[cfg(unix)]
+#[test]
+fn no_name_of_a_file_stops_a_campaign_or_deceives_a_reader() {
+    let campaign = Campaign::new();
+    let record = pitch_steps();
+    let long = "l".repeat(247);
+    let names = [
+        (long.as_str(), long.as_str()),
+        ("a\u{1b}[31mb\u{202e}c", "a_[31mb_c"),
+        ("=cmd|' calc'!A0", "_=cmd|' calc'!A0"),
+        ("<&>\"'", "<&>\"'"),
+    ];
+    for (shift, (name, _)) in names.iter().enumerate() {
+        // Other rows each: the same bytes would count once.
+        let shifted = with_values(&record, "altitude", |_, v| v + 1.0 + shift as f64);
+        campaign.add(name, &shifted.slice(100 * shift, 5400));
+    }
+    let outcome = campaign.harvest("run");
+    assert!(matches!(outcome.code, Some(0 | 2)), "{outcome:?}");
+    assert!(!outcome.stdout.contains('\u{1b}'), "{outcome:?}");
+    let flights = campaign.table("flights");
+    let ids: Vec<&str> = flights.iter().map(|row| &*row["flight_id"]).collect();
+    let mut expected = names.map(|(_, id)| id);
+    expected.sort_unstable();
+    assert_eq!(ids, expected);
+    assert_eq!(campaign.table("fits").len(), names.len());
+    assert!(campaign.path("reports/report.pdf").is_file());
+}
+
 #[test]
 fn an_archive_without_records_cannot_be_run() {
     let campaign = Campaign::new();

@@ -29,7 +29,7 @@ use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
 use super::object;
-use file_rules::{is_hidden, unreadable};
+use file_rules::{flight_id, is_hidden, unreadable};
 
 /// Files of one flight, in the order of their names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -179,14 +179,14 @@ fn identity(file: &Path) -> (String, PathBuf) {
             && matches!(key, "flight" | "flight_id")
             && !value.is_empty()
         {
-            return (value.to_owned(), folder.to_owned());
+            return (flight_id(value), folder.to_owned());
         }
     }
     let stem = file
         .file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default();
-    (stem, file.to_owned())
+    (flight_id(&stem), file.to_owned())
 }
 
 thread_local! {
