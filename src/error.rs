@@ -135,18 +135,19 @@ words! {
     }
 }
 
+/// Similarity of two names from 0 to 1, whatever their case (Jaro and Winkler).
+#[must_use]
+pub fn similarity(a: &str, b: &str) -> f64 {
+    strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
+}
+
 /// A phrase to append to an error: the name among `known` nearest to `given`; empty without a near
 /// one.
 #[must_use]
 pub fn did_you_mean<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let near = known
         .into_iter()
-        .map(|name| {
-            (
-                strsim::jaro_winkler(&given.to_lowercase(), &name.to_lowercase()),
-                name,
-            )
-        })
+        .map(|name| (similarity(given, name), name))
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match near {
         Some((score, name)) if score > 0.7 => format!("; did you mean `{name}`?"),

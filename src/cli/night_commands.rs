@@ -84,12 +84,16 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     let options = &options.options;
     let status = status::status(&options.load()?, &bars(options)?)?;
     if !options.quiet {
-        match &status.night {
-            Some(night) => out!(
+        match (&status.night, &status.damaged_night) {
+            (Some(night), _) => out!(
                 "night {night} is published in {}",
                 options.load()?.reports.display()
             ),
-            None => out!("no night is published yet"),
+            (None, Some(night)) => out!(
+                "night {night} is damaged: its night.json is not as it was published; the next run \
+                 publishes another night"
+            ),
+            (None, None) => out!("no night is published yet"),
         }
         for (flight_id, since) in &status.in_work {
             out!("in work: flight {flight_id} since {since}");

@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::Instrument;
 use super::source::{Files, Source};
 use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
-use crate::error::{Error, Result, did_you_mean};
+use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::estimate::Hold;
 use crate::flight::signal;
 use crate::ingest;
@@ -39,6 +39,12 @@ pub(super) fn tunnel(
                 row.derivative
             ));
         }
+        if let Some(uncertainty) = row.uncertainty.filter(|u| *u < 0.0) {
+            return error(format!(
+                "`{}` has the uncertainty {uncertainty}; none is negative",
+                row.derivative
+            ));
+        }
         if let Some(derivative) = buildup
             .derivatives
             .iter()
@@ -54,10 +60,13 @@ pub(super) fn tunnel(
             row.value *= factor;
             row.uncertainty = row.uncertainty.map(|u| u * factor);
         }
-        read.add(&row)
+        read.add(line, &row)
             .map_err(|what| Error::config(path, Some(line), what))?;
         tunnel.insert_at(&row.derivative, row.third, row.point());
     }
+    misspelt(&read, buildup).map_or(Ok(()), |(line, what)| {
+        Err(Error::config(path, Some(line), what))
+    })?;
     if let Some(third) = settings.third.as_ref().filter(|_| !read.third) {
         let what = format!(
             "no table depends on `{}`, which pipeline.yaml names (tunnel: third:)",
@@ -66,6 +75,32 @@ pub(super) fn tunnel(
         return Err(Error::config(path, None, what));
     }
     Ok(tunnel)
+}
+
+/// Similarity, from 0 to 1, from which a name of the tunnel counts as a misspelt one of the model: a
+/// letter too many or two exchanged, in names of five letters.
+const MISSPELT: f64 = 0.93;
+
+/// Line and message for a name of the tunnel that the model lacks, while the tunnel lacks a very similar
+/// one of the model.
+fn misspelt(read: &TunnelRows, buildup: &Buildup) -> Option<(usize, String)> {
+    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+    let names = derivatives.chain(buildup.combined.iter().map(|c| &c.name));
+    let (found, lacking): (Vec<&String>, Vec<&String>) =
+        names.partition(|name| read.lines.contains_key(&plain(name)));
+    let found: BTreeSet<String> = found.into_iter().map(|name| plain(name)).collect();
+    let unknown = read.lines.iter().filter(|(name, _)| !found.contains(*name));
+    unknown
+        .filter_map(|(_, (line, written))| {
+            let near = lacking
+                .iter()
+                .find(|name| similarity(written, name) >= MISSPELT)?;
+            let what = format!(
+                "the model has no derivative `{written}`; did you mean `{near}`, which has no rows?"
+            );
+            Some((*line, what))
+        })
+        .min()
 }
 
 /// Rows of the tunnel's tables as written; of a DAVE-ML file those of the model's derivatives and
@@ -96,11 +131,15 @@ struct TunnelRows {
     points: BTreeSet<(String, [Option<u64>; 3])>,
     variables: BTreeMap<String, (bool, bool)>,
     third: bool,
+    /// First line of each derivative, and its name as written there.
+    lines: BTreeMap<String, (usize, String)>,
 }
 
 impl TunnelRows {
-    fn add(&mut self, row: &TunnelRow) -> std::result::Result<(), String> {
+    fn add(&mut self, line: usize, row: &TunnelRow) -> std::result::Result<(), String> {
         let name = plain(&row.derivative);
+        let written = || (line, row.derivative.clone());
+        self.lines.entry(name.clone()).or_insert_with(written);
         let given = (row.mach.is_some(), row.third.is_some());
         self.third |= given.1;
         if *self.variables.entry(name.clone()).or_insert(given) != given {
@@ -142,7 +181,12 @@ pub(super) fn events(path: Option<&Path>, classes: &[Class]) -> Result<Vec<Event
             );
             return Err(Error::config(path, Some(line), what));
         }
-        // Also refuses times that are no numbers.
+        for (name, time_s) in [("start_s", event.start_s), ("end_s", event.end_s)] {
+            if !time_s.is_finite() {
+                let what = format!("column `{name}`: {time_s} is no time");
+                return Err(Error::config(path, Some(line), what));
+            }
+        }
         if event.end_s.partial_cmp(&event.start_s) != Some(std::cmp::Ordering::Greater) {
             return Err(Error::config(
                 path,

@@ -7,7 +7,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::channel::{
-    ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel,
+    ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel, values_beyond,
 };
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
@@ -143,7 +143,9 @@ impl<'a> Recording<'a> {
                 problems.push(problem);
             } else {
                 let stuck = stuck_channel(name, &statistics, clock);
-                problems.extend(stuck.map(|refusal| refusal.into_problem(flight_id)));
+                let beyond = values_beyond(name, channel, &statistics, clock);
+                let named = stuck.into_iter().chain(beyond);
+                problems.extend(named.map(|refusal| refusal.into_problem(flight_id)));
                 block_means.extend(one.block_means.map(|means| (channel.signal.clone(), means)));
                 // The turns of an unwrapped angle depend on where the record begins.
                 if statistics.wraps == 0 && channel.wraps_at.is_none() {

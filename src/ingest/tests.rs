@@ -375,6 +375,37 @@ fn a_clock_that_cannot_be_followed_or_is_absent_is_refused_and_named() {
 }
 
 #[test]
+fn a_time_in_another_unit_is_named_as_time() {
+    for (factor, words) in [
+        (1e3, "is the time in ms?"),
+        (1.0 / 60.0, "is the time in min?"),
+    ] {
+        let mut flight = Flight::steady();
+        flight.values("time").iter_mut().for_each(|t| *t *= factor);
+        let problem = flight.refused();
+        assert_eq!(problem.place, "channel `time`");
+        assert!(problem.reason.contains(words), "{}", problem.reason);
+    }
+    // In its true unit the same record is read.
+    let mut flight = Flight::steady();
+    flight.values("time").iter_mut().for_each(|t| *t *= 1e3);
+    flight.raw.columns.get_mut("time").unwrap().unit = Some("ms".to_owned());
+    flight.channel("time").unit = "ms".to_owned();
+    assert_eq!(flight.ingest().unwrap().problems, []);
+}
+
+#[test]
+fn a_record_of_two_rows_is_named_as_short() {
+    let flight = Flight::steady();
+    let stretches = flight.of_files(&[flight.part(0..2)], usize::MAX);
+    assert!(
+        reasons(&stretches[0])[0].starts_with("the record is 0.025 s long, shorter than"),
+        "{:?}",
+        stretches[0].problems
+    );
+}
+
+#[test]
 fn a_signal_with_two_channels_and_a_unit_of_another_quantity_are_refused() {
     let mut flight = Flight::steady();
     flight.channel("de").signal = signal::THETA.to_owned();
@@ -425,6 +456,31 @@ fn dropouts_spikes_and_lost_frames_are_repaired_marked_and_counted() {
     );
     let row = ingested.channels.iter().find(|c| c.channel == "V").unwrap();
     assert_eq!((row.bridged, row.despiked, row.missing), (7, 1, 100));
+}
+
+#[test]
+fn numbers_that_no_aircraft_has_are_missing_and_named() {
+    for (name, rows) in [("theta", 0..3), ("theta", 700..704), ("psi", 1996..2000)] {
+        let mut flight = Flight::noisy();
+        flight.values(name)[rows.clone()].fill(1e308);
+        flight.values(name)[rows.start] = -1e200;
+        let ingested = flight.ingest().unwrap();
+        let first_s = rows.start as f64 * STEP_S;
+        assert_eq!(ingested.problems.len(), 1, "{:?}", ingested.problems);
+        assert_eq!(ingested.problems[0].place, format!("channel `{name}`"));
+        assert_eq!(
+            ingested.problems[0].reason,
+            format!(
+                "{} samples are beyond 1e9 deg, which no aircraft has, the first at {first_s:.3} s; they count \
+                 as missing",
+                rows.len()
+            )
+        );
+        let signal = &flight.channels[name].signal;
+        let series = &ingested.record.signals[signal];
+        assert!(rows.into_iter().all(|k| series.marks[k] != Mark::Measured));
+        assert!(series.values.iter().all(|v| !(v.abs() > 1e3)));
+    }
 }
 
 #[test]

@@ -44,6 +44,8 @@ impl StageStatus {
 pub struct Status {
     /// Name of the current night.
     pub night: Option<String>,
+    /// Name of the current night, if its manifest is missing or damaged.
+    pub damaged_night: Option<String>,
     pub stages: Vec<StageStatus>,
     /// Flights that a run has in work at this moment, and since when.
     pub in_work: InWork,
@@ -90,6 +92,7 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
     }
     Ok(Status {
         night: comparison.current.map(|night| night.name),
+        damaged_night: Nights::look(&config.reports).damaged_current(),
         stages,
         in_work: store::in_work(&config.store),
     })

@@ -117,10 +117,16 @@ fn find_night(config: &Config, nights: &Nights, name: Option<&str>) -> Result<Ni
         None => nights.current(),
     };
     night.ok_or_else(|| {
-        let what = format!(
-            "there is no such night here; there are {}",
-            nights.names().join(", ")
-        );
+        let damaged = nights.damaged_current().filter(|_| name.is_none());
+        let what = match damaged {
+            Some(name) => {
+                format!("night {name} is damaged: its night.json is not as it was published")
+            }
+            None => format!(
+                "there is no such night here; there are {}",
+                nights.names().join(", ")
+            ),
+        };
         Error::not_found(&config.reports, what)
     })
 }

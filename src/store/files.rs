@@ -230,8 +230,31 @@ pub fn place_rows<T: Serialize>(path: &Path, rows: &[T]) -> Result<()> {
     atomic::place(path, &bytes)
 }
 
+/// Form of a text that is no CSV, in words; `None` for a CSV.
+fn other_form(text: &str) -> Option<&'static str> {
+    let header = text.lines().find(|line| !line.trim().is_empty());
+    let Some(header) = header else {
+        return Some("the file is empty: its first line must name its columns");
+    };
+    match (
+        header.contains(','),
+        header.contains(';'),
+        header.contains('\t'),
+    ) {
+        (false, true, _) => Some(
+            "its columns are separated by semicolons; separate them by commas, and write numbers \
+             with a decimal point",
+        ),
+        (false, _, true) => Some("its columns are separated by tabs; separate them by commas"),
+        _ => None,
+    }
+}
+
 pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
     let content = text(path)?;
+    if let Some(what) = other_form(&content) {
+        return Err(Error::config(path, None, what));
+    }
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(content.as_bytes());
@@ -265,6 +288,16 @@ pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_text_of_another_form_is_named_as_that() {
+        let form = |text: &str| other_form(text).unwrap_or_default();
+        assert!(form("").contains("is empty") && form(" \n\n").contains("is empty"));
+        assert!(form("flight_id;start_s\n1;2,5").contains("semicolons"));
+        assert!(form("flight_id\tstart_s").contains("tabs"));
+        assert_eq!(other_form("flight_id,start_s"), None);
+        assert_eq!(other_form("flight_id"), None);
+    }
 
     #[cfg(target_os = "linux")]
     #[test]

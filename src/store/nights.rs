@@ -126,6 +126,13 @@ impl Nights {
         self.night(&self.current_name()?)
     }
 
+    /// Name of the current night, if its manifest is missing or damaged.
+    #[must_use]
+    pub fn damaged_current(&self) -> Option<String> {
+        let name = self.current_name()?;
+        self.night(&name).is_none().then_some(name)
+    }
+
     /// Manifest of the last complete night.
     #[must_use]
     pub fn complete(&self) -> Option<Night> {

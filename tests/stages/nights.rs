@@ -375,6 +375,32 @@ fn status_lists_stale_artefacts_with_reasons_and_changes_nothing() {
 }
 
 #[test]
+fn a_damaged_manifest_is_named_as_damaged() {
+    let campaign = Campaign::of_pitch_steps();
+    campaign.ends("ingest", 0);
+    fs::write(campaign.path("reports/nights/0001/night.json"), "{").unwrap();
+    let outcome = campaign.harvest("status");
+    assert!(
+        outcome
+            .stdout
+            .starts_with("night 0001 is damaged: its night.json"),
+        "{outcome:?}"
+    );
+    let outcome = campaign.ends("verify", 1);
+    assert!(
+        outcome.stderr.contains("night 0001 is damaged"),
+        "{outcome:?}"
+    );
+    campaign.ends("ingest", 0);
+    assert!(
+        campaign
+            .harvest("status")
+            .stdout
+            .starts_with("night 0002 is published")
+    );
+}
+
+#[test]
 fn explain_prints_origin_fit_and_dependencies_of_a_maneuver() {
     let campaign = Campaign::of_pitch_steps();
     campaign.finishes("run");

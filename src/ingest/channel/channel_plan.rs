@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::conditioner::ChannelStatistics;
+use super::conditioner::{ChannelStatistics, LARGEST};
 use crate::error::Problem;
 use crate::flight::{Channel, signal};
 use crate::ingest::clock::Clock;
@@ -159,6 +159,24 @@ pub fn stuck_channel(name: &str, statistics: &ChannelStatistics, clock: &Clock) 
         "its value is stuck {}{more}: noise changed it before, and then nothing; it is left out \
          there",
         named.join(", ")
+    );
+    Some(Refusal::of_channel(name, reason))
+}
+
+/// Refusal of the samples of a channel that are beyond any measurement; `None` where none is.
+#[must_use]
+pub fn values_beyond(
+    name: &str,
+    channel: &Channel,
+    statistics: &ChannelStatistics,
+    clock: &Clock,
+) -> Option<Refusal> {
+    let first_s = clock.time_s(statistics.first_beyond?);
+    let unit = Unit::of_signal(&channel.signal).name;
+    let reason = format!(
+        "{} samples are beyond {LARGEST:e} {unit}, which no aircraft has, the first at {first_s:.3} s; \
+         they count as missing",
+        statistics.beyond
     );
     Some(Refusal::of_channel(name, reason))
 }

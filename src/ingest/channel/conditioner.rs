@@ -30,6 +30,10 @@ const MARGIN: usize = SPELL / 4;
 /// Samples that are unwrapped at once: they stay in the processor's cache.
 const UNWRAPPED_AT_ONCE: usize = 1 << 10;
 
+/// Largest size of a measurement in any signal's unit: ten times the largest aircraft's moment of
+/// inertia in slug ft². A larger number is no measurement.
+pub const LARGEST: f64 = 1e9;
+
 /// Number of kinds of [`Mark`].
 const MARKS: usize = 6;
 
@@ -47,6 +51,9 @@ pub struct ChannelStatistics {
     pub period: usize,
     /// Intervals of samples in which the channel is stuck.
     pub stuck: Vec<(usize, usize)>,
+    /// Number of samples beyond [`LARGEST`], which count as missing, and the first of them.
+    pub beyond: usize,
+    pub first_beyond: Option<usize>,
 }
 
 impl ChannelStatistics {
@@ -216,7 +223,10 @@ impl Conditioner {
 
     /// Takes the next samples as recorded, NaN where there is none.
     pub fn push(&mut self, recorded: &[f64]) {
-        self.convert(recorded);
+        match self.without_beyond(recorded) {
+            Some(recorded) => self.convert(&recorded),
+            None => self.convert(recorded),
+        }
         loop {
             let spell = self.characters.next_spell();
             let (from, to) = (spell * SPELL, ((spell + 1) * SPELL).min(self.samples));
@@ -225,6 +235,24 @@ impl Conditioner {
             }
             self.characterise(from, to);
         }
+    }
+
+    /// Recorded values of which those beyond any measurement are NaN; `None` where none is.
+    fn without_beyond(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
+        let factor = self.factor;
+        let is_beyond = |value: f64| value.is_finite() && (value * factor).abs() > LARGEST;
+        let first = recorded.iter().position(|value| is_beyond(*value))?;
+        let first = self.pushed() + first;
+        self.statistics.first_beyond.get_or_insert(first);
+        let cleaned = recorded.iter().map(|value| {
+            if is_beyond(*value) {
+                self.statistics.beyond += 1;
+                f64::NAN
+            } else {
+                *value
+            }
+        });
+        Some(cleaned.collect())
     }
 
     /// Appends recorded values, unwrapped and in the signal's unit.

@@ -24,6 +24,13 @@ use crate::ingest::settings::Settings;
 /// leave gaps in most maneuvers.
 const MOST_UNUSABLE: f64 = 0.1;
 
+/// Rates of recorders of flight mechanics, Hz. Below, no short period is seen; above, a time is in
+/// another unit.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 2.0..=1000.0;
+
+/// Usual rate of a recorder, Hz, by which the unit of a time is guessed.
+const TYPICAL_RATE_HZ: f64 = 40.0;
+
 /// A stretch of a flight on its clock.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
@@ -280,6 +287,10 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
                 continue;
             }
             let clock = self.clock(sequence)?;
+            self.check_rate(&clock)?;
+            if sequences.len() == 1 && sequence.length_s() < self.settings.least_stretch_s {
+                self.report_short_record(&flight_id, sequence);
+            }
             if let Some(cause) = &sequence.cause {
                 self.report(Refusal {
                     place: format!("stretch `{flight_id}`"),
@@ -308,6 +319,40 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
         } else {
             format!("{flight_id}.{}", index + 1)
         }
+    }
+
+    /// Checks the rate of the main stream, which no setting states, against those of recorders.
+    ///
+    /// # Errors
+    /// A refusal that names the time, and its probable unit.
+    fn check_rate(&self, clock: &Clock) -> Result<(), Refusal> {
+        let rate_hz = 1.0 / clock.step_s;
+        if self.settings.sampling_rate_hz.is_some() || RATES_HZ.contains(&rate_hz) {
+            return Ok(());
+        }
+        let unit = self.times.probable_unit(rate_hz, TYPICAL_RATE_HZ);
+        let unit = unit.map_or_else(
+            || ".".to_owned(),
+            |unit| format!(": is the time in {unit}?"),
+        );
+        Err(self.times.refusal(format!(
+            "by its time the record runs at {rate_hz:.6} Hz; recorders run at {} to {} Hz{unit} The \
+             unit stands in aircraft.yaml; `ingest: expert: sampling_rate_hz` states another rate",
+            RATES_HZ.start(),
+            RATES_HZ.end()
+        )))
+    }
+
+    fn report_short_record(&mut self, flight_id: &str, sequence: &PieceSequence) {
+        self.report(Refusal {
+            place: format!("stretch `{flight_id}`"),
+            reason: format!(
+                "the record is {:.3} s long, shorter than least_stretch_s = {} s: no maneuver with its \
+                 lead-in and decay fits into it",
+                sequence.length_s(),
+                self.settings.least_stretch_s
+            ),
+        });
     }
 
     fn report_short_stretch(&mut self, flight_id: &str, sequence: &PieceSequence) {

@@ -31,6 +31,24 @@ impl<'a, S: ColumnSource + ?Sized> TimeChannels<'a, S> {
         Refusal::of_channel(name, reason)
     }
 
+    /// Unit in which the first time channel probably is, given the rate that its stated unit makes, Hz.
+    pub fn probable_unit(&self, rate_hz: f64, typical_rate_hz: f64) -> Option<&'static str> {
+        let (_, channel) = self.channels.first()?;
+        let stated = Unit::parse(&channel.unit).ok()?;
+        let units = stated
+            .alike()
+            .filter_map(|unit| Some((unit.name, unit.factor_to(stated)?)));
+        let longer = [("min", 60.0), ("h", 3600.0)];
+        let to_stated = Unit::of_signal(TIME).factor_to(stated)?;
+        let longer = longer.map(|(name, seconds)| (name, seconds * to_stated));
+        let distance = |factor: f64| (rate_hz / factor / typical_rate_hz).ln().abs();
+        units
+            .chain(longer)
+            .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))
+            .filter(|(name, _)| *name != stated.name)
+            .map(|(name, _)| name)
+    }
+
     /// Passes the times of some rows of a file to `sink`, s.
     pub fn read(
         &self,

@@ -31,7 +31,7 @@ pub fn rows(
         .extension()
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default();
-    match extension.as_str() {
+    let rows = match extension.as_str() {
         "parquet" | "pq" => of_parquet(path, third),
         "dml" | "xml" => {
             let text = files::text(path)?;
@@ -39,7 +39,11 @@ pub fn rows(
                 .map_err(|(line, what)| Error::config(path, line, what))
         }
         _ => of_csv(path, third),
+    }?;
+    if rows.is_empty() {
+        return Err(Error::config(path, None, "the tunnel database has no rows"));
     }
+    Ok(rows)
 }
 
 /// Rows of a CSV with a header.
