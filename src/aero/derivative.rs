@@ -122,6 +122,12 @@ impl Output {
         }
     }
 
+    /// Returns true for an attitude, the integral of the rates.
+    #[must_use]
+    pub fn is_attitude(self) -> bool {
+        matches!(self, Output::Theta | Output::Phi)
+    }
+
     #[must_use]
     pub fn axis(self) -> Axis {
         if Axis::Longitudinal.outputs().contains(&self) {

@@ -8,6 +8,7 @@ use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
 use super::{check, moved, places, ranges};
+use crate::aero::Axis;
 use crate::error::Result;
 use crate::output_error::calibration_errors::Calibration;
 use crate::{compare, ingest, store};
@@ -118,7 +119,14 @@ fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>
             instruments::replace(size, instrument.fault.given());
         }
     }
+    let ordinary = &mut pipeline.ingest.compatibility.ordinary;
     let estimate = &mut pipeline.estimate;
+    let outputs = [Axis::Longitudinal, Axis::Lateral].into_iter();
+    for output in outputs.flat_map(Axis::outputs) {
+        if let Some(size) = ordinary.of_signal(output.signal()) {
+            estimate.ordinary_bias.insert(output, size.bias);
+        }
+    }
     estimate.max_marked_share = pipeline.segment.quality.marked_share;
     estimate.calibration = errors
         .iter()

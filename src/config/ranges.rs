@@ -10,7 +10,7 @@ use crate::error::Result;
 type Range = (f64, f64);
 
 /// Ranges by the last name of a key. Sizes that set the amount of work have the narrowest.
-const BY_NAME: [(&str, Range); 23] = [
+const BY_NAME: [(&str, Range); 25] = [
     ("memory_mb", (1.0, 1e9)),
     ("sampling_rate_hz", (0.01, 1e6)),
     ("longest_stretch_h", (0.01, 1000.0)),
@@ -31,6 +31,8 @@ const BY_NAME: [(&str, Range); 23] = [
     ("alpha_bin_deg", (1e-3, 180.0)),
     ("alpha_distance_deg", (1e-3, 180.0)),
     ("least_delay_s", (0.0, 10.0)),
+    ("r_squared", (-1e12, 1.0)),
+    ("contradiction", (0.0, 1.0)),
     ("shards", (1.0, 1e6)),
     ("processors", (1.0, 1e6)),
     ("keep_nights", (1.0, 1e6)),

@@ -23,6 +23,8 @@ use crate::aircraft::Aircraft;
 pub trait InGusts<const NX: usize>: Equations<NX> {
     /// State that is the angle of the air.
     const ANGLE: usize = 0;
+    /// Output that measures it.
+    const VANE: usize = 0;
     /// Pairs of states (rate of the gyro, rate that the aerodynamics feel), one for each rotary gust.
     const FELT_RATES: &'static [(usize, usize)];
 

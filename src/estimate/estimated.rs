@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::maneuver::Maneuver;
 use crate::output_error::Fit;
-use crate::tables::{CorrelationRow, EstimateRow, FitRow, History, Outcome};
+use crate::tables::{AgreementRow, CorrelationRow, EstimateRow, FitRow, History, Outcome};
 
 /// Covariance of a maneuver's parameters in the units of the tables; initial states in rad and
 /// rad/s.
@@ -42,6 +42,8 @@ pub struct Estimated {
     /// Correlations among the regressors as flown, and among the estimates.
     pub correlations: Vec<CorrelationRow>,
     pub history: Option<History>,
+    /// Agreement of each output with the maneuver's own fit.
+    pub fit_outputs: Vec<AgreementRow>,
 }
 
 impl Estimated {
@@ -61,6 +63,7 @@ impl Estimated {
             covariance: None,
             correlations: vec![],
             history: None,
+            fit_outputs: vec![],
         }
     }
 }
@@ -86,5 +89,6 @@ pub(super) fn rejected_fit(maneuver: &Maneuver, reason: String) -> FitRow {
         gust_corner_rad_s: None,
         autocorrelation: None,
         likelihood_gain: None,
+        equation_error_distance: None,
     }
 }

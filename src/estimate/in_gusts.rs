@@ -16,6 +16,7 @@ use crate::filter_error::slopes::SlopeEffect;
 use crate::flight::signal;
 use crate::numerics::order_statistics::median;
 use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Measurements, Model, Outcome, Response, equation_error};
 use crate::tables::{EstimationMethod, FitRow};
 use crate::units::DEG;
@@ -40,10 +41,16 @@ pub(super) struct Filtered {
     /// Information of derivatives, biases and initial states.
     pub information: DMatrix<f64>,
     noise: Noise,
+    /// True where gusts account for a drift of the attitude.
+    pub attitude_drifts: bool,
     /// Lag-one correlation of each output's innovations.
     autocorrelation: [f64; OUTPUTS],
     /// Log-likelihood gained over output error.
     likelihood_gain: Option<f64>,
+    /// Outputs along the air's angle; `None` where they diverge.
+    pub outputs_along_air: Option<Vec<[f64; OUTPUTS]>>,
+    /// Equation error with the slopes over α that the filter holds; `None` without any.
+    pub second_opinion: Option<Regression>,
     /// Cost of output error at its start and end.
     output_error_costs: [Option<f64>; 2],
 }
@@ -102,7 +109,10 @@ impl<'a> Task<'a> {
         self.add_calibration(prepared, &sweep, &fitted, &mut fit);
         Some(Filtered {
             information: fitted.information(),
+            outputs_along_air: fitted.outputs_along_air(),
+            second_opinion: self.second_opinion_on(prepared, &sweep),
             noise: fitted.noise(),
+            attitude_drifts: fitted.noise().is_of_air(G::FELT_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
@@ -157,6 +167,24 @@ impl<'a> Task<'a> {
         let wide = self.filter::<NG, G>(&sweep.slopes.window, measurements, &all);
         let values = values_by_name(&model, fitted.filter.names(), fitted.own());
         WidePass::of(&fitted.filter, &fitted.scored.parameters, &wide, &values)
+    }
+
+    /// Equation error with the slopes over α that a fit holds; `None` without any.
+    fn second_opinion_on<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+    ) -> Option<Regression> {
+        let model = sweep.held_in(&prepared.model);
+        let measurements = &prepared.case.measurements;
+        let case = |model: &Model| {
+            let window = &sweep.slopes.window;
+            Case::<NX, E>::new(self.context.aircraft, window, measurements.clone(), model)
+        };
+        let uncertainties = self.held_uncertainties(&prepared.model);
+        let regression =
+            |wide: &Case<NX, E>| equation_error::regression(&case(&model), wide, &uncertainties);
+        (!sweep.is_constant()).then(|| regression(&case(&all_free(&model))))
     }
 
     fn filter<const NG: usize, G: InGusts<NG>>(
@@ -349,6 +377,10 @@ impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
         let n = self.filter.first_noise();
         let all = self.scored.response.information();
         all.view((0, 0), (n, n)).into_owned()
+    }
+
+    fn outputs_along_air(&self) -> Option<Vec<[f64; OUTPUTS]>> {
+        self.filter.outputs_along_air(&self.scored.parameters).ok()
     }
 
     /// Fit in the form of output error: the noise's parameters are left out, and the outputs are the

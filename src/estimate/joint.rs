@@ -125,11 +125,13 @@ pub struct Joined {
 
 /// Estimates maneuvers of one class together.
 ///
-/// The outcome has any failure. A maneuver that fails alone is left out, and the reason names it.
+/// The outcome has any failure. A maneuver that fails alone is left out, and the reason names it;
+/// so are those that are `doubtful`, each with its reason.
 #[must_use]
 pub fn estimate(
     joint_id: &str,
     members: &[(&Record, &Maneuver)],
+    doubtful: &[(&Maneuver, String)],
     class: &Class,
     context: &Context,
 ) -> Joined {
@@ -137,9 +139,11 @@ pub fn estimate(
     let class = class.at(mean_of(&all, |m| m.alpha_deg));
     match class.axis {
         Axis::Longitudinal => {
-            estimate_members::<3, Longitudinal>(joint_id, members, &class, context)
+            estimate_members::<3, Longitudinal>(joint_id, members, doubtful, &class, context)
         }
-        Axis::Lateral => estimate_members::<4, Lateral>(joint_id, members, &class, context),
+        Axis::Lateral => {
+            estimate_members::<4, Lateral>(joint_id, members, doubtful, &class, context)
+        }
     }
 }
 
@@ -153,10 +157,11 @@ struct Member<'a, const NX: usize, E: Equations<NX>> {
 fn estimate_members<const NX: usize, E: Equations<NX>>(
     joint_id: &str,
     members: &[(&Record, &Maneuver)],
+    doubtful: &[(&Maneuver, String)],
     class: &Class,
     context: &Context,
 ) -> Joined {
-    let (mut parts, mut left_out) = (Vec::new(), Vec::new());
+    let (mut parts, mut left_out) = (Vec::new(), doubtful.to_vec());
     for &(record, maneuver) in members {
         match member::<NX, E>(Task {
             record,
@@ -292,6 +297,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
         correlations: vec![],
         covariance: Covariance::of_fit(&names, &fit),
         history: None,
+        fit_outputs: vec![],
         fit: task.fit_row(&fit, left_out, StartingValues::SingleEstimates),
     };
     Ok((estimated, costs))

@@ -16,6 +16,7 @@ mod held_by_evidence;
 mod second_opinion;
 mod alpha_slopes;
 mod in_gusts;
+mod doubt;
 mod single;
 pub mod joint;
 pub mod prediction;
@@ -25,6 +26,6 @@ mod tests;
 pub use context::Context;
 pub use estimated::{Covariance, Estimated};
 pub use settings::{
-    Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings, Settings, Start,
+    Doubtful, Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings, Settings, Start,
 };
 pub use single::maneuver;

@@ -17,20 +17,19 @@ use super::estimated::Estimated;
 use super::settings::Hold;
 use super::settings::PredictionSettings;
 use super::task::Task;
-use crate::aero::{Axis, Derivative, Output};
+use crate::aero::{Axis, Derivative};
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::theil::{self, Agreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
-use crate::tables::{EstimateRow, FitRow, PredictedRow, PredictionRow, PredictionStatus};
-use crate::units::Unit;
+use crate::tables::{AgreementRow, EstimateRow, FitRow, PredictedRow, PredictionStatus};
 
 /// Prediction of a maneuver: its columns of `fits`, and a row for each output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Predicted {
     pub summary: PredictedRow,
-    pub outputs: Vec<PredictionRow>,
+    pub outputs: Vec<AgreementRow>,
 }
 
 impl Predicted {
@@ -257,17 +256,7 @@ fn rows<const NX: usize, E: Equations<NX>>(
     cost: f64,
     others: usize,
 ) -> Predicted {
-    let measured = &case.measurements;
-    let agreement = |o: usize| {
-        let samples = measured.values.iter().zip(&measured.used).zip(computed);
-        Agreement::of(
-            &samples
-                .filter(|((_, used), _)| used[o])
-                .map(|((z, _), y)| (z[o], y[o]))
-                .collect::<Vec<_>>(),
-        )
-    };
-    let agreements: [Agreement; OUTPUTS] = std::array::from_fn(agreement);
+    let agreements = Agreement::of_outputs(&case.measurements, computed);
     let weighted: Vec<(Agreement, f64)> = agreements
         .iter()
         .copied()
@@ -292,24 +281,6 @@ fn rows<const NX: usize, E: Equations<NX>>(
     };
     Predicted {
         summary,
-        outputs: named().map(|(o, a)| row(task, o, a)).collect(),
-    }
-}
-
-fn row(task: &Task, output: Output, agreement: &Agreement) -> PredictionRow {
-    let theil = agreement.theil();
-    PredictionRow {
-        maneuver_id: task.maneuver.maneuver_id.clone(),
-        class: task.class.name.clone(),
-        alpha_deg: task.maneuver.alpha_deg,
-        output,
-        unit: Unit::of_signal(output.signal()).name.to_owned(),
-        samples: agreement.samples,
-        root_mean_square: agreement.root_mean_square(),
-        theil: theil.map(|t| t.coefficient),
-        theil_bias: theil.map(|t| t.bias),
-        theil_variance: theil.map(|t| t.variance),
-        theil_covariance: theil.map(|t| t.covariance),
-        r_squared: agreement.r_squared(),
+        outputs: named().map(|(o, a)| task.agreement_row(o, a)).collect(),
     }
 }

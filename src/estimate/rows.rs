@@ -4,11 +4,12 @@ use nalgebra::DMatrix;
 
 use super::estimated::{Estimated, rejected_fit};
 use super::task::Task;
-use crate::aero::Combined;
+use crate::aero::{Combined, Output};
 use crate::dynamics::motion::Window;
 use crate::maneuver::Status;
+use crate::output_error::theil::Agreement;
 use crate::output_error::{Fit, Measurements};
-use crate::tables::{EstimateRow, FitRow, History, HistoryOutput, StartingValues};
+use crate::tables::{AgreementRow, EstimateRow, FitRow, History, HistoryOutput, StartingValues};
 use crate::units::Unit;
 
 /// A derivative or bias of the axis with its status in the class.
@@ -139,6 +140,26 @@ impl<'a> Task<'a> {
             gust_corner_rad_s: None,
             autocorrelation: None,
             likelihood_gain: None,
+            equation_error_distance: None,
+        }
+    }
+
+    /// Row of an output's agreement with a computed one.
+    pub(super) fn agreement_row(&self, output: Output, agreement: &Agreement) -> AgreementRow {
+        let theil = agreement.theil();
+        AgreementRow {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            class: self.class.name.clone(),
+            alpha_deg: self.maneuver.alpha_deg,
+            output,
+            unit: Unit::of_signal(output.signal()).name.to_owned(),
+            samples: agreement.samples,
+            root_mean_square: agreement.root_mean_square(),
+            theil: theil.map(|t| t.coefficient),
+            theil_bias: theil.map(|t| t.bias),
+            theil_variance: theil.map(|t| t.variance),
+            theil_covariance: theil.map(|t| t.covariance),
+            r_squared: agreement.r_squared(),
         }
     }
 

@@ -1,5 +1,10 @@
 //! Equation error beside output error.
 
+use nalgebra::{DMatrix, DVector};
+
+use crate::numerics::chi_squared::exceedance;
+use crate::numerics::symmetric::inverse;
+use crate::output_error::Fit;
 use crate::output_error::equation_error::Regression;
 use crate::tables::EstimateRow;
 
@@ -11,5 +16,49 @@ pub(super) fn add_second_opinion(names: &[String], second: &Regression, rows: &m
         };
         row.equation_error = second.values[j];
         row.equation_error_bound = second.values[j].map(|_| second.covariance[(j, j)].sqrt());
+    }
+}
+
+/// Distance of a fit from equation error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Distance {
+    /// Number of derivatives that both estimate.
+    pub derivatives: usize,
+    /// Square of the differences in joint standard errors, over all derivatives.
+    pub square: f64,
+}
+
+impl Distance {
+    /// Distance over the derivatives that both estimate; `None` without any, or without bounds.
+    ///
+    /// Both estimates use the same data and the same held values, so the covariance of their
+    /// difference is less than the sum of their covariances, which stands here: the distance is
+    /// rather too small.
+    pub fn of(fit: &Fit, second: &Regression) -> Option<Distance> {
+        let corrected = fit.covariance_corrected.as_ref()?;
+        let both: Vec<usize> = (0..second.values.len())
+            .filter(|&j| second.values[j].is_some())
+            .collect();
+        let differences = both
+            .iter()
+            .filter_map(|&j| Some(fit.values[j] - second.values[j]?));
+        let differences = DVector::from_vec(differences.collect());
+        let sum = DMatrix::from_fn(both.len(), both.len(), |i, j| {
+            corrected[(both[i], both[j])] + second.covariance[(both[i], both[j])]
+        });
+        (!both.is_empty()).then_some(Distance {
+            derivatives: both.len(),
+            square: differences.dot(&(inverse(&sum)? * &differences)),
+        })
+    }
+
+    /// Root mean square over the derivatives.
+    pub fn per_derivative(&self) -> f64 {
+        (self.square / self.derivatives as f64).sqrt()
+    }
+
+    /// Probability of a larger distance if both are right.
+    pub fn probability(&self) -> f64 {
+        exceedance(self.square, self.derivatives)
     }
 }

@@ -39,6 +39,17 @@ pub enum Start {
     WindTunnel,
 }
 
+/// Use of doubtful fits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Doubtful {
+    /// They enter no trend, prediction or joint estimate.
+    #[default]
+    LeaveOut,
+    /// They count as converged, with their doubts as the reason.
+    Use,
+}
+
 /// Choice of the derivatives that are held at the tunnel's values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -109,6 +120,10 @@ settings! {
         /// class's own (Tables 1 and 3), `evidence` holds what the tunnel determines better than
         /// the maneuver. The intervals of `evidence` cover less than those of `table`.
         pub hold: Hold = Hold::default(),
+        /// Use of fits that converged and are not credible, by the limits of `expert: doubt:`:
+        /// `leave_out` of trends, predictions and joint estimates with the outcome `doubtful`, or
+        /// `use` as `converged`.
+        pub doubtful: Doubtful = Doubtful::default(),
         /// Standard uncertainty of a held derivative whose table states none, percent of the root
         /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
         /// derivatives.
@@ -139,8 +154,12 @@ settings! {
         pub filter: scoring::Settings = scoring::Settings::default(),
         /// Limits of the identifiability measures.
         pub identifiability: identifiability::Limits = identifiability::Limits::default(),
+        /// Limits beyond which a fit is doubtful.
+        pub doubt: DoubtLimits = DoubtLimits::default(),
     }
     elsewhere {
+        /// Ordinary bias of each output's instrument: `instruments:` of aircraft.yaml.
+        pub ordinary_bias: BTreeMap<Output, f64> = BTreeMap::new(),
         /// Uncertainty that calibration leaves of each signal: `instruments:` of aircraft.yaml.
         /// Signals without an entry count as exact.
         pub calibration: BTreeMap<String, Calibration> = BTreeMap::new(),
@@ -149,7 +168,25 @@ settings! {
         pub max_marked_share: f64 = 0.2,
     }
 }
-single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, BTreeMap<Output, f64>);
+single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, Doubtful, BTreeMap<Output, f64>);
+
+settings! {
+    /// Limits beyond which a fit that converged is doubtful.
+    #[derive(Copy)]
+    pub struct DoubtLimits {
+        /// Least share of an output's measured variance that the fit explains, of outputs that move
+        /// by more than an instrument's ordinary bias. At 0 a fit is doubtful where a constant would
+        /// do better. Larger: more fits are doubtful.
+        pub r_squared: f64 = 0.0,
+        /// Probability, if both are right, of derivatives as far from equation error as these, below
+        /// which the fit is doubtful. Larger: more fits are doubtful; at 0 none by this.
+        pub contradiction: f64 = 1e-6,
+        /// Largest bias, and largest difference of an initial state from the measured one, in
+        /// ordinary biases of the instrument (`instruments: ordinary` of aircraft.yaml). Larger:
+        /// fewer fits are doubtful.
+        pub ordinary_biases: f64 = 5.0,
+    }
+}
 
 settings! {
     /// Settings of joint estimation.

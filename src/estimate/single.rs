@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::context::Context;
+use super::doubt::Explanation;
 use super::estimated::{Covariance, Estimated};
 use super::in_gusts::{Filtered, is_white};
 use super::prepared_case::PreparedCase;
@@ -101,8 +102,14 @@ impl Task<'_> {
         let information = fit
             .final_cost
             .map(|_| cost::sums(&fit.response, &fit.weights).information);
+        let explanation = Explanation {
+            outputs: fit.final_cost.map(|_| &*fit.response.outputs),
+            attitude_drifts: false,
+            second_opinion: &second,
+        };
         let mut estimated =
             self.estimated(&prepared, &fit, start.into(), information.as_ref(), &second);
+        self.add_agreement(case, &fit, &explanation, &mut estimated);
         Self::add_still_air(&case.measurements, &fit, &mut estimated.fit);
         Ok(estimated)
     }
@@ -115,8 +122,15 @@ impl Task<'_> {
     ) -> Estimated {
         let start = StartingValues::EquationError;
         let information = Some(&filtered.information);
+        let second = filtered.second_opinion.as_ref().unwrap_or(second);
         let mut estimated = self.estimated(prepared, &filtered.fit, start, information, second);
         self.add_gusts(filtered, prepared.case.step_s, &mut estimated.fit);
+        let explanation = Explanation {
+            outputs: filtered.outputs_along_air.as_deref(),
+            attitude_drifts: filtered.attitude_drifts,
+            second_opinion: second,
+        };
+        self.add_agreement(&prepared.case, &filtered.fit, &explanation, &mut estimated);
         estimated
     }
 
@@ -143,6 +157,7 @@ impl Task<'_> {
             correlations: vec![],
             history: Some(self.history(&case.measurements, fit, window, surfaces)),
             fit: self.fit_row(fit, *left_out, start),
+            fit_outputs: vec![],
         };
         add_second_opinion(&case.names, second, &mut estimated.estimates);
         self.add_diagnostics(case, window, model, information, &mut estimated);

@@ -22,6 +22,7 @@ use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
+use crate::units::RAD;
 
 /// Maneuver prepared for filter error.
 #[derive(Debug)]
@@ -201,6 +202,26 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
         self.add_covariance_part(parameters, &gains, &mut response);
         Ok(response)
+    }
+
+    /// Outputs of the equations along the air's angle: they are integrated without gusts, and only the
+    /// angle follows the vane, by the gain of a random walk of the gusts' size ([`Noise::angle_gain`]).
+    ///
+    /// A prediction from one sample to the next follows any motion. These outputs follow it as far as
+    /// the derivatives explain it, in turbulence too.
+    ///
+    /// # Errors
+    /// [`Diverged`] when the state leaves its bounds.
+    pub fn outputs_along_air(&self, parameters: &[f64]) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
+        let mut gain = PatternGain::none();
+        gain.gain[(E::ANGLE, E::VANE)] = RAD * self.noise(parameters).angle_gain(E::VANE);
+        let gains = vec![gain; self.patterns.len()];
+        let mut corrections = self.corrections(parameters, &gains);
+        corrections.decay = 0.0;
+        let mut response = self.empty_response();
+        let no_sums = None::<&mut NormalSums>;
+        self.run_on(&self.case, parameters, &corrections, &mut response, no_sums)?;
+        Ok(response.predicted)
     }
 
     fn empty_response(&self) -> Response {

@@ -99,6 +99,17 @@ pub(super) fn gains<const NX: usize>(
 }
 
 impl<const NX: usize> PatternGain<NX> {
+    /// Gain that corrects nothing.
+    pub fn none() -> Self {
+        PatternGain {
+            gain: Gain::zeros(),
+            inverse: Outputs::zeros(),
+            whitening: Outputs::zeros(),
+            log_determinant: 0.0,
+            slopes: vec![],
+        }
+    }
+
     fn of(
         prediction: &States<NX>,
         c: &Observation<NX>,

@@ -34,6 +34,10 @@ const SEVERE_GUST: f64 = 6.0 * RAD;
 const LEAST_ANGLE: f64 = 1e-4 * RAD;
 const LEAST_GUST: f64 = 1e-3 * RAD;
 
+/// Largest size of a rotary gust over that of the angle's walk. Fits in simulated turbulence have up
+/// to 5, fits with surfaces recorded 0.4 s late 300 and more.
+const MOST_EXCESS: f64 = 10.0;
+
 /// Noise of a maneuver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
@@ -202,6 +206,27 @@ impl Noise {
         // Parameters are logarithms, whose rounding the factor covers.
         const AT: f64 = 1.0 + 1e-9;
         self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
+    }
+
+    /// Returns true for moving air whose rotary gusts belong to the angle's walk. A misfit of the rates
+    /// is charged to rotary gusts without gusts of the angle.
+    #[must_use]
+    pub fn is_of_air(&self, gusts: usize, step_s: f64) -> bool {
+        let belongs = |gust| self.rotary_excess(gust, step_s) < MOST_EXCESS.ln();
+        !self.is_still() && (0..gusts).all(belongs)
+    }
+
+    /// Steady gain of a filter for the angle alone, a random walk that the output `vane` measures:
+    /// with q and r the variances of walk and output, p = q/2 + √(q²/4 + q r) and K = p / (p + r).
+    /// Zero in still air.
+    #[must_use]
+    pub fn angle_gain(&self, vane: usize) -> f64 {
+        if self.is_still() {
+            return 0.0;
+        }
+        let (q, r) = (self.angle.powi(2), (self.outputs[vane] * RAD).powi(2));
+        let p = 0.5 * q + (0.25 * q * q + q * r).sqrt();
+        p / (p + r)
     }
 
     /// Logarithm of a rotary gust over the size that belongs to the angle's walk. The gust is the

@@ -18,6 +18,7 @@ use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::tests::{
     Noise as Draws, SAMPLES, biases, nothing_measured, truth, window,
 };
+use crate::output_error::theil::Agreement;
 use crate::output_error::{Case, InitialState, Model};
 use crate::units::RAD;
 
@@ -198,6 +199,92 @@ fn assert_still_air_is_output_error<
 fn without_process_noise_predictions_are_the_outputs_of_output_error() {
     assert_still_air_is_output_error::<3, Longitudinal, 4, LongitudinalInGusts>();
     assert_still_air_is_output_error::<4, Lateral, 6, LateralInGusts>();
+}
+
+/// Share of each output's variance that the equations along the air's angle explain.
+fn explained<const NX: usize, E: InGusts<NX>>(
+    filter: &Filter<NX, E>,
+    at: &[f64],
+) -> [f64; OUTPUTS] {
+    let computed = filter.outputs_along_air(at).unwrap();
+    let agreements = Agreement::of_outputs(&filter.case.measurements, &computed);
+    agreements.map(|agreement| agreement.r_squared().unwrap())
+}
+
+/// Compares a maneuver in moderate turbulence with the equations along the air's angle: with the true
+/// derivatives they explain all outputs but the attitude, with others' not.
+fn assert_sound_derivatives_explain_motion_in_gusts<const NX: usize, E: InGusts<NX>>() {
+    let moderate = Noise {
+        angle: 2.5 * light().angle,
+        gusts: light().gusts.map(|g| 2.5 * g),
+        ..light()
+    };
+    let mut simulated = prepared::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
+    let mut draws = Draws(29);
+    for _ in 0..5 {
+        simulated.fly(&moderate, &mut draws);
+        let mut at = simulated.filter.with_noise(&simulated.own, &moderate);
+        let sound = explained(&simulated.filter, &at);
+        for (output, share) in E::AXIS.outputs().into_iter().zip(sound) {
+            assert!(share > 0.3 || output.is_attitude(), "{output}: {share}");
+        }
+        // Opposite moments of the surfaces.
+        for (name, value) in simulated.filter.names().iter().zip(&mut at) {
+            if ["Cm_de", "Cl_da", "Cn_dr"].contains(&&**name) {
+                *value = -*value;
+            }
+        }
+        let wrong = explained(&simulated.filter, &at);
+        assert!(wrong[1] < 0.0, "{wrong:?}");
+    }
+}
+
+#[test]
+fn sound_derivatives_explain_motion_in_gusts_and_wrong_ones_do_not() {
+    assert_sound_derivatives_explain_motion_in_gusts::<4, LongitudinalInGusts>();
+    assert_sound_derivatives_explain_motion_in_gusts::<6, LateralInGusts>();
+}
+
+#[test]
+fn outputs_along_still_air_are_those_of_output_error() {
+    let axis = Axis::Lateral;
+    let mut simulated = prepared::<6, LateralInGusts>(&truth(axis), &biases(axis));
+    simulated.fly(&light(), &mut Draws(7));
+    let at = simulated
+        .filter
+        .with_noise(&simulated.own, &Noise::still(light().outputs));
+    let along = simulated.filter.outputs_along_air(&at).unwrap();
+    let predicted = simulated.filter.respond(&at).unwrap().predicted;
+    for (along, predicted) in along.iter().zip(&predicted) {
+        assert_abs_diff_eq!(along[..], predicted[..], epsilon = 1e-9);
+    }
+}
+
+#[test]
+fn the_gain_of_the_angle_alone_is_the_limit_of_its_filter() {
+    let noise = light();
+    let (q, r) = (noise.angle.powi(2), (noise.outputs[0] * RAD).powi(2));
+    let mut predicted = q;
+    for _ in 0..1000 {
+        predicted = predicted * r / (predicted + r) + q;
+    }
+    let limit = predicted / (predicted + r);
+    assert_relative_eq!(noise.angle_gain(0), limit, max_relative = 1e-12);
+    assert_abs_diff_eq!(Noise::still(noise.outputs).angle_gain(0), 0.0);
+}
+
+#[test]
+fn rotary_gusts_without_gusts_of_the_angle_are_not_of_the_air() {
+    let step_s = 0.025;
+    // The size that belongs to the angle's walk: σ √(ω / 2Δt).
+    let belongs = light().angle * (light().corner / (2.0 * step_s)).sqrt();
+    let with_rotary = |size: f64| Noise {
+        gusts: [size * belongs; 2],
+        ..light()
+    };
+    assert!(light().is_of_air(2, step_s) && with_rotary(9.9).is_of_air(2, step_s));
+    assert!(!with_rotary(10.1).is_of_air(2, step_s));
+    assert!(!Noise::still(light().outputs).is_of_air(2, step_s));
 }
 
 /// Checks at the true parameters that the innovations are white with the computed covariance.

@@ -66,6 +66,7 @@ fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     let members: Vec<JointRow> = members.cloned().collect();
     table::publish(shelf, &campaign.correlations)?;
     table::publish_fits(shelf, &fits, &predicted)?;
+    table::publish_as(shelf, "fit_outputs", &campaign.fit_outputs)?;
     table::publish(shelf, &estimates)?;
     table::publish_as(shelf, "combined", &sums)?;
     table::publish(shelf, &members)?;

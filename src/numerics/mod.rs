@@ -1,6 +1,7 @@
 //! Numerical methods that several rooms share: vectors of the processor, aligned matrices, the
-//! inverse of a symmetric matrix, Fourier sums, one Runge-Kutta step, Student's t.
+//! inverse of a symmetric matrix, Fourier sums, one Runge-Kutta step, Student's t, χ².
 
+pub mod chi_squared;
 pub(crate) mod harmonics;
 pub(crate) mod matrix;
 pub mod order_statistics;

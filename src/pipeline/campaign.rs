@@ -12,9 +12,9 @@ use crate::output_error::Outcome;
 use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{
-    ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow, EstimateRow,
-    EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, ManeuverComparisonRow,
-    OutlierRow, PredictionRow, TrendRow, VerdictRow,
+    AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow,
+    EstimateRow, EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow,
+    ManeuverComparisonRow, OutlierRow, TrendRow, VerdictRow,
 };
 
 /// A flight, maneuver or group whose artefact the store lacks.
@@ -79,6 +79,8 @@ pub struct Campaign {
     pub estimates: Vec<EstimateRow>,
     /// Sums of derivatives that the tunnel tabulates, with the variance of the sum.
     pub combined: Vec<EstimateRow>,
+    /// Agreement of each output with its maneuver's own fit.
+    pub fit_outputs: Vec<AgreementRow>,
     pub correlations: Vec<CorrelationRow>,
     /// Joint estimates. Their rows are published, but enter no trend, which would count the same
     /// data twice.
@@ -129,7 +131,7 @@ impl Campaign {
 
     /// Predicted outputs of all maneuvers.
     #[must_use]
-    pub fn predictions(&self) -> Vec<PredictionRow> {
+    pub fn predictions(&self) -> Vec<AgreementRow> {
         let outputs = self.predicted.iter().flat_map(|p| &p.outputs);
         outputs.cloned().collect()
     }

@@ -213,7 +213,7 @@ impl<'a> Conductor<'a> {
         let Some(estimates) = estimate_step::estimate(runner, campaign)? else {
             return Ok(false);
         };
-        group_steps::join(runner, campaign)?;
+        group_steps::join(runner, campaign, &estimates)?;
         group_steps::predict(runner, campaign, &estimates)?;
         estimate_step::collect_rows(campaign, estimates);
         Ok(campaign.state(Stage::Estimate).missing.is_empty())

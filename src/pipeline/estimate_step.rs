@@ -95,7 +95,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 15;
+    const VERSION: u32 = 16;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id
@@ -256,6 +256,7 @@ pub fn collect_rows(campaign: &mut Campaign, estimates: Vec<Estimated>) {
         campaign.fits.push(estimated.fit);
         campaign.estimates.extend(estimated.estimates);
         campaign.combined.extend(estimated.combined);
+        campaign.fit_outputs.extend(estimated.fit_outputs);
         campaign.correlations.extend(estimated.correlations);
     }
 }

@@ -67,7 +67,8 @@ pub struct JointStep<'a> {
     store: &'a Store,
     settings: &'a JointSettings,
     bin: &'a Bin,
-    members: Vec<Member<'a>>,
+    /// Members with their fits.
+    members: Vec<(Member<'a>, &'a FitRow)>,
     delays: &'a [DelayCorrection],
 }
 
@@ -87,7 +88,11 @@ impl<'a> Step for JointStep<'a> {
             joint_id: &self.bin.joint_id,
             class: &self.bin.class,
             settings: self.settings,
-            estimates: self.members.iter().map(|m| m.estimate.as_str()).collect(),
+            estimates: self
+                .members
+                .iter()
+                .map(|(m, _)| m.estimate.as_str())
+                .collect(),
         }
     }
 
@@ -96,15 +101,23 @@ impl<'a> Step for JointStep<'a> {
             .config
             .class(&self.bin.class)
             .ok_or_else(|| Error::store(&self.store.path(name), &"its class is not configured"))?;
-        let records: Result<Vec<Record>> =
-            self.members.iter().map(|m| m.record(self.store)).collect();
-        let records = records?;
-        let maneuvers = self.members.iter().map(|m| m.maneuver);
+        let (doubtful, sound): (Vec<_>, Vec<_>) = self
+            .members
+            .iter()
+            .partition(|(_, fit)| fit.outcome == Outcome::Doubtful);
+        let records = sound.iter().map(|(member, _)| member.record(self.store));
+        let records = records.collect::<Result<Vec<Record>>>()?;
+        let maneuvers = sound.iter().map(|(member, _)| member.maneuver);
         let members: Vec<(&Record, &Maneuver)> = records.iter().zip(maneuvers).collect();
+        let doubtful: Vec<(&Maneuver, String)> = doubtful
+            .into_iter()
+            .map(|(member, fit)| (member.maneuver, format!("doubtful: {}", fit.reason)))
+            .collect();
         let joint_id = &self.bin.joint_id;
         Ok(Made::Settled(joint::estimate(
             joint_id,
             &members,
+            &doubtful,
             class,
             &context(self.config, self.delays),
         )))
@@ -115,7 +128,7 @@ impl<'a> Step for JointStep<'a> {
 ///
 /// # Errors
 /// A fault that stops the run.
-pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
+pub fn join(runner: &StepRunner, campaign: &mut Campaign, estimates: &[Estimated]) -> Result<()> {
     let Some(settings) = &runner.config.estimate.joint else {
         return Ok(());
     };
@@ -123,7 +136,7 @@ pub fn join(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     let members = |bin: &Bin| {
         let indices = bin.members.iter();
         indices
-            .filter_map(|&i| Member::of(campaign, i))
+            .filter_map(|&i| Some((Member::of(campaign, i)?, &estimates.get(i)?.fit)))
             .collect::<Vec<_>>()
     };
     let steps: Vec<JointStep> = bins
@@ -236,7 +249,7 @@ pub fn predict(
     let sources = prediction::others(&campaign.maneuvers, &fits, settings);
     let bring = |(i, sources): (usize, &Option<Vec<usize>>)| {
         let Some(sources) = sources else {
-            let predicted = Predicted::none("its own fit did not converge", 0);
+            let predicted = Predicted::none("its own fit did not converge or is doubtful", 0);
             return Ok(Some(predicted));
         };
         let from = sources.iter().filter_map(|&j| {

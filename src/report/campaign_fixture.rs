@@ -10,9 +10,9 @@ use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow, CorrelationRow, EstimateRow,
-    EventRow, EventVerdict, FitRow, FlightRow, History, HistoryOutput, InstrumentRow, Outcome,
-    PredictionRow, TrendRow, TunnelDifference, TunnelVerdict,
+    AgreementRow, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
+    CorrelationRow, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow, History, HistoryOutput,
+    InstrumentRow, Outcome, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -21,7 +21,7 @@ pub struct Campaign {
     pub maneuvers: Vec<Maneuver>,
     pub fits: Vec<FitRow>,
     pub estimates: Vec<EstimateRow>,
-    pub predictions: Vec<PredictionRow>,
+    pub predictions: Vec<AgreementRow>,
     pub correlations: Vec<CorrelationRow>,
     pub limits: Limits,
     pub trends: Vec<TrendRow>,
@@ -220,6 +220,7 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         gust_corner_rad_s: None,
         autocorrelation: None,
         likelihood_gain: None,
+        equation_error_distance: None,
     });
     for (name, unit) in if axis == Axis::Longitudinal {
         LONGITUDINAL

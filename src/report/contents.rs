@@ -9,8 +9,8 @@ use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
-    ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow, FitRow, FlightRow,
-    History, InstrumentRow, PredictionRow, TrendRow,
+    AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
+    FitRow, FlightRow, History, InstrumentRow, TrendRow,
 };
 
 /// A maneuver class of the configuration.
@@ -34,7 +34,7 @@ pub struct Contents<'a> {
     pub fits: &'a [FitRow],
     pub estimates: &'a [EstimateRow],
     /// Outputs of each maneuver, predicted with derivatives estimated from other maneuvers.
-    pub predictions: &'a [PredictionRow],
+    pub predictions: &'a [AgreementRow],
     pub correlations: &'a [CorrelationRow],
     /// Limits above which a correlation, a variance inflation or a condition index is flagged.
     pub limits: &'a Limits,

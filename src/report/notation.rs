@@ -11,8 +11,9 @@ use crate::units::Unit;
 pub const NOTHING: &str = "\u{2013}";
 
 /// Outcomes of a fit with their names in the report, in the order of its columns.
-pub const OUTCOMES: [(Outcome, &str); 4] = [
+pub const OUTCOMES: [(Outcome, &str); 5] = [
     (Outcome::Converged, "converged"),
+    (Outcome::Doubtful, "doubtful"),
     (Outcome::NotConverged, "did not converge"),
     (Outcome::Unidentifiable, "unidentifiable"),
     (Outcome::Rejected, "rejected"),

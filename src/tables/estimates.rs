@@ -13,11 +13,12 @@ table! {
         pub maneuver_id: String,
         /// Class of the maneuver.
         pub class: String,
-        /// Outcome of the estimation; only converged fits go into trends.
+        /// Outcome of the estimation; only converged fits go into trends, predictions and joint
+        /// estimates.
         pub outcome: Outcome,
-        /// Cause of the outcome: what ended the iteration, which derivatives are undetermined, or
-        /// what was missing. With `hold: evidence` also the undetermined derivatives that have no
-        /// tunnel value to be held at.
+        /// Cause of the outcome: what makes the fit doubtful, what ended the iteration, which
+        /// derivatives are undetermined, or what was missing. With `hold: evidence` also the
+        /// undetermined derivatives that have no tunnel value to be held at.
         pub reason: String,
         /// Starting values of the iteration that led to the outcome: the configured ones, or the
         /// other ones where these do not converge.
@@ -55,6 +56,10 @@ table! {
         pub autocorrelation: Option<f64> ["1"],
         /// Log-likelihood that filter error gained over output error.
         pub likelihood_gain: Option<f64> ["1"],
+        /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n): d are the differences of
+        /// the n derivatives that both estimate, C is the sum of both covariances. Around or below
+        /// one where they agree: both use the same data, so that C is rather too large.
+        pub equation_error_distance: Option<f64> ["1"],
     }
 }
 
@@ -73,6 +78,9 @@ words! {
     pub enum Outcome {
         /// The iteration reached the minimum.
         Converged = "converged",
+        /// The iteration reached the minimum, and the fit is not credible; the reason names why
+        /// (`estimate: expert: doubt:`). With `estimate: doubtful: use` such a fit is `converged`.
+        Doubtful = "doubtful",
         /// The iteration stopped before the minimum; the reason names the cause.
         NotConverged = "not_converged",
         /// The data do not determine some direction of the parameters; the reason names the

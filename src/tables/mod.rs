@@ -31,6 +31,6 @@ pub use flights::{
 };
 pub use history::{History, HistoryOutput};
 pub use page::page;
-pub use predictions::{PredictedRow, PredictionRow, PredictionStatus};
+pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use published::{PublishedTrend, PublishedVerdict};
 pub use trends::{OutlierRow, TrendRow};

@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use super::{
-    ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, CorrelationRow, CoverageRow,
-    DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow, FlightRow,
-    InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, PredictionRow,
-    StartRow, TrendRow, VerdictRow,
+    AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, CorrelationRow,
+    CoverageRow, DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow,
+    FlightRow, InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, StartRow,
+    TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -44,6 +44,15 @@ the full covariance. A sum has a row where both parts were estimated. Constant a
 strongly correlated; their sum is well determined.
 ";
 
+const FIT_OUTPUTS: &str = "\
+Agreement of each output with the maneuver's own fit.
+
+Computed outputs are those of the equations, integrated over the
+maneuver with the estimates of the fit. With filter error they contain no gusts, except that the angle of
+the air follows the vane as closely as the size of the gusts asks for: predictions from one sample to the
+next would follow any motion.
+";
+
 /// The page as Markdown.
 #[must_use]
 pub fn page() -> String {
@@ -63,7 +72,9 @@ pub fn page() -> String {
         "maneuver and tabulated sum",
         COMBINED,
     );
-    table::<PredictionRow>(&mut page);
+    section(&mut page, "fit_outputs", "maneuver and output", FIT_OUTPUTS);
+    rows(&mut page, &AgreementRow::columns(&[]));
+    table::<AgreementRow>(&mut page);
     table::<JointRow>(&mut page);
     table::<CorrelationRow>(&mut page);
     table::<TrendRow>(&mut page);

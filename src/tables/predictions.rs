@@ -76,7 +76,7 @@ table! {
     /// that some other estimates; the tunnel gives the rest. Biases, initial states and, unless
     /// `share_constants`, constants are the maneuver's own: they are fitted again with the
     /// derivatives fixed, because they take up the zero errors of the flight's vanes and surfaces.
-    pub struct PredictionRow in "predictions" per "predicted maneuver and output" {
+    pub struct AgreementRow in "predictions" per "predicted maneuver and output" {
         /// Maneuver.
         pub maneuver_id: String,
         /// Class of the maneuver.
@@ -89,9 +89,9 @@ table! {
         pub unit: String,
         /// Number of samples that count.
         pub samples: usize ["samples"],
-        /// Root mean square of measured minus predicted, in the column `unit`.
+        /// Root mean square of measured minus computed, in the column `unit`.
         pub root_mean_square: f64,
-        /// √(Σ(y−z)²/n) / (√(Σz²/n) + √(Σy²/n)), with z measured and y predicted. It is small for
+        /// √(Σ(y−z)²/n) / (√(Σz²/n) + √(Σy²/n)), with z measured and y computed. It is small for
         /// an output with a large mean, such as α: `r_squared` does not depend on the mean.
         pub theil: Option<f64> ["1"],
         /// Share (ȳ−z̄)² of the mean square difference.

@@ -51,9 +51,15 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
     (
         "estimate",
         "fits",
-        "maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out confounded \
+        "maneuver_id class outcome reason iterations initial_cost final_cost condition_number left_out confounded equation_error_distance \
          prediction predicted_from predicted_cost theil theil_bias theil_variance theil_covariance theil_alpha theil_ay \
          r_squared_alpha r_squared_ay",
+    ),
+    (
+        "estimate",
+        "fit_outputs",
+        "maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias theil_variance \
+         theil_covariance r_squared",
     ),
     (
         "estimate",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::support::{Campaign, Row, demo, number};
+use crate::support::{Campaign, Row, demo, flight, number, values, with_values};
 
 #[test]
 fn a_derivative_s_trend_is_through_the_classes_of_its_group() {
@@ -90,4 +90,56 @@ fn a_new_group_is_a_line_in_the_pipeline() {
         others(campaign.table("comparison")),
         others(demo().tables["comparison"].clone())
     );
+}
+
+#[test]
+fn a_doubtful_maneuver_keeps_its_numbers_and_enters_no_trend() {
+    // The elevator of one flight is recorded 0.4 s late: its maneuvers do not follow the model.
+    let campaign = Campaign::new();
+    for number in 1..=4 {
+        let mut record = flight(number, 3600);
+        if number == 1 {
+            let elevator = values(&record, "de");
+            record = with_values(&record, "de", |row, _| elevator[row.saturating_sub(16)]);
+        }
+        campaign.add(&format!("flight_00{number}"), &record);
+    }
+    let outcome = campaign.ends("run", 2);
+    let fits = campaign.table("fits");
+    let doubtful: Vec<&Row> = fits.iter().filter(|f| f["outcome"] == "doubtful").collect();
+    assert!(!doubtful.is_empty(), "{outcome:?}");
+    let (problems, estimates) = (campaign.table("problems"), campaign.table("estimates"));
+    let report = std::fs::read_to_string(campaign.path("reports/report.html")).unwrap();
+    assert!(report.contains("doubtful maneuver") && outcome.stdout.contains("converged"));
+    for fit in &doubtful {
+        let id = &fit["maneuver_id"];
+        assert!(id.starts_with("flight_001"), "{fit:?}");
+        assert!(
+            problems
+                .iter()
+                .any(|p| p["reason"].starts_with("doubtful") && p["place"] == *id),
+            "{problems:?}"
+        );
+        assert!(
+            estimates
+                .iter()
+                .any(|e| e["maneuver_id"] == *id && !e["bound_corrected"].is_empty())
+        );
+    }
+    let converged: BTreeSet<&str> = fits
+        .iter()
+        .filter(|f| f["outcome"] == "converged")
+        .map(|f| f["maneuver_id"].as_str())
+        .collect();
+    let counted = estimates.iter().filter(|e| {
+        e["derivative"] == "Cm_alpha"
+            && e["status"] == "estimated"
+            && converged.contains(&*e["maneuver_id"])
+    });
+    let counted = counted.count().to_string();
+    let trends = campaign.table("trends");
+    let of_all = trends
+        .iter()
+        .filter(|t| t["derivative"] == "Cm_alpha" && t["group"] == "all");
+    assert!(of_all.clone().count() > 0 && of_all.clone().all(|t| t["maneuvers"] == counted));
 }

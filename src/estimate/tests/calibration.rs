@@ -77,7 +77,7 @@ fn an_error_common_to_maneuvers_does_not_average_out() {
     let records = [bench.flown(5, 1.0, 0.0), bench.flown(6, 1.0, 0.0)];
     let maneuvers = [maneuver("a", 20.0), maneuver("b", 20.0)];
     let members: Vec<(&Record, &Maneuver)> = records.iter().zip(&maneuvers).collect();
-    let joined = joint::estimate("joint", &members, &bench.class, &bench.context());
+    let joined = joint::estimate("joint", &members, &[], &bench.class, &bench.context());
     let row = row(&joined.estimated, "Cm_de");
     assert_relative_eq!(
         row.bound_calibration.unwrap(),

@@ -1,6 +1,7 @@
 //! Joint estimates and predictions on simulated maneuvers of known derivatives.
 
 mod calibration;
+mod doubt;
 mod evidence;
 
 use std::collections::BTreeMap;
@@ -215,6 +216,7 @@ fn maneuvers_joined_have_smaller_bounds_and_no_biases_and_a_spoiled_one_is_left_
     let joined = joint::estimate(
         "joint/steps/20.20",
         &members,
+        &[],
         &bench.class,
         &bench.context(),
     );
@@ -266,6 +268,7 @@ fn with_one_sound_maneuver_there_is_nothing_to_join_and_the_row_says_so() {
     let joined = joint::estimate(
         "joint/steps/20.10",
         &members,
+        &[],
         &bench.class,
         &bench.context(),
     );

@@ -1,5 +1,7 @@
 //! Two nights that differ in one thing: that is found, with its cause, and nothing else is.
 
+use std::collections::BTreeMap;
+
 use super::*;
 use crate::lineage::Lineage;
 use crate::tables::TunnelVerdict;
@@ -92,6 +94,7 @@ fn fit(maneuver_id: &str, class: &str) -> FitRow {
         gust_corner_rad_s: None,
         autocorrelation: None,
         likelihood_gain: None,
+        equation_error_distance: None,
     }
 }
 

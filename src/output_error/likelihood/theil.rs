@@ -8,6 +8,9 @@
 //! Jategaonkar 2015, section 11.4). A good model leaves almost nothing to bias and variance. R² = 1
 //! − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and can be negative.
 
+use crate::dynamics::OUTPUTS;
+use crate::output_error::case::Measurements;
+
 /// Theil's inequality coefficient and the shares of its parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theil {
@@ -45,6 +48,26 @@ impl Agreement {
             square_computed: mean(pairs, |_, y| (y - mean_computed).powi(2)),
             product: mean(pairs, |z, y| (z - mean_measured) * (y - mean_computed)),
         }
+    }
+
+    /// Moments of each output, over the samples that count.
+    #[must_use]
+    pub fn of_outputs(
+        measured: &Measurements,
+        computed: &[[f64; OUTPUTS]],
+    ) -> [Agreement; OUTPUTS] {
+        let samples = measured.values.iter().zip(&measured.used).zip(computed);
+        std::array::from_fn(|o| {
+            let counted = samples.clone().filter(|((_, used), _)| used[o]);
+            let pairs: Vec<(f64, f64)> = counted.map(|((z, _), y)| (z[o], y[o])).collect();
+            Agreement::of(&pairs)
+        })
+    }
+
+    /// Standard deviation of the measured values.
+    #[must_use]
+    pub fn measured_deviation(&self) -> f64 {
+        self.square_measured.sqrt()
     }
 
     /// Mean squares of the difference's three parts: bias, variance, covariance.

@@ -282,7 +282,10 @@ fn caption(derivative: &DerivativeResults, scale: Scale) -> String {
             derivative.undetermined,
             "not drawn: not determined by the data",
         ),
-        (derivative.unconverged, "not drawn: fit not converged"),
+        (
+            derivative.unconverged,
+            "not drawn: fit not converged or doubtful",
+        ),
     ];
     for (n, reason) in not_drawn {
         if n > 0 {

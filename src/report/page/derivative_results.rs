@@ -109,12 +109,17 @@ fn names<'a>(contents: &Contents<'a>) -> Vec<&'a str> {
     names
 }
 
-/// Maneuvers whose fit did not converge or was rejected.
+/// Maneuvers whose fit did not converge, was rejected or is doubtful.
 fn failed_fits<'a>(contents: &Contents<'a>) -> BTreeSet<&'a str> {
     contents
         .fits
         .iter()
-        .filter(|f| matches!(f.outcome, Outcome::NotConverged | Outcome::Rejected))
+        .filter(|f| {
+            matches!(
+                f.outcome,
+                Outcome::NotConverged | Outcome::Rejected | Outcome::Doubtful
+            )
+        })
         .map(|f| f.maneuver_id.as_str())
         .collect()
 }

@@ -15,7 +15,7 @@ use crate::report::notation::{
     self, Digits, NOTHING, angle, count, fixed, number, outcome_in_words,
 };
 use crate::report::table_view::TableView;
-use crate::tables::{EstimateRow, FitRow, History, PredictionRow};
+use crate::tables::{AgreementRow, EstimateRow, FitRow, History};
 
 /// Page of one maneuver.
 #[derive(Clone, Debug, Serialize)]
@@ -76,7 +76,7 @@ struct RowsByManeuver<'a> {
     fits: BTreeMap<&'a str, &'a FitRow>,
     histories: BTreeMap<&'a str, Vec<&'a History>>,
     estimates: BTreeMap<&'a str, Vec<&'a EstimateRow>>,
-    predictions: BTreeMap<&'a str, Vec<&'a PredictionRow>>,
+    predictions: BTreeMap<&'a str, Vec<&'a AgreementRow>>,
     problems: BTreeMap<&'a str, Vec<&'a Problem>>,
 }
 
@@ -168,7 +168,7 @@ fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String)> {
     facts
 }
 
-fn prediction_fact(rows: &[&PredictionRow]) -> (String, String) {
+fn prediction_fact(rows: &[&AgreementRow]) -> (String, String) {
     let outputs: Vec<String> = rows
         .iter()
         .map(|p| format!("{} {}", p.output, number(p.theil, 2)))

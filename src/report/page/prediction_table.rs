@@ -5,7 +5,7 @@ use crate::numerics::order_statistics::quantile;
 use crate::report::contents::Contents;
 use crate::report::notation::{NOTHING, fixed, number};
 use crate::report::table_view::TableView;
-use crate::tables::PredictionRow;
+use crate::tables::AgreementRow;
 
 const NOTE: &str = "Cross-validation: each maneuver is predicted with derivatives estimated from \
     the other maneuvers of its class and angle of attack. Biases and initial states are its own, \
@@ -32,7 +32,7 @@ const HEADS: [&str; 9] = [
 pub fn table(contents: &Contents) -> Option<TableView> {
     let mut rows = Vec::new();
     for class in contents.classes {
-        let mut by_output: Vec<(Output, Vec<&PredictionRow>)> = Vec::new();
+        let mut by_output: Vec<(Output, Vec<&AgreementRow>)> = Vec::new();
         for row in contents
             .predictions
             .iter()
@@ -50,7 +50,7 @@ pub fn table(contents: &Contents) -> Option<TableView> {
     (!rows.is_empty()).then(|| TableView::new("Class and output", NOTE, &HEADS, rows))
 }
 
-fn cells(class: &str, output: Output, predictions: &[&PredictionRow]) -> Vec<String> {
+fn cells(class: &str, output: Output, predictions: &[&AgreementRow]) -> Vec<String> {
     let worst = predictions
         .iter()
         .filter_map(|p| Some((p.theil?, p)))
@@ -70,7 +70,7 @@ fn cells(class: &str, output: Output, predictions: &[&PredictionRow]) -> Vec<Str
     ]
 }
 
-fn median(predictions: &[&PredictionRow], value: fn(&PredictionRow) -> Option<f64>) -> Option<f64> {
+fn median(predictions: &[&AgreementRow], value: fn(&AgreementRow) -> Option<f64>) -> Option<f64> {
     quantile(predictions.iter().filter_map(|p| value(p)), 0.5)
 }
 
@@ -86,8 +86,8 @@ mod tests {
     use super::*;
     use crate::report::campaign_fixture;
 
-    fn prediction(maneuver: &str, theil: f64, r_squared: f64) -> PredictionRow {
-        PredictionRow {
+    fn prediction(maneuver: &str, theil: f64, r_squared: f64) -> AgreementRow {
+        AgreementRow {
             maneuver_id: maneuver.into(),
             class: "OLON".into(),
             alpha_deg: 20.0,

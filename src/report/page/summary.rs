@@ -173,13 +173,14 @@ fn disagreement_in_words(name: &str, z: f64, row: &ComparisonRow) -> String {
 
 /// Failed fits, failed checks of the records, events not confirmed, problems.
 fn failed(contents: &Contents) -> Vec<String> {
-    let failed_fits: Vec<&FitRow> = contents
+    let (doubtful, failed_fits): (Vec<&FitRow>, Vec<&FitRow>) = contents
         .fits
         .iter()
         .filter(|fit| fit.outcome != Outcome::Converged)
-        .collect();
+        .partition(|fit| fit.outcome == Outcome::Doubtful);
     let mut lines = Vec::new();
     lines.extend(failed_fits_line(&failed_fits));
+    lines.extend(doubtful_fits_line(&doubtful));
     lines.extend(checks_line(contents));
     lines.extend(events_line(contents));
     if !contents.problems.is_empty() {
@@ -187,7 +188,7 @@ fn failed(contents: &Contents) -> Vec<String> {
             "{} in flights, channels or maneuvers: see what failed and why.",
             count(contents.problems.len(), "problem")
         ));
-    } else if failed_fits.is_empty() {
+    } else if failed_fits.is_empty() && doubtful.is_empty() {
         lines.push("Every flight was read and every maneuver fitted.".to_owned());
     }
     lines
@@ -211,6 +212,19 @@ fn failed_fits_line(fits: &[&FitRow]) -> Option<String> {
             "{} without a sound fit: {}{more}.",
             count(fits.len(), "maneuver"),
             listed.join(", ")
+        )
+    })
+}
+
+/// All doubtful fits, each with its reason.
+fn doubtful_fits_line(fits: &[&FitRow]) -> Option<String> {
+    let named = |fit: &&FitRow| format!("{} ({})", fit.maneuver_id, fit.reason);
+    let all: Vec<String> = fits.iter().map(named).collect();
+    (!fits.is_empty()).then(|| {
+        format!(
+            "{} in no trend: {}.",
+            count(fits.len(), "doubtful maneuver"),
+            all.join(", ")
         )
     })
 }
@@ -249,6 +263,28 @@ mod tests {
     use super::super::derivative_results;
     use super::*;
     use crate::report::campaign_fixture::campaign;
+
+    #[test]
+    fn a_doubtful_maneuver_is_named_with_its_reason() {
+        let mut campaign = campaign();
+        let fit = campaign.fits.last_mut().unwrap();
+        fit.outcome = Outcome::Doubtful;
+        fit.reason = "its derivatives are far from equation error".into();
+        let name = fit.maneuver_id.clone();
+        let lines = failed(&campaign.contents());
+        let line = lines
+            .iter()
+            .find(|l| l.contains("1 doubtful maneuver in no trend"));
+        let line = line.unwrap_or_else(|| panic!("{lines:?}"));
+        assert!(
+            line.contains(&name) && line.contains("far from equation error"),
+            "{line}"
+        );
+        assert!(
+            lines.iter().all(|l| !l.contains("every maneuver fitted")),
+            "{lines:?}"
+        );
+    }
 
     #[test]
     fn opposite_signs_are_in_the_summary() {

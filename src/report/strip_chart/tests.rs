@@ -92,6 +92,7 @@ fn fit(outcome: Outcome, reason: &str) -> FitRow {
         gust_corner_rad_s: None,
         autocorrelation: None,
         likelihood_gain: None,
+        equation_error_distance: None,
     }
 }
 

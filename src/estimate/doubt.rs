@@ -1,0 +1,178 @@
+//! Doubts about a fit that converged: it explains less than a constant, contradicts equation error,
+//! or needs an error that no instrument has.
+
+use super::estimated::Estimated;
+use super::second_opinion::Distance;
+use super::settings::Doubtful;
+use super::task::Task;
+use crate::aero::Output;
+use crate::dynamics::{Equations, OUTPUTS};
+use crate::output_error::equation_error::Regression;
+use crate::output_error::theil::Agreement;
+use crate::output_error::{Case, Fit, InitialState, Outcome};
+use crate::units::{DEG, Unit};
+
+/// Half width of a 95 % interval in standard errors.
+const STANDARD_ERRORS: f64 = 1.96;
+
+/// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
+pub(super) struct Explanation<'a> {
+    /// Outputs of the equations; `None` where they diverge.
+    pub outputs: Option<&'a [[f64; OUTPUTS]]>,
+    /// True where gusts of the air account for a drift of the attitude: the attitude is the sum of
+    /// the rates, and so are the effects of the gusts.
+    pub attitude_drifts: bool,
+    pub second_opinion: &'a Regression,
+}
+
+impl Task<'_> {
+    /// Adds the agreement of a fit with the measured outputs and with equation error, and the outcome
+    /// `doubtful` with its reasons.
+    pub(super) fn add_agreement<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        fit: &Fit,
+        explanation: &Explanation,
+        estimated: &mut Estimated,
+    ) {
+        let outputs = explanation.outputs;
+        let agreements = outputs.map(|y| Agreement::of_outputs(&case.measurements, y));
+        let named = E::AXIS
+            .outputs()
+            .into_iter()
+            .zip(agreements.iter().flatten());
+        estimated.fit_outputs = named.map(|(o, a)| self.agreement_row(o, a)).collect();
+        let distance = Distance::of(fit, explanation.second_opinion);
+        let row = &mut estimated.fit;
+        row.equation_error_distance = distance.map(|d| d.per_derivative());
+        if fit.outcome != Outcome::Converged {
+            return;
+        }
+        let mut doubts = self.unexplained_outputs::<NX, E>(fit, explanation, agreements.as_ref());
+        doubts.extend(self.contradiction(distance));
+        doubts.extend(self.impossible_biases(case, fit));
+        doubts.extend(self.impossible_initial_states(case, fit));
+        if doubts.is_empty() {
+            return;
+        }
+        let doubts = doubts.join("; ");
+        match self.context.settings.doubtful {
+            Doubtful::LeaveOut => (row.outcome, row.reason) = (Outcome::Doubtful, doubts),
+            Doubtful::Use => row.reason = format!("{}; used though {doubts}", row.reason),
+        }
+    }
+
+    /// Outputs that move and that a constant would fit better.
+    fn unexplained_outputs<const NX: usize, E: Equations<NX>>(
+        &self,
+        fit: &Fit,
+        explanation: &Explanation,
+        agreements: Option<&[Agreement; OUTPUTS]>,
+    ) -> Vec<String> {
+        let Some(agreements) = agreements else {
+            return vec!["its equations diverge along the maneuver".to_owned()];
+        };
+        let least = self.context.settings.doubt.r_squared;
+        let mut doubts = Vec::new();
+        for (o, output) in E::AXIS.outputs().into_iter().enumerate() {
+            let ordinary = self.ordinary_bias(output).unwrap_or(0.0);
+            let moves = agreements[o].measured_deviation() > ordinary;
+            let drifts = explanation.attitude_drifts && output.is_attitude();
+            let counts = moves && !drifts && fit.weights[o] > 0.0;
+            let share = agreements[o].r_squared().filter(|share| *share < least);
+            if let Some(share) = share.filter(|_| counts) {
+                doubts.push(format!(
+                    "it explains less of {} than a constant (R² {share:.2})",
+                    output.signal()
+                ));
+            }
+        }
+        doubts
+    }
+
+    fn contradiction(&self, distance: Option<Distance>) -> Option<String> {
+        let distance = distance?;
+        let probability = distance.probability();
+        (probability < self.context.settings.doubt.contradiction).then(|| {
+            format!(
+                "its {} derivatives are {:.1} joint standard errors from equation error \
+                 (probability {probability:.0e})",
+                distance.derivatives,
+                distance.per_derivative(),
+            )
+        })
+    }
+
+    /// Biases beyond what an instrument has, by more than their uncertainty.
+    fn impossible_biases<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        fit: &Fit,
+    ) -> Vec<String> {
+        let mut doubts = Vec::new();
+        for (i, &o) in case.biased_outputs.iter().enumerate() {
+            let j = case.derivatives() + i;
+            let error = self.impossible_error(E::AXIS.outputs()[o], fit, j, fit.values[j], 1.0);
+            doubts.extend(error.map(|error| format!("{} is {error}", case.names[j])));
+        }
+        doubts
+    }
+
+    /// Initial states as far from the measured ones, by more than their uncertainty: from the first
+    /// sample, which may be an outlier, and from the mean of several, which may move. The first
+    /// outputs are the states as measured.
+    fn impossible_initial_states<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+        fit: &Fit,
+    ) -> Vec<String> {
+        let first = case.parameters() - NX;
+        let Some(measured) = case.states.first() else {
+            return vec![];
+        };
+        if case.initial_state != InitialState::Estimated {
+            return vec![];
+        }
+        let mut doubts = Vec::new();
+        for (i, output) in E::AXIS.outputs().into_iter().take(NX).enumerate() {
+            let changes = [measured[i], case.start[i]].map(|x| DEG * (fit.values[first + i] - x));
+            let change = if changes[0].abs() < changes[1].abs() {
+                changes[0]
+            } else {
+                changes[1]
+            };
+            let error = self.impossible_error(output, fit, first + i, change, DEG);
+            let name = &case.names[first + i];
+            doubts
+                .extend(error.map(|error| format!("{name} differs from the measured by {error}")));
+        }
+        doubts
+    }
+
+    /// Words for an error of an output that its instrument cannot have; `None` for one that it can.
+    /// `unit` is the output's unit in that of the parameter `j`.
+    fn impossible_error(
+        &self,
+        output: Output,
+        fit: &Fit,
+        j: usize,
+        error: f64,
+        unit: f64,
+    ) -> Option<String> {
+        let ordinary = self.ordinary_bias(output)?;
+        let most = self.context.settings.doubt.ordinary_biases * ordinary;
+        let uncertainty = unit * fit.covariance_corrected.as_ref()?[(j, j)].sqrt();
+        (error.abs() > most + STANDARD_ERRORS * uncertainty).then(|| {
+            format!(
+                "{error:.3} {}, {:.0} times the ordinary bias of its instrument",
+                Unit::of_signal(output.signal()).name,
+                error.abs() / ordinary
+            )
+        })
+    }
+
+    fn ordinary_bias(&self, output: Output) -> Option<f64> {
+        let bias = self.context.settings.ordinary_bias.get(&output).copied();
+        bias.filter(|bias| *bias > 0.0)
+    }
+}
