@@ -30,6 +30,12 @@ impl Harmonics {
         }
     }
 
+    /// Numbers of periods over the samples.
+    #[must_use]
+    pub fn numbers(&self) -> Range<usize> {
+        self.numbers.clone()
+    }
+
     /// Number of harmonics.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -8,6 +8,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
+use crate::numerics::harmonics::Harmonics;
+
 /// Fourier sums at the frequencies of a band.
 pub type Spectrum = Vec<Complex<f64>>;
 
@@ -31,10 +33,7 @@ const FEWEST: usize = 20;
 #[derive(Clone, Debug)]
 pub struct Band {
     step_s: f64,
-    /// Multiples of the lowest frequency of the series.
-    multiples: Vec<usize>,
-    /// e^(−2π j i/n) for each i < n, the number of samples.
-    rotations: Vec<Complex<f64>>,
+    harmonics: Harmonics,
     taper: Vec<f64>,
     /// Slope of the taper, 1/s.
     taper_slope: Vec<f64>,
@@ -44,15 +43,13 @@ impl Band {
     /// Band of series of so many samples; `None` where they are too short.
     pub fn new(samples: usize, step_s: f64) -> Option<Band> {
         let length_s = samples as f64 * step_s;
-        let highest_hz = HIGHEST_HZ.min(OF_RATE / step_s);
-        let multiples: Vec<usize> = (1..samples / 2)
-            .filter(|k| (LOWEST_HZ..=highest_hz).contains(&(*k as f64 / length_s)))
-            .collect();
-        let rotation = |i: usize| Complex::from_polar(1.0, -2.0 * PI * i as f64 / samples as f64);
-        (multiples.len() >= FEWEST).then(|| Band {
+        let band_hz = LOWEST_HZ..=HIGHEST_HZ.min(OF_RATE / step_s);
+        let mut inside = (1..samples / 2).filter(|k| band_hz.contains(&(*k as f64 / length_s)));
+        let first = inside.next()?;
+        let numbers = first..first + 1 + inside.count();
+        (numbers.len() >= FEWEST).then(|| Band {
             step_s,
-            multiples,
-            rotations: (0..samples).map(rotation).collect(),
+            harmonics: Harmonics::new(samples, numbers),
             taper: (0..samples).map(|i| taper(i, samples).0).collect(),
             taper_slope: (0..samples).map(|i| taper(i, samples).1 / step_s).collect(),
         })
@@ -60,43 +57,34 @@ impl Band {
 
     /// Frequencies, Hz.
     pub fn frequencies_hz(&self) -> Vec<f64> {
-        let length_s = self.rotations.len() as f64 * self.step_s;
-        let multiples = self.multiples.iter();
-        multiples.map(|k| *k as f64 / length_s).collect()
+        let length_s = self.taper.len() as f64 * self.step_s;
+        let numbers = self.harmonics.numbers();
+        numbers.map(|k| k as f64 / length_s).collect()
     }
 
     /// Fourier sums of a series without its mean, tapered.
     pub fn spectrum(&self, series: &[f64]) -> Spectrum {
-        self.sums(series, &self.taper)
+        let [spectrum] = self.sums(&[without_mean(series, &self.taper)]);
+        spectrum
     }
 
-    /// Fourier sums of a series without its mean, times the slope of the taper.
-    pub fn edge_spectrum(&self, series: &[f64]) -> Spectrum {
-        self.sums(series, &self.taper_slope)
-    }
-
-    fn sums(&self, series: &[f64], factors: &[f64]) -> Spectrum {
-        let samples = self.rotations.len();
-        let mean = series.iter().sum::<f64>() / samples.max(1) as f64;
-        let tapered: Vec<f64> = series
-            .iter()
-            .zip(factors)
-            .map(|(value, factor)| (value - mean) * factor)
-            .collect();
-        let sum = |k: &usize| {
-            let mut turn = 0;
-            let mut sum = Complex::new(0.0, 0.0);
-            for value in &tapered {
-                sum += self.rotations[turn] * *value;
-                turn += k;
-                if turn >= samples {
-                    turn -= samples;
-                }
-            }
-            sum
+    /// Fourier sums of series, each a spectrum.
+    fn sums<const N: usize>(&self, series: &[Vec<f64>; N]) -> [Spectrum; N] {
+        let (sums, count) = (self.harmonics.sums(series), self.harmonics.len());
+        let spectrum = |column: usize| {
+            let sum = |k: usize| Complex::new(sums[(k, column)], sums[(count + k, column)]);
+            (0..count).map(sum).collect()
         };
-        self.multiples.iter().map(sum).collect()
+        std::array::from_fn(spectrum)
     }
+}
+
+/// Series without its mean, times the factor of each sample.
+fn without_mean(series: &[f64], factors: &[f64]) -> Vec<f64> {
+    let mean = series.iter().sum::<f64>() / factors.len().max(1) as f64;
+    let both = series.iter().zip(factors);
+    both.map(|(value, factor)| (value - mean) * factor)
+        .collect()
 }
 
 /// Taper at a sample, and its slope per sample: a raised cosine at either end, one between.
@@ -126,10 +114,11 @@ pub struct Shifted {
 
 impl Shifted {
     pub fn new(band: &Band, series: &[f64]) -> Shifted {
-        Shifted {
-            spectrum: band.spectrum(series),
-            edges: band.edge_spectrum(series),
-        }
+        let [spectrum, edges] = band.sums(&[
+            without_mean(series, &band.taper),
+            without_mean(series, &band.taper_slope),
+        ]);
+        Shifted { spectrum, edges }
     }
 
     /// Spectrum of the series `delay_s` later, and its slope along the delay, 1/s.
