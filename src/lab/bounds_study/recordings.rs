@@ -20,6 +20,8 @@ pub struct StudyManeuver<'a> {
     pub class: &'a Class,
     card: Card,
     noise: RecordNoise,
+    /// Time by which surfaces are recorded late.
+    surface_delay_s: f64,
     /// Settings of the estimates.
     pub settings: estimate::Settings,
     /// Flight of all records; `None` where each record has its own.
@@ -90,6 +92,7 @@ impl<'a> StudyManeuver<'a> {
             class,
             card,
             noise: condition.noise,
+            surface_delay_s: condition.surface_delay_s,
             settings: settings(campaign, condition),
             common_flight,
         })
@@ -136,7 +139,7 @@ impl<'a> StudyManeuver<'a> {
         estimate::maneuver(&record, &flown.maneuver, self.class, &context)
     }
 
-    /// Instruments with the condition's noise and no other errors.
+    /// Instruments with the condition's noise and delay of the surfaces, and no other errors.
     fn noise_only(&self) -> Instruments {
         let outputs = self.class.axis.outputs().map(Output::signal);
         let coloured_time_s = self.campaign.cards.study.coloured_time_s;
@@ -156,14 +159,8 @@ impl<'a> StudyManeuver<'a> {
             };
             (signal.clone(), instrument)
         };
-        Instruments(
-            self.campaign
-                .cards
-                .instruments
-                .0
-                .iter()
-                .map(noise_only)
-                .collect(),
-        )
+        let instruments = self.campaign.cards.instruments.0.iter();
+        let surfaces = &self.campaign.simulator.settings().surface_names;
+        Instruments(instruments.map(noise_only).collect()).late(surfaces, self.surface_delay_s)
     }
 }

@@ -105,7 +105,6 @@ impl FlightCard {
             derivatives,
             turbulence: self.turbulence,
             discrete_gusts: self.discrete_gusts,
-            surface_delay_s: self.surface_delay_s,
         }
     }
 }

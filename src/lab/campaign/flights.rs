@@ -27,7 +27,9 @@ pub struct FlownFlight {
 /// Flies the cards of one flight.
 pub fn fly(campaign: &SimulatedCampaign, flight_id: &str, flight_card: &FlightCard) -> FlownFlight {
     let seed = derived_seed(campaign.cards.seed, flight_id);
+    let surfaces = &campaign.simulator.settings().surface_names;
     let instruments = campaign.cards.instruments.drawn(seed);
+    let instruments = instruments.late(surfaces, flight_card.surface_delay_s);
     let mut flight = FlownFlight {
         flight_id: flight_id.to_owned(),
         instruments,

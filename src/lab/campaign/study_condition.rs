@@ -54,7 +54,6 @@ impl StudyCondition {
             derivatives: self.derivatives,
             turbulence: self.turbulence,
             discrete_gusts: self.discrete_gusts,
-            surface_delay_s: self.surface_delay_s,
         }
     }
 }

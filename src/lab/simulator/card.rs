@@ -21,15 +21,13 @@ pub enum DerivativeLookup {
     Varying,
 }
 
-/// Air, aerodynamics and surface recorder of a maneuver. Default: the estimator's assumptions.
+/// Air and aerodynamics of a maneuver. Default: the estimator's assumptions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FlightCondition {
     pub derivatives: DerivativeLookup,
     /// Continuous turbulence; `None` in still air.
     pub turbulence: Option<Turbulence>,
     pub discrete_gusts: Option<DiscreteGusts>,
-    /// Time by which surfaces are recorded late.
-    pub surface_delay_s: f64,
 }
 
 impl FlightCondition {
@@ -39,7 +37,7 @@ impl FlightCondition {
         self.turbulence.is_some() || self.discrete_gusts.is_some()
     }
 
-    /// Checks the air and the delay.
+    /// Checks the air.
     ///
     /// # Errors
     /// The message for the first setting that is wrong.
@@ -47,11 +45,7 @@ impl FlightCondition {
         self.turbulence.as_ref().map_or(Ok(()), Turbulence::check)?;
         self.discrete_gusts
             .as_ref()
-            .map_or(Ok(()), DiscreteGusts::check)?;
-        if !(self.surface_delay_s >= 0.0 && self.surface_delay_s.is_finite()) {
-            return Err("`surface_delay_s` must not be negative".into());
-        }
-        Ok(())
+            .map_or(Ok(()), DiscreteGusts::check)
     }
 }
 

@@ -12,7 +12,6 @@ use super::law::ControlLaw;
 use super::plant::{Plant, PlantInputs, PlantOutputs};
 use super::sensors;
 use super::settings::Settings;
-use super::surface_history::SurfaceHistory;
 use super::trim::{self, Trim, TrimPoint};
 use crate::error::did_you_mean;
 use crate::flight::record::Series;
@@ -56,17 +55,15 @@ pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeu
     let mut state = flight.initial_state();
     let mut signals: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut alphas_deg = Vec::with_capacity(samples);
-    let mut surfaces = SurfaceHistory::new(card.condition.surface_delay_s / flight.step_s);
     for step in 0..samples * per_sample {
         let outputs = flight.evaluate(&state);
         if has_departed(&state, &outputs) {
             let time_s = step as f64 * flight.step_s;
             return Err(format!("the aircraft departs at {time_s:.1} s of the card"));
         }
-        surfaces.push(&state.inputs.surfaces);
         if step % per_sample == 0 {
             alphas_deg.push(outputs.air.alpha * DEG);
-            for (name, value) in flight.signals(&state, &outputs, &surfaces.recorded(), step) {
+            for (name, value) in flight.signals(&state, &outputs, step) {
                 signals.entry(name).or_default().push(value);
             }
         }
@@ -313,7 +310,6 @@ impl<'a> CardFlight<'a> {
         &self,
         state: &AircraftState,
         outputs: &PlantOutputs,
-        surfaces: &[f64],
         step: usize,
     ) -> Vec<(String, f64)> {
         let time_s = step as f64 * self.step_s;
@@ -322,7 +318,7 @@ impl<'a> CardFlight<'a> {
             .settings
             .surface_names
             .iter()
-            .zip(surfaces)
+            .zip(&state.inputs.surfaces)
             .map(|(name, deg)| (name.clone(), *deg));
         let laws = self.settings.laws.values();
         let sticks: BTreeSet<&String> = laws.flat_map(|law| law.gearing.keys()).collect();

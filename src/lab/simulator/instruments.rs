@@ -72,6 +72,21 @@ impl Instruments {
         Instruments(self.0.iter().map(draw).collect())
     }
 
+    /// Instruments of a recorder that has these signals late by a further delay.
+    #[must_use]
+    pub fn late<'a>(
+        mut self,
+        signals: impl IntoIterator<Item = &'a String>,
+        delay_s: f64,
+    ) -> Instruments {
+        if delay_s != 0.0 {
+            for signal in signals {
+                self.0.entry(signal.clone()).or_default().delay_s += delay_s;
+            }
+        }
+        self
+    }
+
     /// Record of these instruments from the record of perfect ones.
     #[must_use]
     pub fn record(&self, exact: &Record, seed: u64) -> Record {

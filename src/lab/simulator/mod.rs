@@ -26,7 +26,6 @@ pub mod plant;
 pub mod sensors;
 pub mod trim;
 pub mod control;
-mod surface_history;
 mod flight;
 
 use crate::aero::{Buildup, WindTunnel};
