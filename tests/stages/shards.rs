@@ -203,3 +203,37 @@ fn scripts_are_written_for_a_scheduler_and_nothing_is_run() {
         "{maneuvers}"
     );
 }
+
+/// Stand-in for PBS's `qsub`: runs a job at once, the tasks of an array one after the other.
+const QSUB: &str = r#"#!/bin/bash
+script="${@: -1}"
+tasks=$(sed -n 's/^#PBS -J 1-//p' "$script")
+for task in $(seq 1 "${tasks:-1}"); do
+    PBS_ARRAY_INDEX=$task bash "$script" > /dev/null || exit 1
+done
+echo 1.server
+"#;
+
+#[cfg(unix)]
+#[test]
+fn the_scripts_for_pbs_publish_the_tables_of_one_process() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let campaign = two_flights();
+    campaign.copy_pipeline();
+    campaign.edit("pipeline.yaml", "# cluster:\n", "cluster: { shards: 2 }\n");
+    let outcome = run(campaign.command("submit").args(["--engine", "pbs"]));
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let programs = campaign.path("programs");
+    fs::create_dir(&programs).unwrap();
+    fs::write(programs.join("qsub"), QSUB).unwrap();
+    fs::set_permissions(programs.join("qsub"), fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let submitted = run(Command::new("bash")
+        .arg(campaign.path("store/cluster/submit.sh"))
+        .env("PATH", format!("{}:{path}", programs.display())));
+    assert_eq!(submitted.code, Some(0), "{submitted:?}");
+    let whole = two_flights();
+    whole.copy_pipeline();
+    whole.finishes("run");
+    assert!(campaign.tables() == whole.tables());
+}

@@ -62,21 +62,13 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     if object::is_object(Path::new(archive)) {
         files = remote::find(archive)?;
     } else if Path::new(archive).is_dir() {
-        Walk::default().add(Path::new(archive), &mut files)?;
+        Walk::of_flights().add(Path::new(archive), &mut files)?;
+    } else if let Some(at) = archive.find("**") {
+        add_below(archive, at, &mut files)?;
     } else {
-        let nonsense = |what: String| Error::Archive {
-            place: archive.into(),
-            what,
-        };
-        let paths = glob::glob(archive).map_err(|e| nonsense(format!("not a glob: {e}")))?;
-        let mut walk = Walk::default();
-        for path in paths {
-            let path = path.map_err(|e| nonsense(e.to_string()))?;
-            if path.is_dir() {
-                if walk.add(&path, &mut files).is_err() {
-                    files.insert(path);
-                }
-            } else {
+        let mut walk = Walk::of_flights();
+        for path in matches(archive)? {
+            if !path.is_dir() || walk.add(&path, &mut files).is_err() {
                 files.insert(path);
             }
         }
@@ -88,6 +80,50 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     Ok(flights(files))
 }
 
+/// Paths that match a glob.
+fn matches(pattern: &str) -> Result<Vec<PathBuf>, Error> {
+    let nonsense = |what: String| Error::Archive {
+        place: pattern.into(),
+        what,
+    };
+    let paths = glob::glob(pattern).map_err(|e| nonsense(format!("not a glob: {e}")))?;
+    let paths = paths.map(|path| path.map_err(|e| nonsense(e.to_string())));
+    paths.collect()
+}
+
+/// Adds the files of a glob with `**` at a place: the folders above it are searched as an archive is,
+/// because a glob follows links in circles.
+fn add_below(archive: &str, at: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+    let (above, below) = archive.split_at(at);
+    let above = match above.trim_end_matches('/') {
+        "" if above.is_empty() => ".",
+        "" => "/",
+        above => above,
+    };
+    // `**` alone is every flight below.
+    let mut walk = if below.trim_end_matches('/') == "**" {
+        Walk::of_flights()
+    } else {
+        Walk::of_files()
+    };
+    let mut found = BTreeSet::new();
+    for folder in matches(above)?.iter().filter(|path| path.is_dir()) {
+        walk.add(folder, &mut found)?;
+    }
+    let pattern = glob::Pattern::new(archive).map_err(|e| Error::Archive {
+        place: archive.into(),
+        what: format!("not a glob: {e}"),
+    })?;
+    let options = glob::MatchOptions {
+        require_literal_separator: true,
+        ..glob::MatchOptions::new()
+    };
+    let plain = |path: PathBuf| path.strip_prefix("./").map(Path::to_owned).unwrap_or(path);
+    let is_wanted = |path: &PathBuf| path.is_dir() || pattern.matches_path_with(path, options);
+    files.extend(found.into_iter().map(plain).filter(is_wanted));
+    Ok(())
+}
+
 /// Search of folders, each entered once whatever links lead to it: folders themselves first, then
 /// links in the order in which they are found.
 #[derive(Debug, Default)]
@@ -96,21 +132,42 @@ struct Walk {
     entered: BTreeSet<PathBuf>,
     /// Links to folders, not followed yet.
     links: VecDeque<PathBuf>,
+    /// Files of every name are added, not only flights.
+    takes_all: bool,
 }
 
 impl Walk {
-    /// Adds the Parquet files below a folder, except names with a leading dot or underscore. A folder
+    /// Search for Parquet files.
+    fn of_flights() -> Walk {
+        Walk::default()
+    }
+
+    /// Search for files of every extension.
+    fn of_files() -> Walk {
+        Walk {
+            takes_all: true,
+            ..Walk::default()
+        }
+    }
+
+    /// Adds the files below a folder, except names with a leading dot or underscore. A folder
     /// below it that cannot be read, or that a link leads to again, is added itself.
     fn add(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+        if self.has_entered(folder) {
+            files.insert(folder.to_owned());
+            return Ok(());
+        }
         self.enter(folder, files)?;
         while let Some(link) = self.links.pop_front() {
-            let target = fs::canonicalize(&link);
-            let is_new = target.is_ok_and(|target| !self.entered.contains(&target));
-            if !is_new || self.enter(&link, files).is_err() {
+            if self.has_entered(&link) || self.enter(&link, files).is_err() {
                 files.insert(link);
             }
         }
         Ok(())
+    }
+
+    fn has_entered(&self, folder: &Path) -> bool {
+        fs::canonicalize(folder).is_ok_and(|folder| self.entered.contains(&folder))
     }
 
     fn enter(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
@@ -123,12 +180,12 @@ impl Walk {
         paths.sort();
         for path in paths.into_iter().filter(|path| !has_hidden_name(path)) {
             if !path.is_dir() {
-                if has_extension_of_flights(&path) {
+                if self.takes_all || has_extension_of_flights(&path) {
                     files.insert(path);
                 }
             } else if path.is_symlink() {
                 self.links.push_back(path);
-            } else if self.enter(&path, files).is_err() {
+            } else if self.has_entered(&path) || self.enter(&path, files).is_err() {
                 files.insert(path);
             }
         }

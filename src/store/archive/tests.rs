@@ -169,6 +169,13 @@ fn a_folder_is_entered_once_whatever_links_lead_to_it() {
     let ids: BTreeSet<&str> = found.iter().map(|f| f.flight_id.as_str()).collect();
     assert_eq!(ids, ["f1", "x", "y"].into());
     assert_eq!(found[0].files.len() + found[0].rivals.len(), 1);
+    for glob in ["**/*.parquet", "**", "a/**/*.parquet", "**/f?.parquet"] {
+        let again = find(&format!("{place}/{glob}")).unwrap();
+        assert!(again.contains(&found[0]), "{glob}");
+    }
+    assert!(
+        !matches!(find(&format!("{place}/**/g*.parquet")), Ok(all) if all[0].flight_id == "f1")
+    );
 }
 
 #[test]
