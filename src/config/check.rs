@@ -268,7 +268,7 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
         signals.push(&channel.signal);
     }
     for name in signal::POSITIVE {
-        if let Some(value) = config.constants.get(*name).filter(|v| !(**v > 0.0)) {
+        if let Some(value) = config.constants.get(*name).filter(|v| **v <= 0.0) {
             let what = format!("`{name}` must be greater than zero, not {value}");
             return Err(source.error_under("constants", name, what));
         }

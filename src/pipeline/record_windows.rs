@@ -71,7 +71,7 @@ fn number_ids(maneuvers: &mut [Maneuver]) {
         let count = counts.entry(maneuver.maneuver_id.clone()).or_default();
         *count += 1;
         if *count > 1 {
-            maneuver.maneuver_id += &format!(".{count}");
+            maneuver.maneuver_id = format!("{}.{count}", maneuver.maneuver_id);
         }
     }
 }

@@ -127,7 +127,7 @@ fn bounded(item: String) -> String {
         return item;
     }
     let hash = &blake3::hash(item.as_bytes()).to_hex()[..16];
-    let end = (0..=LONGEST_ITEM - hash.len() - 1)
+    let end = (0..LONGEST_ITEM - hash.len())
         .rev()
         .find(|end| item.is_char_boundary(*end));
     format!(
