@@ -11,8 +11,8 @@ use super::channel::{
 };
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
-    check_relations, confirmed_signals, find_faulty_channels, impossible_mass, impossible_signals,
-    measure_gusts, report,
+    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_mass,
+    impossible_signals, lift_curve, measure_gusts, report,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, Findings, OnFault};
@@ -38,6 +38,8 @@ pub struct Assessment {
     /// Corrections that are applied to signals when the record is read.
     pub corrections: Vec<Correction>,
     pub problems: Vec<Problem>,
+    /// Normal force over angle of attack, for the comparison with the tunnel.
+    pub lift: Vec<LiftPoint>,
     /// Signature of the samples, by which repeated rows are found.
     pub signature: Signature,
 }
@@ -107,6 +109,7 @@ pub fn assess(
         instruments: findings.rows(flight_id),
         corrections: findings.corrections(),
         problems,
+        lift: lift_curve(&blocks, context.aircraft, &context.settings.checks),
         signature: recording.signature,
     })
 }

@@ -26,6 +26,7 @@ pub use assessment::{Assessment, assess};
 pub use channel::{
     ChannelPlan, ChannelReader, ConditionedChannel, Overlap, Signature, plan_channels,
 };
+pub use checks::LiftPoint;
 pub use clock::{Clock, Stretch, Survey, survey};
 pub use column_source::ColumnSource;
 pub use context::Context;

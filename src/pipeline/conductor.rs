@@ -8,6 +8,7 @@ use super::estimate_step::{self, EstimateStep};
 use super::flight_contents::{FlightContents, source_file};
 use super::group_steps::{self, JointStep, PredictStep};
 use super::ingest_step::{self, IngestStep};
+use super::lift_check;
 use super::progress::Progress;
 use super::segment_step::{self, SegmentStep};
 use super::step::Step;
@@ -179,6 +180,7 @@ impl<'a> Conductor<'a> {
         let (runner, config) = (&self.runner, self.runner.config);
         let mut campaign = Campaign::default();
         ingest_step::ingest(runner, files, &self.flight_contents, &mut campaign)?;
+        lift_check::compare_lift(config, &mut campaign);
         if until >= Stage::Segment {
             segment_step::segment(runner, &mut campaign)?;
         }

@@ -15,6 +15,7 @@ mod flight_contents;
 mod group_steps;
 mod ingest_step;
 mod ingested;
+mod lift_check;
 mod memory_shares;
 mod problems;
 mod progress;

@@ -1,9 +1,14 @@
 //! Checks of signals that no kinematic relation contains: sizes that are positive, inertias that a
 //! body can have, and a mass that the aircraft's lift can carry.
 
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
 use super::block_means::BlockMeans;
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
+use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::upper_median;
 use crate::units::{G0_FT_S2, RAD, Unit};
@@ -33,6 +38,49 @@ const TYPICAL_LIFT: f64 = 4.0;
 
 /// Fewest blocks from which the mass is checked: ten seconds of a usual setting.
 const FEWEST_BLOCKS: usize = 50;
+
+/// Width of the bins of angle of attack in which lift is averaged, deg: half the usual distance of
+/// test points.
+const BIN_DEG: f64 = 2.5;
+
+/// Fewest blocks of a bin: two seconds of a usual setting.
+const FEWEST_IN_BIN: usize = 10;
+
+/// Normal force coefficient of a flight at an angle of attack, from mass and normal acceleration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LiftPoint {
+    pub alpha_deg: f64,
+    pub mach: f64,
+    pub normal_force: f64,
+}
+
+/// Normal force coefficients of a flight, medians of bins of angle of attack.
+pub fn lift_curve(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<LiftPoint> {
+    let mut bins: BTreeMap<usize, Vec<LiftPoint>> = BTreeMap::new();
+    for block in 0..blocks.count {
+        if let Some(lift) = lift(blocks, block, aircraft, settings) {
+            let alpha_deg = blocks.mean(signal::ALPHA_VANE, block);
+            let point = LiftPoint {
+                alpha_deg,
+                mach: blocks.mean(signal::MACH, block),
+                normal_force: lift * (alpha_deg * RAD).sin(),
+            };
+            bins.entry(whole_steps(alpha_deg, BIN_DEG))
+                .or_default()
+                .push(point);
+        }
+    }
+    let bins = bins.into_values().filter(|bin| bin.len() >= FEWEST_IN_BIN);
+    let median = |bin: &[LiftPoint], of: fn(&LiftPoint) -> f64| upper_median(bin.iter().map(of));
+    let point = |bin: Vec<LiftPoint>| {
+        Some(LiftPoint {
+            alpha_deg: median(&bin, |p| p.alpha_deg)?,
+            mach: median(&bin, |p| p.mach)?,
+            normal_force: median(&bin, |p| p.normal_force)?,
+        })
+    };
+    bins.filter_map(point).collect()
+}
 
 /// Finds sizes that are not positive, and inertias that no body has. A velocity or dynamic pressure of
 /// zero is that of an aircraft at rest, or of a dead instrument.
@@ -103,7 +151,7 @@ pub fn impossible_mass(
     if lift.len() < FEWEST_BLOCKS {
         return None;
     }
-    let median = upper_median(lift.into_iter()).filter(|v| !LIFT_PER_SIN_ALPHA.contains(v))?;
+    let median = upper_median(lift).filter(|v| !LIFT_PER_SIN_ALPHA.contains(v))?;
     let unit = mass_unit.and_then(|unit| probable_unit(unit, median));
     let unit = unit.map_or_else(String::new, |unit| format!(": is it in {unit}?"));
     Some(ImpossibleSignal {

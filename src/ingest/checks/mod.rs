@@ -15,6 +15,7 @@ pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,
 };
 pub(in crate::ingest) use gusts::Gusts;
+pub use mass_properties::LiftPoint;
 pub(in crate::ingest) use mass_properties::{
-    ImpossibleSignal, impossible_mass, impossible_signals,
+    ImpossibleSignal, impossible_mass, impossible_signals, lift_curve,
 };
