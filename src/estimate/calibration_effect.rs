@@ -26,7 +26,10 @@ impl<'a> Task<'a> {
             return;
         }
         match self.gradient_shifts(prepared, &fit.values, &fit.weights) {
-            Ok(shifts) => calibration_errors::add_calibration_errors(&prepared.case, &shifts, fit),
+            Ok(shifts) => {
+                let errors = self.misreadings(&prepared.window);
+                calibration_errors::add_calibration_errors(&prepared.case, &errors, &shifts, fit);
+            }
             Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
         }
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::maneuver::Maneuver;
 use crate::output_error::Fit;
+use crate::output_error::error_effect::ErrorEffect;
 use crate::tables::{AgreementRow, CorrelationRow, EstimateRow, FitRow, History, Outcome};
 
 /// Covariance of a maneuver's parameters in the units of the tables; initial states in rad and
@@ -16,6 +17,9 @@ pub struct Covariance {
     pub white: Vec<f64>,
     /// Corrected as `bound_corrected`, row by row.
     pub corrected: Vec<f64>,
+    /// Effects of errors that other maneuvers share; both covariances contain those of held values,
+    /// `corrected` also those of calibration.
+    pub shared_errors: Vec<ErrorEffect>,
 }
 
 impl Covariance {
@@ -27,6 +31,7 @@ impl Covariance {
             names: names.to_vec(),
             white: rows(white),
             corrected: rows(corrected),
+            shared_errors: fit.shared_errors.clone(),
         })
     }
 }

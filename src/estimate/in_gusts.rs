@@ -17,6 +17,7 @@ use crate::flight::signal;
 use crate::numerics::order_statistics::median;
 use crate::output_error::calibration_errors::Misreading;
 use crate::output_error::equation_error::Regression;
+use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::output_error::{Case, Fit, Measurements, Model, Outcome, Response, equation_error};
 use crate::tables::{EstimationMethod, FitRow};
 use crate::units::DEG;
@@ -226,7 +227,15 @@ impl<'a> Task<'a> {
         fit: &mut Fit,
     ) {
         let uncertainties = self.held_uncertainties(&prepared.model);
-        let mut held = bounds.covariance_of(&pass.held_shifts(&uncertainties));
+        let changes = bounds.changes(&pass.held_shifts(&uncertainties));
+        let mut held = bounds.covariance_of(&changes);
+        let effects = uncertainties
+            .iter()
+            .zip(&changes)
+            .map(|((name, deviation), change)| {
+                ErrorEffect::new(SharedError::Held((*name).to_owned()), *deviation, change)
+            });
+        fit.shared_errors.extend(effects);
         if let Some(effect) = effect {
             for (value, change) in fit.values.iter_mut().zip(effect.change.iter()) {
                 *value += change;
@@ -263,7 +272,11 @@ impl<'a> Task<'a> {
             fit.reason.push_str(super::calibration_effect::NOT_COUNTED);
             return;
         };
-        let common = fitted.bounds.covariance_of(&shifts);
+        let changes = fitted.bounds.changes(&shifts);
+        let common = fitted.bounds.covariance_of(&changes);
+        let effects = errors.iter().zip(&changes);
+        fit.shared_errors
+            .extend(effects.map(|(error, change)| error.effect(change)));
         add(&mut fit.covariance_corrected, &common);
         fit.covariance_calibration = Some(common);
     }
@@ -402,6 +415,7 @@ impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
             covariance_held: None,
             covariance_calibration: None,
             covariance_corrected: Some(self.bounds.corrected.clone()),
+            shared_errors: vec![],
         }
     }
 }

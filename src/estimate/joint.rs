@@ -377,6 +377,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
         return;
     }
     let mut together: Vec<DVector<f64>> = vec![];
+    let mut errors = vec![];
     for (i, part) in parts.iter().enumerate() {
         let places = joint.places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
@@ -387,6 +388,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
             fit.reason.push_str(NOT_COUNTED);
             return;
         };
+        errors = part.task.misreadings(&part.prepared.window);
         together.resize(shifts.len(), DVector::zeros(joint.names().len()));
         for (sum, shift) in together.iter_mut().zip(shifts) {
             for (&place, value) in places.iter().zip(shift.iter()) {
@@ -394,7 +396,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
             }
         }
     }
-    calibration_errors::add_calibration_errors(joint, &together, fit);
+    calibration_errors::add_calibration_errors(joint, &errors, &together, fit);
 }
 
 fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {

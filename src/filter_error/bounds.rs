@@ -135,15 +135,22 @@ impl Bounds {
         both.any(|(change, variance)| change.powi(2) > share * share * variance)
     }
 
-    /// Covariance of the filter's own parameters from changes of the gradient, each by one standard
-    /// deviation of an independent error.
+    /// Changes of the filter's own parameters from changes of the gradient.
     #[must_use]
-    pub fn covariance_of(&self, gradient_shifts: &[DVector<f64>]) -> DMatrix<f64> {
+    pub fn changes(&self, gradient_shifts: &[DVector<f64>]) -> Vec<DVector<f64>> {
+        let n = self.covariance.nrows();
+        let change = |shift: &DVector<f64>| &self.inverse * shift.rows(0, n);
+        gradient_shifts.iter().map(change).collect()
+    }
+
+    /// Covariance of the filter's own parameters from their changes, each by one standard deviation
+    /// of an independent error.
+    #[must_use]
+    pub fn covariance_of(&self, changes: &[DVector<f64>]) -> DMatrix<f64> {
         let n = self.covariance.nrows();
         let mut sum = DMatrix::zeros(n, n);
-        for shift in gradient_shifts {
-            let change = &self.inverse * shift.rows(0, n);
-            sum += &change * change.transpose();
+        for change in changes {
+            sum += change * change.transpose();
         }
         sum
     }

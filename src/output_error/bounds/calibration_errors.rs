@@ -19,6 +19,7 @@ use crate::output_error::kernel::pass::Diverged;
 use crate::output_error::kernel::response::Sensitivities;
 use crate::output_error::likelihood::cost;
 use crate::output_error::likelihood::definition::Likelihood;
+use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError};
 use crate::output_error::likelihood::outcome::Fit;
 use crate::settings::settings;
 
@@ -55,6 +56,20 @@ impl<'a> Misreading<'a> {
             bias: 0.0,
             delay_s,
         }
+    }
+
+    /// Effect of the error, which changes the parameters by `change`.
+    #[must_use]
+    pub fn effect(&self, change: &DVector<f64>) -> ErrorEffect {
+        let signal = self.signal.to_owned();
+        let (error, deviation) = if self.delay_s != 0.0 {
+            (SharedError::Delay(signal), self.delay_s)
+        } else if self.scale != 0.0 {
+            (SharedError::Scale(signal), self.scale)
+        } else {
+            (SharedError::Bias(signal), self.bias)
+        };
+        ErrorEffect::new(error, deviation, change)
     }
 
     /// Window as it would have been recorded with the error.
@@ -319,6 +334,7 @@ fn constant_name(coefficient: Coefficient, regressor: &Regressor) -> String {
 /// given by its change of the gradient at one standard deviation ([`Fitted::gradient_shifts`]).
 pub fn add_calibration_errors<D: Likelihood>(
     data: &D,
+    errors: &[Misreading],
     gradient_shifts: &[DVector<f64>],
     fit: &mut Fit<D::Response>,
 ) {
@@ -329,9 +345,10 @@ pub fn add_calibration_errors<D: Likelihood>(
         return;
     };
     let mut common = DMatrix::zeros(inverse.nrows(), inverse.ncols());
-    for gradient_shift in gradient_shifts {
+    for (error, gradient_shift) in errors.iter().zip(gradient_shifts) {
         let shift = &inverse * gradient_shift;
         common += &shift * shift.transpose();
+        fit.shared_errors.push(error.effect(&shift));
     }
     *corrected += &common;
     fit.covariance_calibration = Some(common);

@@ -9,6 +9,7 @@ use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::inverse;
 use crate::output_error::case::Case;
 use crate::output_error::likelihood::cost::sums;
+use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError};
 use crate::output_error::likelihood::outcome::Fit;
 
 /// Maneuver whose held values are uncertain.
@@ -73,9 +74,12 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
         return;
     };
     let mut held = DMatrix::zeros(n, n);
-    for (cross, uncertainty) in blocks.held.into_iter().zip(uncertainties.values()) {
+    for (cross, (name, uncertainty)) in blocks.held.into_iter().zip(uncertainties) {
         let shift = &inverse * cross * *uncertainty;
         held += &shift * shift.transpose();
+        let error = SharedError::Held((*name).to_owned());
+        fit.shared_errors
+            .push(ErrorEffect::new(error, *uncertainty, &shift));
     }
     *covariance += &held;
     *corrected += &held;

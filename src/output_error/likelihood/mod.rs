@@ -5,6 +5,7 @@
 pub mod cost;
 pub mod definition;
 pub mod equation_error;
+pub mod error_effect;
 pub(crate) mod information;
 pub mod joint;
 pub mod mean;

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::dynamics::OUTPUTS;
 use crate::output_error::kernel::response::Response;
+use crate::output_error::likelihood::error_effect::ErrorEffect;
 pub use crate::tables::Outcome;
 
 /// Result of an estimation; `R` is the response of one maneuver, or of several joined.
@@ -35,6 +36,8 @@ pub struct Fit<R = Response> {
     /// Covariance that counts the residuals' autocorrelation, noise of the surfaces and errors of
     /// calibration.
     pub covariance_corrected: Option<DMatrix<f64>>,
+    /// Effects of the errors that other maneuvers share; the covariances contain them.
+    pub shared_errors: Vec<ErrorEffect>,
 }
 
 impl<R: Default> Fit<R> {
@@ -59,6 +62,7 @@ impl<R: Default> Fit<R> {
             covariance_held: None,
             covariance_calibration: None,
             covariance_corrected: None,
+            shared_errors: vec![],
         }
     }
 }
@@ -82,6 +86,7 @@ impl<R> Fit<R> {
             covariance_held: self.covariance_held,
             covariance_calibration: self.covariance_calibration,
             covariance_corrected: self.covariance_corrected,
+            shared_errors: self.shared_errors,
         };
         (fit, self.response)
     }

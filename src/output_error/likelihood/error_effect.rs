@@ -1,0 +1,40 @@
+//! Effects of errors that several maneuvers share: of the values they hold, and of calibration.
+
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+/// Error that several maneuvers share.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SharedError {
+    /// Error of the value at which this derivative is held.
+    Held(String),
+    /// Scale error of this signal.
+    Scale(String),
+    /// Constant error of this signal.
+    Bias(String),
+    /// Unknown rest of this surface's delay.
+    Delay(String),
+}
+
+/// Change of a maneuver's parameters by one standard deviation of an error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorEffect {
+    pub error: SharedError,
+    /// Standard deviation of the error: of a held value in its own unit.
+    pub deviation: f64,
+    /// Change of each parameter where the true value is above the assumed one by one standard
+    /// deviation.
+    pub change: Vec<f64>,
+}
+
+impl ErrorEffect {
+    #[must_use]
+    pub fn new(error: SharedError, deviation: f64, change: &DVector<f64>) -> ErrorEffect {
+        ErrorEffect {
+            error,
+            deviation,
+            change: change.as_slice().to_vec(),
+        }
+    }
+}
