@@ -15,7 +15,7 @@ use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, signal as s};
-use crate::lab::simulator::random::RandomStream;
+use crate::numerics::random::RandomStream;
 use crate::tables::InstrumentVerdict;
 use crate::units::{DEG, G0_FT_S2};
 

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::recordings::{Realisation, StudyManeuver};
 use crate::error::Problem;
-use crate::lab::simulator::random::derived_seed;
 use crate::maneuver::Status;
+use crate::numerics::random::derived_seed;
 use crate::output_error::Outcome;
 use crate::tables::{CoverageRow, EstimateRow};
 

@@ -7,8 +7,8 @@ use super::recordings::{StudyManeuver, true_tables};
 use crate::aero::{Buildup, WindTunnel};
 use crate::error::Problem;
 use crate::estimate::{Estimated, Start};
-use crate::lab::simulator::random::derived_seed;
 use crate::lab::simulator::{FlownManeuver, TrueDerivative};
+use crate::numerics::random::derived_seed;
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, StartRow, StartVariant, StartingValues};
 

@@ -4,8 +4,8 @@ use super::cards::{FlightCard, TestPoint};
 use super::simulated_campaign::SimulatedCampaign;
 use crate::error::Problem;
 use crate::flight::Record;
-use crate::lab::simulator::random::derived_seed;
 use crate::lab::simulator::{Card, FlownManeuver, Instruments};
+use crate::numerics::random::derived_seed;
 
 /// Record time of a flight's first sample.
 const FIRST_S: f64 = 100.0;

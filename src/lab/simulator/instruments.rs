@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::random::RandomStream;
 use crate::flight::record::Series;
 use crate::flight::{Correction, Mark, Record};
+use crate::numerics::random::RandomStream;
 
 /// Errors of one signal's instrument, in the signal's unit. All zero: a perfect instrument.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,6 @@
 //! ones. The equations of motion ([`body`]) are independent of the estimator's
 //! ([`crate::dynamics`]), so that each checks the other.
 
-pub mod random;
 mod gust;
 mod shaping_filter;
 pub mod turbulence;

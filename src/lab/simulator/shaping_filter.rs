@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::random::RandomStream;
+use crate::numerics::random::RandomStream;
 
 /// A stable filter in continuous time.
 #[derive(Clone, Debug, PartialEq)]

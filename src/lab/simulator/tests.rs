@@ -10,7 +10,6 @@ use super::air_data::AirData;
 use super::body::{BodyState, Euler};
 use super::gust::Gust;
 use super::plant::{PlantInputs, PlantOutputs};
-use super::random::RandomStream;
 use super::trim::{self, Trim, TrimPoint};
 use super::{
     Card, FlownManeuver, Instrument, Instruments, Program, Simulator, Turbulence, TurbulenceModel,
@@ -22,6 +21,7 @@ use crate::estimate::{self, Context, Estimated, Method};
 use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
 use crate::maneuver::Maneuver;
+use crate::numerics::random::RandomStream;
 use crate::surfaces::{self, Basis};
 use crate::tables::Outcome;
 use crate::units::DEG;

@@ -21,8 +21,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::gust::Gust;
-use super::random::RandomStream;
 use super::shaping_filter::ShapingFilter;
+use crate::numerics::random::RandomStream;
 
 /// Form of the spectra.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
