@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store status explain diff verify gc doc docs torture fuzz ingest segment estimate trend compare report export nightly check show shown simulate validate build test same bench lint clean help
+.PHONY: cluster object-store status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model compare report export nightly check show shown simulate validate build test same bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -42,6 +42,9 @@ estimate: build ## estimate the derivatives of every maneuver
 
 trend: build ## fit least-squares trends across angle of attack
 	$(call harvest,trend) $(running)
+
+model: build ## fuse tunnel and flights to the posterior of every derivative
+	$(call harvest,model) $(running)
 
 compare: build ## compare the trends with the wind-tunnel database
 	$(call harvest,compare) $(running)

@@ -128,6 +128,8 @@ words! {
         Estimate = "estimate",
         /// Derivatives to trends.
         Trend = "trend",
+        /// Tunnel and derivatives to the posterior.
+        Model = "model",
         /// The report.
         Report = "report",
         /// The simulator; not in the table `problems`.

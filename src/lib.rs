@@ -60,6 +60,7 @@ pub mod segment;
 mod surfaces;
 pub mod estimate;
 mod trend;
+mod model;
 mod compare;
 mod export;
 mod pdf;

@@ -7,19 +7,21 @@ use clap::Args;
 
 use super::bars::Bars;
 use super::options::{Options, Patience, REJECTED, exit_code, start_threads};
-use crate::night::{has_rejections, model_export};
+use crate::night::{has_rejections, model_export, model_export::Draws};
 
 /// Help below the options.
 pub const EXPORT_HELP: &str = "\
-What is needed is brought up to date first, as far as `compare`. Each derivative is the trend where flight has data and \
-the tunnel elsewhere; every value is marked with its source.
+What is needed is brought up to date first, as far as `model`. Each derivative is the posterior of tunnel and flight, with \
+its uncertainty; every value says whether it is mostly flight's or the tunnel's.
 
   flight_updated.csv, .parquet   rows that `wind_tunnel:` reads as a database again
   flight_updated.dml             DAVE-ML (ANSI/AIAA S-119): tables, and the coefficients as their sums
+  draws.csv, .parquet, draw_NNNN_jsbsim.xml   models drawn from the posterior, with --draws
   flight_updated_jsbsim.xml      JSBSim's <aerodynamics>: name it in the aircraft as <aerodynamics file=\"...\"/>
 
 Examples:
   harvest export                                 into reports/harv/export
+  harvest export --draws 100                     and 100 models for Monte Carlo in a simulator
   harvest export mine --out model                of the pipeline pipelines/mine, into the folder model
 
 Exit codes: 0 written; 1 not written, the message says why; 2 written, and something of the campaign was rejected.";
@@ -33,6 +35,12 @@ pub struct ExportOptions {
     /// The folder to write into [default: export in the folder of the reports]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    /// Also write this many models drawn from the posterior
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    draws: usize,
+    /// Seed of the draws
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    seed: u64,
 }
 
 /// Writes the derivatives for simulators and prints the files.
@@ -42,7 +50,11 @@ pub fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
     let bars = Bars::new(options.options.quiet, None);
     let default = || config.reports.join("export");
     let folder = options.out.clone().unwrap_or_else(default);
-    let exported = model_export::export(&config, &folder, options.patience.wait(), &bars)?;
+    let draws = Draws {
+        number: options.draws,
+        seed: options.seed,
+    };
+    let exported = model_export::export(&config, &folder, draws, options.patience.wait(), &bars)?;
     if !options.options.quiet {
         let (values, from_flight) = (exported.values, exported.from_flight);
         out!("{values} values, {from_flight} of them from flight");

@@ -83,6 +83,8 @@ enum Command {
     Estimate(StageOptions),
     /// Fit least-squares trends across angle of attack
     Trend(RunOptions),
+    /// Fuse tunnel and flights to the posterior of every derivative
+    Model(RunOptions),
     /// Compare the trends with the wind-tunnel database
     Compare(RunOptions),
     /// Write the report
@@ -162,6 +164,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Segment(options) => return run_stage(Stage::Segment, &options),
         Command::Estimate(options) => return run_stage(Stage::Estimate, &options),
         Command::Trend(options) => (Stage::Trend, options),
+        Command::Model(options) => (Stage::Model, options),
         Command::Compare(options) => (Stage::Compare, options),
         Command::Status(options) => return night_commands::status(&options),
         Command::Explain(options) => return night_commands::explain(&options),

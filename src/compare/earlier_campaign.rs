@@ -163,7 +163,7 @@ mod tests {
             crate::compare::ranges::ranges_of_changes(&rows, "reports/last", &Settings::default());
         assert_eq!(
             verdicts[1].words,
-            "flight higher than reports/last at 15°, by 67%"
+            "flight higher than reports/last at 15°, by 67% ± 17%"
         );
         assert_eq!((worst.len(), worst[0].alpha_deg), (2, 20.0));
     }

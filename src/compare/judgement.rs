@@ -29,7 +29,7 @@ impl From<Agreement> for TunnelVerdict {
 impl From<TunnelVerdict> for Agreement {
     fn from(verdict: TunnelVerdict) -> Agreement {
         match verdict {
-            TunnelVerdict::NoTunnelValue => Agreement::NoValue,
+            TunnelVerdict::NoTunnelValue | TunnelVerdict::NothingLearnt => Agreement::NoValue,
             TunnelVerdict::Agrees => Agreement::Agrees,
             TunnelVerdict::FlightHigher => Agreement::Higher,
             TunnelVerdict::FlightLower => Agreement::Lower,

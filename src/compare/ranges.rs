@@ -20,6 +20,8 @@ struct ComparedAlpha<'a> {
     other: Option<f64>,
     difference_pct: Option<f64>,
     z: Option<f64>,
+    /// Standard error of the difference in percent of the other value.
+    error_pct: Option<f64>,
 }
 
 impl<'a> ComparedAlpha<'a> {
@@ -35,6 +37,7 @@ impl<'a> ComparedAlpha<'a> {
             other: r.tunnel.wind_tunnel,
             difference_pct: r.tunnel.difference_pct,
             z: r.tunnel.z,
+            error_pct: share(r.tunnel.uncertainty, r.tunnel.wind_tunnel),
         }
     }
 
@@ -50,8 +53,21 @@ impl<'a> ComparedAlpha<'a> {
             other: r.before,
             difference_pct: r.difference_pct,
             z: r.z,
+            error_pct: share(
+                Some(
+                    r.standard_error
+                        .hypot(r.before_standard_error.unwrap_or(0.0)),
+                ),
+                r.before,
+            ),
         }
     }
+}
+
+/// A value in percent of another's magnitude.
+fn share(value: Option<f64>, other: Option<f64>) -> Option<f64> {
+    let share = 100.0 * value? / other?.abs();
+    share.is_finite().then_some(share)
 }
 
 /// The ranges of the comparison with the tunnel, and the worst of them.
@@ -219,6 +235,8 @@ fn extent_in_words(run: &[ComparedAlpha]) -> String {
             format!("{share:.0}%")
         }
     };
+    let error = median(run.iter().filter_map(|p| p.error_pct));
+    let error = error.map_or_else(String::new, |error| format!(" ± {}", percent(error)));
     match (
         median(shares.iter().copied()),
         shares.first(),
@@ -226,13 +244,13 @@ fn extent_in_words(run: &[ComparedAlpha]) -> String {
     ) {
         (Some(middle), Some(least), Some(most)) if most - least > 0.5 * middle => {
             format!(
-                ", by {} ({} to {})",
+                ", by {}{error} ({} to {})",
                 percent(middle),
                 percent(*least),
                 percent(*most)
             )
         }
-        (Some(middle), ..) => format!(", by {}", percent(middle)),
+        (Some(middle), ..) => format!(", by {}{error}", percent(middle)),
         _ => {
             let apart = run
                 .iter()
@@ -265,6 +283,7 @@ mod tests {
             mach: Some(0.3),
             flight,
             standard_error: 0.1,
+            flight_share_pct: Some(99.0),
             tunnel: TunnelDifference {
                 wind_tunnel: tunnel,
                 difference: tunnel.map(|t| flight - t),
@@ -314,7 +333,7 @@ mod tests {
             sentences(&rows),
             [
                 "agrees within its uncertainty from 5° to 10°",
-                "flight lower than tunnel from 35° to 60°, by 30%"
+                "flight lower than tunnel from 35° to 60°, by 30% ± 5.0%"
             ]
         );
     }
@@ -346,7 +365,7 @@ mod tests {
         ];
         assert_eq!(
             sentences(&rows),
-            ["flight higher than tunnel from 5° to 15°, by 30% (10% to 50%)"]
+            ["flight higher than tunnel from 5° to 15°, by 30% ± 5.0% (10% to 50%)"]
         );
     }
 

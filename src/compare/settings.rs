@@ -18,6 +18,9 @@ settings! {
         /// tunnel's value. The default is about the repeatability of tunnel tests. Larger: more rows
         /// agree.
         pub agreement_pct: f64 = 5.0,
+        /// Share of the information below which flight taught nothing about a value, percent. Larger:
+        /// more rows with the verdict `nothing learnt`.
+        pub learnt_pct: f64 = 10.0,
         /// Most rows of the table `disagreements`.
         pub worst: usize = 20,
         /// Folders with the published tables of earlier campaigns or nights. Each adds its trends to

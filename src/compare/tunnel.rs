@@ -1,6 +1,7 @@
-//! Comparison of flight with the wind tunnel: trends at the tunnel's breakpoints, and each maneuver
+//! Comparison of flight with the wind tunnel: the posterior at the tunnel's breakpoints, and each maneuver
 //! at its own flight condition.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::judgement::judge;
@@ -9,62 +10,112 @@ use crate::aero::wind_tunnel::TunnelValue;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
 use crate::tables::{
-    ComparisonRow, EstimateRow, ManeuverComparisonRow, TrendRow, TunnelDifference,
+    ComparisonRow, EstimateRow, ManeuverComparisonRow, PosteriorRow, TunnelDifference,
+    TunnelVerdict,
 };
 use crate::trend;
 
-/// Compares the trend of each derivative's group with the tunnel: one row per derivative and α, in
-/// the order of the trends, at the tunnel's breakpoints where it has some there.
+/// Compares the posterior of each derivative with the tunnel: one row per derivative and α, in the
+/// order of the posterior, at the tunnel's breakpoints where it has some there. Over Mach number and
+/// third variable the point nearest to the maneuvers near that α counts.
 ///
-/// The verdict is `sign differs` where both are non-zero beyond their uncertainty and on different
-/// sides of zero; `agrees` within `agreement_z` standard errors or `agreement_pct` percent; else
-/// `flight higher` or `flight lower` in the algebraic sense: −0.3 is lower than −0.2.
-/// `difference_pct` is in percent of the tunnel value's magnitude, so it has the same sign.
+/// The posterior's standard deviation has the tunnel's uncertainty in it, so it alone is the error of
+/// the difference. The verdict is `nothing learnt` where flight gave less than `learnt_pct` of the
+/// information; `sign differs` where both are on different sides of zero, the posterior beyond its
+/// error; `agrees` within `agreement_z` errors or `agreement_pct` percent; else `flight higher` or
+/// `flight lower` in the algebraic sense: −0.3 is lower than −0.2. `difference_pct` is in percent
+/// of the tunnel value's magnitude, so it has the same sign.
 #[must_use]
-pub fn compare_trends(
-    trends: &[TrendRow],
+pub fn compare_posterior(
+    posterior: &[PosteriorRow],
     maneuvers: &[Maneuver],
     tunnel: &WindTunnel,
     groups: &trend::Settings,
     settings: &Settings,
 ) -> Vec<ComparisonRow> {
-    let row = |t: &TrendRow| {
-        let group = groups
-            .group_of(&t.derivative)
-            .filter(|g| g.name == t.group)?;
-        let of_it = || {
-            trends
-                .iter()
-                .filter(|o| o.derivative == t.derivative && o.group == t.group)
-        };
-        let breakpoints = tunnel.alphas_deg(&t.derivative);
-        let is_breakpoint = |alpha: f64| {
-            breakpoints
-                .binary_search_by(|b| b.total_cmp(&alpha))
-                .is_ok()
-        };
-        let comparable = settings.is_comparable(&t.derivative);
-        if comparable && !is_breakpoint(t.alpha_deg) && of_it().any(|o| is_breakpoint(o.alpha_deg))
-        {
-            return None;
-        }
-        let classes = maneuvers.iter().filter(|m| group.has(&m.class));
-        let condition = condition_near(classes, tunnel, t.alpha_deg, groups.alpha_step_deg);
-        let value = condition
-            .filter(|_| comparable)
-            .and_then(|condition| tunnel.at(&t.derivative, &condition));
-        Some(ComparisonRow {
-            derivative: t.derivative.clone(),
-            unit: t.unit.clone(),
-            group: t.group.clone(),
-            alpha_deg: t.alpha_deg,
-            mach: condition.map(|c| c.mach),
-            flight: t.value,
-            standard_error: t.standard_error,
-            tunnel: against_tunnel(t.value, t.standard_error, value, settings),
-        })
+    let derivatives = posterior.chunk_by(|a, b| a.derivative == b.derivative);
+    derivatives
+        .flat_map(|rows| compare_derivative(rows, maneuvers, tunnel, groups, settings))
+        .collect()
+}
+
+/// Rows of one derivative.
+fn compare_derivative(
+    rows: &[PosteriorRow],
+    maneuvers: &[Maneuver],
+    tunnel: &WindTunnel,
+    groups: &trend::Settings,
+    settings: &Settings,
+) -> Vec<ComparisonRow> {
+    let name = &rows[0].derivative;
+    let group = groups.group_of(name);
+    let breakpoints = tunnel.alphas_deg(name);
+    let is_breakpoint = |row: &&PosteriorRow| breakpoints.contains(&row.alpha_deg);
+    let has_breakpoints = rows.iter().any(|row| is_breakpoint(&row));
+    let mut alphas: Vec<f64> = rows
+        .iter()
+        .filter(|row| !has_breakpoints || is_breakpoint(row))
+        .map(|row| row.alpha_deg)
+        .collect();
+    alphas.sort_by(f64::total_cmp);
+    alphas.dedup();
+    let row = |alpha_deg: f64| {
+        let of_group = |m: &&Maneuver| group.is_none_or(|group| group.has(&m.class));
+        let flown = maneuvers.iter().filter(of_group);
+        let condition = condition_near(flown, tunnel, alpha_deg, groups.alpha_step_deg);
+        let there = rows
+            .iter()
+            .filter(|row| row.alpha_deg.total_cmp(&alpha_deg).is_eq());
+        let nearest = there.min_by(|a, b| {
+            let distance = |row: &PosteriorRow| distance(row, condition.as_ref());
+            distance(a)
+                .partial_cmp(&distance(b))
+                .unwrap_or(Ordering::Equal)
+        })?;
+        let group = group.map_or_else(String::new, |g| g.name.clone());
+        Some(comparison_row(nearest, group, condition, settings))
     };
-    trends.iter().filter_map(row).collect()
+    alphas.into_iter().filter_map(row).collect()
+}
+
+/// Distance of a row from a condition: over Mach number first, then the third variable.
+fn distance(row: &PosteriorRow, condition: Option<&Condition>) -> (f64, f64) {
+    let apart = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| (a - b).abs());
+    (
+        apart(row.mach, condition.map(|c| c.mach)),
+        apart(row.third, condition.and_then(|c| c.third)),
+    )
+}
+
+fn comparison_row(
+    row: &PosteriorRow,
+    group: String,
+    condition: Option<Condition>,
+    settings: &Settings,
+) -> ComparisonRow {
+    let is_comparable = settings.is_comparable(&row.derivative);
+    let value = row.wind_tunnel.filter(|_| is_comparable);
+    let value = value.map(|value| TunnelValue {
+        value,
+        uncertainty: None,
+    });
+    let mut tunnel = against_tunnel(row.value, row.standard_deviation, value, settings);
+    let share = row.flight_share_pct.unwrap_or(0.0);
+    let is_learnt = row.maneuvers > 0 && share >= settings.learnt_pct;
+    if value.is_some() && !is_learnt {
+        tunnel.verdict = TunnelVerdict::NothingLearnt;
+    }
+    ComparisonRow {
+        derivative: row.derivative.clone(),
+        unit: row.unit.clone(),
+        group,
+        alpha_deg: row.alpha_deg,
+        mach: condition.map(|c| c.mach),
+        flight: row.value,
+        standard_error: row.standard_deviation,
+        flight_share_pct: row.flight_share_pct,
+        tunnel,
+    }
 }
 
 /// Compares the estimates of each maneuver with the tunnel at the maneuver's mean flight condition:
@@ -171,26 +222,23 @@ mod tests {
     use crate::aero::Axis;
     use crate::aero::wind_tunnel::TunnelPoint;
     use crate::maneuver::ManeuverOrigin;
-    use crate::tables::TunnelVerdict;
     use approx::assert_relative_eq;
 
-    fn flight(value: f64, standard_error: f64) -> TrendRow {
-        TrendRow {
+    fn flight(value: f64, standard_deviation: f64) -> PosteriorRow {
+        PosteriorRow {
             derivative: "d".into(),
             unit: "per_deg".into(),
-            group: "all".into(),
             alpha_deg: 20.0,
+            mach: None,
+            third: None,
             value,
-            standard_error,
-            lower_95: value - 2.0 * standard_error,
-            upper_95: value + 2.0 * standard_error,
-            prediction_lower_95: 0.0,
-            prediction_upper_95: 0.0,
-            outliers: 0,
-            curve: "polynomial".into(),
-            maneuvers: 10,
-            order: 1,
-            scatter: 0.0,
+            standard_deviation,
+            lower_95: value - 2.0 * standard_deviation,
+            upper_95: value + 2.0 * standard_deviation,
+            wind_tunnel: None,
+            prior_deviation: 1.0,
+            flight_share_pct: Some(99.0),
+            maneuvers: 3,
         }
     }
 
@@ -216,114 +264,95 @@ mod tests {
         }
     }
 
-    fn tunnel(value: f64, uncertainty: Option<f64>) -> WindTunnel {
-        let mut tunnel = WindTunnel::default();
-        tunnel.insert(
-            "d",
-            TunnelPoint {
-                alpha_deg: 20.0,
-                mach: None,
-                value,
-                uncertainty,
-                source: None,
-            },
-        );
-        tunnel
-    }
-
-    fn one(trend: TrendRow, tunnel: &WindTunnel, settings: &Settings) -> ComparisonRow {
+    fn one(row: PosteriorRow, value: Option<f64>, settings: &Settings) -> ComparisonRow {
         let maneuvers = [maneuver("A", 20.3, 0.3)];
-        let mut rows = compare_trends(
-            &[trend],
+        let row = PosteriorRow {
+            wind_tunnel: value,
+            ..row
+        };
+        let groups = trend::Settings::default();
+        let mut rows = compare_posterior(
+            &[row],
             &maneuvers,
-            tunnel,
-            &trend::Settings::default(),
+            &WindTunnel::default(),
+            &groups,
             settings,
         );
         assert_eq!(rows.len(), 1);
         rows.remove(0)
     }
 
-    fn verdict_on(trend: TrendRow, value: f64, uncertainty: Option<f64>) -> TunnelVerdict {
-        one(trend, &tunnel(value, uncertainty), &Settings::default())
-            .tunnel
-            .verdict
+    fn verdict_on(row: PosteriorRow, value: f64) -> TunnelVerdict {
+        one(row, Some(value), &Settings::default()).tunnel.verdict
     }
 
     #[test]
     fn flight_and_tunnel_agree_within_two_standard_errors() {
+        assert_eq!(verdict_on(flight(1.19, 0.1), 1.0), TunnelVerdict::Agrees);
         assert_eq!(
-            verdict_on(flight(1.19, 0.1), 1.0, None),
-            TunnelVerdict::Agrees
-        );
-        assert_eq!(
-            verdict_on(flight(1.21, 0.1), 1.0, None),
+            verdict_on(flight(1.21, 0.1), 1.0),
             TunnelVerdict::FlightHigher
         );
         assert_eq!(
-            verdict_on(flight(0.79, 0.1), 1.0, None),
+            verdict_on(flight(0.79, 0.1), 1.0),
             TunnelVerdict::FlightLower
         );
     }
 
     #[test]
-    fn the_tunnel_s_uncertainty_counts() {
+    fn a_tenth_of_the_information_is_nothing_learnt() {
+        let with_share = |share: f64, maneuvers: usize| PosteriorRow {
+            flight_share_pct: Some(share),
+            maneuvers,
+            ..flight(1.5, 0.1)
+        };
         assert_eq!(
-            verdict_on(flight(1.25, 0.1), 1.0, Some(0.1)),
-            TunnelVerdict::Agrees
+            verdict_on(with_share(9.9, 3), 1.0),
+            TunnelVerdict::NothingLearnt
         );
-        let row = one(
-            flight(1.5, 0.3),
-            &tunnel(1.0, Some(0.4)),
-            &Settings::default(),
+        assert_eq!(
+            verdict_on(with_share(10.1, 3), 1.0),
+            TunnelVerdict::FlightHigher
         );
-        assert_relative_eq!(row.tunnel.z.expect("z"), 1.0);
+        assert_eq!(
+            verdict_on(with_share(99.0, 0), 1.0),
+            TunnelVerdict::NothingLearnt
+        );
     }
 
     #[test]
     fn a_small_difference_agrees_however_well_it_is_determined() {
+        assert_eq!(verdict_on(flight(-1.04, 1e-6), -1.0), TunnelVerdict::Agrees);
         assert_eq!(
-            verdict_on(flight(-1.04, 1e-6), -1.0, None),
-            TunnelVerdict::Agrees
-        );
-        assert_eq!(
-            verdict_on(flight(-1.06, 1e-6), -1.0, None),
+            verdict_on(flight(-1.06, 1e-6), -1.0),
             TunnelVerdict::FlightLower
         );
         assert_eq!(
-            verdict_on(flight(-0.94, 1e-6), -1.0, None),
+            verdict_on(flight(-0.94, 1e-6), -1.0),
             TunnelVerdict::FlightHigher
         );
     }
 
     #[test]
-    fn signs_differ_only_where_both_are_sure() {
+    fn signs_differ_only_where_flight_is_sure() {
         assert_eq!(
-            verdict_on(flight(-0.5, 0.1), 1.0, Some(0.1)),
+            verdict_on(flight(-0.5, 0.1), 1.0),
             TunnelVerdict::SignDiffers
         );
         assert_eq!(
-            verdict_on(flight(-0.1, 0.1), 1.0, Some(0.1)),
+            verdict_on(flight(-0.1, 0.1), 1.0),
             TunnelVerdict::FlightLower
-        );
-        assert_eq!(
-            verdict_on(flight(0.5, 0.1), -0.1, Some(0.1)),
-            TunnelVerdict::FlightHigher
         );
     }
 
     #[test]
     fn a_derivative_without_a_tunnel_value_says_so() {
-        let none = one(
-            flight(1.0, 0.1),
-            &WindTunnel::default(),
-            &Settings::default(),
-        );
+        let none = one(flight(1.0, 0.1), None, &Settings::default());
         let settings = Settings {
             not_comparable: ["d".to_owned()].into(),
             ..Settings::default()
         };
-        let refused = one(flight(1.0, 0.1), &tunnel(1.0, None), &settings);
+        let refused = one(flight(1.0, 0.1), Some(1.0), &settings);
         for row in [none, refused] {
             assert_eq!(row.tunnel.verdict, TunnelVerdict::NoTunnelValue);
             assert_eq!(
@@ -340,15 +369,11 @@ mod tests {
 
     #[test]
     fn the_numbers_of_a_row_are_those_of_their_definitions() {
-        let row = one(
-            flight(-1.5, 0.25),
-            &tunnel(-2.0, None),
-            &Settings::default(),
-        );
+        let row = one(flight(-1.5, 0.25), Some(-2.0), &Settings::default());
         assert_relative_eq!(row.tunnel.difference.expect("difference"), 0.5);
         assert_relative_eq!(row.tunnel.difference_pct.expect("percent"), 25.0);
         assert_relative_eq!(row.tunnel.z.expect("z"), 2.0);
-        let zero = one(flight(1.0, 0.0), &tunnel(0.0, None), &Settings::default());
+        let zero = one(flight(1.0, 0.0), Some(0.0), &Settings::default());
         assert_eq!(
             (
                 zero.tunnel.difference_pct,
@@ -360,23 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tunnel_is_read_at_the_mach_of_the_group_s_maneuvers_near_that_alpha() {
-        let mut tunnel = WindTunnel::default();
-        for (alpha_deg, mach, value) in [
-            (20.0, 0.2, 2.0),
-            (20.0, 0.6, 6.0),
-            (30.0, 0.2, 2.0),
-            (30.0, 0.6, 6.0),
-        ] {
-            let point = TunnelPoint {
-                alpha_deg,
-                mach: Some(mach),
-                value,
-                uncertainty: None,
-                source: None,
-            };
-            tunnel.insert("d", point);
-        }
+    fn the_point_nearest_to_the_flown_mach_number_is_compared() {
         let group = trend::Group {
             name: "A".into(),
             classes: vec!["A".into()],
@@ -389,33 +398,29 @@ mod tests {
         let maneuvers = [
             maneuver("A", 19.0, 0.3),
             maneuver("A", 21.0, 0.4),
-            maneuver("B", 20.0, 0.6),
-            maneuver("A", 40.0, 0.2),
+            maneuver("B", 20.0, 0.9),
         ];
-        let of = |group: &str, alpha_deg: f64| TrendRow {
-            group: group.into(),
-            alpha_deg,
+        let at = |mach: f64| PosteriorRow {
+            mach: Some(mach),
+            wind_tunnel: Some(10.0 * mach),
             ..flight(3.5, 0.1)
         };
-        let trends = [of("A", 20.0), of("B", 20.0), of("A", 30.0)];
-        let rows = compare_trends(&trends, &maneuvers, &tunnel, &groups, &Settings::default());
-        // The trend of class B does not speak for the derivative; no maneuver is within half a step
-        // of 30°, and the nearest is that at 21°.
-        assert_eq!(rows.len(), 2);
-        assert_relative_eq!(
-            rows[0].tunnel.wind_tunnel.expect("tunnel"),
-            3.5,
-            max_relative = 1e-12
+        let posterior = [at(0.2), at(0.4), at(0.6)];
+        let tunnel = WindTunnel::default();
+        let rows = compare_posterior(
+            &posterior,
+            &maneuvers,
+            &tunnel,
+            &groups,
+            &Settings::default(),
         );
-        assert_relative_eq!(
-            rows[1].tunnel.wind_tunnel.expect("tunnel"),
-            4.0,
-            max_relative = 1e-12
-        );
+        assert_eq!(rows.len(), 1);
+        assert_relative_eq!(rows[0].tunnel.wind_tunnel.expect("tunnel"), 4.0);
+        assert_relative_eq!(rows[0].mach.expect("mach"), 0.35);
     }
 
     #[test]
-    fn the_tunnel_is_compared_at_its_own_breakpoints_where_a_trend_has_some() {
+    fn the_tunnel_is_compared_at_its_own_breakpoints_where_the_posterior_has_some() {
         let mut tunnel = WindTunnel::default();
         for alpha_deg in [12.5, 20.0] {
             tunnel.insert(
@@ -429,14 +434,14 @@ mod tests {
                 },
             );
         }
-        let at = |alpha_deg: f64| TrendRow {
+        let at = |alpha_deg: f64| PosteriorRow {
             alpha_deg,
             ..flight(1.0, 0.1)
         };
-        let alphas = |trends: &[TrendRow]| -> Vec<f64> {
+        let alphas = |rows: &[PosteriorRow]| -> Vec<f64> {
             let maneuvers = [maneuver("A", 20.3, 0.3)];
             let groups = trend::Settings::default();
-            let rows = compare_trends(trends, &maneuvers, &tunnel, &groups, &Settings::default());
+            let rows = compare_posterior(rows, &maneuvers, &tunnel, &groups, &Settings::default());
             rows.iter().map(|r| r.alpha_deg).collect()
         };
         assert_eq!(

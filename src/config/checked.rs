@@ -9,7 +9,7 @@ use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, model, segment, trend};
 
 /// Configuration of a pipeline: everything that decides a campaign's results.
 #[derive(Clone, Debug)]
@@ -38,6 +38,7 @@ pub struct Config {
     pub segment: segment::Settings,
     pub estimate: estimate::Settings,
     pub trend: trend::Settings,
+    pub model: model::Settings,
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,

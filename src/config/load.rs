@@ -85,6 +85,7 @@ impl Config {
             segment: pipeline.segment,
             estimate: pipeline.estimate,
             trend: pipeline.trend,
+            model: pipeline.model,
             compare: against(pipeline.compare, overrides.against),
             export: pipeline.export,
             report: pipeline.report,
@@ -110,6 +111,7 @@ fn pipeline_file(source: &Source) -> Result<PipelineFile> {
 /// read them.
 fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>) {
     pipeline.ingest.share();
+    pipeline.model.tunnel_uncertainty_pct = pipeline.estimate.held_uncertainty_pct;
     let compatibility = &mut pipeline.ingest.compatibility;
     for (signal, instrument) in errors {
         if let Some(size) = compatibility.ordinary.of_signal(signal) {

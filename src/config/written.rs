@@ -15,7 +15,7 @@ use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
 use crate::settings::settings;
-use crate::{compare, estimate, export, ingest, segment, trend};
+use crate::{compare, estimate, export, ingest, model, segment, trend};
 
 settings! {
     /// `pipeline.yaml`. Paths are relative to the folder harvest is run in.
@@ -55,6 +55,9 @@ settings! {
         /// Trends across angle of attack.
         #[serde(default)]
         pub trend: trend::Settings,
+        /// Posterior: tunnel and flight as one answer.
+        #[serde(default)]
+        pub model: model::Settings,
         /// Comparison with the wind tunnel and earlier campaigns.
         #[serde(default)]
         pub compare: compare::Settings,

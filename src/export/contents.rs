@@ -4,9 +4,8 @@ use super::derivative_table::DerivativeTable;
 use super::settings::Settings;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::maneuver::Maneuver;
-use crate::tables::{EstimateRow, TrendRow};
-use crate::trend;
+use crate::model::CorrelatedDerivatives;
+use crate::tables::PosteriorRow;
 
 /// Everything that an export is made from.
 #[derive(Clone, Copy, Debug)]
@@ -15,11 +14,9 @@ pub struct Contents<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub tunnel: &'a WindTunnel,
-    pub trends: &'a [TrendRow],
-    /// Estimates of converged maneuvers, for the flown ranges.
-    pub estimates: &'a [EstimateRow],
-    pub maneuvers: &'a [Maneuver],
-    pub groups: &'a trend::Settings,
+    pub posterior: &'a [PosteriorRow],
+    /// Correlations between derivatives of the posterior.
+    pub correlations: &'a [CorrelatedDerivatives],
     pub settings: &'a Settings,
 }
 

@@ -7,6 +7,7 @@ use super::contents::{COEFFICIENTS, Contents, terms};
 use super::derivative_table::{DerivativeTable, GridCell};
 use super::xml::{Xml, escaped};
 use crate::aero::{Coefficient, Derivative, Regressor};
+use crate::model::CorrelatedDerivatives;
 
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n\
     <!DOCTYPE DAVEfunc PUBLIC \"-//AIAA//DTD for Flight Dynamic Models - Functions 2.0//EN\" \
@@ -48,7 +49,7 @@ pub fn document(contents: &Contents, tables: &[DerivativeTable]) -> String {
             &table.sources(),
             Mark::Output,
         );
-        let words = format!("1 where {name} is flight's, 0 where it is the tunnel's");
+        let words = format!("1 where flight gave half or more of what is known of {name}, else 0");
         variable(&mut xml, name, &flag(name), "nd", &words, Mark::Output);
     }
     for coefficient in COEFFICIENTS {
@@ -60,7 +61,7 @@ pub fn document(contents: &Contents, tables: &[DerivativeTable]) -> String {
         xml.close();
     }
     for table in tables {
-        gridded(table, &mut xml);
+        gridded(contents, table, &mut xml);
     }
     for table in tables {
         function(
@@ -86,8 +87,9 @@ fn header(contents: &Contents, xml: &mut Xml) {
     );
     xml.empty("creationDate", &[("date", &settings.date)]);
     let text = format!(
-        "{}: flight-updated derivatives: trends of flight tests where there is data, wind tunnel elsewhere; each table \
-         says which, and a function <name>_is_flight says it at every point. Body axes: CN up, CA aft, CY right, moments \
+        "{}: flight-updated derivatives: posterior of flight tests and wind tunnel; each table says which it is \
+         mostly, and a function <name>_is_flight says it at every point. Uncertainties are standard deviations; correlations \
+         between derivatives are means over the breakpoints. Body axes: CN up, CA aft, CY right, moments \
          right wing down, nose up, nose right, about the c.g. Reference area {} ft2, span {} ft, chord {} ft. Thrust \
          vectoring is in lbf and ft lbf and in no coefficient. Tables are linear between their points and constant beyond.",
         contents.title, a.wing_area_ft2, a.span_ft, a.chord_ft
@@ -280,7 +282,22 @@ fn variables<'a>(table: &DerivativeTable, third: Option<&'a str>) -> Vec<(&'stat
     variables
 }
 
-fn gridded(table: &DerivativeTable, xml: &mut Xml) {
+/// Writes a table's correlations: first the derivatives that name it below their own table, then those
+/// before it with the coefficient.
+fn correlations(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
+    let own = |pair: &&CorrelatedDerivatives| pair.first == table.derivative;
+    for pair in contents.correlations.iter().filter(own) {
+        xml.empty("correlatesWith", &[("varID", &pair.second)]);
+    }
+    let named = |pair: &&CorrelatedDerivatives| pair.second == table.derivative;
+    for pair in contents.correlations.iter().filter(named) {
+        let coefficient = pair.correlation.to_string();
+        let attributes = [("varID", pair.first.as_str()), ("corrCoef", &coefficient)];
+        xml.empty("correlation", &attributes);
+    }
+}
+
+fn gridded(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
     let n = table.alphas_deg.len().max(1);
     let lines = |of: &dyn Fn(&GridCell) -> f64| -> Vec<String> {
         let values: Vec<f64> = table.cells.iter().map(of).collect();
@@ -321,7 +338,9 @@ fn gridded(table: &DerivativeTable, xml: &mut Xml) {
             &[],
             &lines(&|c| c.uncertainty.unwrap_or_default()),
         );
-        for _ in 0..3 {
+        xml.close();
+        correlations(contents, table, xml);
+        for _ in 0..2 {
             xml.close();
         }
     }

@@ -1,7 +1,7 @@
 //! One derivative over the grid of the export.
 
 use crate::aero::Condition;
-use crate::tables::ExportRow;
+use crate::tables::{DrawRow, ExportRow};
 
 /// One derivative over the grid of angle of attack, Mach number and third variable.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,20 +62,7 @@ impl DerivativeTable {
         places.map(condition).zip(&self.cells)
     }
 
-    /// Cell at one of the table's own points.
-    pub(super) fn cell(&self, at: &Condition) -> Option<&GridCell> {
-        let own = |a: f64, b: f64| is_same_breakpoint(a, b) || a.is_nan() || b.is_nan();
-        let there = |(point, _): &(Condition, &GridCell)| {
-            let third = point
-                .third
-                .zip(at.third)
-                .is_none_or(|(a, b)| is_same_breakpoint(a, b));
-            is_same_breakpoint(point.alpha_deg, at.alpha_deg) && own(point.mach, at.mach) && third
-        };
-        self.points().find(there).map(|(_, cell)| cell)
-    }
-
-    /// Ranges of α by source: `flight, trend of all: 10° to 40°; wind tunnel: 5°, 45° to 60°`.
+    /// Ranges of α by source: `posterior: mostly flight: 10° to 40°; wind tunnel: 5°`.
     ///
     /// For a table over Mach numbers, the ranges are those at a flown Mach number.
     #[must_use]
@@ -109,6 +96,21 @@ impl DerivativeTable {
             .collect();
         words.join("; ")
     }
+}
+
+/// Rows of one draw's tables.
+#[must_use]
+pub fn draw_rows(draw: usize, tables: &[DerivativeTable]) -> Vec<DrawRow> {
+    let row = |row: ExportRow| DrawRow {
+        draw,
+        derivative: row.derivative,
+        alpha_deg: row.alpha_deg,
+        mach: row.mach,
+        third: row.third,
+        value: row.value,
+        unit: row.unit,
+    };
+    rows(tables).into_iter().map(row).collect()
 }
 
 /// Rows of the tables, in the columns of a wind-tunnel database.

@@ -18,7 +18,7 @@ pub fn section(contents: &Contents, tables: &[DerivativeTable]) -> String {
     xml.open("aerodynamics", &[]);
     let a = contents.aircraft;
     let description = format!(
-        "{}: derivatives from flight where it has data, from the wind tunnel elsewhere; each function says which. \
+        "{}: posterior of flight tests and wind tunnel; each function says which it mostly is. \
          Reference area {} ft2, span {} ft, chord {} ft: metrics must be the same. Moments are about the c.g.: put the \
          aerodynamic reference point (AERORP) there. Signals that have no property of their own begin with harvest/ and \
          are to be set by the flight control section, in the unit of their names.",

@@ -13,6 +13,8 @@ words! {
         Estimate = "estimate",
         /// Derivatives to trends across angle of attack.
         Trend = "trend",
+        /// Tunnel and derivatives to the posterior.
+        Model = "model",
         /// Trends against the tunnel and earlier campaigns.
         Compare = "compare",
         /// The report.

@@ -107,6 +107,7 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
             ]),
         ),
         (Stage::Trend, named([("trend", value(&config.trend))])),
+        (Stage::Model, named([("model", value(&config.model))])),
         (Stage::Compare, named([("compare", value(&config.compare))])),
         (
             Stage::Report,

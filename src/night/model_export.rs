@@ -9,7 +9,8 @@ use crate::config::Config;
 use crate::error::{Problem, Result};
 use crate::export::{self, Contents, daveml, jsbsim};
 use crate::lineage::Stage;
-use crate::pipeline::{Campaign, Conductor, Progress, converged_estimates};
+use crate::numerics::random::RandomStream;
+use crate::pipeline::{Campaign, Conductor, Progress};
 use crate::store::table::Shelf;
 use crate::store::{atomic, table};
 
@@ -26,6 +27,14 @@ pub struct Exported {
     pub problems: Vec<Problem>,
 }
 
+/// Models to be drawn from the posterior.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Draws {
+    pub number: usize,
+    /// Seed of the random numbers: the same seed draws the same models.
+    pub seed: u64,
+}
+
 /// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and
 /// writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
 /// (`_jsbsim.xml`) into a folder. The published night stays as it is.
@@ -35,25 +44,59 @@ pub struct Exported {
 pub fn export(
     config: &Config,
     folder: &Path,
+    draws: Draws,
     wait: Duration,
     progress: &dyn Progress,
 ) -> Result<Exported> {
     let conductor = Conductor::open(config, wait, progress)?;
-    let campaign = conductor.campaign(Stage::Compare)?;
-    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Compare);
-    let estimates = converged_estimates(config, &campaign);
+    let campaign = conductor.campaign(Stage::Model)?;
+    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
+    let correlations = campaign.model.correlations();
     let contents = Contents {
         title: &config.title,
         aircraft: &config.aircraft,
         buildup: &config.buildup,
         tunnel: &config.tunnel,
-        trends: &campaign.trends,
-        estimates: &estimates,
-        maneuvers: &campaign.maneuvers,
-        groups: &config.trend,
+        posterior: &campaign.model.rows.posterior,
+        correlations: &correlations,
         settings: &config.export,
     };
-    write(&contents, &campaign, folder, &shelf)
+    let mut exported = write(&contents, &campaign, folder, &shelf)?;
+    if draws.number > 0 {
+        exported
+            .files
+            .extend(write_draws(&contents, &campaign, folder, &shelf, draws)?);
+    }
+    Ok(exported)
+}
+
+/// Writes the models drawn: one table of all, and a JSBSim section of each.
+fn write_draws(
+    contents: &Contents,
+    campaign: &Campaign,
+    folder: &Path,
+    shelf: &Shelf,
+    draws: Draws,
+) -> Result<Vec<PathBuf>> {
+    let mut all = Vec::new();
+    let mut files = ["draws.csv", "draws.parquet"]
+        .map(|name| folder.join(name))
+        .to_vec();
+    let mut stream = RandomStream::new(draws.seed, "draws");
+    for draw in 1..=draws.number {
+        let posterior = campaign.model.drawn(&mut stream);
+        let drawn = Contents {
+            posterior: &posterior,
+            ..*contents
+        };
+        let tables = export::tables(&drawn);
+        let section = folder.join(format!("draw_{draw:04}_jsbsim.xml"));
+        atomic::place(&section, jsbsim::section(&drawn, &tables).as_bytes())?;
+        files.push(section);
+        all.extend(export::draw_rows(draw, &tables));
+    }
+    table::publish(shelf, &all)?;
+    Ok(files)
 }
 
 fn write(

@@ -30,6 +30,9 @@ pub fn publish_tables(
     if until >= Stage::Trend {
         publish_trend(&shelf(Stage::Trend), campaign)?;
     }
+    if until >= Stage::Model {
+        publish_model(&shelf(Stage::Model), campaign)?;
+    }
     if until >= Stage::Compare {
         publish_compare(&shelf(Stage::Compare), campaign)?;
     }
@@ -76,6 +79,15 @@ fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
 fn publish_trend(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.outliers)?;
     table::publish(shelf, &campaign.trends)
+}
+
+fn publish_model(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    let rows = &campaign.model.rows;
+    table::publish(shelf, &rows.posterior)?;
+    table::publish(shelf, &rows.covariance)?;
+    table::publish(shelf, &rows.scales)?;
+    table::publish(shelf, &rows.contributions)?;
+    table::publish(shelf, &rows.self_check)
 }
 
 fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {

@@ -4,10 +4,14 @@
 pub mod chi_squared;
 pub(crate) mod harmonics;
 pub(crate) mod matrix;
+pub mod minimise;
 pub mod order_statistics;
+pub mod random;
+pub mod root;
 pub(crate) mod row_products;
 pub mod runge_kutta;
 pub(crate) mod simd;
 pub mod student;
 pub mod symmetric;
+pub mod triangular;
 pub mod trig;

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use super::ingested::Flight;
 use crate::error::Problem;
+use crate::estimate::Covariance;
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Unknown};
+use crate::model::Model;
 use crate::output_error::Outcome;
 use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
@@ -88,9 +90,13 @@ pub struct Campaign {
     /// Prediction of each maneuver from others, in the order of the maneuvers; empty if switched
     /// off.
     pub predicted: Vec<Predicted>,
+    /// Covariance of each maneuver's parameters, in the order of the maneuvers.
+    pub covariances: Vec<Option<Covariance>>,
     pub trends: Vec<TrendRow>,
     /// Maneuvers far from their trend.
     pub outliers: Vec<OutlierRow>,
+    /// Posterior of every derivative.
+    pub model: Model,
     pub comparison: Vec<ComparisonRow>,
     pub maneuver_comparison: Vec<ManeuverComparisonRow>,
     /// Readings of the tunnel beyond its tables.

@@ -9,6 +9,7 @@ use super::flight_contents::{FlightContents, source_file};
 use super::group_steps::{self, JointStep, PredictStep};
 use super::ingest_step::{self, IngestStep};
 use super::lift_check;
+use super::model_stage::{self, MODEL_VERSION};
 use super::progress::Progress;
 use super::segment_step::{self, SegmentStep};
 use super::step::Step;
@@ -44,6 +45,7 @@ fn version_of<S: Step>() -> (&'static str, u32) {
 pub fn method_versions() -> BTreeMap<String, u32> {
     let made_anew = [
         (Stage::Trend.name(), TREND_VERSION),
+        (Stage::Model.name(), MODEL_VERSION),
         (Stage::Compare.name(), COMPARE_VERSION),
     ];
     step_versions()
@@ -189,6 +191,9 @@ impl<'a> Conductor<'a> {
         }
         if until >= Stage::Trend {
             trend_stage::fit_trends(config, &mut campaign);
+        }
+        if until >= Stage::Model {
+            model_stage::fit_model(config, &mut campaign);
         }
         if until >= Stage::Compare {
             trend_stage::compare(config, &self.earlier, &mut campaign);

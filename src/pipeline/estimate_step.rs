@@ -254,6 +254,7 @@ pub fn collect_rows(campaign: &mut Campaign, estimates: Vec<Estimated>) {
             ));
         }
         campaign.fits.push(estimated.fit);
+        campaign.covariances.push(estimated.covariance);
         campaign.estimates.extend(estimated.estimates);
         campaign.combined.extend(estimated.combined);
         campaign.fit_outputs.extend(estimated.fit_outputs);

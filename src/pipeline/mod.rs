@@ -28,6 +28,7 @@ pub mod show;
 mod step;
 mod step_runner;
 mod surfaces_step;
+mod model_stage;
 mod trend_stage;
 
 pub use progress::Progress;
@@ -41,4 +42,3 @@ pub(crate) use report_stage::{PAGE, PRINTED_PAGE, Report, make_report};
 pub(crate) use segment_step::SegmentStep;
 pub(crate) use step::Step;
 pub(crate) use step_runner::Absent;
-pub(crate) use trend_stage::converged_estimates;

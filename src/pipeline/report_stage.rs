@@ -71,6 +71,7 @@ pub fn make_report(
         predictions: &campaign.predictions(),
         correlations: &campaign.correlations,
         limits: &config.estimate.identifiability,
+        posterior: &campaign.model.rows.posterior,
         trends: &campaign.trends,
         comparison: &campaign.comparison,
         flights: &campaign.flight_rows,

@@ -18,7 +18,7 @@ use crate::trend;
 pub const TREND_VERSION: u32 = 3;
 
 /// Version of the comparison.
-pub const COMPARE_VERSION: u32 = 1;
+pub const COMPARE_VERSION: u32 = 2;
 
 /// Reads the published trends of the earlier campaigns that the analyst names.
 ///
@@ -60,12 +60,17 @@ pub fn fit_trends(config: &Config, campaign: &mut Campaign) {
     campaign.outliers = found.outliers;
 }
 
-/// Compares trends and maneuvers with the tunnel, and trends with earlier campaigns.
+/// Compares posterior and maneuvers with the tunnel, and trends with earlier campaigns.
 pub fn compare(config: &Config, earlier: &[Earlier], campaign: &mut Campaign) {
     let (tunnel, settings) = (&config.tunnel, &config.compare);
     let maneuvers = &campaign.maneuvers;
-    let comparison =
-        compare::compare_trends(&campaign.trends, maneuvers, tunnel, &config.trend, settings);
+    let comparison = compare::compare_posterior(
+        &campaign.model.rows.posterior,
+        maneuvers,
+        tunnel,
+        &config.trend,
+        settings,
+    );
     let converged = converged_estimates(config, campaign);
     let maneuver_comparison = compare::compare_maneuvers(&converged, maneuvers, tunnel, settings);
     let extrapolations =

@@ -12,7 +12,7 @@ use crate::output_error::identifiability::Limits;
 use crate::tables::{
     AgreementRow, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
     CorrelationRow, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow, History, HistoryOutput,
-    InstrumentRow, Outcome, TrendRow, TunnelDifference, TunnelVerdict,
+    InstrumentRow, Outcome, PosteriorRow, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -25,6 +25,7 @@ pub struct Campaign {
     pub correlations: Vec<CorrelationRow>,
     pub limits: Limits,
     pub trends: Vec<TrendRow>,
+    pub posterior: Vec<PosteriorRow>,
     pub comparison: Vec<ComparisonRow>,
     pub flights: Vec<FlightRow>,
     pub channels: Vec<ChannelRow>,
@@ -53,6 +54,7 @@ impl Campaign {
             predictions: &self.predictions,
             correlations: &self.correlations,
             limits: &self.limits,
+            posterior: &self.posterior,
             trends: &self.trends,
             comparison: &self.comparison,
             flights: &self.flights,
@@ -300,6 +302,21 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         order: 2,
         scatter: 0.001,
     });
+    campaign.posterior.push(PosteriorRow {
+        derivative: name.into(),
+        unit: unit.into(),
+        alpha_deg,
+        mach: None,
+        third: None,
+        value,
+        standard_deviation: 0.001,
+        lower_95: value - 0.002,
+        upper_95: value + 0.002,
+        wind_tunnel: Some(0.05),
+        prior_deviation: 0.01,
+        flight_share_pct: Some(99.0),
+        maneuvers: 10,
+    });
     campaign.comparison.push(ComparisonRow {
         derivative: name.into(),
         unit: unit.into(),
@@ -308,6 +325,7 @@ fn compare(campaign: &mut Campaign, name: &str, unit: &str, alpha_deg: f64) {
         mach: Some(0.3),
         flight: value,
         standard_error: 0.001,
+        flight_share_pct: Some(99.0),
         tunnel: TunnelDifference {
             wind_tunnel: Some(0.05),
             difference: Some(value - 0.05),

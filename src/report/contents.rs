@@ -10,7 +10,7 @@ use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
 use crate::tables::{
     AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
-    FitRow, FlightRow, History, InstrumentRow, TrendRow,
+    FitRow, FlightRow, History, InstrumentRow, PosteriorRow, TrendRow,
 };
 
 /// A maneuver class of the configuration.
@@ -38,6 +38,7 @@ pub struct Contents<'a> {
     pub correlations: &'a [CorrelationRow],
     /// Limits above which a correlation, a variance inflation or a condition index is flagged.
     pub limits: &'a Limits,
+    pub posterior: &'a [PosteriorRow],
     pub trends: &'a [TrendRow],
     pub comparison: &'a [ComparisonRow],
     pub flights: &'a [FlightRow],

@@ -11,8 +11,8 @@ table! {
         pub wind_tunnel: Option<f64>,
         /// Flight minus tunnel, in the column `unit`.
         pub difference: Option<f64>,
-        /// Standard error of the difference, in the column `unit`: root sum of squares of
-        /// flight's and the tunnel's stated one.
+        /// Standard error of the difference, in the column `unit`: the posterior's standard deviation;
+        /// for a maneuver the root sum of squares of its bound and the tunnel's stated error.
         pub uncertainty: Option<f64>,
         /// Difference over the tunnel's magnitude.
         pub difference_pct: Option<f64> ["%"],
@@ -24,23 +24,24 @@ table! {
 }
 
 table! {
-    /// Trends against the wind tunnel.
+    /// Posterior against the wind tunnel.
     pub struct ComparisonRow in "comparison" per "derivative and angle of attack" {
         /// Name of the derivative in the model.
         pub derivative: String,
         /// Unit of the derivative.
         pub unit: String,
-        /// Group whose trend is flight's value.
+        /// Group of classes that has the derivative's trend.
         pub group: String,
-        /// Angle of attack: the tunnel's breakpoints where it has some inside the trend, else the
-        /// trend's own.
+        /// Angle of attack: the tunnel's breakpoints where it has some, else the posterior's.
         pub alpha_deg: f64 ["deg"],
-        /// Mean Mach number of the group's maneuvers near that angle, at which the tunnel is read.
+        /// Mean Mach number of the group's maneuvers near that angle.
         pub mach: Option<f64> ["1"],
-        /// Value of the trend, in the column `unit`.
+        /// Value of the posterior, in the column `unit`.
         pub flight: f64,
-        /// Standard error of the trend, in the column `unit`.
+        /// Standard deviation of the posterior, in the column `unit`.
         pub standard_error: f64,
+        /// Share of the information that flight gave.
+        pub flight_share_pct: Option<f64> ["%"],
         /// Comparison with the tunnel.
         pub tunnel: TunnelDifference,
     }
@@ -58,6 +59,8 @@ words! {
         /// The values are on different sides of zero, each by more than 2 (`agreement_z`) of its
         /// standard errors.
         SignDiffers = "sign differs",
+        /// Flight gave less than 10 % (`learnt_pct`) of the information.
+        NothingLearnt = "nothing learnt",
         /// The table has no value, or `compare: not_comparable:` names the derivative.
         NoTunnelValue = "no tunnel value",
     }

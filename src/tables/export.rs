@@ -3,14 +3,11 @@
 use crate::schema::table;
 
 table! {
-    /// Flight-updated derivatives for simulators, in the columns of a tunnel database: the trend
-    /// where flight has data, the tunnel elsewhere.
+    /// Flight-updated derivatives for simulators, in the columns of a tunnel database: the posterior.
     ///
     /// `harvest export` writes them into `export/` as CSV, Parquet, DAVE-ML and a JSBSim section.
-    /// Where the tunnel depends on Mach, the lowest and highest Mach number flown are breakpoints:
-    /// flight stands between them. Where flight has a sum (`CN_ba = CN_0 + CN_alpha α`) and its
-    /// slope, the constant is the sum less the slope's part. The simulator then reproduces the sum,
-    /// which flight determines best. The constant's uncertainty is that of both as if independent.
+    /// Constants that the posterior does not have are the tunnel's. Correlations are in
+    /// `posterior_covariance` and, between derivatives, in the DAVE-ML file.
     pub struct ExportRow in "flight_updated" per "derivative and breakpoint of the export" {
         /// Name of the derivative in the model.
         pub derivative: String,
@@ -27,9 +24,9 @@ table! {
         pub unit: String,
         /// Standard uncertainty, in the column `unit`, where known.
         pub uncertainty: Option<f64>,
-        /// Source of the value: flight with its trend, or the tunnel's own source.
+        /// Source of the value: the posterior, mostly flight or mostly wind tunnel; or the tunnel alone.
         pub source: String,
-        /// 1 where the value is flight's, 0 where it is the tunnel's.
+        /// 1 where flight gave half of the information or more, else 0.
         pub is_flight: usize ["1"],
     }
 }
@@ -37,4 +34,26 @@ table! {
 impl ExportRow {
     /// Declared name of the column that is published under the third variable's name.
     pub const THIRD: &str = "third";
+}
+
+table! {
+    /// Models drawn from the posterior, for Monte Carlo in a simulator: `harvest export --draws N`.
+    ///
+    /// Each draw is a whole model; its values are correlated as the posterior's are.
+    pub struct DrawRow in "draws" per "draw, derivative and breakpoint" {
+        /// Number of the draw, from 1.
+        pub draw: usize ["1"],
+        /// Name of the derivative in the model.
+        pub derivative: String,
+        /// Angle of attack.
+        pub alpha_deg: f64 ["deg"],
+        /// Mach number; empty where the table does not depend on it.
+        pub mach: Option<f64> ["1"],
+        /// Third variable of the tables, in its unit; empty without one.
+        pub third: Option<f64> ["the variable's unit"],
+        /// Value, in the column `unit`.
+        pub value: f64,
+        /// Unit of the derivative.
+        pub unit: String,
+    }
 }

@@ -11,6 +11,7 @@ mod export;
 mod flights;
 mod history;
 mod page;
+mod posterior;
 mod predictions;
 mod published;
 mod trends;
@@ -24,13 +25,16 @@ pub use estimates::{
     CorrelationKind, CorrelationRow, EstimateRow, EstimationMethod, FitRow, JOINT_FLIGHT, JointRow,
     Outcome, Participation, StartingValues,
 };
-pub use export::ExportRow;
+pub use export::{DrawRow, ExportRow};
 pub use flights::{
     ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict,
     FlightRow, InstrumentRow, InstrumentVerdict,
 };
 pub use history::{History, HistoryOutput};
 pub use page::page;
+pub use posterior::{
+    ContributionRow, CovarianceRow, Knowledge, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
+};
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use published::{PublishedTrend, PublishedVerdict};
 pub use trends::{OutlierRow, TrendRow};

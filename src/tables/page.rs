@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use super::{
-    AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, CorrelationRow,
-    CoverageRow, DisagreementRow, EstimateRow, EventRow, ExportRow, ExtrapolationRow, FitRow,
-    FlightRow, InstrumentRow, JointRow, ManeuverComparisonRow, OutlierRow, PredictedRow, StartRow,
-    TrendRow, VerdictRow,
+    AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
+    CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
+    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, ManeuverComparisonRow,
+    OutlierRow, PosteriorRow, PredictedRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -79,6 +79,11 @@ pub fn page() -> String {
     table::<CorrelationRow>(&mut page);
     table::<TrendRow>(&mut page);
     table::<OutlierRow>(&mut page);
+    table::<PosteriorRow>(&mut page);
+    table::<CovarianceRow>(&mut page);
+    table::<ScaleRow>(&mut page);
+    table::<ContributionRow>(&mut page);
+    table::<SelfCheckRow>(&mut page);
     table::<ComparisonRow>(&mut page);
     table::<ManeuverComparisonRow>(&mut page);
     table::<VerdictRow>(&mut page);
@@ -86,6 +91,7 @@ pub fn page() -> String {
     table::<ChangeRow>(&mut page);
     table::<ExtrapolationRow>(&mut page);
     table::<ExportRow>(&mut page);
+    table::<DrawRow>(&mut page);
     table::<FlightRow>(&mut page);
     table::<ChannelRow>(&mut page);
     table::<CheckRow>(&mut page);

@@ -15,47 +15,41 @@ fn exported() -> Campaign {
 }
 
 #[test]
-fn the_export_is_the_trend_where_flight_has_data_and_comes_back_as_the_tunnel() {
+fn the_export_is_the_posterior_and_comes_back_as_the_tunnel() {
     let campaign = exported();
     let folder = campaign.path("reports/export");
     let text = std::fs::read_to_string(folder.join("flight_updated.csv")).unwrap();
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let rows: Vec<crate::support::Row> = reader.deserialize().map(Result::unwrap).collect();
-    let comparison = campaign.table("comparison");
-    let mut flight = 0;
-    for row in rows.iter().filter(|r| r["is_flight"] == "1") {
-        let same = |c: &&crate::support::Row| {
-            c["derivative"] == row["derivative"]
-                && (number(c, "alpha_deg") - number(row, "alpha_deg")).abs() < 1e-9
+    let mut exported = rows.iter().filter(|r| r["source"].starts_with("posterior"));
+    let posterior = campaign.table("posterior");
+    assert!(posterior.len() > 1000, "{} rows", posterior.len());
+    for row in &posterior {
+        let same = |r: &&crate::support::Row| {
+            r["derivative"] == row["derivative"] && r["alpha_deg"] == row["alpha_deg"]
         };
-        // A constant is what is left of its sum.
-        if row["source"].contains("−") {
-            continue;
-        }
-        let compared = comparison
-            .iter()
+        let found = exported
+            .clone()
             .find(same)
             .unwrap_or_else(|| panic!("{row:?}"));
-        assert_eq!(compared["flight"], row["value"]);
-        flight += 1;
+        assert_eq!(found["value"], row["value"]);
+        assert_eq!(found["uncertainty"], row["standard_deviation"]);
     }
-    assert!(
-        flight > 100 && flight < rows.len(),
-        "{flight} of {}",
-        rows.len()
-    );
+    assert_eq!(exported.by_ref().count(), posterior.len());
     let value = |name: &str, alpha: &str| {
         let there = |r: &&crate::support::Row| r["derivative"] == name && r["alpha_deg"] == alpha;
         rows.iter().find(there).map(|r| number(r, "value"))
     };
-    for row in rows
-        .iter()
-        .filter(|r| r["source"].contains("CN_ba − CN_alpha α"))
-    {
+    for row in rows.iter().filter(|r| r["derivative"] == "CN_0") {
         let alpha = &row["alpha_deg"];
         let sum =
             number(row, "value") + value("CN_alpha", alpha).unwrap() * number(row, "alpha_deg");
-        approx::assert_relative_eq!(sum, value("CN_ba", alpha).unwrap(), max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            sum,
+            value("CN_ba", alpha).unwrap(),
+            epsilon = 1e-12,
+            max_relative = 1e-12
+        );
     }
     // Every format is a tunnel that the pipeline takes; `export::tests` hold that its values are
     // the same to the bit.
@@ -92,6 +86,21 @@ fn jsbsim_itself_computes_the_exported_coefficients() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
+}
+
+#[test]
+fn draws_are_whole_models_and_the_same_for_the_same_seed() {
+    let campaign = exported();
+    let export = || crate::support::run(campaign.command("export").args(["--draws", "3"]));
+    let read = |name: &str| std::fs::read(campaign.path("reports/export").join(name)).unwrap();
+    assert_eq!(export().code, Some(0));
+    let (table, section) = (read("draws.csv"), read("draw_0002_jsbsim.xml"));
+    assert_ne!(section, read("draw_0003_jsbsim.xml"));
+    assert_eq!(export().code, Some(0));
+    assert_eq!(table, read("draws.csv"));
+    assert_eq!(section, read("draw_0002_jsbsim.xml"));
+    let rows = |table: &[u8]| String::from_utf8_lossy(table).lines().count() - 1;
+    assert_eq!(rows(&table), 3 * rows(&read("flight_updated.csv")));
 }
 
 #[test]

@@ -102,9 +102,35 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "derivative unit group maneuver_id class alpha_deg value bound trend z weight_share",
     ),
     (
+        "model",
+        "posterior",
+        "derivative unit alpha_deg mach third value standard_deviation lower_95 upper_95 wind_tunnel prior_deviation \
+         flight_share_pct maneuvers",
+    ),
+    (
+        "model",
+        "posterior_covariance",
+        "first first_alpha_deg first_mach first_third second second_alpha_deg second_mach second_third covariance",
+    ),
+    (
+        "model",
+        "hyperparameters",
+        "derivative knowledge size length_deg",
+    ),
+    (
+        "model",
+        "contributions",
+        "maneuver_id class coefficient weight",
+    ),
+    (
+        "model",
+        "self_check",
+        "left_out item coefficient estimates inside_95_pct log_density",
+    ),
+    (
         "compare",
         "comparison",
-        "derivative unit alpha_deg mach flight standard_error wind_tunnel difference uncertainty difference_pct z verdict",
+        "derivative unit alpha_deg mach flight standard_error flight_share_pct wind_tunnel difference uncertainty difference_pct z verdict",
     ),
     (
         "compare",
@@ -146,8 +172,8 @@ const WITHOUT_ROWS: [&str; 7] = [
     "unknown",
 ];
 
-const STAGES: [&str; 6] = [
-    "ingest", "segment", "estimate", "trend", "compare", "report",
+const STAGES: [&str; 7] = [
+    "ingest", "segment", "estimate", "trend", "model", "compare", "report",
 ];
 
 /// Two short flights, one maneuver of each axis.

@@ -8,7 +8,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 /// Element; its children in order, with ? * + as in the DTD, and an alternative's names between
 /// bars; required attributes.
-const MODELS: [(&str, &str, &str); 35] = [
+const MODELS: [(&str, &str, &str); 37] = [
     (
         "DAVEfunc",
         "fileHeader variableDef+ breakpointDef* griddedTableDef* ungriddedTableDef* function* checkData?",
@@ -52,6 +52,8 @@ const MODELS: [(&str, &str, &str); 35] = [
         "numSigmas",
     ),
     ("bounds", "dataTable", ""),
+    ("correlatesWith", "", "varID"),
+    ("correlation", "", "varID corrCoef"),
     ("dataTable", "#text", ""),
     (
         "function",

@@ -14,15 +14,15 @@ use nalgebra::Vector3;
 use super::derivative_table::{DerivativeTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Axis, Condition, WindTunnel, wind_tunnel};
+use crate::aero::{Condition, WindTunnel, wind_tunnel};
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
 use crate::lab::simulator::air_data::AirData;
-use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
+use crate::model::CorrelatedDerivatives;
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
-use crate::tables::{EstimateRow, TrendRow};
+use crate::tables::PosteriorRow;
 
 /// A database of the tables, read linearly and clamped, as simulators read them.
 fn database(tables: &[DerivativeTable], settings: &wind_tunnel::Settings) -> WindTunnel {
@@ -47,106 +47,60 @@ fn database(tables: &[DerivativeTable], settings: &wind_tunnel::Settings) -> Win
 
 const ALPHAS: [f64; 7] = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0];
 
-/// The shipped pipeline with trends of four derivatives, one of each kind, between 10 and 40 deg.
+/// The shipped pipeline with a posterior of four derivatives, one of each kind, between 10 and 40 deg.
 struct Flown {
     config: Config,
-    trends: Vec<TrendRow>,
-    estimates: Vec<EstimateRow>,
-    maneuvers: Vec<Maneuver>,
+    posterior: Vec<PosteriorRow>,
+    correlations: Vec<CorrelatedDerivatives>,
 }
 
-fn trend_row(derivative: &str, unit: &str, group: &str, alpha_deg: f64, value: f64) -> TrendRow {
-    TrendRow {
+fn posterior_row(derivative: &str, unit: &str, at: &Condition, value: f64) -> PosteriorRow {
+    PosteriorRow {
         derivative: derivative.into(),
         unit: unit.into(),
-        group: group.into(),
-        alpha_deg,
+        alpha_deg: at.alpha_deg,
+        mach: Some(at.mach).filter(|mach| *mach > 0.0),
+        third: at.third,
         value,
-        standard_error: 0.01 + 1e-4 * alpha_deg,
+        standard_deviation: 0.01 + 1e-4 * at.alpha_deg,
         lower_95: value - 0.02,
         upper_95: value + 0.02,
-        prediction_lower_95: value - 0.04,
-        prediction_upper_95: value + 0.04,
+        wind_tunnel: Some(1.0),
+        prior_deviation: 0.2,
+        flight_share_pct: Some(2.0 * at.alpha_deg),
         maneuvers: 8,
-        outliers: 0,
-        curve: "polynomial".into(),
-        order: 2,
-        scatter: 0.0,
     }
 }
 
-fn maneuver(maneuver_id: &str, class: &str, mach: f64) -> Maneuver {
-    Maneuver {
-        maneuver_id: maneuver_id.into(),
-        flight_id: "f1".into(),
-        class: class.into(),
-        axis: Axis::Longitudinal,
-        start_s: 0.0,
-        end_s: 10.0,
-        alpha_deg: 25.0,
-        mach,
-        qbar_psf: 50.0,
-        velocity_ft_s: 300.0,
-        altitude_ft: 25e3,
-        mass_slug: 1050.0,
-        x_cg_ft: 38.0,
-        samples: 401,
-        origin: ManeuverOrigin::Found,
-        recognised: crate::maneuver::Recognised::default(),
-        quality: crate::maneuver::Quality::default(),
-    }
-}
-
-fn estimate(maneuver_id: &str, class: &str, derivative: &str) -> EstimateRow {
-    EstimateRow {
-        maneuver_id: maneuver_id.into(),
-        flight_id: "f1".into(),
-        class: class.into(),
-        alpha_deg: 25.0,
-        mach: 0.3,
-        derivative: derivative.into(),
-        unit: "per_deg".into(),
-        status: Status::Estimated,
-        value: Some(1.0),
-        bound: Some(0.1),
-        bound_held: None,
-        bound_calibration: None,
-        bound_corrected: None,
-        wind_tunnel: None,
-        variance_inflation: None,
-        excitation: None,
-        contribution_pct: None,
-        equation_error: None,
-        equation_error_bound: None,
-        held_because: None,
+fn at_alpha(alpha_deg: f64) -> Condition {
+    Condition {
+        alpha_deg,
+        mach: 0.0,
+        third: None,
     }
 }
 
 impl Flown {
     fn new() -> Flown {
         let config = Config::load(Path::new("pipelines/harv"), Overrides::default()).unwrap();
-        let (mut trends, mut estimates) = (Vec::new(), Vec::new());
+        let mut posterior = Vec::new();
         for name in ["CN_alpha", "Cm_q", "Cl_p", "CY_dyv"] {
-            let group = &config.trend.group_of(name).unwrap().name;
             let unit = config.buildup.unit_of(name).unwrap().name();
             for (i, alpha) in ALPHAS.into_iter().enumerate() {
                 let tunnel = config.tunnel.value(name, alpha, 0.3).unwrap().value;
-                trends.push(trend_row(
-                    name,
-                    unit,
-                    group,
-                    alpha,
-                    1.2 * tunnel + 0.001 * i as f64,
-                ));
+                let value = 1.2 * tunnel + 0.001 * i as f64;
+                posterior.push(posterior_row(name, unit, &at_alpha(alpha), value));
             }
-            estimates.extend(["m1", "m2"].map(|id| estimate(id, "PPSS", name)));
         }
-        let maneuvers = vec![maneuver("m1", "PPSS", 0.25), maneuver("m2", "PPSS", 0.35)];
+        let correlations = vec![CorrelatedDerivatives {
+            first: "CN_alpha".into(),
+            second: "Cm_q".into(),
+            correlation: -0.5,
+        }];
         Flown {
             config,
-            trends,
-            estimates,
-            maneuvers,
+            posterior,
+            correlations,
         }
     }
 
@@ -156,10 +110,8 @@ impl Flown {
             aircraft: &self.config.aircraft,
             buildup: &self.config.buildup,
             tunnel: &self.config.tunnel,
-            trends: &self.trends,
-            estimates: &self.estimates,
-            maneuvers: &self.maneuvers,
-            groups: &self.config.trend,
+            posterior: &self.posterior,
+            correlations: &self.correlations,
             settings: &self.config.export,
         }
     }
@@ -190,12 +142,27 @@ impl Flown {
             }
         }
         self.config.tunnel = tunnel;
+        self.posterior.clear();
+        for third in [Some(10e3), Some(40e3)] {
+            for mach in [0.2, 0.9] {
+                for alpha_deg in [5.0, 20.0, 50.0] {
+                    let at = Condition {
+                        alpha_deg,
+                        mach,
+                        third,
+                    };
+                    let value = alpha_deg * (1.1 + mach);
+                    self.posterior
+                        .push(posterior_row("CN_alpha", "per_deg", &at, value));
+                }
+            }
+        }
         self
     }
 }
 
 #[test]
-fn flight_stands_where_it_has_data_and_the_tunnel_elsewhere() {
+fn the_posterior_stands_where_it_has_rows_and_the_tunnel_elsewhere() {
     let flown = Flown::new();
     let tables = tables(&flown.contents());
     assert_eq!(
@@ -204,90 +171,51 @@ fn flight_stands_where_it_has_data_and_the_tunnel_elsewhere() {
     );
     for table in &tables {
         for (at, cell) in table.points() {
-            let trend = flown.trends.iter().find(|t| {
-                t.derivative == table.derivative && (t.alpha_deg - at.alpha_deg).abs() < 1e-9
+            let row = flown.posterior.iter().find(|row| {
+                row.derivative == table.derivative
+                    && is_same_breakpoint(row.alpha_deg, at.alpha_deg)
             });
-            assert_eq!(
-                cell.is_flight,
-                trend.is_some(),
-                "{} {at:?}",
-                table.derivative
-            );
             let tunnel = flown
                 .config
                 .tunnel
-                .value(&table.derivative, at.alpha_deg, 0.3)
-                .unwrap()
-                .value;
-            assert_eq!(
-                cell.value.to_bits(),
-                trend.map_or(tunnel, |t| t.value).to_bits()
+                .value(&table.derivative, at.alpha_deg, 0.3);
+            let (value, uncertainty) = row.map_or_else(
+                || (tunnel.unwrap().value, tunnel.unwrap().uncertainty),
+                |row| (row.value, Some(row.standard_deviation)),
             );
+            assert_eq!(cell.value.to_bits(), value.to_bits());
+            assert_eq!(cell.uncertainty, uncertainty);
+            // The share of flight is 2 % for each degree.
+            assert_eq!(cell.is_flight, row.is_some() && at.alpha_deg >= 25.0);
         }
     }
     let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
     assert_eq!(
         slope.sources(),
-        "wind tunnel: 5°, 45° to 60°; flight, trend of all: 10° to 40°"
+        "posterior: mostly wind tunnel: 10° to 20°; posterior: mostly flight: 25° to 40°"
     );
 }
 
 #[test]
-fn the_exported_constant_and_slope_add_up_to_the_sum_that_was_flown() {
-    let mut flown = Flown::new();
-    for (name, of) in [
-        ("CN_0", &(|_| 0.3) as &dyn Fn(f64) -> f64),
-        ("CN_ba", &|a| 0.07 * a - 0.05),
-    ] {
-        let group = &flown.config.trend.group_of(name).unwrap().name;
-        flown
-            .trends
-            .extend(ALPHAS.map(|alpha| trend_row(name, "-", group, alpha, of(alpha))));
-        flown.estimates.push(estimate("m1", "PPSS", name));
-    }
-    let tables = tables(&flown.contents());
-    let at = |name: &str, alpha_deg: f64| {
-        let table = tables.iter().find(|t| t.derivative == name).unwrap();
-        table
-            .points()
-            .find(|(at, _)| is_same_breakpoint(at.alpha_deg, alpha_deg))
-            .unwrap()
-            .1
-    };
-    for alpha in ALPHAS {
-        assert_relative_eq!(
-            at("CN_0", alpha).value + at("CN_alpha", alpha).value * alpha,
-            0.07 * alpha - 0.05
-        );
-        assert_eq!(at("CN_0", alpha).source, "flight, CN_ba − CN_alpha α");
-        let wanted = (0.01 + 1e-4 * alpha) * alpha.hypot(1.0);
-        assert_relative_eq!(
-            at("CN_0", alpha).uncertainty.unwrap(),
-            wanted,
-            max_relative = 1e-12
-        );
-    }
-    let tunnel = flown.config.tunnel.value("CN_0", 50.0, 0.3).unwrap().value;
-    assert_eq!(at("CN_0", 50.0).value.to_bits(), tunnel.to_bits());
-}
-
-#[test]
-fn over_mach_numbers_flight_stands_between_those_that_were_flown() {
+fn the_grid_of_the_export_is_that_of_the_posterior() {
     let flown = Flown::new().over_mach_and_altitude();
     let tables = tables(&flown.contents());
     let slope = tables.iter().find(|t| t.derivative == "CN_alpha").unwrap();
-    assert_eq!(slope.machs, [0.2, 0.25, 0.35, 0.9]);
-    assert_eq!(slope.thirds, [10e3, 25e3, 40e3]);
-    assert_eq!(
-        slope.alphas_deg,
-        [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 50.0]
-    );
+    assert_eq!(slope.machs, [0.2, 0.9]);
+    assert_eq!(slope.thirds, [10e3, 40e3]);
+    assert_eq!(slope.alphas_deg, [5.0, 20.0, 50.0]);
     for (at, cell) in slope.points() {
-        let inside = (0.25..=0.35).contains(&at.mach)
-            && at.third == Some(25e3)
-            && (10.0..=40.0).contains(&at.alpha_deg);
-        assert_eq!(cell.is_flight, inside, "{at:?}");
+        assert_relative_eq!(cell.value, at.alpha_deg * (1.1 + at.mach));
     }
+}
+
+#[test]
+fn daveml_has_the_correlations_between_derivatives() {
+    let flown = Flown::new();
+    let contents = flown.contents();
+    let text = daveml::document(&contents, &tables(&contents));
+    assert!(text.contains("<correlatesWith varID=\"Cm_q\"/>"));
+    assert!(text.contains("<correlation varID=\"CN_alpha\" corrCoef=\"-0.5\"/>"));
 }
 
 /// Place of a value, by its bits: derivative, α, Mach, third variable.
@@ -365,7 +293,9 @@ fn daveml_keeps_the_uncertainties_where_every_value_has_one() {
     std::fs::write(&path, text).unwrap();
     let found = tunnel::rows(&path, Some("altitude_ft"), |name| name == "CN_alpha").unwrap();
     assert!(
-        found.iter().any(|(_, r)| r.uncertainty == Some(0.5))
+        found
+            .iter()
+            .any(|(_, r)| r.uncertainty == Some(0.01 + 1e-4 * 50.0))
             && found.iter().all(|(_, r)| r.uncertainty.is_some())
     );
 }

@@ -15,7 +15,9 @@ use self::causes::Causes;
 use super::published_night::{ManeuverWindow, NightTables};
 use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, VerdictChange};
 use crate::maneuver::Status;
-use crate::tables::{EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict};
+use crate::tables::{
+    EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict, TunnelVerdict,
+};
 
 /// Changes from the night `since` to now.
 #[must_use]
@@ -206,6 +208,8 @@ fn moved_trends(before: &NightTables, now: &NightTables, causes: &Causes) -> Vec
     now.trends.iter().filter_map(moved).collect()
 }
 
+/// Verdicts that are no longer what they were. The first verdict on what flight had taught nothing about
+/// is news, but no change.
 fn changed_verdicts(
     before: &NightTables,
     now: &NightTables,
@@ -218,7 +222,8 @@ fn changed_verdicts(
         .collect();
     let changed = |c: &PublishedVerdict| {
         let was = old.get(&trend_point(&c.derivative, "", c.alpha_deg))?;
-        (was.verdict != c.verdict).then(|| VerdictChange {
+        let is_first = was.verdict == TunnelVerdict::NothingLearnt;
+        (was.verdict != c.verdict && !is_first).then(|| VerdictChange {
             derivative: c.derivative.clone(),
             alpha_deg: c.alpha_deg,
             before: was.verdict,

@@ -1,5 +1,5 @@
-//! Estimates of one derivative over angle of attack with trend and wind tunnel, in the manner of
-//! the paper's Figures 5-7 and 13-16.
+//! Estimates of one derivative over angle of attack with posterior, trend and wind tunnel, in the
+//! manner of the paper's Figures 5-7 and 13-16.
 //!
 //! The plotting crate draws paper, axes, lines and band. Markers and bars of the estimates are one
 //! path per class in the crate's scene: the crate would draw bars over hollow markers, and give
@@ -45,8 +45,11 @@ pub struct DerivativeFigure<'a> {
     pub y_label: String,
     pub alpha: Scale,
     pub scale: Scale,
-    /// Angle of attack (deg), lower and upper end of the trend's 95 % band.
+    /// Angle of attack (deg), lower and upper end of the prior's 95 % band.
+    pub prior: Vec<(f64, f64, f64)>,
+    /// As `prior`, of the posterior.
     pub band: Vec<(f64, f64, f64)>,
+    pub posterior: Vec<(f64, f64)>,
     pub trend: Vec<(f64, f64)>,
     pub tunnel: Vec<(f64, f64)>,
     pub classes: Vec<ClassEstimates>,
@@ -143,19 +146,11 @@ fn empty_plot() -> Plot {
     Plot::Scatter(ScatterPlot::new())
 }
 
-/// Band, tunnel and trend, from back to front.
+/// Bands, tunnel, trend and posterior, from back to front.
 fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
     let mut plots = vec![empty_plot()];
-    if figure.band.len() > 1 {
-        let (alpha, ends): (Vec<f64>, Vec<(f64, f64)>) =
-            figure.band.iter().map(|&(a, l, u)| (a, (l, u))).unzip();
-        let (lower, upper): (Vec<f64>, Vec<f64>) = ends.into_iter().unzip();
-        plots.push(Plot::Band(
-            BandPlot::new(alpha, lower, upper)
-                .with_color("#5f6670")
-                .with_opacity(0.25),
-        ));
-    }
+    plots.extend(band(&figure.prior, figure.scale, TUNNEL_COLOUR, 0.08));
+    plots.extend(band(&figure.band, figure.scale, "#5f6670", 0.35));
     if !figure.tunnel.is_empty() {
         plots.push(Plot::Line(curve(&figure.tunnel, TUNNEL_COLOUR, 1.6, "6 4")));
     }
@@ -168,9 +163,24 @@ fn curves(figure: &DerivativeFigure) -> Vec<Plot> {
         ));
     }
     if !figure.trend.is_empty() {
-        plots.push(Plot::Line(curve(&figure.trend, INK, 1.8, "")));
+        plots.push(Plot::Line(curve(&figure.trend, INK, 1.0, "2 3")));
+    }
+    if !figure.posterior.is_empty() {
+        plots.push(Plot::Line(curve(&figure.posterior, INK, 1.8, "")));
     }
     plots
+}
+
+/// Band cut at the frame; none of fewer than two points.
+fn band(ends: &[(f64, f64, f64)], scale: Scale, colour: &str, opacity: f64) -> Option<Plot> {
+    let inside = |value: f64| value.clamp(scale.min, scale.max);
+    let alpha: Vec<f64> = ends.iter().map(|end| end.0).collect();
+    let lower: Vec<f64> = ends.iter().map(|end| inside(end.1)).collect();
+    let upper: Vec<f64> = ends.iter().map(|end| inside(end.2)).collect();
+    let band = BandPlot::new(alpha, lower, upper)
+        .with_color(colour)
+        .with_opacity(opacity);
+    (ends.len() > 1).then_some(Plot::Band(band))
 }
 
 fn curve(points: &[(f64, f64)], colour: &str, width: f64, dash: &str) -> LinePlot {
@@ -329,7 +339,9 @@ mod tests {
                 max: 0.1,
                 step: 0.02,
             },
+            prior: vec![(5.0, 0.02, 0.09), (60.0, 0.0, 0.2)],
             band: vec![(5.0, 0.04, 0.06), (60.0, 0.01, 0.05)],
+            posterior: vec![(5.0, 0.05), (60.0, 0.03)],
             trend: vec![(5.0, 0.05), (60.0, 0.03)],
             tunnel: vec![(5.0, 0.055), (60.0, 0.02)],
             classes: vec![
@@ -369,11 +381,12 @@ mod tests {
 
     #[test]
     fn a_figure_without_curves_has_axes() {
-        let (band, trend, tunnel) = (vec![], vec![], vec![]);
         let svg = draw(&DerivativeFigure {
-            band,
-            trend,
-            tunnel,
+            prior: vec![],
+            band: vec![],
+            posterior: vec![],
+            trend: vec![],
+            tunnel: vec![],
             ..figure()
         });
         assert!(

@@ -22,6 +22,7 @@ fn style(verdict: TunnelVerdict) -> (f64, f64, &'static str) {
         TunnelVerdict::FlightHigher => (0.0, 7.0, "#0060a8"),
         TunnelVerdict::FlightLower => (7.0, 14.0, "#b34700"),
         TunnelVerdict::SignDiffers => (0.0, 14.0, "#7a0143"),
+        TunnelVerdict::NothingLearnt => (4.0, 10.0, "#dfe1e5"),
         TunnelVerdict::NoTunnelValue => (6.5, 7.5, "#c9ccd1"),
     }
 }

@@ -15,7 +15,10 @@ use crate::report::figure::scale::{Scale, ValueRange, extent};
 use crate::report::figure::style::{INK, TUNNEL_COLOUR};
 use crate::report::notation::{self, Digits, NOTHING, angle, count, fixed, number};
 use crate::report::table_view::TableView;
-use crate::tables::{ComparisonRow, TrendRow};
+use crate::tables::{ComparisonRow, PosteriorRow, TrendRow};
+
+/// Half width of a 95 % interval in standard deviations.
+const NORMAL_95: f64 = 1.96;
 
 /// Page of one derivative.
 #[derive(Clone, Debug, Serialize)]
@@ -85,7 +88,10 @@ fn alpha_scale(derivatives: &[DerivativeResults]) -> Scale {
     let trends = derivatives
         .iter()
         .flat_map(|d| d.trend.iter().map(|t| t.alpha_deg));
-    let (low, high) = extent(points.chain(trends)).unwrap_or((0.0, 60.0));
+    let posterior = derivatives
+        .iter()
+        .flat_map(|d| d.posterior.iter().map(|p| p.alpha_deg));
+    let (low, high) = extent(points.chain(trends).chain(posterior)).unwrap_or((0.0, 60.0));
     Scale::with_step(low, high, 5.0, 10.0)
 }
 
@@ -113,6 +119,7 @@ fn page(
         .iter()
         .map(|(name, class)| LegendView::new(class.marker.key(), name))
         .collect();
+    legend.extend(posterior_key(derivative));
     legend.extend(trend_key(derivative));
     legend.extend(tunnel_key(derivative));
     let classes = classes.into_iter().map(|(_, class)| class).collect();
@@ -150,7 +157,13 @@ fn draw_figure(
         y_label: axis_label(derivative.name, &notation::unit(derivative.unit)),
         alpha,
         scale,
-        band: confidence_band(derivative),
+        prior: prior_band(derivative),
+        band: posterior_band(derivative),
+        posterior: derivative
+            .posterior
+            .iter()
+            .map(|p| (p.alpha_deg, p.value))
+            .collect(),
         trend: trend
             .filter(|(x, y)| x.is_finite() && y.is_finite())
             .collect(),
@@ -195,6 +208,12 @@ fn alternative_text(derivative: &DerivativeResults) -> String {
         .iter()
         .map(|row| (row.alpha_deg, row.value))
         .collect();
+    let posterior: Vec<(f64, f64)> = derivative
+        .posterior
+        .iter()
+        .map(|row| (row.alpha_deg, row.value))
+        .collect();
+    parts.extend(ends_in_words("posterior", &posterior));
     parts.extend(ends_in_words("trend", &trend));
     parts.extend(ends_in_words("wind tunnel", &derivative.tunnel));
     parts.join("; ") + "."
@@ -223,46 +242,61 @@ fn axis_label(name: &str, unit: &str) -> String {
 fn value_range(derivative: &DerivativeResults) -> ValueRange {
     let trend = derivative.trend.iter().map(|t| t.value);
     ValueRange {
-        lines: trend.chain(derivative.tunnel.iter().map(|t| t.1)).collect(),
+        lines: trend
+            .chain(derivative.tunnel.iter().map(|t| t.1))
+            .chain(derivative.posterior.iter().map(|p| p.value))
+            .collect(),
         estimates: derivative
             .points
             .iter()
             .map(|p| (p.value, p.bound))
             .collect(),
         band: derivative
-            .trend
+            .posterior
             .iter()
-            .flat_map(|t| [t.lower_95, t.upper_95])
+            .flat_map(|p| [p.lower_95, p.upper_95])
             .collect(),
     }
 }
 
-fn confidence_band(derivative: &DerivativeResults) -> Vec<(f64, f64, f64)> {
-    derivative
-        .trend
-        .iter()
-        .map(|t| (t.alpha_deg, t.lower_95, t.upper_95))
+fn posterior_band(derivative: &DerivativeResults) -> Vec<(f64, f64, f64)> {
+    let rows = derivative.posterior.iter();
+    rows.map(|p| (p.alpha_deg, p.lower_95, p.upper_95))
         .filter(|(_, low, high)| low.is_finite() && high.is_finite())
         .collect()
 }
 
-fn trend_key(derivative: &DerivativeResults) -> Option<LegendView> {
-    let band = r##"<rect y="1" width="24" height="10" fill="#5f6670" fill-opacity=".25"/>"##;
+/// 95 % band of the prior about the tunnel.
+fn prior_band(derivative: &DerivativeResults) -> Vec<(f64, f64, f64)> {
+    let end = |p: &&PosteriorRow| {
+        let (tunnel, reach) = (p.wind_tunnel?, NORMAL_95 * p.prior_deviation);
+        Some((p.alpha_deg, tunnel - reach, tunnel + reach))
+    };
+    derivative.posterior.iter().filter_map(end).collect()
+}
+
+fn posterior_key(derivative: &DerivativeResults) -> Option<LegendView> {
+    let band = r##"<rect y="1" width="24" height="10" fill="#5f6670" fill-opacity=".35"/>"##;
     let drawing = key(24, &format!("{band}{}", line(INK, "", 1.8)));
+    (!derivative.posterior.is_empty()).then(|| LegendView::new(drawing, "posterior, 95 % band"))
+}
+
+fn trend_key(derivative: &DerivativeResults) -> Option<LegendView> {
+    let drawing = key(24, &line(INK, "2 3", 1.0));
     let group = if derivative.group.is_empty() {
         String::new()
     } else {
         format!(" ({})", derivative.group)
     };
-    (!derivative.trend.is_empty())
-        .then(|| LegendView::new(drawing, &format!("trend{group}, 95 % band")))
+    (!derivative.trend.is_empty()).then(|| LegendView::new(drawing, &format!("trend{group}")))
 }
 
 fn tunnel_key(derivative: &DerivativeResults) -> Option<LegendView> {
     let cross =
         format!(r#"<path d="M9 3l6 6m0-6l-6 6" stroke="{TUNNEL_COLOUR}" stroke-width="1.5"/>"#);
     let drawing = key(24, &format!("{}{cross}", line(TUNNEL_COLOUR, "6 4", 1.6)));
-    (!derivative.tunnel.is_empty()).then(|| LegendView::new(drawing, "wind tunnel"))
+    (!derivative.tunnel.is_empty())
+        .then(|| LegendView::new(drawing, "wind tunnel; prior's 95 % band tinted"))
 }
 
 /// Caption: number of estimates, meaning of the bars, estimates that are not drawn.

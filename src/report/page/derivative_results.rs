@@ -6,7 +6,7 @@ use crate::aero::{Axis, Coefficient};
 use crate::maneuver::Status;
 use crate::report::contents::{Contents, group_by};
 use crate::report::notation::coefficient_of;
-use crate::tables::{ComparisonRow, EstimateRow, Outcome, TrendRow};
+use crate::tables::{ComparisonRow, EstimateRow, Outcome, PosteriorRow, TrendRow};
 
 /// One estimate as it is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,8 @@ pub struct DerivativeResults<'a> {
     /// Group of classes whose trend is the flight result.
     pub group: &'a str,
     pub trend: Vec<&'a TrendRow>,
+    /// Posterior at the Mach number and third variable where flight gave most.
+    pub posterior: Vec<&'a PosteriorRow>,
     pub comparison: Vec<&'a ComparisonRow>,
     /// Angle of attack (deg) and wind-tunnel value.
     pub tunnel: Vec<(f64, f64)>,
@@ -68,6 +70,7 @@ pub fn collect<'a>(contents: &Contents<'a>) -> Vec<DerivativeResults<'a>> {
     let failed = failed_fits(contents);
     let estimates = group_by(contents.estimates, |row| &row.derivative);
     let trends = group_by(contents.trends, |row| &row.derivative);
+    let posterior = group_by(contents.posterior, |row| &row.derivative);
     let comparisons = group_by(contents.comparison, |row| &row.derivative);
     let axes: BTreeMap<&str, Axis> = contents
         .classes
@@ -80,6 +83,7 @@ pub fn collect<'a>(contents: &Contents<'a>) -> Vec<DerivativeResults<'a>> {
             let rows = DerivativeRows {
                 estimates: estimates.get(name).map_or(&[], Vec::as_slice),
                 trends: trends.get(name).map_or(&[], Vec::as_slice),
+                posterior: posterior.get(name).map_or(&[], Vec::as_slice),
                 comparison: comparisons.get(name).map_or(&[], Vec::as_slice),
             };
             rows.results(name, &failed, &axes)
@@ -128,6 +132,7 @@ fn failed_fits<'a>(contents: &Contents<'a>) -> BTreeSet<&'a str> {
 struct DerivativeRows<'a, 'r> {
     estimates: &'r [&'a EstimateRow],
     trends: &'r [&'a TrendRow],
+    posterior: &'r [&'a PosteriorRow],
     comparison: &'r [&'a ComparisonRow],
 }
 
@@ -169,9 +174,20 @@ impl<'a> DerivativeRows<'a, '_> {
             points,
             group: group.unwrap_or_default(),
             trend: sorted_by_alpha(trend, |t| t.alpha_deg),
+            posterior: self.posterior(),
             comparison: sorted_by_alpha(self.comparison.iter().copied(), |c| c.alpha_deg),
             tunnel: self.tunnel(),
         }
+    }
+
+    /// Posterior at the Mach number and third variable where flight gave most.
+    fn posterior(&self) -> Vec<&'a PosteriorRow> {
+        let share = |row: &PosteriorRow| row.flight_share_pct.unwrap_or(0.0);
+        let all = self.posterior.iter().copied();
+        let most = all.clone().max_by(|a, b| share(a).total_cmp(&share(b)));
+        let place = most.map(|row| (row.mach, row.third));
+        let there = all.filter(|row| Some((row.mach, row.third)) == place);
+        sorted_by_alpha(there, |row| row.alpha_deg)
     }
 
     /// Group of the compared trend, or of the first trend.

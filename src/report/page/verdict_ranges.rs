@@ -126,6 +126,7 @@ mod tests {
             mach: None,
             flight: 1.0,
             standard_error: 0.1,
+            flight_share_pct: None,
             tunnel: TunnelDifference {
                 wind_tunnel: None,
                 difference: None,

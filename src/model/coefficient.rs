@@ -1,0 +1,181 @@
+//! Posterior of one coefficient: evidence to scales, weights and a Gaussian.
+
+use std::collections::BTreeMap;
+
+use super::evidence::Evidence;
+use super::flight_data::{FlightData, Observed};
+use super::observation::Observation;
+use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
+use super::prior::Scale;
+use super::scales::{centres, most_probable};
+use super::self_check::{self, Agreement};
+use super::term::{Basis, Term};
+use super::unknowns::Unknowns;
+use crate::numerics::root::EXACT;
+
+/// Reweightings: weights follow from scales, and scales from weights.
+const REWEIGHTINGS: usize = 2;
+
+/// Share of the largest variance below which the check of classes leaves directions out.
+const CHECKED_VARIANCE: f64 = 1e-6;
+
+/// Posterior of one coefficient.
+#[derive(Clone, Debug)]
+pub struct CoefficientPosterior {
+    pub terms: Vec<Term>,
+    pub unknowns: Unknowns,
+    pub scales: Vec<Scale>,
+    pub gaussian: Gaussian,
+    /// Weight of each maneuver that takes part, by its place in the evidence.
+    pub weights: BTreeMap<usize, f64>,
+    /// Terms that each maneuver estimates, by its place in the evidence.
+    pub estimated: BTreeMap<usize, Vec<usize>>,
+    /// Agreement of each flight with the others.
+    pub flights: BTreeMap<String, Agreement>,
+    /// Agreement of each class with the others.
+    pub classes: BTreeMap<String, Agreement>,
+}
+
+impl CoefficientPosterior {
+    /// Posterior of a coefficient from its terms; `None` where the evidence is not finite.
+    #[must_use]
+    pub fn of(
+        terms: Vec<Term>,
+        evidence: &[Evidence],
+        basis: &Basis,
+    ) -> Option<CoefficientPosterior> {
+        let mut data = Data::new(&terms, evidence, basis);
+        let mut weights = vec![1.0; evidence.len()];
+        let (mut scales, mut found) = data.fit(&terms, &weights, &centres(&terms))?;
+        for _ in 0..REWEIGHTINGS {
+            let freedom = basis.settings.degrees_of_freedom;
+            weights = reweighted(&data.flights, &weights, &found, freedom);
+            (scales, found) = data.fit(&terms, &weights, &scales)?;
+        }
+        data.posterior(terms, scales, &weights, found, evidence)
+    }
+}
+
+/// Evidence about a coefficient.
+pub struct Data {
+    pub unknowns: Unknowns,
+    /// Flights in the order of their ids.
+    pub flights: Vec<FlightData>,
+    flight_ids: Vec<String>,
+    /// Class and observation of each maneuver that takes part.
+    observations: Vec<(usize, Observation)>,
+    /// Maneuvers of each flight: place in the evidence, and among the observations.
+    places: Vec<Vec<(usize, usize)>>,
+    estimated: BTreeMap<usize, Vec<usize>>,
+}
+
+impl Data {
+    /// Collects the evidence about a coefficient's terms.
+    #[must_use]
+    pub fn new(terms: &[Term], evidence: &[Evidence], basis: &Basis) -> Data {
+        let mut class_places: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut observations: Vec<(usize, Observation)> = vec![];
+        let mut places: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
+        let mut estimated = BTreeMap::new();
+        for (place, own) in evidence.iter().enumerate() {
+            let Some(observation) = own.about(terms, basis.tunnel) else {
+                continue;
+            };
+            let next = class_places.len();
+            let class = *class_places.entry(&own.maneuver.class).or_insert(next);
+            let of_flight = places.entry(&own.maneuver.flight_id).or_default();
+            of_flight.push((place, observations.len()));
+            estimated.insert(place, observation.terms.clone());
+            observations.push((class, observation));
+        }
+        let unknowns = Unknowns::new(terms, &observations, basis.settings.class_error);
+        let mut data = Data {
+            unknowns,
+            flights: vec![],
+            flight_ids: places.keys().map(|id| (*id).to_owned()).collect(),
+            observations,
+            places: places.into_values().collect(),
+            estimated,
+        };
+        data.flights = (0..data.places.len())
+            .map(|flight| FlightData::new(&data.observed(flight), terms, &data.unknowns))
+            .collect();
+        data
+    }
+
+    /// Observations of a flight.
+    fn observed(&self, flight: usize) -> Vec<Observed<'_>> {
+        let places = self.places[flight].iter().map(|&(place, i)| {
+            let (class, observation) = &self.observations[i];
+            (place, *class, observation)
+        });
+        places.collect()
+    }
+
+    /// Adds to the noise what lies between the points of the grids.
+    pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
+        let mut flights = std::mem::take(&mut self.flights);
+        for (i, flight) in flights.iter_mut().enumerate() {
+            flight.set_between(&self.observed(i), terms, scales);
+        }
+        self.flights = flights;
+    }
+
+    /// Most probable scales, from a start, and the Gaussian that they give.
+    fn fit(
+        &mut self,
+        terms: &[Term],
+        weights: &[f64],
+        start: &[Scale],
+    ) -> Option<(Vec<Scale>, Gaussian)> {
+        self.set_between(terms, start);
+        let sums = information(&self.flights, weights, self.unknowns.count);
+        let mut scales = start.to_vec();
+        if !self.flights.is_empty() {
+            let own = of_differences(&sums, &self.unknowns)?;
+            scales = most_probable(terms, &self.unknowns, &own, start);
+        }
+        let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
+        Some((scales, gaussian))
+    }
+
+    fn posterior(
+        self,
+        terms: Vec<Term>,
+        scales: Vec<Scale>,
+        weights: &[f64],
+        gaussian: Gaussian,
+        evidence: &[Evidence],
+    ) -> Option<CoefficientPosterior> {
+        let root = self.unknowns.root(&terms, &scales, CHECKED_VARIANCE);
+        let checked = self.flight_ids.iter().zip(&self.flights);
+        let flights = checked.filter_map(|(id, flight)| {
+            Some((id.clone(), self_check::flight(flight, weights, &gaussian)?))
+        });
+        let mut classes: BTreeMap<String, Agreement> = BTreeMap::new();
+        for &place in self.estimated.keys() {
+            let class = &evidence[place].maneuver.class;
+            if !classes.contains_key(class) {
+                let is_own = |m: usize| evidence[m].maneuver.class == *class;
+                let agreement = self_check::maneuvers(
+                    &self.flights,
+                    weights,
+                    &root,
+                    self.unknowns.count,
+                    is_own,
+                )?;
+                classes.insert(class.clone(), agreement);
+            }
+        }
+        Some(CoefficientPosterior {
+            flights: flights.collect(),
+            classes,
+            weights: self.estimated.keys().map(|&m| (m, weights[m])).collect(),
+            estimated: self.estimated,
+            terms,
+            unknowns: self.unknowns,
+            scales,
+            gaussian,
+        })
+    }
+}

@@ -1,0 +1,206 @@
+//! Evidence of a flight's maneuvers about one coefficient. Calibration errors are common to the flight.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::observation::Observation;
+use super::prior::Scale;
+use super::term::Term;
+use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
+use crate::output_error::error_effect::SharedError;
+
+/// Evidence of a flight: y = A z + K u + e.
+#[derive(Clone, Debug)]
+pub struct FlightData {
+    /// Place of each maneuver in the evidence, and its rows.
+    pub maneuvers: Vec<(usize, Range<usize>)>,
+    /// y.
+    pub differences: DVector<f64>,
+    /// A.
+    pub rows: Vec<SparseRow>,
+    /// Covariance of e, maneuver by maneuver, without what lies between the points of the grids.
+    own_noise: Vec<DMatrix<f64>>,
+    /// Covariance of e, maneuver by maneuver.
+    noise: Vec<DMatrix<f64>>,
+    /// K Kᵀ.
+    calibration: DMatrix<f64>,
+}
+
+/// Sums of the normal equations: Λ = Σ Aᵀ Σ⁻¹ A and η = Σ Aᵀ Σ⁻¹ y.
+#[derive(Clone, Debug)]
+pub struct Information {
+    pub matrix: DMatrix<f64>,
+    pub vector: DVector<f64>,
+}
+
+impl Information {
+    #[must_use]
+    pub fn none(unknowns: usize) -> Information {
+        Information {
+            matrix: DMatrix::zeros(unknowns, unknowns),
+            vector: DVector::zeros(unknowns),
+        }
+    }
+}
+
+/// Evidence of one maneuver: place in the evidence, class, and observation.
+pub type Observed<'a> = (usize, usize, &'a Observation);
+
+impl FlightData {
+    /// Evidence of one flight's maneuvers.
+    #[must_use]
+    pub fn new(observed: &[Observed], terms: &[Term], unknowns: &Unknowns) -> FlightData {
+        let count = observed.iter().map(|(_, _, o)| o.terms.len()).sum();
+        let mut data = FlightData {
+            maneuvers: vec![],
+            differences: DVector::zeros(count),
+            rows: vec![],
+            own_noise: vec![],
+            noise: vec![],
+            calibration: DMatrix::zeros(count, count),
+        };
+        let mut effects: BTreeMap<&SharedError, DVector<f64>> = BTreeMap::new();
+        for &(place, class, observation) in observed {
+            let first = data.rows.len();
+            data.rows.extend(unknowns.rows(terms, class, observation));
+            let range = first..data.rows.len();
+            let own = data.differences.rows_range_mut(range.clone());
+            { own }.copy_from(&observation.differences);
+            let of_flight = observation.calibration.iter();
+            for (error, change) in of_flight.filter(|(e, _)| !is_of_campaign(e)) {
+                let effect = effects
+                    .entry(error)
+                    .or_insert_with(|| DVector::zeros(count));
+                effect.rows_range_mut(range.clone()).copy_from(change);
+            }
+            data.own_noise.push(observation.noise.clone());
+            data.maneuvers.push((place, range));
+        }
+        for effect in effects.values() {
+            data.calibration += effect * effect.transpose();
+        }
+        data.noise.clone_from(&data.own_noise);
+        data
+    }
+
+    /// Adds to each maneuver's noise what lies between the points of the grids.
+    pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
+        for (i, (_, _, observation)) in observed.iter().enumerate() {
+            let both = terms.iter().zip(scales);
+            let variances = both.map(|(t, s)| t.prior.between(s, &observation.condition));
+            let variances = DMatrix::from_diagonal(&DVector::from_iterator(terms.len(), variances));
+            let design = &observation.design;
+            self.noise[i] = &self.own_noise[i] + design * variances * design.transpose();
+        }
+    }
+
+    /// Evidence of some of the maneuvers.
+    #[must_use]
+    pub fn of_maneuvers(&self, counts: impl Fn(usize) -> bool) -> FlightData {
+        let kept: Vec<usize> = (0..self.maneuvers.len())
+            .filter(|&i| counts(self.maneuvers[i].0))
+            .collect();
+        let places: Vec<usize> = kept
+            .iter()
+            .flat_map(|&i| self.maneuvers[i].1.clone())
+            .collect();
+        let mut first = 0;
+        let maneuvers = kept.iter().map(|&i| {
+            let (place, rows) = &self.maneuvers[i];
+            let range = first..first + rows.len();
+            first = range.end;
+            (*place, range)
+        });
+        FlightData {
+            maneuvers: maneuvers.collect(),
+            differences: self.differences.select_rows(&places),
+            rows: places.iter().map(|&i| self.rows[i].clone()).collect(),
+            own_noise: kept.iter().map(|&i| self.own_noise[i].clone()).collect(),
+            noise: kept.iter().map(|&i| self.noise[i].clone()).collect(),
+            calibration: self
+                .calibration
+                .select_rows(&places)
+                .select_columns(&places),
+        }
+    }
+
+    /// Covariance of what no other maneuver shares, of the maneuver at a place in this flight.
+    #[must_use]
+    pub fn noise(&self, maneuver: usize) -> &DMatrix<f64> {
+        &self.noise[maneuver]
+    }
+
+    /// Covariance Σ of K u + e; the noise of a maneuver of weight w is 1/w times its own.
+    #[must_use]
+    pub fn covariance(&self, weights: &[f64]) -> DMatrix<f64> {
+        let mut covariance = self.calibration.clone();
+        for ((place, rows), noise) in self.maneuvers.iter().zip(&self.noise) {
+            let mut own = covariance.view_mut((rows.start, rows.start), noise.shape());
+            own += noise / weights[*place];
+        }
+        covariance
+    }
+
+    /// Adds the flight to the normal equations. A covariance that is not positive definite adds
+    /// nothing.
+    pub fn add_to(&self, weights: &[f64], sums: &mut Information) {
+        let Some(cholesky) = self.cholesky(weights) else {
+            return;
+        };
+        let active = self.active();
+        let lower = cholesky.l_dirty();
+        let mut rows = self.dense(&active);
+        lower.solve_lower_triangular_mut(&mut rows);
+        let mut differences = self.differences.clone();
+        lower.solve_lower_triangular_mut(&mut differences);
+        let own = rows.tr_mul(&rows);
+        let vector = rows.tr_mul(&differences);
+        for (i, &row) in active.iter().enumerate() {
+            sums.vector[row] += vector[i];
+            for (j, &column) in active.iter().enumerate() {
+                sums.matrix[(row, column)] += own[(i, j)];
+            }
+        }
+    }
+
+    #[must_use]
+    pub fn cholesky(&self, weights: &[f64]) -> Option<Cholesky<f64, Dyn>> {
+        Cholesky::new(self.covariance(weights))
+    }
+
+    /// Unknowns that the flight's rows touch, ascending.
+    fn active(&self) -> Vec<usize> {
+        let touched = self.rows.iter().flatten().map(|(place, _)| *place);
+        touched.collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    fn dense(&self, active: &[usize]) -> DMatrix<f64> {
+        let mut dense = DMatrix::zeros(self.rows.len(), active.len());
+        for (i, row) in self.rows.iter().enumerate() {
+            for (place, value) in row {
+                if let Ok(column) = active.binary_search(place) {
+                    dense[(i, column)] += value;
+                }
+            }
+        }
+        dense
+    }
+
+    /// A m and A P Aᵀ of a vector and a covariance of the unknowns.
+    #[must_use]
+    pub fn image(
+        &self,
+        mean: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let active = self.active();
+        let dense = self.dense(&active);
+        let own = covariance.select_rows(&active).select_columns(&active);
+        (
+            &dense * mean.select_rows(&active),
+            &dense * own * dense.transpose(),
+        )
+    }
+}

@@ -1,0 +1,78 @@
+//! Model: the campaign as one answer. The posterior of every derivative over the flight condition, from
+//! the tunnel as prior and the maneuvers as evidence.
+//!
+//! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives from
+//! the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver is evidence
+//! with its whole corrected covariance, the exact effect of what it held, and the calibration errors
+//! that it shares with its flight ([`observation`]). Sizes and lengths of the differences are the most
+//! probable ones ([`scales`]); a maneuver that the others contradict weighs less ([`posterior`]).
+
+mod settings;
+mod evidence;
+mod grid;
+mod prior;
+mod term;
+mod observation;
+mod unknowns;
+mod flight_data;
+mod scales;
+mod posterior;
+mod self_check;
+mod coefficient;
+mod published;
+mod rows;
+mod campaign_model;
+mod draws;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
+use coefficient::CoefficientPosterior;
+use term::Basis;
+
+pub use campaign_model::Model;
+pub use draws::CorrelatedDerivatives;
+pub use evidence::Evidence;
+pub use settings::Settings;
+
+/// Computes the posterior of every derivative. The order of the evidence within a flight, and of the
+/// flights, is that of their ids.
+#[must_use]
+pub fn model(
+    evidence: &[Evidence],
+    buildup: &Buildup,
+    tunnel: &WindTunnel,
+    settings: &Settings,
+) -> Model {
+    let mut evidence = evidence.to_vec();
+    evidence.sort_by(|a, b| a.maneuver.maneuver_id.cmp(&b.maneuver.maneuver_id));
+    let tunnel = tunnel.clamped();
+    let basis = Basis {
+        buildup,
+        tunnel: &tunnel,
+        settings,
+    };
+    let all = [Axis::Longitudinal, Axis::Lateral].map(Axis::coefficients);
+    let all: Vec<Coefficient> = all.into_iter().flatten().collect();
+    let of = |coefficient: Coefficient| {
+        let terms = basis.terms(coefficient, &evidence);
+        let has_terms = !terms.is_empty();
+        let found = has_terms.then(|| CoefficientPosterior::of(terms, &evidence, &basis))?;
+        let rows = found.as_ref().map(|p| p.rows(coefficient, &evidence));
+        Some((coefficient, found.zip(rows)))
+    };
+    let found: Vec<_> = all.into_par_iter().filter_map(of).collect();
+    let mut model = Model::default();
+    for (coefficient, found) in found {
+        match found {
+            Some((posterior, rows)) => {
+                model.rows.append(rows);
+                model.coefficients.push((coefficient, posterior));
+            }
+            None => model.failed.push(coefficient),
+        }
+    }
+    model
+}

@@ -1,0 +1,215 @@
+//! Evidence of a maneuver about a coefficient: differences of its estimates from the tunnel, as linear
+//! functions of the coefficient's unknown differences and of errors that maneuvers share.
+//!
+//! With f the differences at the maneuver's condition, an estimate is off the tunnel by
+//!
+//! y = (S + G) f + K u + e,
+//!
+//! where S picks the estimated derivatives, G is the change of the estimates with what they hold, K u
+//! the effect of calibration errors, and e has the rest of the corrected covariance. Nuisances of the
+//! maneuver are marginalised by taking the rows and columns of its estimates alone.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::Evidence;
+use super::term::Term;
+use crate::aero::{Condition, WindTunnel};
+use crate::maneuver::Status;
+use crate::numerics::symmetric::{scale, scaled};
+use crate::output_error::error_effect::{ErrorEffect, SharedError};
+
+/// Least eigenvalue of a noise covariance at unit diagonal.
+const LEAST_EIGENVALUE: f64 = 1e-6;
+
+/// Evidence of a maneuver about one coefficient.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    pub condition: Condition,
+    /// Place of each row's term.
+    pub terms: Vec<usize>,
+    /// Estimates less the tunnel's values.
+    pub differences: DVector<f64>,
+    /// S + G: one row per estimate, one column per term.
+    pub design: DMatrix<f64>,
+    /// Covariance of what no other maneuver shares.
+    pub noise: DMatrix<f64>,
+    /// Changes of the rows by one standard deviation of each calibration error.
+    pub calibration: Vec<(SharedError, DVector<f64>)>,
+}
+
+/// One row of an observation: an estimate, or the sum that stands for a constant.
+struct Row {
+    term: usize,
+    /// Weights of the maneuver's parameters in it.
+    of_parameters: Vec<(usize, f64)>,
+    /// Estimate less the tunnel's value.
+    difference: f64,
+}
+
+impl Evidence<'_> {
+    /// Evidence about a coefficient's terms; `None` where the maneuver estimates none of them.
+    #[must_use]
+    pub fn about(&self, terms: &[Term], tunnel: &WindTunnel) -> Option<Observation> {
+        let condition = self.maneuver.condition(tunnel);
+        let rows: Vec<Row> = (0..terms.len())
+            .filter_map(|i| self.row(terms, i, tunnel, &condition))
+            .collect();
+        if rows.is_empty() {
+            return None;
+        }
+        let of_rows = self.matrix_of(&rows);
+        let effects = &self.covariance.shared_errors;
+        let design = self.design(terms, &rows, &of_rows);
+        let calibration = effects.iter().filter(|e| !is_held(e));
+        let is_shared = |e: &&ErrorEffect| match &e.error {
+            SharedError::Held(name) => terms.iter().any(|t| t.derivative == *name),
+            _ => true,
+        };
+        let shared = effects.iter().filter(is_shared);
+        let noise = self.noise(&of_rows, shared)?;
+        Some(Observation {
+            condition,
+            terms: rows.iter().map(|r| r.term).collect(),
+            differences: DVector::from_iterator(rows.len(), rows.iter().map(|r| r.difference)),
+            design,
+            noise,
+            calibration: calibration
+                .map(|e| {
+                    (
+                        e.error.clone(),
+                        &of_rows * DVector::from_column_slice(&e.change),
+                    )
+                })
+                .filter(|(_, change)| change.iter().any(|c| *c != 0.0))
+                .collect(),
+        })
+    }
+
+    fn row(&self, terms: &[Term], i: usize, tunnel: &WindTunnel, at: &Condition) -> Option<Row> {
+        let term = &terms[i];
+        let (own, mut value) = self.estimated(&term.derivative)?;
+        let mut of_parameters = vec![(own, 1.0)];
+        if let Some(slope) = &term.slope {
+            match self.estimated(slope) {
+                Some((place, slope)) => {
+                    of_parameters.push((place, at.alpha_deg));
+                    value += at.alpha_deg * slope;
+                }
+                None => value += at.alpha_deg * self.held(slope)?,
+            }
+        }
+        let known = tunnel.at(&term.prior.name, at).map_or(0.0, |t| t.value);
+        Some(Row {
+            term: i,
+            of_parameters,
+            difference: value - known,
+        })
+    }
+
+    /// Place among the parameters and value of an estimated derivative.
+    fn estimated(&self, name: &str) -> Option<(usize, f64)> {
+        let place = self.covariance.names.iter().position(|n| n == name)?;
+        let row = self.estimates.iter().find(|e| e.derivative == name)?;
+        let value = row.value.filter(|v| v.is_finite())?;
+        (row.status == Status::Estimated).then_some((place, value))
+    }
+
+    /// Tunnel's value at which a derivative acted in the maneuver.
+    fn held(&self, name: &str) -> Option<f64> {
+        let row = self.estimates.iter().find(|e| e.derivative == name)?;
+        row.wind_tunnel
+    }
+
+    fn matrix_of(&self, rows: &[Row]) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(rows.len(), self.covariance.names.len());
+        for (i, row) in rows.iter().enumerate() {
+            for &(parameter, weight) in &row.of_parameters {
+                matrix[(i, parameter)] = weight;
+            }
+        }
+        matrix
+    }
+
+    fn design(&self, terms: &[Term], rows: &[Row], of_rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut design = DMatrix::zeros(rows.len(), terms.len());
+        for (i, row) in rows.iter().enumerate() {
+            let term = &terms[row.term];
+            design[(i, row.term)] += 1.0;
+            if let Some(slope) = &term.slope
+                && self.estimated(slope).is_none()
+            {
+                self.add_derivative(terms, slope, -self.maneuver.alpha_deg, i, &mut design);
+            }
+        }
+        for effect in &self.covariance.shared_errors {
+            if let SharedError::Held(name) = &effect.error
+                && effect.deviation > 0.0
+            {
+                let gains = of_rows * DVector::from_column_slice(&effect.change) / effect.deviation;
+                for (i, gain) in gains.iter().enumerate() {
+                    self.add_derivative(terms, name, *gain, i, &mut design);
+                }
+            }
+        }
+        design
+    }
+
+    /// Adds the effect of a derivative's difference on a row. The difference of a constant is that of
+    /// its sum less that of the slope times α.
+    fn add_derivative(
+        &self,
+        terms: &[Term],
+        name: &str,
+        effect: f64,
+        row: usize,
+        design: &mut DMatrix<f64>,
+    ) {
+        let Some(place) = terms.iter().position(|t| t.derivative == name) else {
+            return;
+        };
+        design[(row, place)] += effect;
+        let slope = terms[place].slope.as_ref();
+        if let Some(slope) = slope.and_then(|s| terms.iter().position(|t| t.derivative == *s)) {
+            design[(row, slope)] -= effect * self.maneuver.alpha_deg;
+        }
+    }
+
+    /// Corrected covariance of the rows without the effects that are modelled.
+    fn noise<'e>(
+        &self,
+        of_rows: &DMatrix<f64>,
+        shared: impl Iterator<Item = &'e ErrorEffect>,
+    ) -> Option<DMatrix<f64>> {
+        let n = self.covariance.names.len();
+        let mut own = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        for effect in shared {
+            let change = DVector::from_column_slice(&effect.change);
+            own -= &change * change.transpose();
+        }
+        let whole = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let whole = of_rows * whole * of_rows.transpose();
+        floored(&(of_rows * own * of_rows.transpose()), &whole)
+    }
+}
+
+fn is_held(effect: &ErrorEffect) -> bool {
+    matches!(effect.error, SharedError::Held(_))
+}
+
+/// Covariance with the eigenvalues raised that are negative or tiny beside the variances of `whole`;
+/// `None` unless both are finite and these variances positive.
+fn floored(covariance: &DMatrix<f64>, whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let is_sound = covariance.iter().chain(whole.iter()).all(|v| v.is_finite())
+        && whole.diagonal().iter().all(|v| *v > 0.0);
+    if !is_sound {
+        return None;
+    }
+    let units = scale(whole);
+    let at_unit = scaled(covariance, &units);
+    let mut eigen = at_unit.symmetric_eigen();
+    eigen
+        .eigenvalues
+        .apply(|value| *value = value.max(LEAST_EIGENVALUE));
+    let back = units.map(|unit| 1.0 / unit);
+    Some(scaled(&eigen.recompose(), &back))
+}

@@ -1,0 +1,150 @@
+//! Posterior of a coefficient's differences from the tunnel, given scales and weights: a Gaussian.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::flight_data::{FlightData, Information};
+use super::prior::Scale;
+use super::term::Term;
+use super::unknowns::{Unknowns, root_of_differences};
+use crate::numerics::root::{BlockRoot, EXACT};
+use crate::numerics::triangular::{cholesky, solve_lower};
+
+/// Share of the information that rounding may hide: data a million times as sure as the prior stay
+/// positive definite.
+const ROUNDING: f64 = 1e-13;
+
+/// Gaussian of all unknowns of a coefficient.
+#[derive(Clone, Debug)]
+pub struct Gaussian {
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+/// Normal equations of all flights, in their order.
+#[must_use]
+pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> Information {
+    let mut sums = Information::none(unknowns);
+    for flight in flights {
+        flight.add_to(weights, &mut sums);
+    }
+    sums
+}
+
+/// Gaussian with a prior covariance R Rᵀ: P = R (I + Rᵀ Λ R)⁻¹ Rᵀ, mean P η. `None` where the data
+/// are not finite.
+#[must_use]
+pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
+    let mut inner = root.right(&root.left(&information.matrix));
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
+    }
+    let lower = cholesky(inner)?;
+    let mut halves = root.transposed();
+    solve_lower(lower.as_view(), halves.as_view_mut());
+    let covariance = halves.transpose() * halves;
+    let mean = &covariance * &information.vector;
+    mean.iter()
+        .all(|v| v.is_finite())
+        .then_some(Gaussian { mean, covariance })
+}
+
+/// Normal equations of the differences from the tunnel, with the other unknowns marginalised.
+#[must_use]
+pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<Information> {
+    let (n, all) = (unknowns.differences, unknowns.count);
+    let (matrix, vector) = (&information.matrix, &information.vector);
+    let own = Information {
+        matrix: matrix.view((n, n), (all - n, all - n)).into_owned(),
+        vector: vector.rows(n, all - n).into_owned(),
+    };
+    let others = gaussian(&unknowns.root_of_others(EXACT), &own)?;
+    let cross = matrix.view((0, n), (n, all - n));
+    Some(Information {
+        matrix: matrix.view((0, 0), (n, n)) - cross * &others.covariance * cross.transpose(),
+        vector: vector.rows(0, n) - cross * &others.mean,
+    })
+}
+
+/// Prediction of rows that were left out: what was observed less what the others predict, with the
+/// covariance of that difference.
+#[derive(Clone, Debug)]
+pub struct LeftOut {
+    pub differences: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+/// Flight as the other flights predict it, and each of its maneuvers as all others predict it.
+#[derive(Clone, Debug)]
+pub struct FlightLeftOut {
+    pub flight: LeftOut,
+    /// By place in the evidence.
+    pub maneuvers: BTreeMap<usize, LeftOut>,
+}
+
+/// Prediction of a flight's rows without them, in closed form.
+///
+/// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision
+/// V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r; a part of them likewise from the part of V⁻¹.
+#[must_use]
+pub fn left_out(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<FlightLeftOut> {
+    let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
+    let inverse = flight.cholesky(weights)?.inverse();
+    let precision = &inverse - &inverse * spread * &inverse;
+    let weighted = inverse * (&flight.differences - predicted);
+    let all = 0..weighted.len();
+    let part = |rows: &std::ops::Range<usize>| {
+        let own = precision.view((rows.start, rows.start), (rows.len(), rows.len()));
+        let covariance = Cholesky::new(own.into_owned())?.inverse();
+        Some(LeftOut {
+            differences: &covariance * weighted.rows_range(rows.clone()),
+            covariance,
+        })
+    };
+    let maneuvers = flight.maneuvers.iter();
+    Some(FlightLeftOut {
+        flight: part(&all)?,
+        maneuvers: maneuvers
+            .filter_map(|(place, rows)| Some((*place, part(rows)?)))
+            .collect(),
+    })
+}
+
+/// Weights of the maneuvers by Student's t: a maneuver far from what all others predict weighs less.
+///
+/// Each is judged at its full weight: V of the prediction less the noise that its weight added.
+#[must_use]
+pub fn reweighted(
+    flights: &[FlightData],
+    weights: &[f64],
+    whole: &Gaussian,
+    degrees_of_freedom: f64,
+) -> Vec<f64> {
+    let mut next = weights.to_vec();
+    for flight in flights {
+        let Some(left_out) = left_out(flight, weights, whole) else {
+            continue;
+        };
+        for (i, (place, rows)) in flight.maneuvers.iter().enumerate() {
+            let Some(alone) = left_out.maneuvers.get(place) else {
+                continue;
+            };
+            let added = flight.noise(i) * (1.0 / weights[*place] - 1.0);
+            if let Some(cholesky) = Cholesky::new(&alone.covariance - added) {
+                let distance = alone.differences.dot(&cholesky.solve(&alone.differences));
+                let expected = degrees_of_freedom + rows.len() as f64;
+                next[*place] = (expected / (degrees_of_freedom + distance)).min(1.0);
+            }
+        }
+    }
+    next
+}
+
+/// Prior covariance of the differences.
+#[must_use]
+pub fn prior(terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
+    let root = root_of_differences(terms, scales, EXACT);
+    let transposed = root.transposed();
+    transposed.tr_mul(&transposed)
+}

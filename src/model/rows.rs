@@ -1,0 +1,146 @@
+//! Rows of the posterior's tables.
+
+use super::coefficient::CoefficientPosterior;
+use super::evidence::Evidence;
+use super::published::Quantity;
+use super::self_check::Agreement;
+use crate::aero::Coefficient;
+use crate::tables::{
+    ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
+};
+
+/// Share of a unit beyond which digits are published.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// Tables of one coefficient.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rows {
+    pub posterior: Vec<PosteriorRow>,
+    pub covariance: Vec<CovarianceRow>,
+    pub scales: Vec<ScaleRow>,
+    pub contributions: Vec<ContributionRow>,
+    pub self_check: Vec<SelfCheckRow>,
+}
+
+impl Rows {
+    /// Appends the rows of another coefficient.
+    pub fn append(&mut self, other: Rows) {
+        self.posterior.extend(other.posterior);
+        self.covariance.extend(other.covariance);
+        self.scales.extend(other.scales);
+        self.contributions.extend(other.contributions);
+        self.self_check.extend(other.self_check);
+    }
+}
+
+impl CoefficientPosterior {
+    /// Rows of all tables.
+    #[must_use]
+    pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Rows {
+        let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
+        let quantities = self.quantities();
+        let posterior = quantities.iter().flat_map(|q| self.posterior(q, &alphas));
+        Rows {
+            posterior: posterior.collect(),
+            covariance: self.covariance_rows(),
+            scales: self.scale_rows(),
+            contributions: self.contributions(coefficient, evidence),
+            self_check: self.self_check(coefficient),
+        }
+    }
+
+    fn posterior(&self, quantity: &Quantity, alphas_deg: &[f64]) -> Vec<PosteriorRow> {
+        let (values, covariance) = self.values(quantity);
+        let before = self.prior_covariance(quantity);
+        let row = |i: usize| {
+            let (node, variance) = (&quantity.nodes[i], covariance[(i, i)].max(0.0));
+            let deviation = variance.sqrt();
+            let known = before[(i, i)];
+            PosteriorRow {
+                derivative: quantity.name.clone(),
+                unit: quantity.unit.to_owned(),
+                alpha_deg: node.alpha_deg,
+                mach: node.mach,
+                third: node.third,
+                value: values[i],
+                standard_deviation: deviation,
+                lower_95: values[i] - NORMAL_95 * deviation,
+                upper_95: values[i] + NORMAL_95 * deviation,
+                wind_tunnel: quantity.has_tunnel.then_some(quantity.tunnel[i]),
+                prior_deviation: known.sqrt(),
+                flight_share_pct: (known > 0.0).then(|| 100.0 * (1.0 - variance / known).max(0.0)),
+                maneuvers: self.maneuvers_near(quantity.term, alphas_deg, node.alpha_deg),
+            }
+        };
+        (0..values.len()).map(row).collect()
+    }
+
+    fn covariance_rows(&self) -> Vec<CovarianceRow> {
+        let points = self.terms.iter().flat_map(|term| {
+            let nodes = term.prior.grid.nodes().into_iter();
+            nodes.map(|node| (term.prior.name.as_str(), node))
+        });
+        let points: Vec<_> = points.collect();
+        let mut rows = Vec::with_capacity(points.len() * (points.len() + 1) / 2);
+        for (i, (first, at)) in points.iter().enumerate() {
+            for (j, (second, there)) in points.iter().enumerate().take(i + 1) {
+                rows.push(CovarianceRow {
+                    first: (*first).to_owned(),
+                    first_alpha_deg: at.alpha_deg,
+                    first_mach: at.mach,
+                    first_third: at.third,
+                    second: (*second).to_owned(),
+                    second_alpha_deg: there.alpha_deg,
+                    second_mach: there.mach,
+                    second_third: there.third,
+                    covariance: self.gaussian.covariance[(i, j)],
+                });
+            }
+        }
+        rows
+    }
+
+    fn scale_rows(&self) -> Vec<ScaleRow> {
+        let both = self.terms.iter().zip(&self.scales);
+        both.map(|(term, scale)| ScaleRow {
+            derivative: term.prior.name.clone(),
+            knowledge: term.prior.known,
+            size: scale.size,
+            length_deg: scale.length_deg,
+        })
+        .collect()
+    }
+
+    fn contributions(
+        &self,
+        coefficient: Coefficient,
+        evidence: &[Evidence],
+    ) -> Vec<ContributionRow> {
+        let row = |(place, weight): (&usize, &f64)| {
+            let maneuver = evidence[*place].maneuver;
+            ContributionRow {
+                maneuver_id: maneuver.maneuver_id.clone(),
+                class: maneuver.class.clone(),
+                coefficient: format!("{coefficient:?}"),
+                weight: *weight,
+            }
+        };
+        self.weights.iter().map(row).collect()
+    }
+
+    fn self_check(&self, coefficient: Coefficient) -> Vec<SelfCheckRow> {
+        let row = |left_out: LeftOutKind, item: &str, agreement: &Agreement| SelfCheckRow {
+            left_out,
+            item: item.to_owned(),
+            coefficient: format!("{coefficient:?}"),
+            estimates: agreement.estimates,
+            inside_95_pct: 100.0 * agreement.inside as f64 / agreement.estimates.max(1) as f64,
+            log_density: agreement.log_density,
+        };
+        let flights = self.flights.iter();
+        let flights = flights.map(|(id, a)| row(LeftOutKind::Flight, id, a));
+        let classes = self.classes.iter();
+        let classes = classes.map(|(id, a)| row(LeftOutKind::Class, id, a));
+        flights.chain(classes).collect()
+    }
+}

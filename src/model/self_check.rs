@@ -1,0 +1,88 @@
+//! Check without truth: each flight as the others predict it, each class as the other classes predict
+//! it. Scales and weights are those of all data.
+
+use nalgebra::{Cholesky, DVector};
+
+use super::flight_data::FlightData;
+use super::posterior::{Gaussian, LeftOut, gaussian, information, left_out};
+use crate::numerics::root::BlockRoot;
+
+/// Half width of a 95 % interval in standard deviations.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// Agreement of what was left out with its prediction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// Number of estimates.
+    pub estimates: usize,
+    /// Number of them inside their 95 % interval.
+    pub inside: usize,
+    /// Log density of the estimates, each in its own unit.
+    pub log_density: f64,
+}
+
+impl std::ops::AddAssign for Agreement {
+    fn add_assign(&mut self, other: Agreement) {
+        self.estimates += other.estimates;
+        self.inside += other.inside;
+        self.log_density += other.log_density;
+    }
+}
+
+impl LeftOut {
+    /// Agreement of the rows with their joint prediction.
+    #[must_use]
+    pub fn agreement(&self) -> Agreement {
+        let variances = self.covariance.diagonal();
+        let both = self.differences.iter().zip(variances.iter());
+        let inside = both.filter(|(d, variance)| d.abs() <= NORMAL_95 * variance.sqrt());
+        let log_density = Cholesky::new(self.covariance.clone()).map_or(f64::NEG_INFINITY, |c| {
+            let square = self.differences.dot(&c.solve(&self.differences));
+            let roots: f64 = c.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+            let n = self.differences.len() as f64;
+            -0.5 * square - roots - 0.5 * n * std::f64::consts::TAU.ln()
+        });
+        Agreement {
+            estimates: self.differences.len(),
+            inside: inside.count(),
+            log_density,
+        }
+    }
+}
+
+/// Agreement of a flight with the other flights.
+#[must_use]
+pub fn flight(data: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<Agreement> {
+    Some(left_out(data, weights, whole)?.flight.agreement())
+}
+
+/// Agreement of some maneuvers with all others. What their flights' calibration errors are is not
+/// taken from the others.
+#[must_use]
+pub fn maneuvers(
+    flights: &[FlightData],
+    weights: &[f64],
+    root: &BlockRoot,
+    unknowns: usize,
+    is_left_out: impl Fn(usize) -> bool,
+) -> Option<Agreement> {
+    let others = flights.iter().map(|f| f.of_maneuvers(|m| !is_left_out(m)));
+    let others: Vec<FlightData> = others.filter(|f| !f.rows.is_empty()).collect();
+    let rest = gaussian(root, &information(&others, weights, unknowns))?;
+    let mut sum = Agreement::default();
+    for flight in flights {
+        let own = flight.of_maneuvers(&is_left_out);
+        if own.rows.is_empty() {
+            continue;
+        }
+        let (predicted, spread) = own.image(&rest.mean, &rest.covariance);
+        let differences: DVector<f64> = &own.differences - predicted;
+        let covariance = spread + own.covariance(weights);
+        let prediction = LeftOut {
+            differences,
+            covariance,
+        };
+        sum += prediction.agreement();
+    }
+    (sum.estimates > 0).then_some(sum)
+}

@@ -1,0 +1,145 @@
+//! Terms of a coefficient whose difference from the tunnel is unknown.
+//!
+//! A constant whose sum with its slope the tunnel tabulates is replaced by the sum, which flight and
+//! tunnel both know better. A constant about which nothing is known is no term: each maneuver keeps
+//! its own.
+
+use super::evidence::Evidence;
+use super::grid::{Grid, refined};
+use super::prior::{Prior, Scale, Table};
+use super::settings::Settings;
+use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::maneuver::Status;
+use crate::numerics::order_statistics::median;
+use crate::tables::Knowledge;
+
+/// One unknown of a coefficient.
+#[derive(Clone, Debug)]
+pub struct Term {
+    /// Derivative of the model that it is or stands for.
+    pub derivative: String,
+    /// Slope of the sum that stands for its constant; `None` for a derivative itself.
+    pub slope: Option<String>,
+    pub unit: &'static str,
+    pub prior: Prior,
+}
+
+/// Data from which the terms follow.
+#[derive(Clone, Copy, Debug)]
+pub struct Basis<'a> {
+    pub buildup: &'a Buildup,
+    /// Tunnel, constant beyond its ends.
+    pub tunnel: &'a WindTunnel,
+    pub settings: &'a Settings,
+}
+
+impl Basis<'_> {
+    /// Terms of a coefficient, in the order of the model.
+    #[must_use]
+    pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<Term> {
+        let of_coefficient = |d: &&Derivative| d.coefficient == coefficient;
+        let derivatives = self.buildup.derivatives.iter().filter(of_coefficient);
+        let alphas = self.alphas_deg(coefficient, evidence);
+        derivatives
+            .filter_map(|derivative| self.term(derivative, &alphas, evidence))
+            .collect()
+    }
+
+    /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
+    /// points between.
+    fn alphas_deg(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<f64> {
+        let names = self.buildup.derivatives.iter();
+        let names = names
+            .filter(|d| d.coefficient == coefficient)
+            .map(|d| &d.name)
+            .chain(self.buildup.combined.iter().map(|c| &c.name).filter(|sum| {
+                let constant = self.buildup.combined.iter().find(|c| c.name == **sum);
+                let constant = constant.and_then(|c| self.buildup.derivative(&c.constant));
+                constant.is_some_and(|d| d.coefficient == coefficient)
+            }));
+        let tabulated: Vec<f64> = names
+            .flat_map(|name| self.tunnel.alphas_deg(name))
+            .collect();
+        let axis = coefficient.axis();
+        let own = evidence.iter().filter(|e| e.maneuver.axis == axis);
+        let flown = || own.clone().map(|e| e.maneuver.alpha_deg);
+        // Beyond the tables a whole step holds the outermost maneuver.
+        let step = self.settings.alpha_step_deg;
+        let lowest = flown().reduce(f64::min).map(|a| (a / step).floor() * step);
+        let highest = flown().reduce(f64::max).map(|a| (a / step).ceil() * step);
+        let first = tabulated.iter().copied().reduce(f64::min);
+        let last = tabulated.iter().copied().reduce(f64::max);
+        let below = lowest.filter(|a| first.is_none_or(|first| *a < first));
+        let above = highest.filter(|a| last.is_none_or(|last| *a > last));
+        refined(tabulated.into_iter().chain(below).chain(above), step)
+    }
+
+    fn term(&self, derivative: &Derivative, alphas: &[f64], evidence: &[Evidence]) -> Option<Term> {
+        let is_constant = derivative.regressor == Regressor::Constant;
+        let sum = self.buildup.combined.iter();
+        let mut sum = sum.clone().find(|c| c.constant == derivative.name);
+        let is_tabulated = |name: &str| self.tunnel.root_mean_square(name) > 0.0;
+        if is_tabulated(&derivative.name) && sum.is_some_and(|s| !is_tabulated(&s.name)) {
+            sum = None;
+        }
+        let name = sum.map_or(&derivative.name, |s| &s.name);
+        if is_constant && sum.is_none() && !is_tabulated(name) {
+            return None;
+        }
+        let grid = Grid {
+            alphas_deg: alphas.to_vec(),
+            machs: self.tunnel.machs(name),
+            thirds: self.tunnel.thirds(name),
+        };
+        let (table, size) = self.table(name, &grid, evidence)?;
+        let length_deg = self.settings.length_deg;
+        let prior = Prior::new(name.clone(), grid, table, Scale { size, length_deg });
+        Some(Term {
+            derivative: derivative.name.clone(),
+            slope: sum.map(|s| s.slope.clone()),
+            unit: self.buildup.unit_of(name)?.name(),
+            prior,
+        })
+    }
+
+    /// Tunnel's table over a grid, and the centre of the difference's relative size. A derivative
+    /// without table has the order of magnitude of its estimates; `None` without estimates.
+    fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(Table, f64)> {
+        let read = |node: super::grid::Node| self.tunnel.at(name, &node.condition());
+        let values: Option<Vec<_>> = grid.nodes().into_iter().map(read).collect();
+        let size = self.tunnel.root_mean_square(name);
+        if let Some(values) = values.filter(|_| size > 0.0) {
+            let mean = values.iter().map(|v| v.value).collect();
+            let stated: Option<Vec<f64>> = values.iter().map(|v| v.uncertainty).collect();
+            let (known, centre) = match stated {
+                Some(_) => (Knowledge::TableWithUncertainty, 1.0),
+                None => (
+                    Knowledge::Table,
+                    self.settings.tunnel_uncertainty_pct / 100.0,
+                ),
+            };
+            let uncertainty = stated.unwrap_or_default();
+            return Some((
+                Table {
+                    known,
+                    mean,
+                    uncertainty,
+                    size,
+                },
+                centre,
+            ));
+        }
+        let rows = evidence
+            .iter()
+            .flat_map(|e| e.estimates.iter().chain(e.combined));
+        let own = rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
+        let size = median(own.filter_map(|row| row.value).map(f64::abs))?;
+        let table = Table {
+            known: Knowledge::Magnitude,
+            mean: vec![0.0; grid.len()],
+            uncertainty: vec![],
+            size,
+        };
+        (size > 0.0).then_some((table, 1.0))
+    }
+}

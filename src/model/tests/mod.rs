@@ -1,0 +1,6 @@
+//! Tests of the posterior: its exact limits, its derivatives, and simulated campaigns.
+
+mod fixture;
+mod limits;
+mod parts;
+mod simulated;

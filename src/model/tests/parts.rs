@@ -1,0 +1,301 @@
+//! Parts of the posterior against other ways to compute them.
+
+use approx::assert_relative_eq;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::fixture::{Flown, NAMES, buildup, diagonal, exact, posterior, tunnel};
+use crate::aero::{Coefficient, Condition};
+use crate::model::coefficient::Data;
+use crate::model::posterior::{gaussian, information, left_out, of_differences};
+use crate::model::prior::Scale;
+use crate::model::scales::negative_log_posterior;
+use crate::model::term::{Basis, Term};
+use crate::model::{Evidence, Settings};
+use crate::numerics::random::RandomStream;
+use crate::numerics::root::EXACT;
+use crate::output_error::error_effect::SharedError;
+
+/// Ten maneuvers in four flights, with everything that they can share.
+fn campaign() -> Vec<Flown> {
+    let mut noise = RandomStream::new(5, "campaign");
+    (0..10)
+        .map(|i| {
+            let alpha_deg = 3.7 * f64::from(i) + 1.0;
+            let flight = format!("f{}", i % 4);
+            let estimates = [
+                ("CN_0", 0.1 + 0.02 * noise.normal()),
+                ("CN_alpha", 0.05 + 0.004 * noise.normal()),
+            ];
+            let covariance = diagonal([0.02, 0.003]);
+            Flown::new(
+                &format!("m{i}"),
+                &flight,
+                alpha_deg,
+                &estimates,
+                &covariance,
+            )
+            .with(SharedError::Held("CN_q".into()), 0.8, &[0.004, -0.002])
+            .with(SharedError::Bias("an".into()), 0.01, &[0.006, 0.001])
+            .with(SharedError::Delay("de_deg".into()), 0.001, &[0.002, 0.001])
+        })
+        .collect()
+}
+
+/// Terms and data of a campaign.
+fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
+    let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
+    let (buildup, tunnel) = (buildup(), tunnel(None));
+    let basis = Basis {
+        buildup: &buildup,
+        tunnel: &tunnel,
+        settings,
+    };
+    let terms = basis.terms(Coefficient::CN, &evidence);
+    let data = Data::new(&terms, &evidence, &basis);
+    (terms, data)
+}
+
+fn scales() -> Vec<Scale> {
+    [(0.2, 12.0), (0.3, 20.0), (0.15, 9.0)]
+        .map(|(size, length_deg)| Scale { size, length_deg })
+        .to_vec()
+}
+
+/// Rows, differences and covariance of all data, dense.
+fn dense(data: &Data, weights: &[f64]) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
+    let n = data.flights.iter().map(|f| f.rows.len()).sum();
+    let mut rows = DMatrix::zeros(n, data.unknowns.count);
+    let mut covariance = DMatrix::zeros(n, n);
+    let mut differences = DVector::zeros(n);
+    let mut first = 0;
+    for flight in &data.flights {
+        let own = flight.covariance(weights);
+        covariance
+            .view_mut((first, first), own.shape())
+            .copy_from(&own);
+        for (i, row) in flight.rows.iter().enumerate() {
+            differences[first + i] = flight.differences[i];
+            for (place, value) in row {
+                rows[(first + i, *place)] += *value;
+            }
+        }
+        first += flight.rows.len();
+    }
+    (rows, differences, covariance)
+}
+
+#[test]
+fn the_normal_equations_give_generalised_least_squares() {
+    let flown = campaign();
+    let (terms, mut data) = data(&flown, &Settings::default());
+    data.set_between(&terms, &scales());
+    let weights = vec![1.0, 0.4, 1.0, 1.0, 1.0, 0.7, 1.0, 1.0, 1.0, 1.0];
+    let root = data.unknowns.root(&terms, &scales(), EXACT);
+    let found = gaussian(
+        &root,
+        &information(&data.flights, &weights, data.unknowns.count),
+    )
+    .unwrap();
+    // y ~ N(0, A C Aᵀ + Σ): the mean of the unknowns is C Aᵀ (A C Aᵀ + Σ)⁻¹ y.
+    let (rows, differences, covariance) = dense(&data, &weights);
+    let transposed = root.transposed();
+    let prior = transposed.tr_mul(&transposed);
+    let gain = &prior * rows.transpose();
+    let inverse = Cholesky::new(&rows * &gain + covariance).unwrap().inverse();
+    let mean = &gain * &inverse * differences;
+    let rest = &prior - &gain * inverse * gain.transpose();
+    let scale = prior.diagonal().map(f64::sqrt);
+    for i in 0..data.unknowns.count {
+        assert_relative_eq!(found.mean[i], mean[i], epsilon = 1e-9 * scale[i]);
+        for j in 0..data.unknowns.count {
+            let unit = scale[i] * scale[j];
+            assert_relative_eq!(
+                found.covariance[(i, j)],
+                rest[(i, j)],
+                epsilon = 1e-9 * unit
+            );
+        }
+    }
+}
+
+#[test]
+fn the_gradient_over_the_scales_is_that_of_differences() {
+    let flown = campaign();
+    let (terms, data) = data(&flown, &Settings::default());
+    let weights = vec![1.0; flown.len()];
+    let sums = information(&data.flights, &weights, data.unknowns.count);
+    let own = of_differences(&sums, &data.unknowns).unwrap();
+    let value = |scales: &[Scale]| {
+        negative_log_posterior(&terms, &data.unknowns, &own, scales, EXACT).unwrap()
+    };
+    let (_, gradient) = value(&scales());
+    let step = 1e-5f64;
+    for i in 0..terms.len() {
+        let shifted = |size: f64, length: f64| {
+            let mut scales = scales();
+            scales[i].size *= size.exp();
+            scales[i].length_deg *= length.exp();
+            value(&scales).0
+        };
+        let by_size = (shifted(step, 0.0) - shifted(-step, 0.0)) / (2.0 * step);
+        let by_length = (shifted(0.0, step) - shifted(0.0, -step)) / (2.0 * step);
+        assert_relative_eq!(
+            gradient[2 * i],
+            by_size,
+            epsilon = 1e-6,
+            max_relative = 1e-6
+        );
+        assert_relative_eq!(
+            gradient[2 * i + 1],
+            by_length,
+            epsilon = 1e-6,
+            max_relative = 1e-6
+        );
+    }
+}
+
+#[test]
+fn the_likelihood_of_the_scales_is_that_of_the_data() {
+    // Differences of the log likelihood between two scales, against the dense one of the data.
+    let flown = campaign();
+    let (terms, data) = data(&flown, &exact());
+    let weights = vec![1.0; flown.len()];
+    let sums = information(&data.flights, &weights, data.unknowns.count);
+    let others = [Scale {
+        size: 0.4,
+        length_deg: 25.0,
+    }; 3];
+    let (rows, differences, covariance) = dense(&data, &weights);
+    let of_data = |scales: &[Scale]| {
+        let root = data.unknowns.root(&terms, scales, EXACT);
+        let image = root.right(&rows);
+        let cholesky = Cholesky::new(&covariance + &image * image.transpose()).unwrap();
+        let roots: f64 = cholesky.l().diagonal().iter().map(|d| d.ln()).sum();
+        0.5 * differences.dot(&cholesky.solve(&differences)) + roots
+    };
+    let own = |scales: &[Scale]| {
+        let own = of_differences(&sums, &data.unknowns).unwrap();
+        let (value, _) =
+            negative_log_posterior(&terms, &data.unknowns, &own, scales, EXACT).unwrap();
+        let both = terms.iter().zip(scales);
+        value - both.map(|(t, s)| t.prior.penalty(s).0).sum::<f64>()
+    };
+    assert_relative_eq!(
+        own(&scales()) - own(&others),
+        of_data(&scales()) - of_data(&others),
+        max_relative = 1e-8
+    );
+}
+
+#[test]
+fn what_is_left_out_is_predicted_as_if_it_had_not_been_there() {
+    let flown = campaign();
+    let (terms, data) = data(&flown, &Settings::default());
+    let weights = vec![1.0; flown.len()];
+    let root = data.unknowns.root(&terms, &scales(), EXACT);
+    let whole = gaussian(
+        &root,
+        &information(&data.flights, &weights, data.unknowns.count),
+    )
+    .unwrap();
+    let left = left_out(&data.flights[1], &weights, &whole).unwrap();
+    // The flight: the others are fitted anew.
+    let mut others = data.flights.clone();
+    let own = others.remove(1);
+    let rest = gaussian(&root, &information(&others, &weights, data.unknowns.count)).unwrap();
+    let (predicted, spread) = own.image(&rest.mean, &rest.covariance);
+    let expected = &own.differences - predicted;
+    assert_relative_eq!(left.flight.differences, expected, epsilon = 1e-9);
+    let expected = spread + own.covariance(&weights);
+    assert_relative_eq!(left.flight.covariance, expected, epsilon = 1e-9);
+    // One of its maneuvers: the flight's calibration errors are as its other maneuvers say.
+    let (place, rows) = own.maneuvers[0].clone();
+    // Of the flight's rows, those of the maneuver given the others.
+    let joint = left.flight.covariance.clone();
+    let kept: Vec<usize> = (0..own.rows.len()).filter(|i| !rows.contains(i)).collect();
+    let out: Vec<usize> = rows.clone().collect();
+    let cross = joint.select_rows(&out).select_columns(&kept);
+    let inverse = Cholesky::new(joint.select_rows(&kept).select_columns(&kept))
+        .unwrap()
+        .inverse();
+    let differences = left.flight.differences.select_rows(&out)
+        - &cross * &inverse * left.flight.differences.select_rows(&kept);
+    let covariance =
+        joint.select_rows(&out).select_columns(&out) - &cross * inverse * cross.transpose();
+    assert_relative_eq!(
+        left.maneuvers[&place].differences,
+        differences,
+        epsilon = 1e-9
+    );
+    assert_relative_eq!(
+        left.maneuvers[&place].covariance,
+        covariance,
+        epsilon = 1e-9
+    );
+}
+
+#[test]
+fn between_the_points_the_prior_s_variance_is_kept() {
+    let (terms, _) = data(&campaign(), &exact());
+    let prior = &terms[1].prior;
+    let scale = scales()[1];
+    let at = |alpha_deg: f64| Condition {
+        alpha_deg,
+        mach: 0.3,
+        third: None,
+    };
+    assert_relative_eq!(prior.between(&scale, &at(10.0)), 0.0, epsilon = 1e-18);
+    // Half way between two points the straight line and what lies between make up the whole variance
+    // but for their covariance, which the closed form has.
+    let step = prior.grid.alphas_deg[1] - prior.grid.alphas_deg[0];
+    let middle = prior.grid.alphas_deg[4] + 0.5 * step;
+    let fading = |d: f64| {
+        let r = 3f64.sqrt() * d / scale.length_deg;
+        (1.0 + r) * (-r).exp()
+    };
+    let shares = prior.grid.shares(&at(middle));
+    let (i, j) = (shares[0].0, shares[1].0);
+    // Amplitude at the point between, where the table is linear.
+    let mean = 0.5 * (prior.mean[i] + prior.mean[j]);
+    let size = tunnel(None).root_mean_square("CN_alpha");
+    let shape = 0.5 * size * size + 0.5 * mean * mean;
+    let expected =
+        scale.size.powi(2) / 1.25 * shape * (1.5 + 0.5 * fading(step) - 2.0 * fading(0.5 * step));
+    assert_relative_eq!(
+        prior.between(&scale, &at(middle)),
+        expected,
+        max_relative = 1e-9
+    );
+}
+
+#[test]
+fn draws_have_the_mean_and_covariance_of_the_posterior() {
+    let model = posterior(&campaign(), &tunnel(None), &Settings::default());
+    let mut stream = RandomStream::new(1, "draws");
+    let count = 2000;
+    let rows = &model.rows.posterior;
+    let draws: Vec<Vec<f64>> = (0..count)
+        .map(|_| model.drawn(&mut stream).iter().map(|r| r.value).collect())
+        .collect();
+    for (i, row) in rows.iter().enumerate() {
+        let mean = draws.iter().map(|d| d[i]).sum::<f64>() / f64::from(count);
+        let square = draws.iter().map(|d| (d[i] - mean).powi(2)).sum::<f64>() / f64::from(count);
+        let deviation = row.standard_deviation;
+        assert_relative_eq!(
+            mean,
+            row.value,
+            epsilon = 4.0 * deviation / f64::from(count).sqrt()
+        );
+        assert_relative_eq!(square.sqrt(), deviation, max_relative = 0.08);
+    }
+    // The constant of each draw is its sum less the slope's part.
+    let of = |draw: &[f64], name: &str, alpha_deg: f64| {
+        let place = rows
+            .iter()
+            .position(|r| r.derivative == name && (r.alpha_deg - alpha_deg).abs() < 1e-9);
+        draw[place.unwrap()]
+    };
+    let draw = &draws[7];
+    let sum = of(draw, NAMES[0], 20.0) + 20.0 * of(draw, NAMES[1], 20.0);
+    assert_relative_eq!(sum, of(draw, "CN_ba", 20.0), max_relative = 1e-12);
+}

@@ -1,0 +1,189 @@
+//! Unknowns of a coefficient in one vector: differences from the tunnel at the points of the grids, then
+//! errors that all maneuvers of a class, or of the campaign, share.
+//!
+//! What a class gets wrong alike every time is, for each derivative it estimates, a function of α in
+//! bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+
+use super::grid::Grid;
+use super::observation::Observation;
+use super::prior::{Scale, fading};
+use super::term::Term;
+use crate::numerics::root::{BlockRoot, root};
+use crate::output_error::error_effect::SharedError;
+
+/// Distance over which a class's errors fade, deg; also the spacing of their grid.
+const CLASS_LENGTH_DEG: f64 = 10.0;
+
+/// Row of a sparse matrix over the unknowns.
+pub type SparseRow = Vec<(usize, f64)>;
+
+/// Order of the unknowns.
+#[derive(Clone, Debug)]
+pub struct Unknowns {
+    /// First unknown of each term.
+    pub starts: Vec<usize>,
+    /// Number of differences from the tunnel, which come first.
+    pub differences: usize,
+    /// Number of unknowns.
+    pub count: usize,
+    classes: BTreeMap<(usize, usize), ClassError>,
+    campaign: BTreeMap<SharedError, usize>,
+    class_error: f64,
+}
+
+/// Function of α that a class's estimates of a term share.
+#[derive(Clone, Debug)]
+struct ClassError {
+    start: usize,
+    grid: Grid,
+}
+
+impl Unknowns {
+    /// Unknowns of a coefficient's terms and of observations by class.
+    #[must_use]
+    pub fn new(
+        terms: &[Term],
+        observations: &[(usize, Observation)],
+        class_error: f64,
+    ) -> Unknowns {
+        let mut count = 0;
+        let mut next = |length: usize| {
+            count += length;
+            count - length
+        };
+        let starts = terms.iter().map(|t| next(t.prior.grid.len())).collect();
+        let mut ranges: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
+        let mut campaign = BTreeMap::new();
+        for (class, observation) in observations {
+            let alpha = observation.condition.alpha_deg;
+            for term in &observation.terms {
+                let range = ranges.entry((*class, *term)).or_insert((alpha, alpha));
+                *range = (range.0.min(alpha), range.1.max(alpha));
+            }
+            let shared = observation.calibration.iter().map(|(error, _)| error);
+            for error in shared.filter(|e| is_of_campaign(e)) {
+                campaign.insert(error.clone(), 0);
+            }
+        }
+        let differences = next(0);
+        let classes = ranges
+            .into_iter()
+            .map(|(key, range)| {
+                let grid = class_grid(range);
+                let start = next(grid.len());
+                (key, ClassError { start, grid })
+            })
+            .collect();
+        for place in campaign.values_mut() {
+            *place = next(1);
+        }
+        Unknowns {
+            starts,
+            differences,
+            count: next(0),
+            classes,
+            campaign,
+            class_error,
+        }
+    }
+
+    /// Rows of an observation over the unknowns.
+    #[must_use]
+    pub fn rows(&self, terms: &[Term], class: usize, observation: &Observation) -> Vec<SparseRow> {
+        let shares: Vec<SparseRow> = terms
+            .iter()
+            .map(|t| t.prior.grid.shares(&observation.condition))
+            .collect();
+        let rows = observation.terms.iter().enumerate().map(|(i, &term)| {
+            let mut row = self.row(observation.design.row(i).iter().copied(), &shares);
+            let bound = observation.noise[(i, i)].sqrt();
+            if let Some(error) = self.classes.get(&(class, term)) {
+                let own = error.grid.shares(&observation.condition).into_iter();
+                row.extend(own.map(|(node, share)| (error.start + node, share * bound)));
+            }
+            for (error, change) in &observation.calibration {
+                let place = self.campaign.get(error);
+                row.extend(place.map(|place| (*place, change[i])));
+            }
+            row
+        });
+        rows.collect()
+    }
+
+    /// Row over the differences alone, from weights of the terms and shares of their points.
+    #[must_use]
+    pub fn row(&self, weights: impl Iterator<Item = f64>, shares: &[SparseRow]) -> SparseRow {
+        let mut row = Vec::new();
+        for ((start, shares), weight) in self.starts.iter().zip(shares).zip(weights) {
+            if weight != 0.0 {
+                row.extend(
+                    shares
+                        .iter()
+                        .map(|(node, share)| (start + node, weight * share)),
+                );
+            }
+        }
+        row
+    }
+
+    /// Root of the prior covariance of all unknowns but the differences, without directions below `least`
+    /// of the largest variance of its kind.
+    #[must_use]
+    pub fn root_of_others(&self, least: f64) -> BlockRoot {
+        let mut whole = BlockRoot::default();
+        self.push_others(least, &mut whole);
+        whole
+    }
+
+    /// As [`Unknowns::root_of_others`], of all unknowns.
+    #[must_use]
+    pub fn root(&self, terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+        let mut whole = root_of_differences(terms, scales, least);
+        self.push_others(least, &mut whole);
+        whole
+    }
+
+    fn push_others(&self, least: f64, whole: &mut BlockRoot) {
+        for error in self.classes.values() {
+            let alphas = &error.grid.alphas_deg;
+            let covariance = DMatrix::from_fn(alphas.len(), alphas.len(), |i, j| {
+                let distance = (alphas[i] - alphas[j]).abs() / CLASS_LENGTH_DEG;
+                self.class_error * self.class_error * fading(distance)
+            });
+            whole.push(root(&covariance, least));
+        }
+        let of_campaign = self.campaign.len();
+        whole.push(DMatrix::identity(of_campaign, of_campaign));
+    }
+}
+
+/// Root of the prior covariance of the differences, without directions below `least` of a term's
+/// largest variance.
+#[must_use]
+pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+    let mut whole = BlockRoot::default();
+    for (term, scale) in terms.iter().zip(scales) {
+        whole.push(root(&term.prior.covariance(scale), least));
+    }
+    whole
+}
+
+/// True for an error that is common to all flights: surfaces are recorded late by the recorder.
+#[must_use]
+pub fn is_of_campaign(error: &SharedError) -> bool {
+    matches!(error, SharedError::Delay(_))
+}
+
+fn class_grid((lowest, highest): (f64, f64)) -> Grid {
+    let mut alpha = (lowest / CLASS_LENGTH_DEG).floor() * CLASS_LENGTH_DEG;
+    let mut alphas = vec![alpha];
+    while alpha < highest {
+        alpha += CLASS_LENGTH_DEG;
+        alphas.push(alpha);
+    }
+    Grid::of_alpha(alphas)
+}

@@ -1,0 +1,168 @@
+//! Square roots of covariances: R with R Rᵀ = C, block by block.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+/// Share of the largest variance below which a direction has none.
+pub const EXACT: f64 = 1e-14;
+
+/// Square root of a positive semidefinite covariance by Cholesky's method with pivoting. Directions
+/// whose variance is below `least` of the largest one are left out, so the root has as many columns as
+/// there are directions left.
+#[must_use]
+pub fn root(covariance: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
+    let n = covariance.nrows();
+    let mut rest = covariance.diagonal();
+    let limit = least * rest.amax();
+    let mut root = DMatrix::<f64>::zeros(n, n);
+    let mut rank = 0;
+    while rank < n {
+        let pivot = rest.imax();
+        if rest[pivot] <= limit {
+            break;
+        }
+        let mut column = covariance.column(pivot).into_owned();
+        for k in 0..rank {
+            column.axpy(-root[(pivot, k)], &root.column(k), 1.0);
+        }
+        column /= rest[pivot].sqrt();
+        for (rest, value) in rest.iter_mut().zip(column.iter()) {
+            *rest -= value * value;
+        }
+        rest[pivot] = 0.0;
+        root.set_column(rank, &column);
+        rank += 1;
+    }
+    root.resize_horizontally(rank, 0.0)
+}
+
+/// Root of a block diagonal covariance.
+#[derive(Clone, Debug, Default)]
+pub struct BlockRoot {
+    /// Roots of the blocks.
+    blocks: Vec<DMatrix<f64>>,
+}
+
+impl BlockRoot {
+    /// Appends a block.
+    pub fn push(&mut self, root: DMatrix<f64>) {
+        self.blocks.push(root);
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.blocks.iter().map(DMatrix::ncols).sum()
+    }
+
+    /// Blocks with their rows and columns.
+    fn places(&self) -> impl Iterator<Item = (&DMatrix<f64>, Range<usize>, Range<usize>)> {
+        let (mut row, mut column) = (0, 0);
+        self.blocks.iter().map(move |block| {
+            let rows = row..row + block.nrows();
+            let columns = column..column + block.ncols();
+            (row, column) = (rows.end, columns.end);
+            (block, rows, columns)
+        })
+    }
+
+    /// Rᵀ M.
+    #[must_use]
+    pub fn left(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(self.rank(), matrix.ncols());
+        for (block, rows, columns) in self.places() {
+            let own = block.transpose() * matrix.rows_range(rows);
+            product.rows_range_mut(columns).copy_from(&own);
+        }
+        product
+    }
+
+    /// Rᵀ v.
+    #[must_use]
+    pub fn left_of(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let mut product = DVector::zeros(self.rank());
+        for (block, rows, columns) in self.places() {
+            let own = block.tr_mul(&vector.rows_range(rows));
+            product.rows_range_mut(columns).copy_from(&own);
+        }
+        product
+    }
+
+    /// M R.
+    #[must_use]
+    pub fn right(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(matrix.nrows(), self.rank());
+        for (block, rows, columns) in self.places() {
+            let own = matrix.columns_range(rows) * block;
+            product.columns_range_mut(columns).copy_from(&own);
+        }
+        product
+    }
+
+    /// Rᵀ.
+    #[must_use]
+    pub fn transposed(&self) -> DMatrix<f64> {
+        let count = self.blocks.iter().map(DMatrix::nrows).sum();
+        let mut whole = DMatrix::zeros(self.rank(), count);
+        for (block, rows, columns) in self.places() {
+            let shape = (columns.len(), rows.len());
+            let mut own = whole.view_mut((columns.start, rows.start), shape);
+            own.copy_from(&block.transpose());
+        }
+        whole
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    fn covariance() -> DMatrix<f64> {
+        DMatrix::from_row_slice(3, 3, &[4.0, 2.0, 0.6, 2.0, 5.0, 1.0, 0.6, 1.0, 2.0])
+    }
+
+    #[test]
+    fn the_square_of_the_root_is_the_covariance() {
+        let root = root(&covariance(), EXACT);
+        assert_relative_eq!(&root * root.transpose(), covariance(), epsilon = 1e-14);
+    }
+
+    #[test]
+    fn a_direction_without_variance_has_no_column() {
+        let singular = [0.0, 0.0, 0.0, 0.0, 4.0, 4.0, 0.0, 4.0, 4.0];
+        let covariance = DMatrix::from_row_slice(3, 3, &singular);
+        let root = root(&covariance, EXACT);
+        assert_eq!(root.ncols(), 1);
+        assert_relative_eq!(&root * root.transpose(), covariance, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn what_is_left_out_of_a_root_is_less_than_asked_for() {
+        let nodes = DMatrix::from_fn(40, 40, |i, j| (-(i as f64 - j as f64).powi(2) / 50.0).exp());
+        let root = root(&nodes, 1e-6);
+        assert!(root.ncols() < 25);
+        let rest = nodes - &root * root.transpose();
+        assert!(rest.diagonal().amax() <= 1e-6 && rest.diagonal().min() > -1e-12);
+    }
+
+    #[test]
+    fn products_with_blocks_are_those_with_the_whole_matrix() {
+        let mut blocks = BlockRoot::default();
+        blocks.push(root(&covariance(), EXACT));
+        blocks.push(DMatrix::from_element(2, 1, 3.0));
+        let whole = blocks.transposed();
+        assert_eq!(whole.shape(), (4, 5));
+        let matrix = DMatrix::from_fn(5, 5, |i, j| (3 * i + j) as f64);
+        assert_relative_eq!(blocks.left(&matrix), &whole * &matrix, epsilon = 1e-12);
+        assert_relative_eq!(
+            blocks.right(&matrix),
+            &matrix * whole.transpose(),
+            epsilon = 1e-12
+        );
+        let vector = matrix.column(2).into_owned();
+        assert_relative_eq!(blocks.left_of(&vector), &whole * &vector, epsilon = 1e-12);
+    }
+}

@@ -1,0 +1,89 @@
+//! Cholesky's method and triangular systems by blocks: most of the work is products of matrices, which
+//! run several times as fast as the columns of the plain methods.
+
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut};
+
+/// Size up to which the plain methods are as fast.
+const PLAIN: usize = 48;
+
+/// Lower triangular L with L Lᵀ = A; what stands above its diagonal is not defined. `None` unless A is
+/// positive definite.
+#[must_use]
+pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    factorise(matrix.as_view_mut()).then_some(matrix)
+}
+
+fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
+    let n = matrix.nrows();
+    if n <= PLAIN {
+        let Some(plain) = Cholesky::new(matrix.clone_owned()) else {
+            return false;
+        };
+        matrix.copy_from(plain.l_dirty());
+        return true;
+    }
+    let half = n / 2;
+    if !factorise(matrix.view_mut((0, 0), (half, half))) {
+        return false;
+    }
+    let mut below = matrix.view((half, 0), (n - half, half)).transpose();
+    solve_lower(matrix.view((0, 0), (half, half)), below.as_view_mut());
+    let lower = below.transpose();
+    matrix.view_mut((half, 0), lower.shape()).copy_from(&lower);
+    let mut rest = matrix.view_mut((half, half), (n - half, n - half));
+    rest.gemm(-1.0, &lower, &below, 1.0);
+    factorise(rest)
+}
+
+/// Replaces B by L⁻¹ B for a lower triangular L.
+pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
+    let n = lower.nrows();
+    if n <= PLAIN {
+        lower.solve_lower_triangular_mut(&mut right);
+        return;
+    }
+    let half = n / 2;
+    let (mut first, mut second) = right.rows_range_pair_mut(..half, half..);
+    solve_lower(lower.view((0, 0), (half, half)), first.as_view_mut());
+    second.gemm(-1.0, &lower.view((half, 0), (n - half, half)), &first, 1.0);
+    solve_lower(
+        lower.view((half, half), (n - half, n - half)),
+        second.as_view_mut(),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    fn matrix(n: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, n, |i, j| {
+            let apart = (i as f64 - j as f64).abs() / 9.0;
+            (-apart).exp() + if i == j { 0.1 } else { 0.0 }
+        })
+    }
+
+    #[test]
+    fn blocks_give_what_the_plain_method_gives() {
+        for n in [5, 48, 49, 131] {
+            let plain = Cholesky::new(matrix(n)).unwrap().l();
+            let blocked = cholesky(matrix(n)).unwrap().lower_triangle();
+            assert_relative_eq!(blocked, plain, epsilon = 1e-12);
+            let mut right = DMatrix::from_fn(n, 7, |i, j| (i * j) as f64 - 3.0);
+            let given = right.clone();
+            solve_lower(plain.as_view(), right.as_view_mut());
+            assert_relative_eq!(&plain * right, given, epsilon = 1e-9);
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_has_no_root() {
+        for place in [3, 100] {
+            let mut indefinite = matrix(120);
+            indefinite[(place, place)] = -1.0;
+            assert!(cholesky(indefinite).is_none());
+        }
+    }
+}
