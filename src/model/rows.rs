@@ -76,14 +76,17 @@ impl CoefficientPosterior {
     }
 
     fn covariance_rows(&self) -> Vec<CovarianceRow> {
-        let points = self.terms.iter().flat_map(|term| {
-            let nodes = term.prior.grid.nodes().into_iter();
-            nodes.map(|node| (term.prior.name.as_str(), node))
-        });
-        let points: Vec<_> = points.collect();
+        let mut points = Vec::new();
+        for (term, start) in self.terms.iter().zip(&self.unknowns.starts) {
+            for (i, node) in term.prior.grid.nodes().into_iter().enumerate() {
+                if term.breakpoints_deg.contains(&node.alpha_deg) {
+                    points.push((term.prior.name.as_str(), node, start + i));
+                }
+            }
+        }
         let mut rows = Vec::with_capacity(points.len() * (points.len() + 1) / 2);
-        for (i, (first, at)) in points.iter().enumerate() {
-            for (j, (second, there)) in points.iter().enumerate().take(i + 1) {
+        for (i, (first, at, row)) in points.iter().enumerate() {
+            for (second, there, column) in &points[..=i] {
                 rows.push(CovarianceRow {
                     first: (*first).to_owned(),
                     first_alpha_deg: at.alpha_deg,
@@ -93,7 +96,7 @@ impl CoefficientPosterior {
                     second_alpha_deg: there.alpha_deg,
                     second_mach: there.mach,
                     second_third: there.third,
-                    covariance: self.gaussian.covariance[(i, j)],
+                    covariance: self.gaussian.covariance[(*row, *column)],
                 });
             }
         }

@@ -22,6 +22,8 @@ pub struct Term {
     pub slope: Option<String>,
     pub unit: &'static str,
     pub prior: Prior,
+    /// Tunnel's breakpoints; all of the grid's without a table.
+    pub breakpoints_deg: Vec<f64>,
 }
 
 /// Data from which the terms follow.
@@ -93,12 +95,17 @@ impl Basis<'_> {
         };
         let (table, size) = self.table(name, &grid, evidence)?;
         let length_deg = self.settings.length_deg;
+        let mut breakpoints_deg = self.tunnel.alphas_deg(name);
+        if breakpoints_deg.is_empty() {
+            breakpoints_deg = alphas.to_vec();
+        }
         let prior = Prior::new(name.clone(), grid, table, Scale { size, length_deg });
         Some(Term {
             derivative: derivative.name.clone(),
             slope: sum.map(|s| s.slope.clone()),
             unit: self.buildup.unit_of(name)?.name(),
             prior,
+            breakpoints_deg,
         })
     }
 

@@ -43,10 +43,10 @@ table! {
 }
 
 table! {
-    /// Covariances of the posterior within each coefficient, each pair once.
+    /// Covariances of the posterior within each coefficient, each pair once, at the tunnel's breakpoints.
     ///
     /// Different coefficients are independent. The constant of a sum follows from sum and slope.
-    pub struct CovarianceRow in "posterior_covariance" per "pair of rows of the posterior" {
+    pub struct CovarianceRow in "posterior_covariance" per "pair of derivatives and breakpoints" {
         /// Derivative or sum.
         pub first: String,
         /// Angle of attack of `first`.
