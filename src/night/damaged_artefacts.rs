@@ -11,15 +11,10 @@ use crate::store::{ArtefactName, Contents, Digest, Kind, Night, Store};
 /// its digest is in its flight's artefact.
 pub fn damaged_artefacts(store: &Store, contents: &Contents, night: &Night) -> Vec<ArtefactName> {
     let records = records(store, night);
-    let has_record = |name: &ArtefactName, digest: &Digest| {
-        let path = store.path(name);
-        contents.of(&path).is_ok_and(|found| found == *digest)
-            || !store.has_file(name) && store.is_shared(name, digest.bytes)
-    };
     let is_whole = |(name, bytes): &(&ArtefactName, &u64)| {
         if name.is_of(Kind::Records) {
             let digest = records.get(*name);
-            digest.is_some_and(|digest| has_record(name, digest))
+            digest.is_some_and(|digest| store.has_record(name, digest, contents))
         } else {
             store.is_whole(name, **bytes)
         }

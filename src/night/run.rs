@@ -74,6 +74,7 @@ pub fn run(
         until,
     };
     if let Some(night) = run.valid_night() {
+        run.conductor.runner.store.send_unsent()?;
         run.conductor.remember_contents()?;
         return Ok(run.outcome(night, false));
     }

@@ -117,20 +117,13 @@ impl<'a> StepRunner<'a> {
             .unwrap_or_default()
     }
 
-    /// `true` if the store has a companion as it was written. A record that only the object store
-    /// has is checked by its size here, by its digest when it is fetched.
+    /// `true` if the store has a companion as it was written.
     fn has(&self, companion: &Companion) -> bool {
-        let Some(digest) = &companion.digest else {
-            return self.store.has_sealed(&companion.name);
-        };
-        let path = self.store.path(&companion.name);
-        let is_in_folder = self.contents.of(&path).is_ok_and(|found| found == *digest);
-        if is_in_folder {
-            self.store.note_present(&companion.name);
+        let Companion { name, digest } = companion;
+        match digest {
+            Some(digest) => self.store.has_record(name, digest, &self.contents),
+            None => self.store.has_sealed(name),
         }
-        is_in_folder
-            || !self.store.has_file(&companion.name)
-                && self.store.is_shared(&companion.name, digest.bytes)
     }
 
     /// Brings the artefacts of several steps in parallel, in their order.

@@ -152,8 +152,7 @@ impl Store {
     }
 
     /// `true` if the folder has a file of this name, whole or damaged.
-    #[must_use]
-    pub fn has_file(&self, name: &ArtefactName) -> bool {
+    fn has_file(&self, name: &ArtefactName) -> bool {
         self.path(name).exists()
     }
 
@@ -211,16 +210,14 @@ impl Store {
 
     /// Notes an artefact of the folder; [`Store::send_unsent`] sends it if the object store lacks
     /// it.
-    pub fn note_present(&self, name: &ArtefactName) {
+    fn note_present(&self, name: &ArtefactName) {
         let is_unsent = |shared: &Shared| shared.size(name.as_str()).is_none();
         if self.shared.as_ref().is_some_and(is_unsent) {
             locked(&self.unsent).insert(name.clone());
         }
     }
 
-    /// `true` if the object store has an artefact of this size, which [`Store::fetch`] can bring.
-    #[must_use]
-    pub fn is_shared(&self, name: &ArtefactName, bytes: u64) -> bool {
+    fn is_shared(&self, name: &ArtefactName, bytes: u64) -> bool {
         let size = |shared: &Shared| shared.size(name.as_str());
         self.shared.as_ref().and_then(size) == Some(bytes)
     }
@@ -298,6 +295,23 @@ impl Store {
             .and_then(shared)
             .as_ref()
             .is_some_and(is_sealed)
+    }
+
+    /// `true` if the folder has a record as it was written, or only the object store has it, with this
+    /// size; then [`Store::fetch`] checks its digest.
+    #[must_use]
+    pub fn has_record(&self, name: &ArtefactName, digest: &Digest, contents: &Contents) -> bool {
+        if self.has_file(name) {
+            let is_written = contents
+                .of(&self.path(name))
+                .is_ok_and(|own| own == *digest);
+            if is_written {
+                self.note_present(name);
+            }
+            is_written
+        } else {
+            self.is_shared(name, digest.bytes)
+        }
     }
 
     /// `true` if the folder has an artefact whose seal fits, or only the object store has it, with this
