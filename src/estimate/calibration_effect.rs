@@ -25,9 +25,9 @@ impl<'a> Task<'a> {
         if fit.covariance_corrected.is_none() || is_exact {
             return;
         }
-        match self.gradient_shifts(prepared, &fit.values, &fit.weights) {
+        let errors = self.misreadings(&prepared.window);
+        match self.gradient_shifts(prepared, &errors, &fit.values, &fit.weights) {
             Ok(shifts) => {
-                let errors = self.misreadings(&prepared.window);
                 calibration_errors::add_calibration_errors(&prepared.case, &errors, &shifts, fit);
             }
             Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
@@ -51,10 +51,10 @@ impl<'a> Task<'a> {
     pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
         &self,
         prepared: &PreparedCase<'a, NX, E>,
+        errors: &[Misreading],
         values: &[f64],
         weights: &[f64; OUTPUTS],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let errors = self.misreadings(&prepared.window);
         let aircraft = self.context.aircraft;
         let PreparedCase {
             window,
@@ -70,6 +70,6 @@ impl<'a> Task<'a> {
             values,
             weights,
         }
-        .gradient_shifts(&errors)
+        .gradient_shifts(errors)
     }
 }

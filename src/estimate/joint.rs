@@ -381,14 +381,14 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     for (i, part) in parts.iter().enumerate() {
         let places = joint.places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
+        errors = part.task.misreadings(&part.prepared.window);
         let Ok(shifts) = part
             .task
-            .gradient_shifts(&part.prepared, &own, &fit.weights)
+            .gradient_shifts(&part.prepared, &errors, &own, &fit.weights)
         else {
             fit.reason.push_str(NOT_COUNTED);
             return;
         };
-        errors = part.task.misreadings(&part.prepared.window);
         together.resize(shifts.len(), DVector::zeros(joint.names().len()));
         for (sum, shift) in together.iter_mut().zip(shifts) {
             for (&place, value) in places.iter().zip(shift.iter()) {

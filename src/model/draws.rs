@@ -1,9 +1,10 @@
 //! Models drawn from the posterior, and the correlations between its derivatives.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::CoefficientPosterior;
+use super::published::Quantity;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
 use crate::tables::PosteriorRow;
@@ -20,20 +21,51 @@ pub struct CorrelatedDerivatives {
     pub correlation: f64,
 }
 
-impl Model {
+/// Source of models drawn from a posterior.
+#[derive(Clone, Debug)]
+pub struct Sampler<'a> {
+    rows: &'a [PosteriorRow],
+    coefficients: Vec<CoefficientSampler>,
+}
+
+/// Differences of one coefficient: mean + root · normal deviates.
+#[derive(Clone, Debug)]
+struct CoefficientSampler {
+    quantities: Vec<Quantity>,
+    mean: DVector<f64>,
+    root: DMatrix<f64>,
+}
+
+impl Sampler<'_> {
     /// Rows of the posterior with the values of one draw.
     #[must_use]
-    pub fn drawn(&self, stream: &mut RandomStream) -> Vec<PosteriorRow> {
-        let mut values = Vec::new();
-        for (_, coefficient) in &self.coefficients {
-            values.extend(coefficient.drawn(stream));
+    pub fn draw(&self, stream: &mut RandomStream) -> Vec<PosteriorRow> {
+        let mut values = Vec::with_capacity(self.rows.len());
+        for own in &self.coefficients {
+            let deviates = DVector::from_fn(own.root.ncols(), |_, _| stream.normal());
+            let differences = &own.mean + &own.root * deviates;
+            for quantity in &own.quantities {
+                values.extend(quantity.values(differences.as_slice()));
+            }
         }
-        let rows = self.rows.posterior.iter().zip(values);
+        let rows = self.rows.iter().zip(values);
         rows.map(|(row, value)| PosteriorRow {
             value,
             ..row.clone()
         })
         .collect()
+    }
+}
+
+impl Model {
+    /// Source of models drawn from the posterior.
+    #[must_use]
+    pub fn sampler(&self) -> Sampler<'_> {
+        let all = self.coefficients.iter();
+        Sampler {
+            rows: &self.rows.posterior,
+            coefficients: all.map(|(_, own)| own.sampler()).collect(),
+        }
     }
 
     /// Correlations between the published derivatives of each coefficient.
@@ -46,21 +78,14 @@ impl Model {
 }
 
 impl CoefficientPosterior {
-    /// Values of all published quantities in one draw, in the order of the rows.
-    fn drawn(&self, stream: &mut RandomStream) -> Vec<f64> {
+    fn sampler(&self) -> CoefficientSampler {
         let n = self.unknowns.differences;
         let covariance = self.gaussian.covariance.view((0, 0), (n, n)).into_owned();
-        let root = root(&covariance, EXACT);
-        let deviates = DVector::from_fn(root.ncols(), |_, _| stream.normal());
-        let differences = self.gaussian.mean.rows(0, n) + root * deviates;
-        let mut values = Vec::new();
-        for quantity in self.quantities() {
-            for (row, tunnel) in quantity.rows.iter().zip(&quantity.tunnel) {
-                let difference: f64 = row.iter().map(|(place, w)| w * differences[*place]).sum();
-                values.push(tunnel + difference);
-            }
+        CoefficientSampler {
+            quantities: self.quantities(),
+            mean: self.gaussian.mean.rows(0, n).into_owned(),
+            root: root(&covariance, EXACT),
         }
-        values
     }
 
     fn correlations(&self) -> Vec<CorrelatedDerivatives> {

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::flight_data::{FlightData, Information};
 use super::prior::Scale;
 use super::term::Term;
-use super::unknowns::{Unknowns, root_of_differences};
+use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, EXACT};
 use crate::numerics::triangular::{cholesky, solve_lower};
 
@@ -143,8 +143,11 @@ pub fn reweighted(
 
 /// Prior covariance of the differences.
 #[must_use]
-pub fn prior(terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
-    let root = root_of_differences(terms, scales, EXACT);
-    let transposed = root.transposed();
-    transposed.tr_mul(&transposed)
+pub fn prior(unknowns: &Unknowns, terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
+    let mut whole = DMatrix::zeros(unknowns.differences, unknowns.differences);
+    for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
+        let own = term.prior.covariance(scale);
+        whole.view_mut((start, start), own.shape()).copy_from(&own);
+    }
+    whole
 }

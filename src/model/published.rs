@@ -1,12 +1,9 @@
 //! Quantities of a coefficient's posterior that are published: its terms, and the constants of sums.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::coefficient::CoefficientPosterior;
 use super::grid::Node;
-use super::posterior::prior;
 use super::term::Term;
-use super::unknowns::SparseRow;
+use super::unknowns::{SparseRow, between};
 use crate::tables::Knowledge;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.
@@ -69,62 +66,29 @@ impl CoefficientPosterior {
         Some(constant)
     }
 
-    /// Values of a quantity, with their covariance.
+    /// Value of a quantity at each of its points.
     #[must_use]
-    pub fn values(&self, quantity: &Quantity) -> (Vec<f64>, DMatrix<f64>) {
-        let rows = self.dense(quantity);
-        let n = self.unknowns.differences;
-        let mean: DVector<f64> = &rows * self.gaussian.mean.rows(0, n);
-        let values = mean.iter().zip(&quantity.tunnel).map(|(f, t)| t + f);
-        let covariance = self.gaussian.covariance.view((0, 0), (n, n));
-        (values.collect(), &rows * covariance * rows.transpose())
-    }
-
-    /// Covariance of a quantity before flight.
-    #[must_use]
-    pub fn prior_covariance(&self, quantity: &Quantity) -> DMatrix<f64> {
-        let rows = self.dense(quantity);
-        let prior = prior(&self.terms, &self.scales);
-        &rows * prior * rows.transpose()
+    pub fn values(&self, quantity: &Quantity) -> Vec<f64> {
+        quantity.values(self.gaussian.mean.as_slice())
     }
 
     /// Mean over the points of the correlation of two quantities on one grid.
     #[must_use]
     pub fn mean_correlation(&self, first: &Quantity, second: &Quantity) -> f64 {
-        let n = self.unknowns.differences;
-        let covariance = self.gaussian.covariance.view((0, 0), (n, n));
-        let (first, second) = (self.dense(first), self.dense(second));
-        let points = first.nrows();
-        let sum: f64 = (0..points)
-            .map(|i| {
-                let (a, b) = (first.row(i), second.row(i));
-                let between = |x: nalgebra::RowDVector<f64>, y: nalgebra::RowDVector<f64>| {
-                    (x * covariance).dot(&y)
-                };
-                let (a, b) = (a.into_owned(), b.into_owned());
-                let variances = between(a.clone(), a.clone()) * between(b.clone(), b.clone());
-                if variances > 0.0 {
-                    between(a, b) / variances.sqrt()
-                } else {
-                    0.0
-                }
-            })
-            .sum();
-        sum / points.max(1) as f64
-    }
-
-    fn dense(&self, quantity: &Quantity) -> DMatrix<f64> {
-        let mut dense = DMatrix::zeros(quantity.rows.len(), self.unknowns.differences);
-        for (i, row) in quantity.rows.iter().enumerate() {
-            for (place, weight) in row {
-                dense[(i, *place)] += weight;
+        let covariance = &self.gaussian.covariance;
+        let correlation = |(a, b): (&SparseRow, &SparseRow)| {
+            let variances = between(a, a, covariance) * between(b, b, covariance);
+            if variances > 0.0 {
+                between(a, b, covariance) / variances.sqrt()
+            } else {
+                0.0
             }
-        }
-        dense
+        };
+        let both = first.rows.iter().zip(&second.rows);
+        both.map(correlation).sum::<f64>() / first.rows.len().max(1) as f64
     }
 
-    /// Number of maneuvers of full weight that estimate a term within its length of an angle of
-    /// attack, rounded.
+    /// Number of maneuvers that estimate a term within its length of an angle of attack.
     #[must_use]
     pub fn maneuvers_near(&self, term: usize, alphas_deg: &[f64], alpha_deg: f64) -> usize {
         let reach = self.scales[term].length_deg;
@@ -132,5 +96,19 @@ impl CoefficientPosterior {
             terms.contains(&term) && (alphas_deg[**place] - alpha_deg).abs() <= reach
         });
         near.count()
+    }
+}
+
+impl Quantity {
+    /// Value at each point, of given differences from the tunnel.
+    #[must_use]
+    pub fn values(&self, differences: &[f64]) -> Vec<f64> {
+        let points = self.rows.iter().zip(&self.tunnel);
+        points
+            .map(|(row, tunnel)| {
+                let difference: f64 = row.iter().map(|(place, w)| w * differences[*place]).sum();
+                tunnel + difference
+            })
+            .collect()
     }
 }

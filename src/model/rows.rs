@@ -1,16 +1,18 @@
 //! Rows of the posterior's tables.
 
+use nalgebra::DMatrix;
+
 use super::coefficient::CoefficientPosterior;
 use super::evidence::Evidence;
+use super::posterior::prior;
 use super::published::Quantity;
 use super::self_check::Agreement;
+use super::unknowns::between;
 use crate::aero::Coefficient;
+use crate::numerics::student::NORMAL_95;
 use crate::tables::{
     ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
 };
-
-/// Share of a unit beyond which digits are published.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Tables of one coefficient.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,7 +41,10 @@ impl CoefficientPosterior {
     pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Rows {
         let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
         let quantities = self.quantities();
-        let posterior = quantities.iter().flat_map(|q| self.posterior(q, &alphas));
+        let before = prior(&self.unknowns, &self.terms, &self.scales);
+        let posterior = quantities
+            .iter()
+            .flat_map(|q| self.posterior(q, &before, &alphas));
         Rows {
             posterior: posterior.collect(),
             covariance: self.covariance_rows(),
@@ -49,13 +54,18 @@ impl CoefficientPosterior {
         }
     }
 
-    fn posterior(&self, quantity: &Quantity, alphas_deg: &[f64]) -> Vec<PosteriorRow> {
-        let (values, covariance) = self.values(quantity);
-        let before = self.prior_covariance(quantity);
+    fn posterior(
+        &self,
+        quantity: &Quantity,
+        before: &DMatrix<f64>,
+        alphas_deg: &[f64],
+    ) -> Vec<PosteriorRow> {
+        let values = self.values(quantity);
         let row = |i: usize| {
-            let (node, variance) = (&quantity.nodes[i], covariance[(i, i)].max(0.0));
+            let (node, own) = (&quantity.nodes[i], &quantity.rows[i]);
+            let variance = between(own, own, &self.gaussian.covariance).max(0.0);
             let deviation = variance.sqrt();
-            let known = before[(i, i)];
+            let known = between(own, own, before);
             PosteriorRow {
                 derivative: quantity.name.clone(),
                 unit: quantity.unit.to_owned(),

@@ -6,9 +6,7 @@ use nalgebra::{Cholesky, DVector};
 use super::flight_data::FlightData;
 use super::posterior::{Gaussian, LeftOut, gaussian, information, left_out};
 use crate::numerics::root::BlockRoot;
-
-/// Half width of a 95 % interval in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
+use crate::numerics::student::NORMAL_95;
 
 /// Agreement of what was left out with its prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

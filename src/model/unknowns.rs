@@ -187,3 +187,14 @@ fn class_grid((lowest, highest): (f64, f64)) -> Grid {
     }
     Grid::of_alpha(alphas)
 }
+
+/// Covariance of two weighted sums of the unknowns.
+#[must_use]
+pub fn between(first: &SparseRow, second: &SparseRow, covariance: &DMatrix<f64>) -> f64 {
+    let pairs = first
+        .iter()
+        .flat_map(|a| second.iter().map(move |b| (a, b)));
+    pairs
+        .map(|((i, weight), (j, other))| weight * other * covariance[(*i, *j)])
+        .sum()
+}

@@ -82,9 +82,10 @@ fn write_draws(
     let mut files = ["draws.csv", "draws.parquet"]
         .map(|name| folder.join(name))
         .to_vec();
+    let sampler = campaign.model.sampler();
     let mut stream = RandomStream::new(draws.seed, "draws");
     for draw in 1..=draws.number {
-        let posterior = campaign.model.drawn(&mut stream);
+        let posterior = sampler.draw(&mut stream);
         let drawn = Contents {
             posterior: &posterior,
             ..*contents

@@ -271,11 +271,12 @@ fn between_the_points_the_prior_s_variance_is_kept() {
 #[test]
 fn draws_have_the_mean_and_covariance_of_the_posterior() {
     let model = posterior(&campaign(), &tunnel(None), &Settings::default());
+    let sampler = model.sampler();
     let mut stream = RandomStream::new(1, "draws");
     let count = 2000;
     let rows = &model.rows.posterior;
     let draws: Vec<Vec<f64>> = (0..count)
-        .map(|_| model.drawn(&mut stream).iter().map(|r| r.value).collect())
+        .map(|_| sampler.draw(&mut stream).iter().map(|r| r.value).collect())
         .collect();
     for (i, row) in rows.iter().enumerate() {
         let mean = draws.iter().map(|d| d[i]).sum::<f64>() / f64::from(count);

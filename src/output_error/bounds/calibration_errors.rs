@@ -19,7 +19,7 @@ use crate::output_error::kernel::pass::Diverged;
 use crate::output_error::kernel::response::Sensitivities;
 use crate::output_error::likelihood::cost;
 use crate::output_error::likelihood::definition::Likelihood;
-use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError};
+use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError, covariance_of};
 use crate::output_error::likelihood::outcome::Fit;
 use crate::settings::settings;
 
@@ -344,12 +344,11 @@ pub fn add_calibration_errors<D: Likelihood>(
     let Some(inverse) = inverse(&data.sums(&fit.response, &fit.weights).information) else {
         return;
     };
-    let mut common = DMatrix::zeros(inverse.nrows(), inverse.ncols());
-    for (error, gradient_shift) in errors.iter().zip(gradient_shifts) {
-        let shift = &inverse * gradient_shift;
-        common += &shift * shift.transpose();
-        fit.shared_errors.push(error.effect(&shift));
-    }
+    let shifts: Vec<DVector<f64>> = gradient_shifts.iter().map(|g| &inverse * g).collect();
+    let effects = errors.iter().zip(&shifts);
+    fit.shared_errors
+        .extend(effects.map(|(error, shift)| error.effect(shift)));
+    let common = covariance_of(&shifts, inverse.nrows());
     *corrected += &common;
     fit.covariance_calibration = Some(common);
 }

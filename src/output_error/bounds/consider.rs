@@ -9,7 +9,7 @@ use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::inverse;
 use crate::output_error::case::Case;
 use crate::output_error::likelihood::cost::sums;
-use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError};
+use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError, covariance_of};
 use crate::output_error::likelihood::outcome::Fit;
 
 /// Maneuver whose held values are uncertain.
@@ -73,14 +73,16 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     let Some(inverse) = inverse(&blocks.free) else {
         return;
     };
-    let mut held = DMatrix::zeros(n, n);
-    for (cross, (name, uncertainty)) in blocks.held.into_iter().zip(uncertainties) {
-        let shift = &inverse * cross * *uncertainty;
-        held += &shift * shift.transpose();
+    let shifts = blocks.held.iter().zip(uncertainties.values());
+    let shifts: Vec<DVector<f64>> = shifts
+        .map(|(cross, uncertainty)| &inverse * cross * *uncertainty)
+        .collect();
+    for (shift, (name, uncertainty)) in shifts.iter().zip(uncertainties) {
         let error = SharedError::Held((*name).to_owned());
         fit.shared_errors
-            .push(ErrorEffect::new(error, *uncertainty, &shift));
+            .push(ErrorEffect::new(error, *uncertainty, shift));
     }
+    let held = covariance_of(&shifts, n);
     *covariance += &held;
     *corrected += &held;
     fit.covariance_held = Some(held);

@@ -1,6 +1,6 @@
 //! Effects of errors that several maneuvers share: of the values they hold, and of calibration.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Error that several maneuvers share.
@@ -26,6 +26,17 @@ pub struct ErrorEffect {
     /// Change of each parameter where the true value is above the assumed one by one standard
     /// deviation.
     pub change: Vec<f64>,
+}
+
+/// Covariance of `n` parameters from their changes, each by one standard deviation of an independent
+/// error.
+#[must_use]
+pub fn covariance_of(changes: &[DVector<f64>], n: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(n, n);
+    for change in changes {
+        sum += change * change.transpose();
+    }
+    sum
 }
 
 impl ErrorEffect {

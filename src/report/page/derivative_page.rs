@@ -8,6 +8,7 @@ use super::class_markers::ClassMarkers;
 use super::derivative_results::DerivativeResults;
 use super::verdict_ranges;
 use crate::aero::Coefficient;
+use crate::numerics::student::NORMAL_95;
 use crate::report::contents::group_by;
 use crate::report::figure::derivative_figure::{self, ClassEstimates, DerivativeFigure};
 use crate::report::figure::legend::{LegendView, key, line};
@@ -16,9 +17,6 @@ use crate::report::figure::style::{INK, TUNNEL_COLOUR};
 use crate::report::notation::{self, Digits, NOTHING, angle, count, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{ComparisonRow, PosteriorRow, TrendRow};
-
-/// Half width of a 95 % interval in standard deviations.
-const NORMAL_95: f64 = 1.96;
 
 /// Page of one derivative.
 #[derive(Clone, Debug, Serialize)]
