@@ -17,7 +17,7 @@ use crate::flight::signal;
 use crate::numerics::order_statistics::median;
 use crate::output_error::calibration_errors::Misreading;
 use crate::output_error::equation_error::Regression;
-use crate::output_error::error_effect::{ErrorEffect, SharedError};
+use crate::output_error::error_effect::{ErrorEffect, SharedError, covariance_of};
 use crate::output_error::{Case, Fit, Measurements, Model, Outcome, Response, equation_error};
 use crate::tables::{EstimationMethod, FitRow};
 use crate::units::DEG;
@@ -32,6 +32,16 @@ const COLOURED: f64 = 0.3;
 
 /// Change by slopes over α, in bounds, up to which they are not held in a second fit.
 const SMALL_CHANGE: f64 = 0.3;
+
+/// Steps to the slopes over α: the effect on the estimates is linear but for products of slopes and
+/// noise.
+const SLOPE_STEPS: usize = 3;
+
+/// Shares of a step to the slopes that are tried.
+const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+
+/// Rise of the cost by a step to the slopes that the slopes' prior may outweigh.
+const ALLOWED_RISE: f64 = 1.0;
 
 /// Least output noise as a share of the noise seen in the samples.
 const LEAST_SHARE: f64 = 0.5;
@@ -85,40 +95,113 @@ impl<'a> Task<'a> {
             (moving, still)
         };
         let slopes = self.alpha_slopes(&prepared.window, &self.with_held_free(prepared));
-        let mut sweep = Sweep::constant(slopes);
+        let constant = Sweep::constant(slopes);
         let from = |(own, noise): &(Vec<f64>, Noise)| {
-            self.fit_filter::<NX, E, NG, G>(prepared, &sweep, own, noise, &resolution)
+            self.fit_filter::<NX, E, NG, G>(prepared, &constant, own, noise, &resolution)
         };
-        let mut fitted = from(&first).or_else(|| from(&second))?;
-        let mut pass = self.wide_pass(prepared, &sweep, &fitted)?;
-        let mut effect = sweep.effect(&pass, &fitted.bounds);
-        if let Some(found) = &effect
-            && fitted.bounds.are_exceeded_by(&found.change, SMALL_CHANGE)
-        {
-            let changed = sweep.at(&found.slopes);
-            let (own, noise) = (fitted.own().to_vec(), fitted.noise());
-            let again = self.fit_filter(prepared, &changed, &own, &noise, &resolution);
-            if let Some(again) = again
-                && let Some(wide) = self.wide_pass(prepared, &changed, &again)
-            {
-                (sweep, fitted, pass) = (changed, again, wide);
-                effect = sweep.effect(&pass, &fitted.bounds);
-            }
-        }
+        let fitted = from(&first).or_else(|| from(&second))?;
+        let start = self.swept(prepared, constant, fitted)?;
+        let swept = self.with_slopes(prepared, start, &resolution);
+        let Swept {
+            sweep,
+            fitted,
+            pass,
+            effect,
+        } = &swept;
         let mut fit = fitted.fit();
-        self.add_held(prepared, &pass, &fitted.bounds, effect.as_ref(), &mut fit);
-        self.add_calibration(prepared, &sweep, &fitted, &mut fit);
+        self.add_held(prepared, pass, &fitted.bounds, effect.as_ref(), &mut fit);
+        self.add_calibration(prepared, sweep, fitted, &mut fit);
         Some(Filtered {
             information: fitted.information(),
             outputs_along_air: fitted.outputs_along_air(),
-            second_opinion: self.second_opinion_on(prepared, &sweep),
+            second_opinion: self.second_opinion_on(prepared, sweep),
             noise: fitted.noise(),
             attitude_drifts: fitted.noise().is_of_air(G::FELT_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
-                .map(|cost| cost - fitted.scored.response.cost),
+                .map(|cost| cost - fitted.cost()),
             fit,
+        })
+    }
+
+    /// Fits the filter again with the slopes held, as long as they move the estimates. A step that the
+    /// likelihood does not bear out is halved; slopes of which no step holds are uncertainty alone.
+    fn with_slopes<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        start: Swept<NG, G>,
+        resolution: &[f64; OUTPUTS],
+    ) -> Swept<NG, G> {
+        let mut swept = start;
+        for _ in 0..SLOPE_STEPS {
+            let Some(effect) = swept.moving_effect() else {
+                return swept;
+            };
+            let next = STEP_SHARES.iter().find_map(|share| {
+                let sweep = swept.sweep.towards(&effect.slopes, *share);
+                let own = swept.fitted.moved(&effect.change, *share);
+                let near = (own, swept.fitted.noise());
+                let implied = (self.implied(prepared, &sweep), Noise::starting(*resolution));
+                let fits = [near, implied].into_iter().filter_map(|(own, noise)| {
+                    self.fit_filter::<NX, E, NG, G>(prepared, &sweep, &own, &noise, resolution)
+                });
+                let fitted = fits.min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
+                let is_borne_out = fitted.cost() < swept.fitted.cost() + ALLOWED_RISE;
+                is_borne_out.then_some(self.swept(prepared, sweep, fitted)?)
+            });
+            match next {
+                Some(next) => swept = next,
+                None => break,
+            }
+        }
+        if let Some(effect) = &mut swept.effect
+            && swept
+                .fitted
+                .bounds
+                .are_exceeded_by(&effect.change, SMALL_CHANGE)
+        {
+            effect.become_uncertainty();
+        }
+        swept
+    }
+
+    /// Starting values by equation error with the slopes held.
+    fn implied<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+    ) -> Vec<f64> {
+        let case = self.case_with::<NX, E>(prepared, sweep, &sweep.held_in(&prepared.model));
+        equation_error::start(&case, &self.tunnel_start(&prepared.case))
+    }
+
+    /// The maneuver in the window of its slopes.
+    fn case_with<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
+        model: &Model,
+    ) -> Case<NX, E> {
+        let measurements = prepared.case.measurements.clone();
+        let window = &sweep.slopes.window;
+        Case::new(self.context.aircraft, window, measurements, model)
+    }
+
+    /// A fit with what is left of the slopes' effect on it.
+    fn swept<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: Sweep,
+        fitted: FilterFit<NG, G>,
+    ) -> Option<Swept<NG, G>> {
+        let pass = self.wide_pass(prepared, &sweep, &fitted)?;
+        let effect = sweep.effect(&pass, &fitted.bounds);
+        Some(Swept {
+            sweep,
+            fitted,
+            pass,
+            effect,
         })
     }
 
@@ -177,11 +260,7 @@ impl<'a> Task<'a> {
         sweep: &Sweep,
     ) -> Option<Regression> {
         let model = sweep.held_in(&prepared.model);
-        let measurements = &prepared.case.measurements;
-        let case = |model: &Model| {
-            let window = &sweep.slopes.window;
-            Case::<NX, E>::new(self.context.aircraft, window, measurements.clone(), model)
-        };
+        let case = |model: &Model| self.case_with::<NX, E>(prepared, sweep, model);
         let uncertainties = self.held_uncertainties(&prepared.model);
         let regression =
             |wide: &Case<NX, E>| equation_error::regression(&case(&model), wide, &uncertainties);
@@ -228,7 +307,7 @@ impl<'a> Task<'a> {
     ) {
         let uncertainties = self.held_uncertainties(&prepared.model);
         let changes = bounds.changes(&pass.held_shifts(&uncertainties));
-        let mut held = bounds.covariance_of(&changes);
+        let mut held = covariance_of(&changes, fit.values.len());
         let effects = uncertainties
             .iter()
             .zip(&changes)
@@ -273,7 +352,7 @@ impl<'a> Task<'a> {
             return;
         };
         let changes = fitted.bounds.changes(&shifts);
-        let common = fitted.bounds.covariance_of(&changes);
+        let common = covariance_of(&changes, fit.values.len());
         let effects = errors.iter().zip(&changes);
         fit.shared_errors
             .extend(effects.map(|(error, change)| error.effect(change)));
@@ -337,22 +416,21 @@ struct Sweep {
 impl Sweep {
     /// Derivatives that do not change over α.
     fn constant(slopes: AlphaSlopes) -> Self {
-        let values = vec![0.0; slopes.sizes.len()];
+        let values = vec![0.0; slopes.derivatives.len()];
         Sweep { slopes, values }
     }
 
-    fn at(&self, values: &DVector<f64>) -> Self {
+    /// A share of the way to other values.
+    fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
+        let both = self.values.iter().zip(values.iter());
         Sweep {
             slopes: self.slopes.clone(),
-            values: values.as_slice().to_vec(),
+            values: both.map(|(from, to)| from + share * (to - from)).collect(),
         }
     }
 
     fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
-        let AlphaSlopes {
-            derivatives, sizes, ..
-        } = &self.slopes;
-        pass.slope_effect(bounds, derivatives, sizes, &self.values)
+        pass.slope_effect(bounds, &self.slopes.derivatives, &self.values)
     }
 
     fn is_constant(&self) -> bool {
@@ -368,6 +446,23 @@ impl Sweep {
     }
 }
 
+/// Fit with the derivatives' slopes held, and the effect of what they are known to be off.
+struct Swept<const NG: usize, G: InGusts<NG>> {
+    sweep: Sweep,
+    fitted: FilterFit<NG, G>,
+    pass: WidePass,
+    effect: Option<SlopeEffect>,
+}
+
+impl<const NG: usize, G: InGusts<NG>> Swept<NG, G> {
+    /// Effect of the slopes, if it moves the estimates by more than a small part of their bounds.
+    fn moving_effect(&self) -> Option<&SlopeEffect> {
+        let bounds = &self.fitted.bounds;
+        let moves = |e: &&SlopeEffect| bounds.are_exceeded_by(&e.change, SMALL_CHANGE);
+        self.effect.as_ref().filter(moves)
+    }
+}
+
 /// Converged filter with its bounds.
 struct FilterFit<const NG: usize, G: InGusts<NG>> {
     filter: Filter<NG, G>,
@@ -376,6 +471,17 @@ struct FilterFit<const NG: usize, G: InGusts<NG>> {
 }
 
 impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
+    /// −log of the likelihood.
+    fn cost(&self) -> f64 {
+        self.scored.response.cost
+    }
+
+    /// Derivatives, biases and initial states, moved by a share of a change.
+    fn moved(&self, change: &DVector<f64>, share: f64) -> Vec<f64> {
+        let both = self.own().iter().zip(change.iter());
+        both.map(|(own, change)| own + share * change).collect()
+    }
+
     /// Derivatives, biases and initial states.
     fn own(&self) -> &[f64] {
         &self.scored.parameters[..self.filter.first_noise()]

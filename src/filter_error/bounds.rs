@@ -142,18 +142,6 @@ impl Bounds {
         let change = |shift: &DVector<f64>| &self.inverse * shift.rows(0, n);
         gradient_shifts.iter().map(change).collect()
     }
-
-    /// Covariance of the filter's own parameters from their changes, each by one standard deviation
-    /// of an independent error.
-    #[must_use]
-    pub fn covariance_of(&self, changes: &[DVector<f64>]) -> DMatrix<f64> {
-        let n = self.covariance.nrows();
-        let mut sum = DMatrix::zeros(n, n);
-        for change in changes {
-            sum += change * change.transpose();
-        }
-        sum
-    }
 }
 
 /// Pass with the held derivatives, and slopes over α, free as well, at a fit.
@@ -217,11 +205,10 @@ impl WidePass {
         &self,
         bounds: &Bounds,
         slopes: &[Derivative],
-        sizes: &[f64],
         values: &[f64],
     ) -> Option<SlopeEffect> {
         let places: Vec<usize> = slopes.iter().filter_map(|d| self.place(&d.name)).collect();
-        if places.len() != sizes.len() || places.is_empty() {
+        if places.len() != values.len() || places.is_empty() {
             return None;
         }
         let columns: Vec<DVector<f64>> = places.iter().map(|p| self.cross(Some(*p))).collect();
@@ -231,7 +218,6 @@ impl WidePass {
             cross: DMatrix::from_columns(&columns),
             slopes: DMatrix::from_fn(n, n, |i, j| self.information[(places[i], places[j])]),
             gradient: DVector::from_iterator(n, places.iter().map(|p| self.gradient[*p])),
-            sizes: DVector::from_column_slice(sizes),
             held_at: DVector::from_column_slice(values),
         };
         information.effect()

@@ -1,22 +1,27 @@
 //! Slopes of the derivatives over α inside a maneuver, and their effect on the estimates.
 //!
-//! Each slope has a normal prior about zero, of a given size times a common share λ. With information
-//! H and gradient g of −J at the fit, f the filter's own parameters and s the slopes,
+//! A slope is a derivative's change over α in the tunnel's. The slopes have a normal prior about a common
+//! share λ. With information H and gradient g of −J at the fit, f the filter's own parameters and s the
+//! slopes,
 //!
 //! ```text
-//! V = H_ss − H_sf H_ff⁻¹ H_fs        D = λ · diag(sizes)
-//! slopes   ŝ = P g_s                 P = D (1 + D V D)⁻¹ D
+//! V = H_ss − H_sf H_ff⁻¹ H_fs        m = λ 1        D = λ w 1
+//! slopes   ŝ = m + P (g_s − V m)     P = D (1 + D V D)⁻¹ D
 //! estimates move by −G (ŝ − s₀)      with covariance G P G',  G = H_ff⁻¹ H_fs
-//! p(data | λ) ∝ |1 + D V D|^(−½) exp(½ g_s' P g_s)
+//! p(data | λ) ∝ |1 + D V D|^(−½) exp(g_s' m − ½ m' V m + ½ (g_s − V m)' P (g_s − V m))
 //! ```
 //!
-//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the mean over λ, so that a maneuver that hardly sweeps α, or whose derivatives are
-//! constant, is left as it is.
+//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the mean
+//! over λ. A maneuver whose derivatives are constant shows it, and is left as it is.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Shares of the sizes: from derivatives that are constant to slopes of twice the size.
-const SHARES: [f64; 7] = [0.0, 0.125, 0.25, 0.5, 1.0, 1.5, 2.0];
+/// Shares λ: from derivatives that are constant to changes half as large again as the tunnel's.
+const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
+
+/// Deviation w of a slope in shares: a table that is off by 20 % changes over α by something else than a
+/// table that is scaled.
+const SCATTER: f64 = 0.5;
 
 /// Effect of the slopes on the estimates.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +32,14 @@ pub struct SlopeEffect {
     pub change: DVector<f64>,
     /// Covariance of that change.
     pub covariance: DMatrix<f64>,
+}
+
+impl SlopeEffect {
+    /// Takes the change for a deviation of the estimates.
+    pub fn become_uncertainty(&mut self) {
+        self.covariance += &self.change * self.change.transpose();
+        self.change.fill(0.0);
+    }
 }
 
 /// Blocks of the information on own parameters and slopes, with the slopes' gradient.
@@ -40,13 +53,11 @@ pub struct SlopeInformation {
     pub slopes: DMatrix<f64>,
     /// Gradient of −J along the slopes.
     pub gradient: DVector<f64>,
-    /// Size of each slope.
-    pub sizes: DVector<f64>,
     /// Value s₀ at which the fit held each slope.
     pub held_at: DVector<f64>,
 }
 
-/// Slopes for one share of the sizes.
+/// Slopes for one share of the tunnel's.
 struct ShareEstimate {
     log_likelihood: f64,
     slopes: DVector<f64>,
@@ -75,17 +86,20 @@ impl SlopeInformation {
         left: &DMatrix<f64>,
         by_slopes: &DMatrix<f64>,
     ) -> Option<ShareEstimate> {
-        let n = self.sizes.len();
-        let sizes = &self.sizes * share;
-        let scaled = DMatrix::from_fn(n, n, |i, j| sizes[i] * left[(i, j)] * sizes[j]);
+        let n = gradient.len();
+        let deviation = SCATTER * share;
+        let expected = DVector::from_element(n, share);
+        let along = left * &expected;
+        let scaled = left * (deviation * deviation);
         let root = Cholesky::new(DMatrix::identity(n, n) + scaled)?;
-        let gradient = gradient.component_mul(&sizes);
-        let unit = root.solve(&gradient);
+        let beyond = (gradient - &along) * deviation;
+        let unit = root.solve(&beyond);
         let log_determinant: f64 = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
-        let slopes = unit.component_mul(&sizes);
-        let scaled_effect = by_slopes * DMatrix::from_diagonal(&sizes);
+        let by_expected = expected.dot(gradient) - 0.5 * expected.dot(&along);
+        let slopes = expected + &unit * deviation;
+        let scaled_effect = by_slopes * deviation;
         Some(ShareEstimate {
-            log_likelihood: 0.5 * (gradient.dot(&unit) - log_determinant),
+            log_likelihood: by_expected + 0.5 * (beyond.dot(&unit) - log_determinant),
             change: by_slopes * (&self.held_at - &slopes),
             slopes,
             covariance: &scaled_effect * root.solve(&scaled_effect.transpose()),
@@ -126,15 +140,14 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// One own parameter and one slope: y = f + s x with x = ±1 at 100 and 50 samples of unit noise.
-    fn line(gradient: f64, size: f64) -> SlopeInformation {
+    /// One own parameter and one slope: y = f + s t x with x = ±1 at 100 and 50 samples of unit noise.
+    fn line(gradient: f64, tunnel: f64) -> SlopeInformation {
         let scalar = |v: f64| DMatrix::from_element(1, 1, v);
         SlopeInformation {
             inverse: scalar(1.0 / 150.0),
-            cross: scalar(50.0),
-            slopes: scalar(150.0),
-            gradient: DVector::from_element(1, gradient),
-            sizes: DVector::from_element(1, size),
+            cross: scalar(50.0 * tunnel),
+            slopes: scalar(150.0 * tunnel * tunnel),
+            gradient: DVector::from_element(1, gradient * tunnel),
             held_at: DVector::zeros(1),
         }
     }
@@ -142,9 +155,9 @@ mod tests {
     #[test]
     fn a_fit_that_holds_the_slope_where_it_is_moves_no_further() {
         let mut held = line(0.0, 100.0);
-        held.held_at[0] = 2.0;
+        held.held_at[0] = 0.02;
         let effect = held.effect().unwrap();
-        assert_relative_eq!(effect.slopes[0], 2.0, max_relative = 1e-3);
+        assert_relative_eq!(effect.slopes[0], 0.02, max_relative = 1e-3);
         assert!(effect.change[0].abs() < 1e-3);
     }
 
@@ -160,20 +173,45 @@ mod tests {
     #[test]
     fn without_a_sign_of_slopes_the_estimate_stays_and_its_covariance_hardly_grows() {
         let effect = line(0.0, 100.0).effect().unwrap();
-        assert_relative_eq!(effect.change[0], 0.0);
+        assert!(effect.change[0].abs() < 1e-3 / 3.0);
         // The least squares of a free slope would add the variance (1/3)² 3/400.
         assert!(effect.covariance[(0, 0)] < 0.5 * (1.0f64 / 3.0).powi(2) * 3.0 / 400.0);
     }
 
     #[test]
-    fn slopes_that_the_data_do_not_determine_leave_the_scatter_of_their_prior() {
-        // No information on the slope: each share is as likely, and the covariance is the mean one.
-        let mut flat = line(0.0, 0.1);
+    fn slopes_that_the_data_do_not_determine_are_those_of_the_prior() {
+        // Without information on the slope each share is as likely.
+        let mut flat = line(0.0, 1.0);
         flat.cross[(0, 0)] = 1e-6;
         flat.slopes[(0, 0)] = 1e-9;
-        let squares = SHARES.iter().map(|s| s * s).sum::<f64>() / SHARES.len() as f64;
+        let count = SHARES.len() as f64;
+        let mean = SHARES.iter().sum::<f64>() / count;
+        let square = SHARES.iter().map(|s| s * s).sum::<f64>() / count;
         let effect = flat.effect().unwrap();
-        let expected = (1e-6 / 150.0 * 0.1f64).powi(2) * squares;
-        assert_relative_eq!(effect.covariance[(0, 0)], expected, max_relative = 1e-6);
+        assert_relative_eq!(effect.slopes[0], mean, max_relative = 1e-6);
+        let gain = 1e-6 / 150.0;
+        assert_relative_eq!(effect.change[0], -gain * mean, max_relative = 1e-6);
+        let variance = gain * gain * (square - mean * mean + SCATTER * SCATTER * square);
+        assert_relative_eq!(effect.covariance[(0, 0)], variance, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn slopes_that_the_data_show_tell_of_those_that_they_do_not() {
+        // The first slope has a deviation of 0.005; nothing is known of the second.
+        let effect = |first: f64| {
+            let own = DVector::from_vec(vec![4e4, 1e-12]);
+            let information = SlopeInformation {
+                inverse: DMatrix::identity(1, 1),
+                cross: DMatrix::zeros(1, 2),
+                slopes: DMatrix::from_diagonal(&own),
+                gradient: DVector::from_vec(vec![4e4 * first, 0.0]),
+                held_at: DVector::zeros(2),
+            };
+            information.effect().unwrap().slopes
+        };
+        let (changing, constant) = (effect(1.0), effect(0.0));
+        assert_relative_eq!(changing[0], 1.0, max_relative = 1e-3);
+        assert!(changing[1] > 0.6, "{changing}");
+        assert!(constant[1] < 0.1, "{constant}");
     }
 }
