@@ -26,6 +26,7 @@ mod tests;
 pub use context::Context;
 pub use estimated::{Covariance, Estimated};
 pub use settings::{
-    Doubtful, Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings, Settings, Start,
+    Doubtful, HeldValues, Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings,
+    Settings, Start,
 };
 pub use single::maneuver;

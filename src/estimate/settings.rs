@@ -39,6 +39,17 @@ pub enum Start {
     WindTunnel,
 }
 
+/// Source of the values that a maneuver holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeldValues {
+    /// The wind tunnel (the paper).
+    Tunnel,
+    /// The posterior of the other flights.
+    #[default]
+    Posterior,
+}
+
 /// Use of doubtful fits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -128,6 +139,11 @@ settings! {
         /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
         /// derivatives.
         pub held_uncertainty_pct: f64 = 20.0,
+        /// Values that maneuvers hold, in the tables from the stage `model` on: `posterior` reads them
+        /// from the posterior of the other flights, `tunnel` from the wind tunnel, as in the paper.
+        /// Trends and posterior are of estimates with the tunnel's values.
+        #[serde(skip_serializing)]
+        pub held_values: HeldValues = HeldValues::default(),
         /// Delays of the surfaces, estimated from all maneuvers of the campaign.
         #[serde(skip_serializing)]
         pub surfaces: surfaces::Settings = surfaces::Settings::default(),
@@ -168,7 +184,7 @@ settings! {
         pub max_marked_share: f64 = 0.2,
     }
 }
-single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, Doubtful, BTreeMap<Output, f64>);
+single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, HeldValues, Doubtful, BTreeMap<Output, f64>);
 
 settings! {
     /// Limits beyond which a fit that converged is doubtful.

@@ -4,13 +4,16 @@ use std::collections::BTreeMap;
 
 use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
+use super::held_values::{HeldDifferences, Posterior};
 use super::observation::Observation;
+use super::others::Others;
 use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
 use super::prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
 use super::term::{Basis, Term};
 use super::unknowns::Unknowns;
+use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
 
 /// Reweightings: weights follow from scales, and scales from weights.
@@ -30,6 +33,8 @@ pub struct CoefficientPosterior {
     pub weights: BTreeMap<usize, f64>,
     /// Terms that each maneuver estimates, by its place in the evidence.
     pub estimated: BTreeMap<usize, Vec<usize>>,
+    /// Differences of what each maneuver holds, by the other flights; by its id.
+    pub held: BTreeMap<String, HeldDifferences>,
     /// Agreement of each flight with the others.
     pub flights: BTreeMap<String, Agreement>,
     /// Agreement of each class with the others.
@@ -52,7 +57,14 @@ impl CoefficientPosterior {
             weights = reweighted(&data.flights, &weights, &found, freedom);
             (scales, found) = data.fit(&terms, &weights, &scales)?;
         }
-        data.posterior(terms, scales, &weights, found, evidence)
+        let posterior = Posterior {
+            terms: &terms,
+            scales: &scales,
+            gaussian: &found,
+        };
+        let held = data.held(&posterior, &weights, evidence, basis.tunnel);
+        let whole = data.posterior(terms, scales, &weights, found, evidence)?;
+        Some(CoefficientPosterior { held, ..whole })
     }
 }
 
@@ -139,6 +151,29 @@ impl Data {
         Some((scales, gaussian))
     }
 
+    /// Differences of what each maneuver holds, by the flights other than its own.
+    fn held(
+        &self,
+        posterior: &Posterior,
+        weights: &[f64],
+        evidence: &[Evidence],
+        tunnel: &WindTunnel,
+    ) -> BTreeMap<String, HeldDifferences> {
+        let mut held = BTreeMap::new();
+        for own in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
+            let place = self.flight_ids.binary_search(&own[0].maneuver.flight_id);
+            let flight = place.ok().map(|i| &self.flights[i]);
+            let Some(others) = Others::new(posterior.gaussian, flight, weights) else {
+                continue;
+            };
+            held.extend(own.iter().filter_map(|e| {
+                let differences = e.held_differences(posterior, &self.unknowns, &others, tunnel)?;
+                Some((e.maneuver.maneuver_id.clone(), differences))
+            }));
+        }
+        held
+    }
+
     fn posterior(
         self,
         terms: Vec<Term>,
@@ -168,6 +203,7 @@ impl Data {
             }
         }
         Some(CoefficientPosterior {
+            held: BTreeMap::new(),
             flights: flights.collect(),
             classes,
             weights: self.estimated.keys().map(|&m| (m, weights[m])).collect(),

@@ -18,10 +18,13 @@ mod flight_data;
 mod scales;
 mod posterior;
 mod self_check;
+mod others;
+mod held_values;
 mod coefficient;
 mod published;
 mod rows;
 mod campaign_model;
+mod with_held;
 mod draws;
 #[cfg(test)]
 mod tests;

@@ -156,7 +156,7 @@ impl Evidence<'_> {
 
     /// Adds the effect of a derivative's difference on a row. The difference of a constant is that of
     /// its sum less that of the slope times α.
-    fn add_derivative(
+    pub fn add_derivative(
         &self,
         terms: &[Term],
         name: &str,

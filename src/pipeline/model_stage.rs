@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 
 use super::campaign::Campaign;
 use super::problems::problem;
+use crate::aero::Combined;
 use crate::config::Config;
 use crate::error::ProblemStage;
-use crate::model::{self, Evidence};
+use crate::estimate::HeldValues;
+use crate::model::{self, Evidence, Model};
 use crate::output_error::Outcome;
 use crate::tables::EstimateRow;
 
 /// Version of the posterior.
-pub const MODEL_VERSION: u32 = 1;
+pub const MODEL_VERSION: u32 = 2;
 
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
@@ -40,7 +42,37 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
         let problem = problem(ProblemStage::Model, "", &place, reason);
         campaign.problems.push(problem);
     }
+    if config.estimate.held_values == HeldValues::Posterior {
+        let sums = &config.buildup.combined;
+        let estimates = with_held(&campaign.estimates, &found, &evidence, sums);
+        let combined = with_held(&campaign.combined, &found, &evidence, sums);
+        (campaign.estimates, campaign.combined) = (estimates, combined);
+    }
     campaign.model = found;
+}
+
+/// Rows of the maneuvers with what they hold read from the posterior of the other flights.
+fn with_held(
+    rows: &[EstimateRow],
+    model: &Model,
+    evidence: &[Evidence],
+    sums: &[Combined],
+) -> Vec<EstimateRow> {
+    let evidence = evidence
+        .iter()
+        .map(|e| (e.maneuver.maneuver_id.as_str(), e));
+    let evidence: BTreeMap<&str, &Evidence> = evidence.collect();
+    let mut new = Vec::with_capacity(rows.len());
+    for own in rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id) {
+        match evidence.get(own[0].maneuver_id.as_str()) {
+            Some(evidence) => {
+                let with = model.with_held(evidence);
+                new.extend(own.iter().map(|row| with.row(row, sums)));
+            }
+            None => new.extend_from_slice(own),
+        }
+    }
+    new
 }
 
 /// Rows of each maneuver, which stand together.

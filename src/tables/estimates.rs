@@ -151,7 +151,8 @@ table! {
         /// Status of the derivative in this maneuver.
         pub status: Status,
         /// Estimate, also of a fit that did not converge; the value it was held at; none where
-        /// inactive. In the column `unit`.
+        /// inactive. Held values are the tunnel's, from the stage `model` on those of the posterior of
+        /// the other flights (`estimate: held_values`). In the column `unit`.
         pub value: Option<f64>,
         /// Cramér-Rao bound, with the uncertainty of the held values; none unless estimated and
         /// determined by the data. In the column `unit`.

@@ -16,7 +16,7 @@ use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
 /// Ten maneuvers in four flights, with everything that they can share.
-fn campaign() -> Vec<Flown> {
+pub fn campaign() -> Vec<Flown> {
     let mut noise = RandomStream::new(5, "campaign");
     (0..10)
         .map(|i| {
@@ -42,7 +42,7 @@ fn campaign() -> Vec<Flown> {
 }
 
 /// Terms and data of a campaign.
-fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
+pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
     let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let (buildup, tunnel) = (buildup(), tunnel(None));
     let basis = Basis {
@@ -55,7 +55,7 @@ fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
     (terms, data)
 }
 
-fn scales() -> Vec<Scale> {
+pub fn scales() -> Vec<Scale> {
     [(0.2, 12.0), (0.3, 20.0), (0.15, 9.0)]
         .map(|(size, length_deg)| Scale { size, length_deg })
         .to_vec()

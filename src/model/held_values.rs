@@ -1,0 +1,86 @@
+//! Differences from the tunnel of what a maneuver holds, as the other flights have them.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::Evidence;
+use super::others::Others;
+use super::posterior::Gaussian;
+use super::prior::Scale;
+use super::term::Term;
+use super::unknowns::{SparseRow, Unknowns};
+use crate::aero::WindTunnel;
+use crate::output_error::error_effect::{ErrorEffect, SharedError};
+
+/// Differences from the tunnel of derivatives of one coefficient that a maneuver holds.
+#[derive(Clone, Debug)]
+pub struct HeldDifferences {
+    pub derivatives: Vec<String>,
+    pub values: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+/// Posterior of a coefficient's terms.
+#[derive(Clone, Copy, Debug)]
+pub struct Posterior<'a> {
+    pub terms: &'a [Term],
+    pub scales: &'a [Scale],
+    pub gaussian: &'a Gaussian,
+}
+
+impl Evidence<'_> {
+    /// Effects of the derivatives that the maneuver holds, by name.
+    pub fn held_effects(&self) -> impl Iterator<Item = (&str, &ErrorEffect)> {
+        let effects = self.covariance.shared_errors.iter();
+        effects.filter_map(|effect| match &effect.error {
+            SharedError::Held(name) if effect.deviation > 0.0 => Some((name.as_str(), effect)),
+            _ => None,
+        })
+    }
+
+    /// Differences of what the maneuver holds, by the other flights; `None` where it holds nothing of
+    /// the coefficient.
+    #[must_use]
+    pub fn held_differences(
+        &self,
+        posterior: &Posterior,
+        unknowns: &Unknowns,
+        others: &Others,
+        tunnel: &WindTunnel,
+    ) -> Option<HeldDifferences> {
+        let Posterior { terms, scales, .. } = *posterior;
+        let effects = self.held_effects().map(|(name, _)| name);
+        let names: Vec<&str> = effects
+            .filter(|name| terms.iter().any(|t| t.derivative == *name))
+            .collect();
+        if names.is_empty() {
+            return None;
+        }
+        let condition = self.maneuver.condition(tunnel);
+        let design = self.design_of(terms, &names);
+        let shares = terms.iter().map(|t| t.prior.grid.shares(&condition));
+        let shares: Vec<SparseRow> = shares.collect();
+        let rows = design.row_iter();
+        let rows: Vec<SparseRow> = rows
+            .map(|row| unknowns.row(row.iter().copied(), &shares))
+            .collect();
+        let (values, covariance) = others.of(&rows);
+        let both = terms.iter().zip(scales);
+        let between = both.map(|(t, s)| t.prior.between(s, &condition));
+        let between = DVector::from_iterator(terms.len(), between);
+        let between = &design * DMatrix::from_diagonal(&between) * design.transpose();
+        Some(HeldDifferences {
+            derivatives: names.into_iter().map(str::to_owned).collect(),
+            values,
+            covariance: covariance + between,
+        })
+    }
+
+    /// Weights of the terms in the differences of derivatives: one row each.
+    fn design_of(&self, terms: &[Term], names: &[&str]) -> DMatrix<f64> {
+        let mut design = DMatrix::zeros(names.len(), terms.len());
+        for (i, name) in names.iter().enumerate() {
+            self.add_derivative(terms, name, 1.0, i, &mut design);
+        }
+        design
+    }
+}

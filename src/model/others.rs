@@ -1,0 +1,66 @@
+//! Posterior of all flights but one.
+//!
+//! With K = Σ − A P Aᵀ of the flight's own rows, the posterior (m, P) of all flights becomes that of the
+//! others: m − P Aᵀ K⁻¹ (y − A m), P + P Aᵀ K⁻¹ A P.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::flight_data::FlightData;
+use super::posterior::Gaussian;
+use super::unknowns::{SparseRow, between};
+
+/// The other flights, seen from one flight.
+pub struct Others<'a> {
+    whole: &'a Gaussian,
+    own: Option<OwnRows<'a>>,
+}
+
+/// Rows of the flight itself: K and K⁻¹ (y − A m).
+struct OwnRows<'a> {
+    flight: &'a FlightData,
+    root: Cholesky<f64, Dyn>,
+    weighted: DVector<f64>,
+}
+
+impl<'a> Others<'a> {
+    /// Posterior of all flights but one. `None` where a covariance is not positive definite.
+    #[must_use]
+    pub fn new(
+        whole: &'a Gaussian,
+        flight: Option<&'a FlightData>,
+        weights: &[f64],
+    ) -> Option<Others<'a>> {
+        let Some(flight) = flight else {
+            return Some(Others { whole, own: None });
+        };
+        let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
+        let root = Cholesky::new(flight.covariance(weights) - spread)?;
+        let weighted = root.solve(&(&flight.differences - predicted));
+        let own = Some(OwnRows {
+            flight,
+            root,
+            weighted,
+        });
+        Some(Others { whole, own })
+    }
+
+    /// Means and covariance of weighted sums of the unknowns.
+    #[must_use]
+    pub fn of(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
+        let Gaussian { mean, covariance } = self.whole;
+        let sum = |row: &SparseRow| row.iter().map(|(place, w)| w * mean[*place]).sum::<f64>();
+        let mut values = DVector::from_iterator(rows.len(), rows.iter().map(sum));
+        let mut spread = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+            between(&rows[i], &rows[j], covariance)
+        });
+        if let Some(own) = &self.own {
+            let own_rows = &own.flight.rows;
+            let cross = DMatrix::from_fn(rows.len(), own_rows.len(), |i, j| {
+                between(&rows[i], &own_rows[j], covariance)
+            });
+            values -= &cross * &own.weighted;
+            spread += &cross * own.root.solve(&cross.transpose());
+        }
+        (values, spread)
+    }
+}
