@@ -10,6 +10,7 @@ use super::cluster_commands;
 use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
 use crate::lineage::{Changes, Moved};
 use crate::night::{diff, explain, gc, status, verify};
+use crate::numerics::digits::rounded;
 
 #[derive(Args, Debug)]
 pub struct StatusOptions {
@@ -224,6 +225,28 @@ fn print_changes(night: &str, changes: &Changes) {
         format!(
             "{} at {} deg: {} became {} [{}]",
             v.derivative, v.alpha_deg, v.before, v.now, v.because
+        )
+    });
+    print_list(
+        "contradicted by the rest of the campaign",
+        &changes.contradictions,
+        |c| {
+            format!(
+                "{} in {}: {:.0} % of {} estimates inside their 95 % intervals",
+                c.item, c.coefficient, c.inside_95_pct, c.estimates
+            )
+        },
+    );
+    print_list("learnt", &changes.learnt, |l| {
+        format!(
+            "{}: {:.1} nats; at {:.1} deg {} ± {} became {} ± {}",
+            l.derivative,
+            l.nats,
+            l.alpha_deg,
+            rounded(l.before),
+            rounded(l.before_deviation),
+            rounded(l.now),
+            rounded(l.now_deviation)
         )
     });
     if changes.is_empty() {

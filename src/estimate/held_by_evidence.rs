@@ -14,6 +14,7 @@ use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
 use crate::maneuver::{Class, Status};
+use crate::numerics::digits::rounded;
 use crate::output_error::coloured::ResidualNoise;
 use crate::output_error::cramer_rao;
 use crate::output_error::holding::{HoldingCandidates, HoldingReason};
@@ -309,12 +310,4 @@ impl Task<'_> {
             }
         }
     }
-}
-
-/// A number with three significant digits.
-fn rounded(value: f64) -> String {
-    let digits = format!("{value:.2e}");
-    digits
-        .parse()
-        .map_or(digits, |number: f64| number.to_string())
 }

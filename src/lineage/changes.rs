@@ -54,12 +54,37 @@ pub struct VerdictChange {
     pub because: String,
 }
 
+/// What flight taught of a derivative since the earlier night.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Learnt {
+    pub derivative: String,
+    /// Divergence of its posterior over α from the earlier night's.
+    pub nats: f64,
+    /// Angle of attack at which the posterior moved most, with its mean and standard deviation there.
+    pub alpha_deg: f64,
+    pub before: f64,
+    pub before_deviation: f64,
+    pub now: f64,
+    pub now_deviation: f64,
+}
+
+/// Flight or class that the rest of the campaign contradicts, and did not in the earlier night.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Contradiction {
+    /// Flight or class.
+    pub item: String,
+    pub coefficient: String,
+    pub estimates: usize,
+    /// Share of its estimates inside the 95 % interval of their prediction by the rest.
+    pub inside_95_pct: f64,
+}
+
 /// Changes between two nights: the content of `alert.json`, and a section of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Changes {
     /// Name of the night compared with; `None` for a first night.
     pub since: Option<String>,
-    /// `true` if a value moved, vanished or changed. New maneuvers alone are no alert.
+    /// `true` if a value moved, vanished or changed, or the rest of the campaign contradicts a part. New maneuvers alone are no alert.
     pub alert: bool,
     /// Differences of flights, configuration and code.
     pub causes: Vec<Cause>,
@@ -71,6 +96,9 @@ pub struct Changes {
     /// Trends that only the earlier night has.
     pub gone_trends: Vec<String>,
     pub verdicts: Vec<VerdictChange>,
+    /// What flight taught, the most first.
+    pub learnt: Vec<Learnt>,
+    pub contradictions: Vec<Contradiction>,
 }
 
 impl Changes {
@@ -83,5 +111,6 @@ impl Changes {
             && self.new_trends.is_empty()
             && self.gone_trends.is_empty()
             && self.verdicts.is_empty()
+            && self.contradictions.is_empty()
     }
 }

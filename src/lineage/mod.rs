@@ -6,7 +6,9 @@ mod differences;
 mod parts;
 mod stage;
 
-pub use changes::{Changes, ManeuverChange, ManeuverDifference, Moved, VerdictChange};
+pub use changes::{
+    Changes, Contradiction, Learnt, ManeuverChange, ManeuverDifference, Moved, VerdictChange,
+};
 pub use differences::{Cause, Origin};
 pub use parts::{Code, Lineage};
 pub use stage::Stage;

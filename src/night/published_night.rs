@@ -6,7 +6,10 @@ use crate::error::Result;
 use crate::lineage::Lineage;
 use crate::store::files;
 use crate::store::nights::{Night, Nights};
-use crate::tables::{EstimateRow, FitRow, PublishedTrend, PublishedVerdict};
+use crate::tables::{
+    CovarianceRow, EstimateRow, FitRow, PosteriorRow, PublishedTrend, PublishedVerdict,
+    SelfCheckRow,
+};
 
 /// Time and class of a maneuver, from the table `maneuvers`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +31,9 @@ pub struct NightTables<'a> {
     pub estimates: &'a [EstimateRow],
     pub trends: &'a [PublishedTrend],
     pub verdicts: &'a [PublishedVerdict],
+    pub posterior: &'a [PosteriorRow],
+    pub covariances: &'a [CovarianceRow],
+    pub self_check: &'a [SelfCheckRow],
 }
 
 /// Tables of a published night that are compared with those of another.
@@ -39,6 +45,9 @@ pub struct PublishedNight {
     estimates: Vec<EstimateRow>,
     trends: Vec<PublishedTrend>,
     verdicts: Vec<PublishedVerdict>,
+    posterior: Vec<PosteriorRow>,
+    covariances: Vec<CovarianceRow>,
+    self_check: Vec<SelfCheckRow>,
 }
 
 impl PublishedNight {
@@ -58,6 +67,9 @@ impl PublishedNight {
             estimates,
             trends: files::published(&folder, "trends")?,
             verdicts: files::published(&folder, "comparison")?,
+            posterior: files::published(&folder, "posterior")?,
+            covariances: files::published(&folder, "posterior_covariance")?,
+            self_check: files::published(&folder, "self_check")?,
         })
     }
 
@@ -71,6 +83,9 @@ impl PublishedNight {
             estimates: &self.estimates,
             trends: &self.trends,
             verdicts: &self.verdicts,
+            posterior: &self.posterior,
+            covariances: &self.covariances,
+            self_check: &self.self_check,
         }
     }
 }

@@ -190,6 +190,9 @@ impl NightRun<'_> {
             estimates: &campaign.estimates,
             trends: &trends,
             verdicts: &verdicts,
+            posterior: &campaign.model.rows.posterior,
+            covariances: &campaign.model.rows.covariance,
+            self_check: &campaign.model.rows.self_check,
         };
         changes::between(&name, &before.tables(), &now)
     }

@@ -2,6 +2,7 @@
 //! inverse of a symmetric matrix, Fourier sums, one Runge-Kutta step, Student's t, χ².
 
 pub mod chi_squared;
+pub(crate) mod digits;
 pub(crate) mod harmonics;
 pub(crate) mod matrix;
 pub mod minimise;

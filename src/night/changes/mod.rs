@@ -3,15 +3,19 @@
 //!
 //! A number has moved if it differs by more than its uncertainty, the larger of the two nights': the
 //! corrected bound of an estimate, the standard error of a trend. Smaller differences are noise and
-//! are not listed.
+//! are not listed. What the posterior learnt is told in nats.
 
 mod causes;
+mod contradictions;
+mod learnt;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use self::causes::Causes;
+use self::contradictions::contradictions;
+use self::learnt::learnt;
 use super::published_night::{ManeuverWindow, NightTables};
 use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, VerdictChange};
 use crate::maneuver::Status;
@@ -34,6 +38,8 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
         gone_trends: trends_before.difference(&trends_now).cloned().collect(),
         trends: moved_trends(before, now, &causes),
         verdicts: changed_verdicts(before, now, &causes),
+        learnt: learnt(before, now),
+        contradictions: contradictions(before, now),
         causes: causes.all,
         maneuvers,
         estimates,
@@ -42,13 +48,14 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
     changes
 }
 
-/// `true` if anything changed besides new maneuvers and new trends.
+/// `true` if anything changed besides new maneuvers, new trends and what flight taught.
 fn needs_attention(changes: &Changes) -> bool {
     let mut maneuvers = changes.maneuvers.iter();
     !changes.estimates.is_empty()
         || !changes.trends.is_empty()
         || !changes.gone_trends.is_empty()
         || !changes.verdicts.is_empty()
+        || !changes.contradictions.is_empty()
         || maneuvers.any(|m| m.what != ManeuverDifference::New)
 }
 
@@ -154,7 +161,8 @@ fn moved_estimates(before: &NightTables, now: &NightTables, causes: &Causes) -> 
         let was = old.get(&(e.maneuver_id.as_str(), e.derivative.as_str()))?;
         let (before, now) = (was.value?, e.value?);
         let uncertainty = larger(was.bound_corrected, e.bound_corrected)?;
-        ((now - before).abs() > uncertainty).then(|| Moved {
+        let least = uncertainty.max(3.0 * news_of_held(was, e));
+        ((now - before).abs() > least).then(|| Moved {
             derivative: e.derivative.clone(),
             of: e.maneuver_id.clone(),
             alpha_deg: e.alpha_deg,
@@ -169,6 +177,13 @@ fn moved_estimates(before: &NightTables, now: &NightTables, causes: &Causes) -> 
         .filter(counts)
         .filter_map(moved)
         .collect()
+}
+
+/// Standard deviation of an estimate's move by what other flights have since said of the values that
+/// it holds.
+fn news_of_held(before: &EstimateRow, now: &EstimateRow) -> f64 {
+    let [before, now] = [before, now].map(|e| e.bound_held.unwrap_or(0.0));
+    (before * before - now * now).max(0.0).sqrt()
 }
 
 fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {

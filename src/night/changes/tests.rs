@@ -33,6 +33,9 @@ impl Campaign {
             estimates,
             trends,
             verdicts,
+            posterior: &[],
+            covariances: &[],
+            self_check: &[],
         }
     }
 

@@ -1,6 +1,6 @@
 //! Changes since the previously published night, with their causes.
 
-use crate::lineage::{Changes, ManeuverDifference, Moved};
+use crate::lineage::{Changes, Contradiction, Learnt, ManeuverDifference, Moved};
 use crate::report::notation::{angle, number};
 use crate::report::table_view::TableView;
 
@@ -8,6 +8,9 @@ use crate::report::table_view::TableView;
 const MOST_CAUSES: usize = 3;
 
 const MOVED_NOTE: &str = "Moved: by more than the larger of the two nights' uncertainties.";
+
+const LEARNT_NOTE: &str = "Learnt: divergence of the posterior over all angles of attack from the \
+                           earlier night's. The values are at the angle where it moved most.";
 
 /// The changes and their causes in a sentence.
 pub fn headline(changes: &Changes) -> String {
@@ -40,6 +43,7 @@ fn counts(changes: &Changes) -> Vec<String> {
         (changes.new_trends.len(), "new trends"),
         (changes.gone_trends.len(), "trends gone"),
         (changes.verdicts.len(), "verdicts changed"),
+        (changes.contradictions.len(), "contradictions"),
     ]
     .iter()
     .filter(|(n, _)| *n > 0)
@@ -70,6 +74,8 @@ pub fn tables(changes: &Changes) -> Vec<TableView> {
     let tables = [
         input_changes(changes),
         verdicts(changes),
+        contradictions(changes),
+        learnt(changes),
         moved("Trends that moved", "group", &changes.trends),
         trend_names(changes),
         maneuvers(changes),
@@ -103,6 +109,40 @@ fn verdicts(changes: &Changes) -> TableView {
         .collect();
     let heads = ["derivative", "α", "before", "now", "because"];
     TableView::new("Verdicts", "", &heads, rows)
+}
+
+fn contradictions(changes: &Changes) -> TableView {
+    let row = |c: &Contradiction| {
+        let inside = format!("{:.0} %", c.inside_95_pct);
+        vec![
+            c.item.clone(),
+            c.coefficient.clone(),
+            c.estimates.to_string(),
+            inside,
+        ]
+    };
+    let rows = changes.contradictions.iter().map(row).collect();
+    let heads = ["flight or class", "coefficient", "estimates", "inside 95 %"];
+    TableView::new("Contradicted by the rest of the campaign", "", &heads, rows)
+}
+
+fn learnt(changes: &Changes) -> TableView {
+    let row = |l: &Learnt| {
+        let value = |v, deviation| {
+            let [v, deviation] = [v, deviation].map(|x| number(Some(x), 3));
+            format!("{v} ± {deviation}")
+        };
+        vec![
+            l.derivative.clone(),
+            format!("{:.1}", l.nats),
+            angle(l.alpha_deg),
+            value(l.before, l.before_deviation),
+            value(l.now, l.now_deviation),
+        ]
+    };
+    let rows = changes.learnt.iter().map(row).collect();
+    let heads = ["derivative", "nats", "α", "before", "now"];
+    TableView::new("Learnt", LEARNT_NOTE, &heads, rows)
 }
 
 fn trend_names(changes: &Changes) -> TableView {

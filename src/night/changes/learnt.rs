@@ -1,0 +1,193 @@
+//! What the flights since the last night taught of each derivative, in nats.
+//!
+//! With the posterior of a derivative at the tunnel's breakpoints N(m₀, P₀) in the earlier night and
+//! N(m, P) now, it is their Kullback-Leibler divergence
+//! ½ (tr P₀⁻¹P − n + (m − m₀)' P₀⁻¹ (m − m₀) + ln |P₀| − ln |P|).
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use crate::lineage::Learnt;
+use crate::night::published_night::NightTables;
+use crate::tables::{CovarianceRow, PosteriorRow};
+
+/// Information about a derivative from which it is listed, nats.
+const LEAST_NATS: f64 = 0.1;
+
+/// Flight condition in ten-thousandths of the variables' units.
+type Point = (i64, Option<i64>, Option<i64>);
+
+/// Posterior of one derivative at the points that both nights have.
+struct Posterior {
+    values: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Rows of a night by derivative.
+struct Night<'a> {
+    rows: BTreeMap<&'a str, BTreeMap<Point, &'a PosteriorRow>>,
+    covariances: BTreeMap<&'a str, BTreeMap<(Point, Point), f64>>,
+}
+
+/// Derivatives of which flight taught something, the most first.
+pub fn learnt(before: &NightTables, now: &NightTables) -> Vec<Learnt> {
+    let (before, now) = (Night::of(before), Night::of(now));
+    let names = now.rows.keys();
+    let mut all: Vec<Learnt> = names.filter_map(|name| of(name, &before, &now)).collect();
+    all.sort_by(|a, b| {
+        b.nats
+            .total_cmp(&a.nats)
+            .then_with(|| a.derivative.cmp(&b.derivative))
+    });
+    all
+}
+
+fn of(derivative: &str, before: &Night, now: &Night) -> Option<Learnt> {
+    let (rows_before, rows) = (before.rows.get(derivative)?, now.rows.get(derivative)?);
+    let points = rows.keys().filter(|p| rows_before.contains_key(p));
+    let points: Vec<Point> = points
+        .filter(|p| now.has(derivative, **p))
+        .copied()
+        .collect();
+    let nats = divergence(
+        &before.posterior(derivative, &points)?,
+        &now.posterior(derivative, &points)?,
+    )?;
+    let pairs = points.iter().map(|p| (rows_before[p], rows[p]));
+    let moved = |(was, is): &(&PosteriorRow, &PosteriorRow)| {
+        (is.value - was.value).abs() / was.standard_deviation
+    };
+    let (was, is) = pairs.max_by(|a, b| moved(a).total_cmp(&moved(b)))?;
+    (nats >= LEAST_NATS).then(|| Learnt {
+        derivative: derivative.to_owned(),
+        nats,
+        alpha_deg: is.alpha_deg,
+        before: was.value,
+        before_deviation: was.standard_deviation,
+        now: is.value,
+        now_deviation: is.standard_deviation,
+    })
+}
+
+/// Divergence in nats; `None` where a covariance is not positive definite.
+fn divergence(before: &Posterior, now: &Posterior) -> Option<f64> {
+    let n = before.values.len();
+    let root = Cholesky::new(before.covariance.clone())?;
+    let own = Cholesky::new(now.covariance.clone())?;
+    let change = &now.values - &before.values;
+    let log = |c: &Cholesky<f64, nalgebra::Dyn>| {
+        let diagonal = c.l_dirty().diagonal();
+        2.0 * diagonal.iter().map(|d| d.ln()).sum::<f64>()
+    };
+    let trace = root.solve(&now.covariance).trace();
+    let square = change.dot(&root.solve(&change));
+    Some(0.5 * (trace - n as f64 + square + log(&root) - log(&own)))
+}
+
+impl<'a> Night<'a> {
+    fn of(tables: &NightTables<'a>) -> Night<'a> {
+        let mut night = Night {
+            rows: BTreeMap::new(),
+            covariances: BTreeMap::new(),
+        };
+        for row in tables.posterior {
+            let own = night.rows.entry(&row.derivative).or_default();
+            own.insert(point(row.alpha_deg, row.mach, row.third), row);
+        }
+        let of_one = tables.covariances.iter().filter(|c| c.first == c.second);
+        for row in of_one {
+            let (first, second) = points(row);
+            let own = night.covariances.entry(&row.first).or_default();
+            own.insert((first, second), row.covariance);
+            own.insert((second, first), row.covariance);
+        }
+        night
+    }
+
+    /// `true` for a point at which covariances are published.
+    fn has(&self, derivative: &str, point: Point) -> bool {
+        let own = self.covariances.get(derivative);
+        own.is_some_and(|own| own.contains_key(&(point, point)))
+    }
+
+    fn posterior(&self, derivative: &str, points: &[Point]) -> Option<Posterior> {
+        let (rows, own) = (
+            self.rows.get(derivative)?,
+            self.covariances.get(derivative)?,
+        );
+        let n = points.len();
+        let mut covariance = DMatrix::zeros(n, n);
+        for (i, a) in points.iter().enumerate() {
+            for (j, b) in points.iter().enumerate() {
+                covariance[(i, j)] = *own.get(&(*a, *b))?;
+            }
+        }
+        let values = points.iter().map(|p| rows[p].value);
+        Some(Posterior {
+            values: DVector::from_iterator(n, values),
+            covariance,
+        })
+    }
+}
+
+fn points(row: &CovarianceRow) -> (Point, Point) {
+    (
+        point(row.first_alpha_deg, row.first_mach, row.first_third),
+        point(row.second_alpha_deg, row.second_mach, row.second_third),
+    )
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "variables of tables")]
+fn point(alpha_deg: f64, mach: Option<f64>, third: Option<f64>) -> Point {
+    let rounded = |v: f64| (v * 1e4).round() as i64;
+    (rounded(alpha_deg), mach.map(rounded), third.map(rounded))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn posterior(values: &[f64], covariance: &[f64]) -> Posterior {
+        let n = values.len();
+        Posterior {
+            values: DVector::from_column_slice(values),
+            covariance: DMatrix::from_row_slice(n, n, covariance),
+        }
+    }
+
+    #[test]
+    fn half_the_deviation_teaches_its_logarithm_less_what_chance_would() {
+        let (before, now) = (posterior(&[1.0], &[4.0]), posterior(&[1.0], &[1.0]));
+        let expected = 2f64.ln() - 0.5 * (1.0 - 0.25);
+        assert_relative_eq!(
+            divergence(&before, &now).unwrap(),
+            expected,
+            epsilon = 1e-12
+        );
+        let moved = posterior(&[3.0], &[1.0]);
+        assert_relative_eq!(
+            divergence(&before, &moved).unwrap(),
+            expected + 0.5,
+            epsilon = 1e-12
+        );
+    }
+
+    #[test]
+    fn points_that_say_the_same_teach_once() {
+        // Two points correlated by 0.999...: the second adds next to nothing.
+        let r = 1.0 - 1e-9;
+        let before = posterior(&[0.0, 0.0], &[4.0, 4.0 * r, 4.0 * r, 4.0]);
+        let s = 1.0 - 4.0 * (1.0 - r);
+        let now = posterior(&[0.0, 0.0], &[1.0, s, s, 1.0]);
+        let once = divergence(&posterior(&[0.0], &[4.0]), &posterior(&[0.0], &[1.0])).unwrap();
+        assert_relative_eq!(divergence(&before, &now).unwrap(), once, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn the_same_posterior_teaches_nothing() {
+        let same = posterior(&[1.0, 2.0], &[2.0, 0.5, 0.5, 1.0]);
+        assert_relative_eq!(divergence(&same, &same).unwrap(), 0.0, epsilon = 1e-12);
+    }
+}
