@@ -12,6 +12,7 @@ mod in_work;
 pub mod lock;
 pub mod log;
 pub mod nights;
+mod numbers;
 pub mod object;
 pub mod record_file;
 pub mod recorder;
