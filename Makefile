@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model compare report export nightly check show shown simulate validate build test same bench lint clean help
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model compare report export nightly check show shown simulate validate build test same bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -127,6 +127,9 @@ bench: ## run the benchmarks
 lint: ## formatting and lints, as .ci/run has them
 	cargo fmt --check
 	cargo clippy --all-targets --features s3 --locked -- -D warnings
+
+supply-chain: ## advisories, licences, sources and duplicate versions of the dependencies, by cargo-deny
+	bash tests/supply_chain.sh
 
 clean: ## remove what runs made: data/store and the folders under reports (cargo clean removes the build)
 	rm -rf data/store reports/*/
