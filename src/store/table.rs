@@ -190,7 +190,7 @@ fn csv_file(rows: usize, columns: &[Column]) -> csv::Result<Vec<u8>> {
 /// by bit.
 fn cell<'a>(cells: &Cells<'a>, row: usize) -> Cow<'a, str> {
     match cells {
-        Cells::Text(cells) => cells[row].unwrap_or_default().into(),
+        Cells::Text(cells) => no_formula(cells[row].unwrap_or_default()),
         Cells::Number(cells) => cells[row]
             .map(|number| zmij::Buffer::new().format(number).to_owned())
             .unwrap_or_default()
@@ -199,6 +199,15 @@ fn cell<'a>(cells: &Cells<'a>, row: usize) -> Cow<'a, str> {
             .map(|number| number.to_string())
             .unwrap_or_default()
             .into(),
+    }
+}
+
+/// A text that a spreadsheet would take for a formula, behind an apostrophe: then it is text there.
+fn no_formula(text: &str) -> Cow<'_, str> {
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+        format!("'{text}").into()
+    } else {
+        text.into()
     }
 }
 
@@ -271,6 +280,23 @@ mod tests {
             cells,
             "\"a \"\"b\"\"\",\"line\nbreak\",semicolon; tab\t,0.30000000000000004,-1e-300,not excited\n"
         );
+    }
+
+    #[test]
+    fn no_text_is_a_formula_in_a_spreadsheet() {
+        for (text, written) in [
+            ("=1+1", "'=1+1"),
+            ("-1", "'-1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("+x", "'+x"),
+            ("\tx", "'\tx"),
+            ("flights/a=1.parquet", "flights/a=1.parquet"),
+            ("", ""),
+        ] {
+            assert_eq!(cell(&Cells::Text(vec![Some(text)]), 0), written);
+        }
+        let number = Cells::Number(vec![Some(-1.5)]);
+        assert_eq!(cell(&number, 0), "-1.5", "numbers stay numbers");
     }
 
     #[test]
