@@ -97,6 +97,7 @@ impl Config {
         check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
         files.all().try_for_each(ranges::are_finite)?;
         ranges::of_pipeline(&files.pipeline)?;
+        files.classes.iter().try_for_each(ranges::of_class)?;
         Ok(config)
     }
 }

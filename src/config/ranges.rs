@@ -10,7 +10,7 @@ use crate::error::Result;
 type Range = (f64, f64);
 
 /// Ranges by the last name of a key. Sizes that set the amount of work have the narrowest.
-const BY_NAME: [(&str, Range); 25] = [
+const BY_NAME: [(&str, Range); 27] = [
     ("memory_mb", (1.0, 1e9)),
     ("sampling_rate_hz", (0.01, 1e6)),
     ("longest_stretch_h", (0.01, 1000.0)),
@@ -30,6 +30,8 @@ const BY_NAME: [(&str, Range); 25] = [
     ("alpha_step_deg", (0.1, 90.0)),
     ("alpha_bin_deg", (1e-3, 180.0)),
     ("alpha_distance_deg", (1e-3, 180.0)),
+    ("length_deg", (0.1, 180.0)),
+    ("degrees_of_freedom", (1.0, 1e12)),
     ("least_delay_s", (0.0, 10.0)),
     ("r_squared", (-1e12, 1.0)),
     ("contradiction", (0.0, 1.0)),
@@ -58,6 +60,20 @@ const SIGNED: [&str; 6] = [
 /// Smallest step of a signal that segment may search for: zero would make a step of each sample.
 const STEPS: Range = (1e-6, 1e9);
 
+/// Ranges of a class's numbers by the last name of a key: inputs of a maneuver, which lasts a day at
+/// most.
+const OF_CLASS: [(&str, Range); 9] = [
+    ("lead_in_s", (0.0, 86_400.0)),
+    ("decay_s", (0.0, 86_400.0)),
+    ("unit_s", (0.0, 86_400.0)),
+    ("at_least", (0.0, 1e6)),
+    ("at_most", (0.0, 1e6)),
+    ("widths", (1e-3, 1e3)),
+    ("tolerance", (0.0, 1e3)),
+    ("ratio", (0.0, 1e3)),
+    ("above_alpha_deg", (-180.0, 180.0)),
+];
+
 /// Range of other sizes.
 const SIZE: Range = (0.0, 1e12);
 
@@ -69,6 +85,18 @@ pub(super) fn are_finite(source: &Source) -> Result<()> {
 /// Checks that the numbers of `pipeline.yaml` are in their ranges.
 pub(super) fn of_pipeline(source: &Source) -> Result<()> {
     check(source, &range)
+}
+
+/// Checks that the numbers of a class are in their ranges.
+pub(super) fn of_class(source: &Source) -> Result<()> {
+    check(source, &range_of_class)
+}
+
+/// Range of the number at a path of keys of a class.
+fn range_of_class(path: &[String]) -> Range {
+    let name = path.last().map_or("", String::as_str);
+    let known = OF_CLASS.iter().find(|(known, _)| *known == name);
+    known.map_or(SIZE, |(_, range)| *range)
 }
 
 /// Range of the number at a path of keys of `pipeline.yaml`.

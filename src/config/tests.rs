@@ -468,6 +468,53 @@ fn an_unknown_word_of_recognition_is_answered_with_the_one_that_was_meant() {
 }
 
 #[test]
+fn numbers_that_no_campaign_has_are_named_with_their_range() {
+    for (file, from, to, said) in [
+        (
+            "maneuvers/ppss.yaml",
+            "lead_in_s: 1.0",
+            "lead_in_s: 1e9",
+            "`lead_in_s` must lie between 0 and 86400, not 1000000000",
+        ),
+        (
+            "maneuvers/3211.yaml",
+            "widths: [3, 2, 1, 1]",
+            "widths: [3, 2, 1, 1e9]",
+            "`widths` must lie between 0.001 and 1000, not 1000000000",
+        ),
+        (
+            "maneuvers/3211.yaml",
+            "tolerance: 0.35",
+            "tolerance: 1e4",
+            "`tolerance` must lie between 0 and 1000, not 10000",
+        ),
+        (
+            "maneuvers/ppss.yaml",
+            "weights: { alpha: 3, q: 8, theta: 5, an: 150, ax: 140 }",
+            "weights: { alpha: 3, q: 8, theta: 5, an: 1e300, ax: 140 }",
+            "`an` must lie between 0 and 1000000000000",
+        ),
+        (
+            "pipeline.yaml",
+            "report:\n",
+            "model: { expert: { length_deg: 1e-9 } }\nreport:\n",
+            "`length_deg` must lie between 0.1 and 180, not 0.000000001",
+        ),
+        (
+            "pipeline.yaml",
+            "report:\n",
+            "model: { expert: { degrees_of_freedom: 0 } }\nreport:\n",
+            "`degrees_of_freedom` must lie between 1 and 1000000000000, not 0",
+        ),
+    ] {
+        let copy = Copy::new();
+        copy.spoil(file, from, to);
+        let e = copy.error();
+        assert!(e.starts_with(file) && e.contains(said), "{e}");
+    }
+}
+
+#[test]
 fn patterns_that_cannot_be_are_named_with_their_line() {
     for (from, to, said) in [
         (
