@@ -89,6 +89,7 @@ const UNITS: &[Unit] = &[
     unit("lb", None, Quantity::Mass, 1.0 / G0_FT_S2),
     unit("kg", None, Quantity::Mass, SLUG),
     unit("slug ft2", Some("_slug_ft2"), Quantity::Inertia, 1.0),
+    unit("lb ft2", None, Quantity::Inertia, 1.0 / G0_FT_S2),
     unit("kg m2", None, Quantity::Inertia, SLUG * FT * FT),
     unit("rpm", Some("_rpm"), Quantity::RotationalSpeed, 1.0),
     unit("s", Some("_s"), Quantity::Time, 1.0),

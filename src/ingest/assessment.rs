@@ -11,8 +11,8 @@ use super::channel::{
 };
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
-    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_mass,
-    impossible_signals, lift_curve, measure_gusts, report,
+    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_gyration,
+    impossible_mass, impossible_signals, lift_curve, measure_gusts, report,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, Findings, OnFault};
@@ -244,6 +244,7 @@ impl Examination<'_> {
         let mass = channels.values().find(|c| c.signal == signal::MASS);
         let unit = mass.map(|channel| channel.unit.as_str());
         impossible_mass(blocks, aircraft, unit, &settings.checks)
+            .or_else(|| impossible_gyration(blocks, aircraft))
             .into_iter()
             .collect()
     }

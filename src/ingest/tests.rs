@@ -564,6 +564,22 @@ fn masses_and_inertias_that_no_aircraft_has_are_named() {
 }
 
 #[test]
+fn inertias_that_are_all_in_a_wrong_unit_are_named() {
+    for (factor, words) in [
+        (32.174, "in roll is 0.840 of half the span"),
+        (1.0 / 32.174, "in roll is 0.026 of half the span"),
+    ] {
+        let mut flight = Flight::steady();
+        for name in ["Ix", "Iy", "Iz", "Ixz"] {
+            flight.values(name).iter_mut().for_each(|v| *v *= factor);
+        }
+        let problem = flight.refused();
+        assert_eq!(problem.place, "channel `Ix`");
+        assert!(problem.reason.contains(words), "{}", problem.reason);
+    }
+}
+
+#[test]
 fn a_channel_of_nothing_but_zeros_is_among_those_that_never_change() {
     let mut flight = Flight::steady();
     flight.values("an").fill(0.0);

@@ -24,6 +24,11 @@ pub struct ImpossibleSignal {
 /// inertias may cause. Those of a flat body are equal.
 const INERTIA_TOLERANCE: f64 = 0.05;
 
+/// Radius of gyration in roll over half the span, with margins of two: aircraft have 0.22 to 0.38
+/// (Raymer, *Aircraft Design*, table 16.1). Inertias in lb ft² for slug ft² make it 5.7 times as
+/// large; kg m² makes it 1.16 times as large, which nothing in a record can tell.
+const GYRATION: std::ops::Range<f64> = 0.1..0.8;
+
 /// Least angle of attack at which the mass is checked, deg: below it the lift at zero angle counts
 /// as much.
 const LEAST_ALPHA_DEG: f64 = 5.0;
@@ -135,6 +140,20 @@ fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
             "no body has moments of inertia Ix {x:.4}, Iy {y:.4}, Iz {z:.4} slug ft2: the largest \
              principal moment, {largest:.4}, exceeds the sum of the others, {others:.4}; is one in \
              another unit?"
+        ),
+    })
+}
+
+/// Finds a roll inertia with which the mass would lie at the axis, or beyond the wing tips: inertias
+/// of one wrong unit keep their ratios, so only the mass and the span contradict them.
+pub fn impossible_gyration(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<ImpossibleSignal> {
+    let (inertia, mass) = (median(blocks, signal::IX)?, median(blocks, signal::MASS)?);
+    let share = (inertia / mass).sqrt() / (0.5 * aircraft.span_ft);
+    (share.is_finite() && !GYRATION.contains(&share)).then(|| ImpossibleSignal {
+        signal: signal::IX,
+        reason: format!(
+            "with it and a mass of {mass:.4} slug the radius of gyration in roll is {share:.3} of half \
+             the span; aircraft have 0.2 to 0.4: are the inertias, or the mass, in another unit?"
         ),
     })
 }

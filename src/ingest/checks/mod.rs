@@ -17,5 +17,5 @@ pub(in crate::ingest) use fault_isolation::{
 pub(in crate::ingest) use gusts::Gusts;
 pub use mass_properties::LiftPoint;
 pub(in crate::ingest) use mass_properties::{
-    ImpossibleSignal, impossible_mass, impossible_signals, lift_curve,
+    ImpossibleSignal, impossible_gyration, impossible_mass, impossible_signals, lift_curve,
 };
