@@ -81,7 +81,7 @@ settings! {
         pub histories_at_alpha_deg: f64 = 30.0,
         /// Most maneuvers with a page of their own. Of more, those that changed, failed or represent
         /// their class come first.
-        pub maneuver_pages: usize = 600,
+        pub maneuver_pages: usize = 300,
         /// HTML template in place of the built-in one.
         pub template: Option<PathBuf> = None,
         /// Published nights that `harvest gc` keeps, at least one. Fewer: less disk space, and a

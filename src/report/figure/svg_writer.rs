@@ -195,33 +195,72 @@ impl SvgWriter {
     }
 }
 
-/// Path data of a line through points, relative from each to the next. The sum of the steps stays
-/// true to the points.
+/// Path data of a line through points, relative from each to the next. Points are left out where the
+/// line stays within [`TOLERANCE`] of them; the sum of the steps stays true to the others.
 #[must_use]
 pub fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
-    let mut data = String::new();
-    let mut previous: Option<(i64, i64)> = None;
-    let mut count = 0;
-    for (x, y) in points {
-        let (x, y) = (tenths(x), tenths(y));
-        match previous {
-            None => {
-                let _ = write!(data, "M{} {}", from_tenths(x), from_tenths(y));
-            }
-            Some((from_x, from_y)) => {
-                let (dx, dy) = (x - from_x, y - from_y);
-                let space = if dy < 0 { "" } else { " " };
-                let _ = write!(data, "l{}{space}{}", from_tenths(dx), from_tenths(dy));
-            }
-        }
-        previous = Some((x, y));
-        count += 1;
+    let points: Vec<(i64, i64)> = points.map(|(x, y)| (tenths(x), tenths(y))).collect();
+    let points = simplified(&points);
+    let Some(&(x, y)) = points.first() else {
+        return String::new();
+    };
+    let mut data = format!("M{} {}", from_tenths(x), from_tenths(y));
+    for (step, pair) in points.windows(2).enumerate() {
+        let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let command = if step == 0 { "l" } else { separator(dx) };
+        // Writing into a String cannot fail.
+        let _ = write!(data, "{command}{}", from_tenths(dx));
+        let _ = write!(data, "{}{}", separator(dy), from_tenths(dy));
     }
-    if count == 1 {
+    if points.len() == 1 {
         // A single point has no length: make it visible.
         data.push_str("h.6");
     }
     data
+}
+
+/// Text before a number that follows another: a sign separates them.
+fn separator(number: i64) -> &'static str {
+    if number < 0 { "" } else { " " }
+}
+
+/// Largest distance of a point from a line that leaves it out, in tenths of a unit: a quarter of a
+/// unit is a quarter of a pixel, and half of the thinnest line.
+const TOLERANCE: f64 = 2.5;
+
+/// The first and the last point, and those that the line between two kept ones would miss by more
+/// than [`TOLERANCE`] (Ramer, Douglas and Peucker).
+fn simplified(points: &[(i64, i64)]) -> Vec<(i64, i64)> {
+    let Some(last) = points.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let mut is_kept = vec![false; points.len()];
+    (is_kept[0], is_kept[last]) = (true, true);
+    let mut open = vec![(0, last)];
+    while let Some((from, to)) = open.pop() {
+        let distance = |at: &usize| distance(points[*at], points[from], points[to]);
+        let inner = from + 1..to;
+        let farthest = inner.max_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(at) = farthest.filter(|at| distance(at) > TOLERANCE) {
+            is_kept[at] = true;
+            open.extend([(from, at), (at, to)]);
+        }
+    }
+    let kept = points.iter().zip(is_kept).filter(|(_, kept)| *kept);
+    kept.map(|(point, _)| *point).collect()
+}
+
+/// Distance of a point from the stretch between two others.
+fn distance(point: (i64, i64), from: (i64, i64), to: (i64, i64)) -> f64 {
+    let vector = |a: (i64, i64), b: (i64, i64)| ((b.0 - a.0) as f64, (b.1 - a.1) as f64);
+    let ((x, y), (dx, dy)) = (vector(from, point), vector(from, to));
+    let squared = dx * dx + dy * dy;
+    let share = if squared > 0.0 {
+        ((x * dx + y * dy) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (x - share * dx).hypot(y - share * dy)
 }
 
 /// Path data of a rectangle.
@@ -257,13 +296,43 @@ fn from_tenths(tenths: i64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
     fn steps_of_tenths_add_up_to_the_points() {
         let data = polyline([(0.04, 1.0), (0.08, 2.25), (10.0, -3.0)].into_iter());
-        assert_eq!(data, "M0 1l.1 1.3l9.9-5.3");
+        assert_eq!(data, "M0 1l.1 1.3 9.9-5.3");
         assert_eq!(polyline([(1.0, 2.0)].into_iter()), "M1 2h.6");
         assert_eq!(polyline(std::iter::empty()), "");
+    }
+
+    #[test]
+    fn points_on_a_straight_line_are_left_out() {
+        let line = (0..100).map(|i| (f64::from(i), 5.0 + 0.1 * f64::from(i % 2)));
+        assert_eq!(polyline(line), "M0 5l99 .1");
+        let peak = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.4), (3.0, 0.0), (4.0, 0.0)];
+        assert_eq!(polyline(peak.into_iter()), "M0 0l2 .4 2-.4");
+        let back = [(0.0, 0.0), (9.0, 0.0), (1.0, 0.0)];
+        assert_eq!(polyline(back.into_iter()), "M0 0l9 0-8 0");
+    }
+
+    proptest! {
+        #[test]
+        fn no_point_is_missed_by_more_than_the_tolerance(
+            points in proptest::collection::vec((-50_i64..50, -50_i64..50), 1..60),
+        ) {
+            let kept = simplified(&points);
+            prop_assert_eq!(kept.first(), points.first());
+            prop_assert_eq!(kept.last(), points.last());
+            for point in &points {
+                let least = kept
+                    .windows(2)
+                    .map(|ends| distance(*point, ends[0], ends[1]))
+                    .fold(if kept.len() == 1 { 0.0 } else { f64::INFINITY }, f64::min);
+                prop_assert!(least <= TOLERANCE, "{point:?}: {least}");
+            }
+        }
     }
 }
