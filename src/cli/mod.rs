@@ -129,6 +129,8 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     crate::memory::keep();
+    // Without it the limit ends the program, and nothing else changes.
+    let _ = signals::outlive_file_limits();
     let code = match Cli::try_parse() {
         Ok(cli) => run(cli.command).unwrap_or_else(|error| report(&error)),
         Err(error) => explain_usage(&error),

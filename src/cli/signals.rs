@@ -1,6 +1,8 @@
-//! A last line in the log when the system or a user ends a run: SIGTERM, SIGINT.
+//! A last line in the log when the system or a user ends a run: SIGTERM, SIGINT. Too large a file is an
+//! error.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use super::bars::Work;
 use crate::store::Log;
@@ -33,6 +35,23 @@ pub fn log_signals(log: &Arc<Log>, work: &Arc<Work>) -> std::io::Result<()> {
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     });
+    Ok(())
+}
+
+/// Makes a file that would become larger than the shell allows (`ulimit -f`) an error of its write, as
+/// a full disk is, and not the end of the program.
+///
+/// # Errors
+/// The system refuses to report signals.
+#[cfg(unix)]
+pub fn outlive_file_limits() -> std::io::Result<()> {
+    let noted = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, noted).map(|_| ())
+}
+
+/// Other systems have no such signals.
+#[cfg(not(unix))]
+pub fn outlive_file_limits() -> std::io::Result<()> {
     Ok(())
 }
 
