@@ -39,6 +39,12 @@ pub(super) fn tunnel(
                 row.derivative
             ));
         }
+        if row.alpha_deg.abs() > 180.0 {
+            return error(format!(
+                "`{}` has the angle of attack {} deg; it lies between -180 and 180",
+                row.derivative, row.alpha_deg
+            ));
+        }
         if let Some(uncertainty) = row.uncertainty.filter(|u| *u < 0.0) {
             return error(format!(
                 "`{}` has the uncertainty {uncertainty}; none is negative",

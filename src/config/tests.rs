@@ -490,8 +490,8 @@ fn numbers_that_no_campaign_has_are_named_with_their_range() {
         ),
         (
             "maneuvers/ppss.yaml",
-            "weights: { alpha: 3, q: 8, theta: 5, an: 150, ax: 140 }",
-            "weights: { alpha: 3, q: 8, theta: 5, an: 1e300, ax: 140 }",
+            "weights: { alpha: 5, q: 8, theta: 4, an: 150, ax: 250 }",
+            "weights: { alpha: 5, q: 8, theta: 4, an: 1e300, ax: 250 }",
             "`an` must lie between 0 and 1000000000000",
         ),
         (
@@ -769,6 +769,14 @@ fn an_event_with_a_time_that_is_no_number_is_named_by_line_and_column() {
     assert_eq!(
         Copy::new().error_with_events("flight_001,PPSS,noon,132\n"),
         "events.csv:2: column `start_s`: invalid float literal"
+    );
+}
+
+#[test]
+fn an_angle_of_attack_beyond_a_half_turn_is_named() {
+    assert_eq!(
+        Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,200,0.08,per_deg\n"),
+        "tunnel.csv:3: `CN_alpha` has the angle of attack 200 deg; it lies between -180 and 180"
     );
 }
 

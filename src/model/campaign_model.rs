@@ -10,5 +10,18 @@ pub struct Model {
     pub coefficients: Vec<(Coefficient, CoefficientPosterior)>,
     pub rows: Rows,
     /// Coefficients whose posterior could not be computed.
-    pub failed: Vec<Coefficient>,
+    pub failed: Vec<(Coefficient, Failure)>,
 }
+
+/// Reason for which a coefficient has no posterior.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// An estimate, or a covariance, is not finite.
+    NotFinite,
+    /// The grids of its derivatives have this many points, more than [`MOST_POINTS`].
+    TooManyPoints(usize),
+}
+
+/// Most points of a coefficient's grids: time grows with their cube and memory with their square, 2,000
+/// points take some seconds and 32 MB a matrix. The largest published tables have some hundred.
+pub const MOST_POINTS: usize = 2000;

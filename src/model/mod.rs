@@ -35,7 +35,7 @@ use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
 use coefficient::CoefficientPosterior;
 use term::Basis;
 
-pub use campaign_model::Model;
+pub use campaign_model::{Failure, MOST_POINTS, Model};
 pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
 pub use settings::Settings;
@@ -60,21 +60,25 @@ pub fn model(
     let all = [Axis::Longitudinal, Axis::Lateral].map(Axis::coefficients);
     let all: Vec<Coefficient> = all.into_iter().flatten().collect();
     let of = |coefficient: Coefficient| {
+        let points = basis.points(coefficient, &evidence);
+        if points > MOST_POINTS {
+            return Some((coefficient, Err(Failure::TooManyPoints(points))));
+        }
         let terms = basis.terms(coefficient, &evidence);
         let has_terms = !terms.is_empty();
         let found = has_terms.then(|| CoefficientPosterior::of(terms, &evidence, &basis))?;
         let rows = found.as_ref().map(|p| p.rows(coefficient, &evidence));
-        Some((coefficient, found.zip(rows)))
+        Some((coefficient, found.zip(rows).ok_or(Failure::NotFinite)))
     };
     let found: Vec<_> = all.into_par_iter().filter_map(of).collect();
     let mut model = Model::default();
     for (coefficient, found) in found {
         match found {
-            Some((posterior, rows)) => {
+            Ok((posterior, rows)) => {
                 model.rows.append(rows);
                 model.coefficients.push((coefficient, posterior));
             }
-            None => model.failed.push(coefficient),
+            Err(failure) => model.failed.push((coefficient, failure)),
         }
     }
     model

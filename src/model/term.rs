@@ -47,6 +47,26 @@ impl Basis<'_> {
             .collect()
     }
 
+    /// Number of points of a coefficient's grids: an upper limit, found without making them.
+    #[must_use]
+    pub fn points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
+        let derivatives = self.buildup.derivatives.iter();
+        let alphas = self.alphas_deg(coefficient, evidence).len();
+        derivatives
+            .filter(|derivative| derivative.coefficient == coefficient)
+            .map(|derivative| {
+                let sums = self.buildup.combined.iter();
+                let own = sums.filter(|sum| sum.constant == derivative.name);
+                let names = own.map(|sum| &sum.name).chain([&derivative.name]);
+                let tables = names.map(|name| {
+                    let (machs, thirds) = (self.tunnel.machs(name), self.tunnel.thirds(name));
+                    machs.len().max(1).saturating_mul(thirds.len().max(1))
+                });
+                alphas.saturating_mul(tables.max().unwrap_or(1))
+            })
+            .fold(0, usize::saturating_add)
+    }
+
     /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
     /// points between.
     fn alphas_deg(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<f64> {

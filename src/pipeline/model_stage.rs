@@ -8,7 +8,7 @@ use crate::aero::Combined;
 use crate::config::Config;
 use crate::error::ProblemStage;
 use crate::estimate::HeldValues;
-use crate::model::{self, Evidence, Model};
+use crate::model::{self, Evidence, Failure, MOST_POINTS, Model};
 use crate::output_error::Outcome;
 use crate::tables::EstimateRow;
 
@@ -35,11 +35,9 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
     });
     let evidence: Vec<Evidence> = evidence.collect();
     let found = model::model(&evidence, &config.buildup, &config.tunnel, &config.model);
-    for coefficient in &found.failed {
+    for (coefficient, failure) in &found.failed {
         let place = format!("{coefficient:?}");
-        let reason =
-            "its posterior could not be computed: an estimate or a covariance is not finite";
-        let problem = problem(ProblemStage::Model, "", &place, reason);
+        let problem = problem(ProblemStage::Model, "", &place, &reason(*failure));
         campaign.problems.push(problem);
     }
     if config.estimate.held_values == HeldValues::Posterior {
@@ -73,6 +71,20 @@ fn with_held(
         }
     }
     new
+}
+
+/// Reason of a posterior's failure, as a problem has it.
+fn reason(failure: Failure) -> String {
+    match failure {
+        Failure::NotFinite => {
+            "its posterior could not be computed: an estimate or a covariance is not finite"
+                .to_owned()
+        }
+        Failure::TooManyPoints(points) => format!(
+            "its posterior was not computed: the tunnel's tables and `model: alpha_step_deg` make a \
+             grid of {points} points for it, and at most {MOST_POINTS} are possible"
+        ),
+    }
 }
 
 /// Rows of each maneuver, which stand together.

@@ -4,6 +4,7 @@ use approx::assert_relative_eq;
 
 use super::fixture::{Flown, at, diagonal, exact, posterior, tunnel};
 use crate::aero::WindTunnel;
+use crate::model::{Failure, MOST_POINTS, Settings};
 use crate::output_error::error_effect::SharedError;
 
 /// Uncertainty of a tunnel beside which flight alone counts.
@@ -38,6 +39,19 @@ fn without_flight_the_posterior_is_the_tunnel_and_its_uncertainty() {
             .iter()
             .all(|r| r.flight_share_pct.is_some_and(|share| share < 1e-9))
     );
+}
+
+#[test]
+fn a_grid_of_too_many_points_is_refused_before_it_takes_memory() {
+    let fine = Settings {
+        alpha_step_deg: 0.001,
+        ..exact()
+    };
+    let found = posterior(&[], &tunnel(None), &fine);
+    assert!(found.coefficients.is_empty());
+    let is_too_large =
+        |failure: &Failure| matches!(failure, Failure::TooManyPoints(n) if *n > MOST_POINTS);
+    assert!(!found.failed.is_empty() && found.failed.iter().all(|(_, f)| is_too_large(f)));
 }
 
 #[test]
