@@ -91,8 +91,9 @@ shown:
 	$(if $(shown),@:,$(error make show FLIGHT=<flight_id>, or make show MANEUVER=<maneuver_id>))
 
 # A step of its own, so that the long first build shows its progress.
+# The bar counts crates on a terminal and in a log alike.
 build: ## build the binary (the first time takes minutes)
-	cargo build --release --locked
+	CARGO_TERM_PROGRESS_WHEN=always CARGO_TERM_PROGRESS_WIDTH=100 cargo build --release --locked
 
 test: ## run the tests and name the ten slowest
 	bash tests/run.sh
