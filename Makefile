@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model compare report export nightly check show shown simulate validate build test same bench lint clean help
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -45,6 +45,9 @@ trend: build ## fit least-squares trends across angle of attack
 
 model: build ## fuse tunnel and flights to the posterior of every derivative
 	$(call harvest,model) $(running)
+
+qualities: build ## judge the flying qualities of the posterior, with the probability of each level
+	$(call harvest,qualities) $(running)
 
 compare: build ## compare the trends with the wind-tunnel database
 	$(call harvest,compare) $(running)

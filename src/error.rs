@@ -130,6 +130,8 @@ words! {
         Trend = "trend",
         /// Tunnel and derivatives to the posterior.
         Model = "model",
+        /// Posterior to the modes of the aircraft and their levels.
+        Qualities = "qualities",
         /// The report.
         Report = "report",
         /// The simulator; not in the table `problems`.

@@ -61,6 +61,7 @@ mod surfaces;
 pub mod estimate;
 mod trend;
 mod model;
+mod qualities;
 mod compare;
 mod export;
 mod pdf;

@@ -85,6 +85,8 @@ enum Command {
     Trend(RunOptions),
     /// Fuse tunnel and flights to the posterior of every derivative
     Model(RunOptions),
+    /// Judge the flying qualities of the posterior, with the probability of each level
+    Qualities(RunOptions),
     /// Compare the trends with the wind-tunnel database
     Compare(RunOptions),
     /// Write the report
@@ -167,6 +169,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Estimate(options) => return run_stage(Stage::Estimate, &options),
         Command::Trend(options) => (Stage::Trend, options),
         Command::Model(options) => (Stage::Model, options),
+        Command::Qualities(options) => (Stage::Qualities, options),
         Command::Compare(options) => (Stage::Compare, options),
         Command::Status(options) => return night_commands::status(&options),
         Command::Explain(options) => return night_commands::explain(&options),

@@ -9,6 +9,7 @@ use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
+use crate::qualities::Specification;
 use crate::{compare, estimate, export, ingest, model, segment, trend};
 
 /// Configuration of a pipeline: everything that decides a campaign's results.
@@ -39,6 +40,8 @@ pub struct Config {
     pub estimate: estimate::Settings,
     pub trend: trend::Settings,
     pub model: model::Settings,
+    /// Specification of flying qualities, where the pipeline has one.
+    pub qualities: Option<Specification>,
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,

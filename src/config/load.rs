@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{check, moved, places, ranges};
+use super::{check, moved, places, qualities, ranges};
 use crate::aero::Axis;
 use crate::error::Result;
 use crate::output_error::calibration_errors::Calibration;
@@ -86,6 +86,7 @@ impl Config {
             estimate: pipeline.estimate,
             trend: pipeline.trend,
             model: pipeline.model,
+            qualities: files.qualities()?,
             compare: against(pipeline.compare, overrides.against),
             export: pipeline.export,
             report: pipeline.report,
@@ -94,6 +95,7 @@ impl Config {
             files: files.all().map(|file| file.named(folder)).collect(),
         };
         check::whole(&config, &files)?;
+        qualities::check(&config, &files)?;
         check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
         files.all().try_for_each(ranges::are_finite)?;
         ranges::of_pipeline(&files.pipeline)?;

@@ -2,7 +2,8 @@
 //!
 //! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages),
 //! `aircraft.yaml` (geometry, sensors, channel map, errors of instruments), `model.yaml` (the
-//! build-up) and `maneuvers/*.yaml` (one class per file).
+//! build-up), `maneuvers/*.yaml` (one class per file) and, where flying qualities are judged,
+//! `qualities.yaml`.
 
 mod check;
 mod checked;
@@ -12,6 +13,7 @@ mod load;
 mod moved;
 mod nesting;
 mod places;
+mod qualities;
 mod ranges;
 mod source;
 mod written;

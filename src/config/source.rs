@@ -9,6 +9,7 @@ use super::written::{AircraftFile, ClassFile, ModelFile};
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
+use crate::qualities::Specification;
 use crate::store::files;
 
 /// One file and its text.
@@ -25,6 +26,8 @@ pub(super) struct Files {
     pub aircraft: Source,
     pub model: Source,
     pub classes: Vec<Source>,
+    /// Flying qualities, where the pipeline has a specification.
+    pub qualities: Option<Source>,
 }
 
 impl Source {
@@ -135,6 +138,7 @@ impl Files {
         [&self.pipeline, &self.aircraft, &self.model]
             .into_iter()
             .chain(&self.classes)
+            .chain(&self.qualities)
     }
 
     pub fn read(folder: &Path) -> Result<Files> {
@@ -151,7 +155,10 @@ impl Files {
                 "no maneuver class: each is a file `<class>.yaml` here",
             ));
         }
+        let qualities = folder.join("qualities.yaml");
+        let has_qualities = files::is_file(&qualities);
         Ok(Files {
+            qualities: has_qualities.then(|| Source::read(qualities)).transpose()?,
             pipeline: Source::read(folder.join("pipeline.yaml"))?,
             aircraft: Source::read(folder.join("aircraft.yaml"))?,
             model: Source::read(folder.join("model.yaml"))?,
@@ -168,6 +175,10 @@ impl Files {
 
     pub fn model(&self) -> Result<Buildup> {
         self.model.parse::<ModelFile>().map(Buildup::from)
+    }
+
+    pub fn qualities(&self) -> Result<Option<Specification>> {
+        self.qualities.as_ref().map(Source::parse).transpose()
     }
 
     pub fn classes(&self) -> Result<Vec<Class>> {

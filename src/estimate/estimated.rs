@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Means};
 use crate::output_error::Fit;
 use crate::output_error::error_effect::ErrorEffect;
 use crate::tables::{AgreementRow, CorrelationRow, EstimateRow, FitRow, History, Outcome};
@@ -49,6 +49,8 @@ pub struct Estimated {
     pub history: Option<History>,
     /// Agreement of each output with the maneuver's own fit.
     pub fit_outputs: Vec<AgreementRow>,
+    /// Means of the record; `None` before they are added, or where a signal is missing.
+    pub means: Option<Means>,
 }
 
 impl Estimated {
@@ -69,6 +71,7 @@ impl Estimated {
             correlations: vec![],
             history: None,
             fit_outputs: vec![],
+            means: None,
         }
     }
 }

@@ -298,6 +298,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
         covariance: Covariance::of_fit(&names, &fit),
         history: None,
         fit_outputs: vec![],
+        means: None,
         fit: task.fit_row(&fit, left_out, StartingValues::SingleEstimates),
     };
     Ok((estimated, costs))

@@ -17,6 +17,7 @@ mod second_opinion;
 mod alpha_slopes;
 mod in_gusts;
 mod doubt;
+mod flown_means;
 mod single;
 pub mod joint;
 pub mod prediction;
@@ -25,6 +26,7 @@ mod tests;
 
 pub use context::Context;
 pub use estimated::{Covariance, Estimated};
+pub use flown_means::means;
 pub use settings::{
     Doubtful, HeldValues, Hold, InactiveSurfaces, JointSettings, Method, PredictionSettings,
     Settings, Start,

@@ -158,6 +158,7 @@ impl Task<'_> {
             history: Some(self.history(&case.measurements, fit, window, surfaces)),
             fit: self.fit_row(fit, *left_out, start),
             fit_outputs: vec![],
+            means: None,
         };
         add_second_opinion(&case.names, second, &mut estimated.estimates);
         self.add_diagnostics(case, window, model, information, &mut estimated);

@@ -15,6 +15,8 @@ words! {
         Trend = "trend",
         /// Tunnel and derivatives to the posterior.
         Model = "model",
+        /// Posterior to the modes of the aircraft and their levels.
+        Qualities = "qualities",
         /// Trends against the tunnel and earlier campaigns.
         Compare = "compare",
         /// The report.

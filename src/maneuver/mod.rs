@@ -3,6 +3,8 @@
 
 pub mod class;
 pub mod found;
+mod means;
 
 pub use class::{Class, Overrides, Pulses, Recognition, Status, StepCount, Sweep};
 pub use found::{Acceptance, Event, Maneuver, ManeuverOrigin, Quality, Recognised, Unknown};
+pub use means::Means;

@@ -26,6 +26,7 @@ mod rows;
 mod campaign_model;
 mod with_held;
 mod draws;
+mod local;
 #[cfg(test)]
 mod tests;
 
@@ -38,6 +39,7 @@ use term::Basis;
 pub use campaign_model::{Failure, MOST_POINTS, Model};
 pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
+pub use local::{LocalKind, LocalPosterior, LocalValue};
 pub use settings::Settings;
 
 /// Computes the posterior of every derivative. The order of the evidence within a flight, and of the

@@ -108,6 +108,10 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
         ),
         (Stage::Trend, named([("trend", value(&config.trend))])),
         (Stage::Model, named([("model", value(&config.model))])),
+        (
+            Stage::Qualities,
+            named([("qualities", value(&config.qualities))]),
+        ),
         (Stage::Compare, named([("compare", value(&config.compare))])),
         (
             Stage::Report,

@@ -33,6 +33,9 @@ pub fn publish_tables(
     if until >= Stage::Model {
         publish_model(&shelf(Stage::Model), campaign)?;
     }
+    if until >= Stage::Qualities {
+        publish_qualities(&shelf(Stage::Qualities), campaign)?;
+    }
     if until >= Stage::Compare {
         publish_compare(&shelf(Stage::Compare), campaign)?;
     }
@@ -88,6 +91,13 @@ fn publish_model(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &rows.scales)?;
     table::publish(shelf, &rows.contributions)?;
     table::publish(shelf, &rows.self_check)
+}
+
+fn publish_qualities(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    let found = &campaign.qualities;
+    table::publish(shelf, &found.qualities)?;
+    table::publish(shelf, &found.levels)?;
+    table::publish(shelf, &found.roots)
 }
 
 fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {

@@ -86,7 +86,14 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
             estimate.add_stale("it is gone from the store", name.as_str());
         }
     }
-    for stage in [Stage::Trend, Stage::Model, Stage::Compare, Stage::Report] {
+    let made_anew = [
+        Stage::Trend,
+        Stage::Model,
+        Stage::Qualities,
+        Stage::Compare,
+        Stage::Report,
+    ];
+    for stage in made_anew {
         let is_upstream_stale = stages.iter().any(|s| !s.stale.is_empty());
         stages.push(comparison.whole_stage(stage, &config.name, is_upstream_stale));
     }

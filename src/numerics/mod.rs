@@ -1,10 +1,12 @@
 //! Numerical methods that several rooms share: vectors of the processor, aligned matrices, the
-//! inverse of a symmetric matrix, Fourier sums, one Runge-Kutta step, Student's t, χ².
+//! inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, Student's t, χ².
 
 pub mod chi_squared;
 pub(crate) mod digits;
+pub mod dual;
 pub(crate) mod harmonics;
 pub(crate) mod matrix;
+pub mod mean;
 pub mod minimise;
 pub mod order_statistics;
 pub mod random;

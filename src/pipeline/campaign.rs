@@ -8,9 +8,10 @@ use crate::estimate::Covariance;
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::lineage::Stage;
-use crate::maneuver::{Maneuver, Unknown};
+use crate::maneuver::{Maneuver, Means, Unknown};
 use crate::model::Model;
 use crate::output_error::Outcome;
+use crate::qualities::Qualities;
 use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{
@@ -92,11 +93,15 @@ pub struct Campaign {
     pub predicted: Vec<Predicted>,
     /// Covariance of each maneuver's parameters, in the order of the maneuvers.
     pub covariances: Vec<Option<Covariance>>,
+    /// Means of each maneuver's record, in the order of the maneuvers.
+    pub means: Vec<Option<Means>>,
     pub trends: Vec<TrendRow>,
     /// Maneuvers far from their trend.
     pub outliers: Vec<OutlierRow>,
     /// Posterior of every derivative.
     pub model: Model,
+    /// Modes of the aircraft and their levels; empty without `qualities.yaml`.
+    pub qualities: Qualities,
     pub comparison: Vec<ComparisonRow>,
     pub maneuver_comparison: Vec<ManeuverComparisonRow>,
     /// Readings of the tunnel beyond its tables.

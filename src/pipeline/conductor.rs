@@ -11,6 +11,7 @@ use super::ingest_step::{self, IngestStep};
 use super::lift_check;
 use super::model_stage::{self, MODEL_VERSION};
 use super::progress::Progress;
+use super::qualities_stage::{self, QUALITIES_VERSION};
 use super::segment_step::{self, SegmentStep};
 use super::step::Step;
 use super::step_runner::{Absent, StepRunner};
@@ -46,6 +47,7 @@ pub fn method_versions() -> BTreeMap<String, u32> {
     let made_anew = [
         (Stage::Trend.name(), TREND_VERSION),
         (Stage::Model.name(), MODEL_VERSION),
+        (Stage::Qualities.name(), QUALITIES_VERSION),
         (Stage::Compare.name(), COMPARE_VERSION),
     ];
     step_versions()
@@ -194,6 +196,9 @@ impl<'a> Conductor<'a> {
         }
         if until >= Stage::Model {
             model_stage::fit_model(config, &mut campaign);
+        }
+        if until >= Stage::Qualities {
+            qualities_stage::judge_qualities(config, &mut campaign);
         }
         if until >= Stage::Compare {
             trend_stage::compare(config, &self.earlier, &mut campaign);

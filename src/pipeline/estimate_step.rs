@@ -121,6 +121,7 @@ impl<'a> Step for EstimateStep<'a> {
             estimate_maneuver(self.config, &record, self.maneuver, self.record.delays);
         let history = estimated.history.take().map(|h| report::thinned(&h));
         self.store.save(&name.sibling(Kind::History), &history)?;
+        estimated.means = estimate::means(&record, self.maneuver, &self.config.buildup);
         Ok(Made::Settled(estimated))
     }
 
@@ -255,6 +256,7 @@ pub fn collect_rows(campaign: &mut Campaign, estimates: Vec<Estimated>) {
         }
         campaign.fits.push(estimated.fit);
         campaign.covariances.push(estimated.covariance);
+        campaign.means.push(estimated.means);
         campaign.estimates.extend(estimated.estimates);
         campaign.combined.extend(estimated.combined);
         campaign.fit_outputs.extend(estimated.fit_outputs);

@@ -3,7 +3,7 @@
 //! Ingest, segment, surfaces, estimate, joint estimate and prediction are steps ([`step::Step`]): artefacts
 //! of the store, each a function of a key. [`step_runner::StepRunner`] loads an artefact or makes
 //! it, so what is up to date is not done again and a killed run goes on where it was. Trends,
-//! comparison and report are small and made anew each time. [`Conductor`] brings the stages in
+//! posterior, flying qualities, comparison and report are small and made anew each time. [`Conductor`] brings the stages in
 //! order, and its [`Campaign`] carries the state of each flight and maneuver: a run, `status`,
 //! `explain` and the shards of a cluster all ask it. Results do not depend on threads: they are
 //! collected in the order of flights and maneuvers.
@@ -19,6 +19,7 @@ mod lift_check;
 mod memory_shares;
 mod problems;
 mod progress;
+mod qualities_stage;
 mod record_windows;
 mod record_writing;
 mod repeated_rows;

@@ -73,6 +73,8 @@ pub fn make_report(
         limits: &config.estimate.identifiability,
         posterior: &campaign.model.rows.posterior,
         trends: &campaign.trends,
+        specification: config.qualities.as_ref(),
+        qualities: &campaign.qualities,
         comparison: &campaign.comparison,
         flights: &campaign.flight_rows,
         channels: &campaign.channels,

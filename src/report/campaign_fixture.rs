@@ -9,10 +9,12 @@ use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
 use crate::output_error::identifiability::Limits;
+use crate::qualities::{Qualities, Specification};
 use crate::tables::{
-    AgreementRow, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
-    CorrelationRow, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow, History, HistoryOutput,
-    InstrumentRow, Outcome, PosteriorRow, TrendRow, TunnelDifference, TunnelVerdict,
+    AgreementRow, Airframe, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
+    CorrelationRow, DeviationBasis, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow,
+    History, HistoryOutput, InstrumentRow, Level, LevelRow, Outcome, PosteriorRow, QualityRow,
+    Quantity, RootRow, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -25,6 +27,8 @@ pub struct Campaign {
     pub correlations: Vec<CorrelationRow>,
     pub limits: Limits,
     pub trends: Vec<TrendRow>,
+    pub specification: Option<Specification>,
+    pub qualities: Qualities,
     pub posterior: Vec<PosteriorRow>,
     pub comparison: Vec<ComparisonRow>,
     pub flights: Vec<FlightRow>,
@@ -56,6 +60,8 @@ impl Campaign {
             limits: &self.limits,
             posterior: &self.posterior,
             trends: &self.trends,
+            specification: self.specification.as_ref(),
+            qualities: &self.qualities,
             comparison: &self.comparison,
             flights: &self.flights,
             channels: &self.channels,
@@ -125,6 +131,7 @@ pub fn campaign() -> Campaign {
             "title: a campaign\n  deeper: 1\n".into(),
         )],
     };
+    judge(&mut campaign);
     campaign.fits[0].outcome = Outcome::NotConverged;
     campaign.estimates[5].value = Some(1e6);
     campaign.checks.push(CheckRow {
@@ -171,6 +178,67 @@ pub fn campaign() -> Campaign {
         verdict: EventVerdict::NotFound,
     });
     campaign
+}
+
+/// Flying qualities at three angles of attack: worse with α, and a spiral that diverges at the last.
+fn judge(campaign: &mut Campaign) {
+    let text = include_str!("../../pipelines/harv/qualities.yaml");
+    campaign.specification = serde_yaml::from_str(text).ok();
+    for (alpha_deg, level_1_pct) in [(10.0, 99.0), (20.0, 60.0), (30.0, 1.0)] {
+        for (quantity, axis, value) in [
+            (Quantity::ShortPeriodDamping, Axis::Longitudinal, 0.6),
+            (Quantity::ControlAnticipation, Axis::Longitudinal, 0.4),
+            (Quantity::DutchRollDamping, Axis::Lateral, 0.2),
+            (Quantity::DutchRollFrequency, Axis::Lateral, 1.5),
+        ] {
+            campaign.qualities.qualities.push(QualityRow {
+                airframe: Airframe::Bare,
+                axis,
+                quantity,
+                unit: quantity.unit().into(),
+                alpha_deg,
+                mach: 0.3,
+                qbar_psf: 60.0,
+                mass_slug: 1_050.0,
+                path_deg: -4.0,
+                value: Some(value - 0.005 * alpha_deg),
+                standard_deviation: Some(0.05),
+                lower_95: Some(value - 0.1),
+                upper_95: Some(value + 0.1),
+                basis: DeviationBasis::Slopes,
+                damping_correlation: Some(0.5),
+            });
+        }
+        for (paragraph, subject) in [
+            ("3.2.2.1.2", "short-period damping"),
+            ("all", "all paragraphs"),
+        ] {
+            campaign.qualities.levels.push(LevelRow {
+                airframe: Airframe::Bare,
+                alpha_deg,
+                paragraph: paragraph.into(),
+                subject: subject.into(),
+                level: if level_1_pct > 50.0 {
+                    Level::One
+                } else {
+                    Level::Two
+                },
+                level_1_pct,
+                level_2_pct: 100.0 - level_1_pct,
+                level_3_pct: 0.0,
+                worse_pct: 0.0,
+            });
+        }
+        for (real, imaginary) in [(-1.0, 1.0), (-1.0, -1.0), (0.01, 0.0)] {
+            campaign.qualities.roots.push(RootRow {
+                airframe: Airframe::Bare,
+                axis: Axis::Lateral,
+                alpha_deg,
+                real,
+                imaginary,
+            });
+        }
+    }
 }
 
 pub fn problem(reason: &str) -> Problem {

@@ -8,6 +8,7 @@ use crate::error::Problem;
 use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
+use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
     FitRow, FlightRow, History, InstrumentRow, PosteriorRow, TrendRow,
@@ -40,6 +41,9 @@ pub struct Contents<'a> {
     pub limits: &'a Limits,
     pub posterior: &'a [PosteriorRow],
     pub trends: &'a [TrendRow],
+    /// Specification of flying qualities, and what it finds; empty without one.
+    pub specification: Option<&'a Specification>,
+    pub qualities: &'a Qualities,
     pub comparison: &'a [ComparisonRow],
     pub flights: &'a [FlightRow],
     pub channels: &'a [ChannelRow],

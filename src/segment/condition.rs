@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
+use crate::numerics::mean::finite_mean;
 use crate::units::DEG;
 
 use super::quality;
@@ -87,13 +88,6 @@ fn mean(record: &Record, name: &str, window: RangeInclusive<usize>) -> Result<f6
         .ok_or_else(|| format!("`{name}` has no sample in the maneuver"))
 }
 
-fn finite_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (n, sum) = values
-        .filter(|v| v.is_finite())
-        .fold((0_usize, 0.0), |(n, sum), v| (n + 1, sum + v));
-    (n > 0).then(|| sum / n as f64)
-}
-
 /// Mean angle of attack at the c.g., deg, from both vanes, the rates and the c.g.
 fn mean_alpha_deg(
     record: &Record,
@@ -120,5 +114,5 @@ fn mean_alpha_deg(
         Some(aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG)
     };
     let alphas: Option<Vec<f64>> = window.by_ref().map(alpha).collect();
-    finite_mean(alphas?.into_iter())
+    finite_mean(alphas?)
 }

@@ -14,6 +14,7 @@ mod page;
 mod posterior;
 mod predictions;
 mod published;
+mod qualities;
 mod trends;
 
 pub use bounds_study::{ConditionRow, CoverageRow, StartRow, StartVariant, Weights};
@@ -37,4 +38,5 @@ pub use posterior::{
 };
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use published::{PublishedTrend, PublishedVerdict};
+pub use qualities::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
 pub use trends::{OutlierRow, TrendRow};

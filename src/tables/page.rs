@@ -5,8 +5,9 @@ use std::fmt::Write;
 use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
-    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, ManeuverComparisonRow,
-    OutlierRow, PosteriorRow, PredictedRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
+    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, LevelRow,
+    ManeuverComparisonRow, OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow,
+    SelfCheckRow, StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -84,6 +85,9 @@ pub fn page() -> String {
     table::<ScaleRow>(&mut page);
     table::<ContributionRow>(&mut page);
     table::<SelfCheckRow>(&mut page);
+    table::<QualityRow>(&mut page);
+    table::<LevelRow>(&mut page);
+    table::<RootRow>(&mut page);
     table::<ComparisonRow>(&mut page);
     table::<ManeuverComparisonRow>(&mut page);
     table::<VerdictRow>(&mut page);

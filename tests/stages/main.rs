@@ -19,6 +19,7 @@ mod nights;
 mod object_store;
 mod pages;
 mod paper;
+mod qualities;
 mod report;
 mod rows;
 mod run;

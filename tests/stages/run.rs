@@ -132,6 +132,22 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "left_out item coefficient estimates inside_95_pct log_density",
     ),
     (
+        "qualities",
+        "qualities",
+        "airframe axis quantity unit alpha_deg mach qbar_psf mass_slug path_deg value standard_deviation lower_95 \
+         upper_95 basis damping_correlation",
+    ),
+    (
+        "qualities",
+        "levels",
+        "airframe alpha_deg paragraph subject level level_1_pct level_2_pct level_3_pct worse_pct",
+    ),
+    (
+        "qualities",
+        "roots",
+        "airframe axis alpha_deg real imaginary",
+    ),
+    (
         "compare",
         "comparison",
         "derivative unit alpha_deg mach flight standard_error flight_share_pct wind_tunnel difference uncertainty difference_pct z verdict",

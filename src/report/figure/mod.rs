@@ -5,6 +5,7 @@
 //! (estimates over angle of attack; the only file that uses the plotting crate), `svg_writer`,
 //! `strips` (signals over time, the renderer of all strip charts), `strip_figure` (time
 //! histories of the report) and `annotated_chart` (strip charts with shaded maneuvers).
+//! `xy_chart` draws one quantity over another, with levels.
 
 pub mod annotated_chart;
 pub mod derivative_figure;
@@ -16,3 +17,4 @@ pub mod strips;
 pub mod style;
 pub mod svg_writer;
 pub mod verdict_bar;
+pub mod xy_chart;

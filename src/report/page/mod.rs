@@ -15,6 +15,8 @@ mod identifiability_tables;
 mod maneuver_page;
 mod maneuver_table;
 mod prediction_table;
+mod qualities_section;
+mod quality_charts;
 mod summary;
 mod verdict_ranges;
 mod verdict_table;
@@ -34,6 +36,7 @@ use correlation_triangle::CorrelationTriangle;
 use derivative_page::DerivativeGroup;
 use derivative_results::DerivativeResults;
 use maneuver_page::ManeuverPage;
+use qualities_section::QualitiesSection;
 use summary::Summary;
 use verdict_table::VerdictGroup;
 
@@ -51,6 +54,7 @@ pub struct Page<'a> {
     outcome_heads: Vec<&'static str>,
     classes: Vec<ClassOutcomes>,
     verdicts: Vec<VerdictGroup>,
+    qualities: Option<QualitiesSection>,
     derivative_groups: Vec<DerivativeGroup>,
     never_estimated: Vec<&'a str>,
     inputs: Vec<ClassFigure>,
@@ -87,6 +91,7 @@ impl<'a> Page<'a> {
             outcome_heads: class_outcomes::heads(),
             classes,
             verdicts: verdict_table::by_axis(&derivatives, &anchors),
+            qualities: qualities_section::section(contents),
             derivative_groups: derivative_page::groups(&derivatives, &anchors, &markers),
             never_estimated: never_estimated(contents, &derivatives),
             inputs: class_figures::inputs(contents, &markers),

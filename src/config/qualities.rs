@@ -1,0 +1,59 @@
+//! Checks of the specification of flying qualities: names resolve, limits are numbers.
+
+use super::checked::Config;
+use super::source::{Files, Source};
+use crate::error::{Result, did_you_mean};
+use crate::qualities::{FEEDBACK_STATES, Specification};
+
+/// Fewest draws that give a probability to a per cent or two.
+const LEAST_DRAWS: usize = 100;
+
+/// Most draws: each takes the roots of two matrices at each angle of attack.
+const MOST_DRAWS: usize = 1_000_000;
+
+/// Checks the specification of a pipeline that has one.
+pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
+    let (Some(specification), Some(source)) = (&config.qualities, &files.qualities) else {
+        return Ok(());
+    };
+    let known = config.buildup.derivatives.iter();
+    let known: Vec<&str> = known.filter_map(|d| d.regressor.surface()).collect();
+    for surface in surfaces(specification) {
+        check_name(source, surface, &known, "surface of the model")?;
+    }
+    for state in specification
+        .feedback
+        .values()
+        .flat_map(|gains| gains.keys())
+    {
+        check_name(
+            source,
+            state,
+            &FEEDBACK_STATES,
+            "state that feedback may use",
+        )?;
+    }
+    if specification.pitch_control.is_empty() {
+        let what = "`pitch_control` names no surface; n/α and 1/T_θ2 need one";
+        return Err(source.error("pitch_control", what));
+    }
+    if !(LEAST_DRAWS..=MOST_DRAWS).contains(&specification.draws) {
+        let draws = specification.draws;
+        let what = format!("`draws` must lie between {LEAST_DRAWS} and {MOST_DRAWS}, not {draws}");
+        return Err(source.error("draws", what));
+    }
+    Ok(())
+}
+
+fn surfaces(specification: &Specification) -> impl Iterator<Item = &String> {
+    let pitch = specification.pitch_control.keys();
+    pitch.chain(specification.feedback.keys())
+}
+
+fn check_name(source: &Source, name: &str, known: &[&str], kind: &str) -> Result<()> {
+    if known.contains(&name) {
+        return Ok(());
+    }
+    let near = did_you_mean(name, known.iter().copied());
+    Err(source.error(name, format!("`{name}` is no {kind}{near}")))
+}

@@ -1,0 +1,38 @@
+//! Flying qualities of the campaign. They are made anew each time from the posterior.
+
+use super::campaign::Campaign;
+use super::problems::problem;
+use crate::config::Config;
+use crate::error::ProblemStage;
+use crate::maneuver::{Maneuver, Means};
+use crate::qualities::{self, Basis};
+
+/// Version of the flying qualities.
+pub const QUALITIES_VERSION: u32 = 1;
+
+/// Computes the flying qualities of the posterior, where the pipeline has a specification.
+pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {
+    let Some(specification) = &config.qualities else {
+        return;
+    };
+    let maneuvers = campaign.maneuvers.iter().zip(&campaign.means);
+    let flown: Vec<(&Maneuver, &Means)> = maneuvers
+        .filter(|(maneuver, _)| !maneuver.is_rejected())
+        .filter_map(|(maneuver, means)| Some((maneuver, means.as_ref()?)))
+        .collect();
+    let basis = Basis {
+        model: &campaign.model,
+        aircraft: &config.aircraft,
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+        specification,
+    };
+    let found = qualities::qualities(&basis, &flown);
+    if found.qualities.is_empty() && !flown.is_empty() {
+        let reason =
+            "no angle of attack of the posterior was flown, or the posterior is not finite";
+        let problem = problem(ProblemStage::Qualities, "", "qualities", reason);
+        campaign.problems.push(problem);
+    }
+    campaign.qualities = found;
+}

@@ -1,0 +1,43 @@
+//! Level of flying qualities that values meet.
+
+use super::specification::{Limit, Requirement, Specification};
+use crate::tables::{Level, Quantity};
+
+/// Values of the modes that exist.
+pub type Values = [(Quantity, f64)];
+
+/// Best level whose limits the values meet, of one requirement.
+///
+/// A mode that does not exist has no limit. A quantity that is not a number meets none.
+#[must_use]
+pub fn level(specification: &Specification, requirement: &Requirement, values: &Values) -> Level {
+    let levels = [Level::One, Level::Two, Level::Three];
+    let is_met = |level: &Level| {
+        let mut limits = specification.limits(requirement);
+        limits.all(|limit| meets(limit, *level, values))
+    };
+    levels.into_iter().find(is_met).unwrap_or(Level::Worse)
+}
+
+fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
+    let Some(value) = value_of(values, limit.quantity) else {
+        return true;
+    };
+    let Some(range) = limit.range(level) else {
+        return false;
+    };
+    let raised = limit.raised.and_then(|raised| {
+        let by = value_of(values, raised.by)?;
+        Some(raised.rise(level, by))
+    });
+    // A comparison with what is not a number is false.
+    range
+        .min
+        .is_none_or(|min| value >= min + raised.unwrap_or(0.0))
+        && range.max.is_none_or(|max| value <= max)
+}
+
+fn value_of(values: &Values, quantity: Quantity) -> Option<f64> {
+    let found = values.iter().find(|(other, _)| *other == quantity);
+    found.map(|(_, value)| *value)
+}

@@ -1,0 +1,95 @@
+//! Qualities: is the aircraft good enough to fly? Modes of the posterior at each angle of attack, and
+//! the probability of each level of flying qualities.
+//!
+//! At an angle of attack [`trim`] is the steady flight that was flown there. [`linear`] is the
+//! equations that are estimated, linearised about it; its matrix is linear in the derivatives.
+//! [`modes`] are its roots with their slopes along each derivative, and [`quantities`] what a
+//! specification judges. [`specification`] has the limits, which are the analyst's data; [`analysis`]
+//! adds the standard deviations and the probabilities of the levels.
+
+mod specification;
+mod trim;
+mod linear;
+mod longitudinal;
+mod lateral;
+mod modes;
+mod quantities;
+mod levels;
+mod analysis;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::maneuver::{Maneuver, Means};
+use crate::model::Model;
+use crate::tables::{LevelRow, QualityRow, RootRow};
+use analysis::Analysis;
+use trim::FlownConditions;
+
+pub use specification::{Range, Specification};
+
+/// States that the feedback of a specification may use.
+pub const FEEDBACK_STATES: [&str; 7] = [
+    "alpha_deg",
+    "q_deg_s",
+    "theta_deg",
+    "beta_deg",
+    "p_deg_s",
+    "r_deg_s",
+    "phi_deg",
+];
+
+/// Flying qualities of a campaign.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Qualities {
+    pub qualities: Vec<QualityRow>,
+    pub levels: Vec<LevelRow>,
+    pub roots: Vec<RootRow>,
+}
+
+/// Aircraft and its model, whose flying qualities are asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Basis<'a> {
+    pub model: &'a Model,
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+    pub tunnel: &'a WindTunnel,
+    pub specification: &'a Specification,
+}
+
+/// Computes the flying qualities at each angle of attack of the posterior within the flown range.
+#[must_use]
+pub fn qualities(basis: &Basis, flown: &[(&Maneuver, &Means)]) -> Qualities {
+    let conditions = FlownConditions::new(flown, basis.tunnel);
+    let mut alphas: Vec<f64> = basis
+        .model
+        .rows
+        .posterior
+        .iter()
+        .map(|row| row.alpha_deg)
+        .collect();
+    alphas.sort_by(f64::total_cmp);
+    alphas.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+    let analyses: Vec<Analysis> = basis
+        .specification
+        .airframes()
+        .into_iter()
+        .flat_map(|airframe| alphas.iter().map(move |alpha| (airframe, *alpha)))
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(airframe, alpha)| {
+            let trim = conditions.trim(alpha, basis.aircraft)?;
+            Analysis::of(basis, airframe, &trim)
+        })
+        .collect();
+    let mut found = Qualities::default();
+    for analysis in analyses {
+        found.qualities.extend(analysis.qualities);
+        found.levels.extend(analysis.levels);
+        found.roots.extend(analysis.roots);
+    }
+    found
+}

@@ -1,0 +1,167 @@
+//! Quantities of the modes that a specification judges, with their slopes along the derivatives.
+
+use nalgebra::DVector;
+
+use super::linear::{LinearModel, Matrix, Vector};
+use super::modes::Modes;
+use crate::aero::Axis;
+use crate::numerics::dual::Dual;
+use crate::tables::Quantity;
+
+/// Quantities of an axis at values of the derivatives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisQuantities {
+    /// Of the modes that exist.
+    pub quantities: Vec<(Quantity, Dual)>,
+    pub modes: Modes,
+}
+
+/// Slopes along the derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Differentiation {
+    Slopes,
+    ValuesAlone,
+}
+
+impl LinearModel {
+    /// Quantities at values of the derivatives; `None` where a value is not finite.
+    #[must_use]
+    pub fn quantities(
+        &self,
+        axis: Axis,
+        values: &DVector<f64>,
+        differentiation: Differentiation,
+    ) -> Option<AxisQuantities> {
+        let along = match differentiation {
+            Differentiation::Slopes => &self.slopes[..],
+            Differentiation::ValuesAlone => &[],
+        };
+        let matrix = self.matrix(values);
+        let modes = Modes::of(axis, &matrix, along)?;
+        let quantities = match axis {
+            Axis::Longitudinal => {
+                let entries = Entries {
+                    matrix,
+                    control: self.control(values),
+                    along,
+                    control_along: &self.control_slopes[..along.len()],
+                };
+                longitudinal(&modes, &entries, self.velocity / self.gravity)
+            }
+            Axis::Lateral => lateral(&modes),
+        };
+        Some(AxisQuantities { quantities, modes })
+    }
+}
+
+/// Entries of A and B with their slopes.
+struct Entries<'a> {
+    matrix: Matrix,
+    control: Vector,
+    along: &'a [Matrix],
+    control_along: &'a [Vector],
+}
+
+impl Entries<'_> {
+    fn a(&self, i: usize, j: usize) -> Dual {
+        let slopes = self.along.iter().map(|m| m[(i, j)]);
+        Dual::new(self.matrix[(i, j)], slopes.collect())
+    }
+
+    fn b(&self, i: usize) -> Dual {
+        let slopes = self.control_along.iter().map(|m| m[i]);
+        Dual::new(self.control[i], slopes.collect())
+    }
+
+    /// Larger zero of pitch attitude to the control: with θ held at zero the moment sets the control,
+    /// and velocity and α are left.
+    fn attitude_zero(&self) -> Dual {
+        let entry = |i: usize, j: usize| self.a(i, j) - self.b(i) * self.a(2, j) / self.b(2);
+        let [xx, xz, zx, zz] = [entry(0, 0), entry(0, 1), entry(1, 0), entry(1, 1)];
+        let sum = xx.clone() + zz.clone();
+        let difference = xx - zz;
+        let root = (difference.clone() * difference + xz * zx * 4.0).sqrt();
+        (root - sum) * 0.5
+    }
+
+    /// Steady load factor per angle of attack, by the control at constant speed: q̇ = 0 gives the
+    /// control, α̇ = 0 the pitch rate.
+    fn load_factor(&self, velocity_over_gravity: f64) -> Dual {
+        let lift_by_moment = self.b(1) / self.b(2);
+        let by_alpha = lift_by_moment.clone() * self.a(2, 1) - self.a(1, 1);
+        let by_rate = self.a(1, 2) - lift_by_moment * self.a(2, 2);
+        by_alpha / by_rate * velocity_over_gravity
+    }
+}
+
+fn longitudinal(
+    modes: &Modes,
+    entries: &Entries,
+    velocity_over_gravity: f64,
+) -> Vec<(Quantity, Dual)> {
+    let (fast, slow) = (modes.fast_pair(), modes.slow_pair());
+    let load_factor = entries.load_factor(velocity_over_gravity);
+    let fastest = modes.slow.iter().map(|i| &modes.roots[*i]);
+    let diverging = fastest.max_by(|a, b| a.value.re.total_cmp(&b.value.re));
+    vec![
+        (Quantity::ShortPeriodFrequency, fast.frequency()),
+        (Quantity::ShortPeriodDamping, fast.damping()),
+        (Quantity::PhugoidFrequency, slow.frequency()),
+        (Quantity::PhugoidDamping, slow.damping()),
+        (
+            Quantity::PhugoidTimeToDouble,
+            diverging.map_or_else(|| f64::NAN.into(), |root| time_to_double(root.real())),
+        ),
+        (Quantity::AttitudeZero, entries.attitude_zero()),
+        (
+            Quantity::ControlAnticipation,
+            fast.product.clone() / load_factor.clone(),
+        ),
+        (Quantity::LoadFactorPerAlpha, load_factor),
+    ]
+}
+
+fn lateral(modes: &Modes) -> Vec<(Quantity, Dual)> {
+    let fast = modes.fast_pair();
+    let oscillation = &modes.roots[modes.fast[0]];
+    let phi_beta = oscillation.magnitude_of_ratio();
+    let mut quantities = vec![
+        (Quantity::DutchRollFrequency, fast.frequency()),
+        (Quantity::DutchRollDamping, fast.damping()),
+        (Quantity::DutchRollDecay, fast.decay()),
+        (
+            Quantity::DutchRollBank,
+            fast.product.clone() * phi_beta.clone(),
+        ),
+        (Quantity::PhiBeta, phi_beta),
+    ];
+    if modes.is_slow_oscillation() {
+        quantities.push((Quantity::RollSpiralDecay, modes.slow_pair().decay()));
+        return quantities;
+    }
+    let [roll, spiral] = modes.slow.map(|i| modes.roots[i].real());
+    quantities.extend([
+        (Quantity::RollTimeConstant, time_constant(roll)),
+        (Quantity::SpiralRate, -spiral.clone()),
+        (Quantity::SpiralTimeToDouble, time_to_double(spiral)),
+    ]);
+    quantities
+}
+
+/// Time constant of a root that decays; infinite for one that does not.
+fn time_constant(root: Dual) -> Dual {
+    if root.value < 0.0 {
+        Dual::from(-1.0) / root
+    } else {
+        f64::INFINITY.into()
+    }
+}
+
+/// Time in which a root doubles; infinite for one that decays.
+fn time_to_double(root: Dual) -> Dual {
+    if root.value > 0.0 {
+        Dual::from(std::f64::consts::LN_2) / root
+    } else {
+        f64::INFINITY.into()
+    }
+}

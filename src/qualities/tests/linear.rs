@@ -1,0 +1,228 @@
+//! Linear equations against differences of the nonlinear ones, and exact slopes against differences.
+
+use std::collections::BTreeMap;
+
+use approx::assert_relative_eq;
+use nalgebra::DVector;
+
+use super::fixture::{aircraft, linear, linear_with, posterior, trim};
+use crate::aero::{Axis, Coefficient};
+use crate::model::{LocalKind, LocalPosterior, LocalValue};
+use crate::qualities::linear::{Matrix, Vector};
+use crate::qualities::quantities::Differentiation;
+use crate::tables::Quantity;
+use crate::units::DEG;
+
+/// Rates of velocity, α, q, θ from forces and moment in flight without sideslip, at constant density
+/// and thrust. Independent of the equations of the program.
+struct Pitching {
+    values: BTreeMap<&'static str, f64>,
+    mach_slope: f64,
+    thrust: f64,
+    /// Constants that make the trim steady.
+    offset: [f64; 2],
+}
+
+impl Pitching {
+    /// CN, Cm, CA.
+    fn coefficients(&self, x: &Vector) -> [f64; 3] {
+        let (aircraft, trim) = (aircraft(), trim());
+        let [velocity, alpha, q, _]: [f64; 4] = (*x).into();
+        let qbar = trim.qbar * (velocity / trim.velocity).powi(2);
+        let force = qbar * aircraft.wing_area_ft2;
+        let alpha_deg = DEG * (alpha - trim.alpha);
+        let rate = q * aircraft.chord_ft / (2.0 * velocity);
+        let mach = trim.condition.mach * (velocity / trim.velocity - 1.0);
+        let (de, dpv) = (-4.0, 3.0);
+        let v = |name: &str| self.values[name];
+        let plain = |c: &str| {
+            let value = |d: &str| {
+                let name = self.values.keys().find(|k| **k == format!("{c}_{d}"));
+                name.map_or(0.0, |name| self.values[name])
+            };
+            value("0") + value("alpha") * alpha_deg + value("q") * rate + value("de") * de
+        };
+        [
+            plain("CN") + v("CN_dpv") * dpv / force + self.mach_slope * mach + self.offset[0],
+            plain("Cm") + v("Cm_dpv") * dpv / (force * aircraft.chord_ft) + self.offset[1],
+            plain("CA"),
+        ]
+    }
+
+    fn rates(&self, x: &Vector) -> Vector {
+        let (aircraft, trim) = (aircraft(), trim());
+        let [velocity, alpha, q, theta]: [f64; 4] = (*x).into();
+        let qbar = trim.qbar * (velocity / trim.velocity).powi(2);
+        let force = qbar * aircraft.wing_area_ft2;
+        let [cn, cm, ca] = self.coefficients(x);
+        let lift = force * (cn * alpha.cos() - ca * alpha.sin());
+        let drag = force * (ca * alpha.cos() + cn * alpha.sin());
+        let path = theta - alpha;
+        let (weight, mass) = (trim.mass * trim.gravity, trim.mass);
+        let along = self.thrust * alpha.cos() - drag - weight * path.sin();
+        let across = lift + self.thrust * alpha.sin() - weight * path.cos();
+        Vector::from([
+            along / mass,
+            q - across / (mass * velocity),
+            force * aircraft.chord_ft * cm / trim.iy,
+            q,
+        ])
+    }
+}
+
+/// The fighter's posterior with a slope of CN along Mach number.
+fn with_mach_slope() -> (LocalPosterior, f64) {
+    let mut posterior = posterior(Axis::Longitudinal, 0.1);
+    let slope = 0.4;
+    posterior.values.push(LocalValue {
+        coefficient: Coefficient::CN,
+        derivative: "CN_0".into(),
+        kind: LocalKind::Sum,
+        is_mach_slope: true,
+    });
+    let n = posterior.mean.len();
+    posterior.mean = posterior.mean.insert_row(n, slope);
+    posterior.covariance = posterior
+        .covariance
+        .insert_row(n, 0.0)
+        .insert_column(n, 0.0);
+    (posterior, slope)
+}
+
+#[test]
+fn the_longitudinal_matrix_is_that_of_differences_of_forces_and_moment() {
+    let (posterior, mach_slope) = with_mach_slope();
+    let names = [
+        "CN_0", "CN_alpha", "CN_q", "CN_de", "CN_dpv", "Cm_0", "Cm_alpha", "Cm_q", "Cm_de",
+        "Cm_dpv", "CA_0", "CA_alpha", "CA_q", "CA_de",
+    ];
+    let trim = trim();
+    let start = Vector::from([trim.velocity, trim.alpha, 0.0, trim.theta]);
+    let mut pitching = Pitching {
+        values: names
+            .into_iter()
+            .zip(posterior.mean.iter().copied())
+            .collect(),
+        mach_slope,
+        thrust: 0.0,
+        offset: [0.0; 2],
+    };
+    let force = trim.qbar * aircraft().wing_area_ft2;
+    let [cn, cm, ca] = pitching.coefficients(&start);
+    pitching.offset = [trim.normal_force(aircraft().wing_area_ft2) - cn, -cm];
+    pitching.thrust = trim.mass * trim.gravity * trim.theta.sin() + force * ca;
+    assert!(pitching.rates(&start).norm() < 1e-12);
+    let differences = Matrix::from_fn(|i, j| {
+        let h = 1e-4 * if j == 0 { trim.velocity } else { 1.0 };
+        let step = Vector::ith(j, h);
+        (pitching.rates(&(start + step))[i] - pitching.rates(&(start - step))[i]) / (2.0 * h)
+    });
+    let found = linear(Axis::Longitudinal, &posterior).matrix(&posterior.mean);
+    assert_relative_eq!(found, differences, epsilon = 1e-7, max_relative = 1e-6);
+    // Each entry that the equations have is exercised.
+    assert!((0..4).all(|i| found[(0, i)].abs() > 1e-4 || i == 2));
+    assert!(found[(2, 0)].abs() > 1e-7 && found[(1, 3)].abs() > 1e-4);
+}
+
+#[test]
+fn feedback_is_gain_times_the_surface_s_effect() {
+    let gains = BTreeMap::from([
+        (
+            "de_deg".to_owned(),
+            BTreeMap::from([("q_deg_s".to_owned(), 0.3)]),
+        ),
+        (
+            "da_deg".to_owned(),
+            BTreeMap::from([("p_deg_s".to_owned(), -0.2)]),
+        ),
+    ]);
+    let (aircraft, trim) = (aircraft(), trim());
+    let pressure = trim.qbar * aircraft.wing_area_ft2;
+    let change = |axis| {
+        let posterior = posterior(axis, 0.1);
+        linear_with(axis, &posterior, &gains).matrix(&posterior.mean)
+            - linear(axis, &posterior).matrix(&posterior.mean)
+    };
+    // deg per deg/s, and a moment per deg: 0.3 · (−0.012 · 57.3) · q̄Sc̄/I_y.
+    let expected = 0.3 * -0.012 * DEG * pressure * aircraft.chord_ft / trim.iy;
+    assert_relative_eq!(
+        change(Axis::Longitudinal)[(2, 2)],
+        expected,
+        max_relative = 1e-12
+    );
+    let determinant = trim.ix * trim.iz - trim.ixz * trim.ixz;
+    let per_moment = trim.iz / determinant * pressure * aircraft.span_ft;
+    let expected = -0.2 * 0.0012 * DEG * per_moment;
+    assert_relative_eq!(
+        change(Axis::Lateral)[(1, 1)],
+        expected,
+        max_relative = 1e-12
+    );
+}
+
+#[test]
+fn slopes_of_every_quantity_are_those_of_differences() {
+    for axis in [Axis::Longitudinal, Axis::Lateral] {
+        let posterior = posterior(axis, 0.1);
+        let linear = linear(axis, &posterior);
+        let at = |values: &DVector<f64>| {
+            let found = linear.quantities(axis, values, Differentiation::ValuesAlone);
+            found.unwrap().quantities
+        };
+        let found = linear.quantities(axis, &posterior.mean, Differentiation::Slopes);
+        for (i, (quantity, dual)) in found.unwrap().quantities.iter().enumerate() {
+            if !dual.value.is_finite() {
+                continue;
+            }
+            for j in 0..posterior.mean.len() {
+                let h = 1e-5 * posterior.mean[j].abs().max(1e-3);
+                let mut step = DVector::zeros(posterior.mean.len());
+                step[j] = h;
+                let above = at(&(&posterior.mean + &step))[i].1.value;
+                let below = at(&(&posterior.mean - &step))[i].1.value;
+                let difference = (above - below) / (2.0 * h);
+                let size = dual.value.abs() / posterior.mean[j].abs().max(1e-3);
+                assert!(
+                    (dual.slopes[j] - difference).abs() < 1e-5 * size + 1e-6 * difference.abs(),
+                    "{quantity} along {}: {} for {difference}",
+                    posterior.values[j].derivative,
+                    dual.slopes[j]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_fighter_has_every_mode() {
+    let quantities = |axis| {
+        let posterior = posterior(axis, 0.1);
+        let linear = linear(axis, &posterior);
+        let found = linear.quantities(axis, &posterior.mean, Differentiation::ValuesAlone);
+        found.unwrap().quantities
+    };
+    let all: BTreeMap<Quantity, f64> = [Axis::Longitudinal, Axis::Lateral]
+        .into_iter()
+        .flat_map(quantities)
+        .map(|(q, dual)| (q, dual.value))
+        .collect();
+    let near = |quantity, range: std::ops::Range<f64>| {
+        assert!(
+            range.contains(&all[&quantity]),
+            "{quantity}: {}",
+            all[&quantity]
+        );
+    };
+    near(Quantity::ShortPeriodFrequency, 0.5..2.0);
+    near(Quantity::PhugoidFrequency, 0.05..0.2);
+    near(Quantity::DutchRollFrequency, 0.8..2.5);
+    near(Quantity::RollTimeConstant, 0.2..3.0);
+    near(Quantity::PhiBeta, 0.5..8.0);
+    // V/g times the lift slope: 360/32.1 · q̄S CN_α/(m V) times 57.3.
+    let lift = 70.0 * 400.0 * 0.055 * DEG * 15f64.to_radians().cos() / (1040.0 * 360.0);
+    assert_relative_eq!(
+        all[&Quantity::LoadFactorPerAlpha],
+        360.0 / 32.1 * lift,
+        max_relative = 0.15
+    );
+}

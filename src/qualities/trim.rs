@@ -1,0 +1,213 @@
+//! Steady flight at an angle of attack, in the conditions that were flown there.
+//!
+//! Between the flown angles of attack conditions are linear. The path is as flown: pitch attitude less
+//! angle of attack. The normal force carries the weight; thrust balances axial force and weight; the
+//! pitch control balances the moment.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::aero::{Condition, WindTunnel};
+use crate::aircraft::{Aircraft, Position};
+use crate::dynamics::Motion;
+use crate::earth::gravity_ft_s2;
+use crate::flight::signal;
+use crate::maneuver::{Maneuver, Means};
+use crate::numerics::mean::finite_mean;
+use crate::units::RAD;
+
+/// Angles of attack within which maneuvers count as one condition, deg.
+const TOGETHER_DEG: f64 = 2.5;
+
+/// Names of the mean angle of attack and the tunnel's third variable among a condition's values.
+const ALPHA: &str = "alpha";
+const THIRD: &str = "third";
+
+/// Steady wings-level flight, in rad, ft, s, slug, lbf.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trim {
+    pub condition: Condition,
+    pub alpha: f64,
+    pub theta: f64,
+    pub velocity: f64,
+    pub qbar: f64,
+    pub mass: f64,
+    pub gravity: f64,
+    pub ix: f64,
+    pub iy: f64,
+    pub iz: f64,
+    pub ixz: f64,
+    /// Positions of surfaces and vanes, deg.
+    pub surfaces_deg: BTreeMap<String, f64>,
+}
+
+impl Trim {
+    /// Motion at trim, with a thrust. Specific forces carry the weight.
+    #[must_use]
+    pub fn motion(&self, thrust: f64) -> Motion {
+        let origin = Position {
+            x_ft: 0.0,
+            y_ft: 0.0,
+            z_ft: 0.0,
+        };
+        Motion {
+            alpha: self.alpha,
+            beta: 0.0,
+            velocity: self.velocity,
+            rates: [0.0; 3],
+            accelerations: [0.0; 3],
+            theta: self.theta,
+            phi: 0.0,
+            force_x: self.gravity * self.theta.sin(),
+            force_y: 0.0,
+            force_z: -self.gravity * self.theta.cos(),
+            gravity: self.gravity,
+            qbar: self.qbar,
+            mass: self.mass,
+            thrust,
+            ix: self.ix,
+            iy: self.iy,
+            iz: self.iz,
+            ixz: self.ixz,
+            engine_momentum: 0.0,
+            cg: origin,
+        }
+    }
+
+    /// Normal force coefficient that carries the weight.
+    #[must_use]
+    pub fn normal_force(&self, wing_area_ft2: f64) -> f64 {
+        self.mass * self.gravity * self.theta.cos() / (self.qbar * wing_area_ft2)
+    }
+}
+
+/// Values of one flown condition, by name.
+type Values = BTreeMap<String, f64>;
+
+/// Conditions in which a campaign was flown, by ascending angle of attack.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlownConditions {
+    conditions: Vec<Values>,
+}
+
+impl FlownConditions {
+    /// Means of maneuvers that were flown at nearly the same angle of attack.
+    #[must_use]
+    pub fn new(flown: &[(&Maneuver, &Means)], tunnel: &WindTunnel) -> FlownConditions {
+        let mut all: Vec<Values> = flown
+            .iter()
+            .map(|(m, means)| values(m, means, tunnel))
+            .collect();
+        all.sort_by(|a, b| a[ALPHA].total_cmp(&b[ALPHA]));
+        let mut groups: Vec<Vec<Values>> = Vec::new();
+        for own in all {
+            match groups.last_mut() {
+                Some(group) if own[ALPHA] - group[0][ALPHA] <= TOGETHER_DEG => group.push(own),
+                _ => groups.push(vec![own]),
+            }
+        }
+        FlownConditions {
+            conditions: groups.iter().map(|group| mean_of(group)).collect(),
+        }
+    }
+
+    /// Steady flight at an angle of attack; `None` well beyond the flown ones.
+    #[must_use]
+    pub fn trim(&self, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
+        let is_near = |c: &&Values| (c[ALPHA] - alpha_deg).abs() <= TOGETHER_DEG;
+        let upper = self.conditions.iter().find(|c| c[ALPHA] >= alpha_deg);
+        let lower = self.conditions.iter().rfind(|c| c[ALPHA] <= alpha_deg);
+        let upper_end = self.conditions.last().filter(is_near);
+        let lower_end = self.conditions.first().filter(is_near);
+        let (lower, upper) = (lower.or(lower_end)?, upper.or(upper_end)?);
+        trim(&between(lower, upper, alpha_deg), alpha_deg, aircraft)
+    }
+}
+
+fn values(maneuver: &Maneuver, means: &Means, tunnel: &WindTunnel) -> Values {
+    let known = [
+        (ALPHA, Some(maneuver.alpha_deg)),
+        (THIRD, maneuver.condition(tunnel).third),
+        (signal::THETA, Some(means.theta_deg)),
+        (signal::MACH, Some(maneuver.mach)),
+        (signal::QBAR, Some(maneuver.qbar_psf)),
+        (signal::VELOCITY, Some(maneuver.velocity_ft_s)),
+        (signal::ALTITUDE, Some(maneuver.altitude_ft)),
+        (signal::MASS, Some(maneuver.mass_slug)),
+        (signal::IX, Some(means.ix_slug_ft2)),
+        (signal::IY, Some(means.iy_slug_ft2)),
+        (signal::IZ, Some(means.iz_slug_ft2)),
+        (signal::IXZ, Some(means.ixz_slug_ft2)),
+    ];
+    let known = known
+        .into_iter()
+        .filter_map(|(name, value)| Some((name.to_owned(), value?)));
+    known.chain(means.surfaces_deg.clone()).collect()
+}
+
+fn mean_of(group: &[Values]) -> Values {
+    let names: BTreeSet<&String> = group.iter().flat_map(BTreeMap::keys).collect();
+    let mean = |name: &String| finite_mean(group.iter().filter_map(|own| own.get(name).copied()));
+    names
+        .into_iter()
+        .filter_map(|name| Some((name.clone(), mean(name)?)))
+        .collect()
+}
+
+/// Values between two conditions; a value that one of them lacks is the other's.
+fn between(lower: &Values, upper: &Values, alpha_deg: f64) -> Values {
+    let width = upper[ALPHA] - lower[ALPHA];
+    let share = if width > 0.0 {
+        (alpha_deg - lower[ALPHA]) / width
+    } else {
+        1.0
+    };
+    let mut values = lower.clone();
+    for (name, value) in upper {
+        let below = lower.get(name).unwrap_or(value);
+        values.insert(name.clone(), below + share * (value - below));
+    }
+    values
+}
+
+fn trim(values: &Values, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
+    let get = |name: &str| values.get(name).copied();
+    // The path is as flown, so pitch attitude follows the angle of attack.
+    let theta_deg = get(signal::THETA)? - get(ALPHA)? + alpha_deg;
+    let known = [
+        ALPHA,
+        THIRD,
+        signal::THETA,
+        signal::MACH,
+        signal::QBAR,
+        signal::VELOCITY,
+        signal::ALTITUDE,
+        signal::MASS,
+        signal::IX,
+        signal::IY,
+        signal::IZ,
+        signal::IXZ,
+    ];
+    let surfaces = values
+        .iter()
+        .filter(|(name, _)| !known.contains(&name.as_str()));
+    Some(Trim {
+        condition: Condition {
+            alpha_deg,
+            mach: get(signal::MACH)?,
+            third: get(THIRD),
+        },
+        alpha: RAD * alpha_deg,
+        theta: RAD * theta_deg,
+        velocity: get(signal::VELOCITY)?,
+        qbar: get(signal::QBAR)?,
+        mass: get(signal::MASS)?,
+        gravity: gravity_ft_s2(aircraft.latitude_deg, get(signal::ALTITUDE)?),
+        ix: get(signal::IX)?,
+        iy: get(signal::IY)?,
+        iz: get(signal::IZ)?,
+        ixz: get(signal::IXZ)?,
+        surfaces_deg: surfaces
+            .map(|(name, value)| (name.clone(), *value))
+            .collect(),
+    })
+}

@@ -1,0 +1,303 @@
+//! Section of the flying qualities: levels with their probabilities, modes, charts.
+
+use serde::Serialize;
+
+use super::quality_charts::{self, QualityChart};
+use crate::aero::Axis;
+use crate::qualities::{Qualities, Specification};
+use crate::report::contents::Contents;
+use crate::report::notation::{NOTHING, angle, fixed, number};
+use crate::report::table_view::TableView;
+use crate::tables::{Airframe, Level, LevelRow, QualityRow, Quantity};
+
+/// The section.
+#[derive(Clone, Debug, Serialize)]
+pub struct QualitiesSection {
+    pub note: String,
+    pub airframes: Vec<AirframeView>,
+}
+
+/// One configuration of the aircraft.
+#[derive(Clone, Debug, Serialize)]
+pub struct AirframeView {
+    pub title: String,
+    /// The board's answer in a sentence or two.
+    pub answer: String,
+    pub charts: Vec<QualityChart>,
+    pub tables: Vec<TableView>,
+}
+
+/// Paragraph of the worst level of all.
+const ALL: &str = "all";
+
+/// Probability from which a level counts as certain, per cent.
+const CERTAIN_PCT: f64 = 95.0;
+
+/// Spacing of the tables' angles of attack, deg.
+const SPACING_DEG: f64 = 5.0;
+
+/// Quantities of an axis with their symbols.
+const LONGITUDINAL: [(Quantity, &str); 7] = [
+    (Quantity::ShortPeriodFrequency, "ω sp, rad/s"),
+    (Quantity::ShortPeriodDamping, "ζ sp"),
+    (Quantity::LoadFactorPerAlpha, "n/α, g/rad"),
+    (Quantity::ControlAnticipation, "CAP, 1/(g s²)"),
+    (Quantity::AttitudeZero, "1/T θ2, 1/s"),
+    (Quantity::PhugoidFrequency, "ω ph, rad/s"),
+    (Quantity::PhugoidDamping, "ζ ph"),
+];
+const LATERAL: [(Quantity, &str); 6] = [
+    (Quantity::DutchRollFrequency, "ω d, rad/s"),
+    (Quantity::DutchRollDamping, "ζ d"),
+    (Quantity::PhiBeta, "|φ/β|"),
+    (Quantity::RollTimeConstant, "T R, s"),
+    (Quantity::SpiralRate, "1/T s, 1/s"),
+    (Quantity::RollSpiralDecay, "ζω of roll and spiral, 1/s"),
+];
+
+/// The section; `None` without a specification or flown conditions.
+#[must_use]
+pub fn section(contents: &Contents) -> Option<QualitiesSection> {
+    let specification = contents.specification?;
+    let qualities = contents.qualities;
+    if qualities.levels.is_empty() {
+        return None;
+    }
+    let airframes = specification.airframes().into_iter();
+    Some(QualitiesSection {
+        note: format!(
+            "{}. Category {}, class {}. Modes of the equations that are estimated, linearised about \
+             steady wings-level flight at the mass, dynamic pressure, Mach number and path flown at \
+             each angle of attack, with the posterior's derivatives. The probabilities count the \
+             posterior's covariance; they ask nothing of pilots.",
+            specification.specification, specification.category, specification.class
+        ),
+        airframes: airframes
+            .map(|airframe| view(qualities, specification, airframe))
+            .collect(),
+    })
+}
+
+fn view(qualities: &Qualities, specification: &Specification, airframe: Airframe) -> AirframeView {
+    let levels: Vec<&LevelRow> = qualities
+        .levels
+        .iter()
+        .filter(|row| row.airframe == airframe)
+        .collect();
+    let rows: Vec<&QualityRow> = qualities
+        .qualities
+        .iter()
+        .filter(|row| row.airframe == airframe)
+        .collect();
+    let alphas = spaced(&levels);
+    AirframeView {
+        title: match airframe {
+            Airframe::Bare => "Bare airframe".to_owned(),
+            Airframe::Augmented => "With feedback".to_owned(),
+        },
+        answer: answer(&levels),
+        charts: quality_charts::charts(qualities, specification, airframe),
+        tables: vec![
+            level_table(&levels, &alphas),
+            mode_table(&rows, &alphas, Axis::Longitudinal, &LONGITUDINAL),
+            mode_table(&rows, &alphas, Axis::Lateral, &LATERAL),
+        ],
+    }
+}
+
+/// Angles of attack at multiples of the tables' spacing; all where there is none.
+fn spaced(levels: &[&LevelRow]) -> Vec<f64> {
+    let mut all: Vec<f64> = levels.iter().map(|row| row.alpha_deg).collect();
+    all.dedup();
+    let is_multiple = |alpha: &f64| {
+        let share = alpha / SPACING_DEG;
+        (share - share.round()).abs() < 1e-6
+    };
+    let spaced: Vec<f64> = all.iter().copied().filter(is_multiple).collect();
+    if spaced.is_empty() { all } else { spaced }
+}
+
+fn is_at(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-9
+}
+
+/// Level 1 with certainty, the most certain level elsewhere, and the paragraphs that fail most.
+fn answer(levels: &[&LevelRow]) -> String {
+    let all: Vec<&&LevelRow> = levels.iter().filter(|row| row.paragraph == ALL).collect();
+    let certain = |row: &&&&LevelRow, most: Level| {
+        let shares = [row.level_1_pct, row.level_2_pct, row.level_3_pct];
+        let count = most as usize + 1;
+        shares[..count.min(3)].iter().sum::<f64>() >= CERTAIN_PCT
+    };
+    let share = |most: Level| {
+        let met = all.iter().filter(|row| certain(row, most)).count();
+        format!("{met} of {}", all.len())
+    };
+    let mut text = format!(
+        "With at least {CERTAIN_PCT:.0} % probability every paragraph is met at Level 1 at {} angles \
+         of attack, at Level 2 or better at {}, and at Level 3 or better at {}.",
+        share(Level::One),
+        share(Level::Two),
+        share(Level::Three)
+    );
+    if let Some(worst) = worst_paragraph(levels) {
+        text.push_str(&worst);
+    }
+    text
+}
+
+/// The paragraph with the smallest probability of Level 1, and where.
+fn worst_paragraph(levels: &[&LevelRow]) -> Option<String> {
+    let own = levels.iter().filter(|row| row.paragraph != ALL);
+    let worst = own.min_by(|a, b| a.level_1_pct.total_cmp(&b.level_1_pct))?;
+    (worst.level_1_pct < CERTAIN_PCT).then(|| {
+        format!(
+            " The least certain is {} ({}) at {}: Level 1 with {} %, worse than Level 3 with {} %.",
+            worst.subject,
+            worst.paragraph,
+            angle(worst.alpha_deg),
+            fixed(worst.level_1_pct, 0),
+            fixed(worst.worse_pct, 0)
+        )
+    })
+}
+
+/// Level and its probability of each paragraph, by angle of attack.
+fn level_table(levels: &[&LevelRow], alphas: &[f64]) -> TableView {
+    let paragraphs: Vec<&&LevelRow> = levels
+        .iter()
+        .filter(|row| alphas.first().is_some_and(|a| is_at(row.alpha_deg, *a)))
+        .collect();
+    let head = |row: &&&LevelRow| format!("{} {}", row.paragraph, row.subject);
+    let heads: Vec<String> = paragraphs.iter().map(head).collect();
+    let heads: Vec<&str> = std::iter::once("α")
+        .chain(heads.iter().map(String::as_str))
+        .collect();
+    let line = |alpha: &f64| {
+        let cell = |paragraph: &&&LevelRow| {
+            let own = levels
+                .iter()
+                .find(|row| is_at(row.alpha_deg, *alpha) && row.paragraph == paragraph.paragraph);
+            own.map_or_else(|| NOTHING.to_owned(), |row| level_cell(row))
+        };
+        let cells = paragraphs.iter().map(cell);
+        std::iter::once(angle(*alpha)).chain(cells).collect()
+    };
+    TableView::new(
+        "Levels",
+        "Level at the mean of the posterior, and its probability.",
+        &heads,
+        alphas.iter().map(line).collect(),
+    )
+}
+
+fn level_cell(row: &LevelRow) -> String {
+    let probability = match row.level {
+        Level::One => row.level_1_pct,
+        Level::Two => row.level_2_pct,
+        Level::Three => row.level_3_pct,
+        Level::Worse => row.worse_pct,
+    };
+    format!("{} ({} %)", row.level, fixed(probability, 0))
+}
+
+/// Quantities of an axis with their standard deviations, by angle of attack.
+fn mode_table(
+    rows: &[&QualityRow],
+    alphas: &[f64],
+    axis: Axis,
+    quantities: &[(Quantity, &str)],
+) -> TableView {
+    let heads: Vec<&str> = ["α", "q̄, lb/ft²", "path"]
+        .into_iter()
+        .chain(quantities.iter().map(|(_, symbol)| *symbol))
+        .collect();
+    let line = |alpha: &f64| {
+        let at = |quantity: Quantity| {
+            let mut own = rows.iter();
+            own.find(|row| is_at(row.alpha_deg, *alpha) && row.quantity == quantity)
+        };
+        let flown = rows
+            .iter()
+            .find(|row| row.axis == axis && is_at(row.alpha_deg, *alpha))?;
+        let condition = [
+            angle(*alpha),
+            fixed(flown.qbar_psf, 0),
+            angle(flown.path_deg),
+        ];
+        let cells = quantities
+            .iter()
+            .map(|(quantity, _)| mode_cell(at(*quantity)));
+        Some(condition.into_iter().chain(cells).collect())
+    };
+    let title = match axis {
+        Axis::Longitudinal => "Longitudinal modes",
+        Axis::Lateral => "Lateral-directional modes",
+    };
+    TableView::new(
+        title,
+        "Value ± standard deviation. – : the mode does not exist or diverges.",
+        &heads,
+        alphas.iter().filter_map(line).collect(),
+    )
+}
+
+fn mode_cell(row: Option<&&QualityRow>) -> String {
+    let Some(value) = row.and_then(|row| row.value) else {
+        return NOTHING.to_owned();
+    };
+    let deviation = row.and_then(|row| row.standard_deviation);
+    format!("{} ± {}", number(Some(value), 3), number(deviation, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::campaign_fixture::campaign;
+
+    #[test]
+    fn the_answer_counts_the_angles_of_attack_that_are_certain() {
+        let campaign = campaign();
+        let section = section(&campaign.contents()).expect("a section");
+        let bare = &section.airframes[0];
+        assert!(
+            bare.answer.contains("Level 1 at 1 of 3 angles"),
+            "{}",
+            bare.answer
+        );
+        assert!(
+            bare.answer.contains("Level 2 or better at 3 of 3"),
+            "{}",
+            bare.answer
+        );
+        assert!(
+            bare.answer
+                .contains("short-period damping (3.2.2.1.2) at 30°: Level 1 with 1 %")
+        );
+        assert_eq!(
+            bare.charts.len(),
+            3,
+            "two charts of levels and the lateral roots"
+        );
+        let levels = &bare.tables[0];
+        assert_eq!(levels.rows[1], ["20°", "1 (60 %)", "1 (60 %)"]);
+        assert_eq!(bare.tables[1].rows[0][4], "0.550 ± 0.050");
+    }
+
+    #[test]
+    fn without_a_specification_there_is_no_section() {
+        let mut campaign = campaign();
+        campaign.specification = None;
+        assert!(section(&campaign.contents()).is_none());
+    }
+
+    #[test]
+    fn the_page_has_the_charts_and_the_answer() {
+        let campaign = campaign();
+        let page = crate::report::html(&campaign.contents(), None).expect("a page");
+        assert!(page.contains("Level 2 or better"));
+        assert!(page.contains("id=\"chart-short-period-bare\""));
+        assert!(page.contains("id=\"chart-roots-lateral-bare\""));
+        assert!(!page.contains("NaN"));
+    }
+}

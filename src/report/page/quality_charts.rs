@@ -1,0 +1,282 @@
+//! Charts of the flying qualities: control anticipation over damping, frequency over damping of the
+//! Dutch roll, and the roots over angle of attack.
+
+use serde::Serialize;
+
+use crate::aero::Axis;
+use crate::qualities::{Qualities, Range, Specification};
+use crate::report::figure::scale::{Scale, extent};
+use crate::report::figure::style::{DARK_COLOURS, INK};
+use crate::report::figure::xy_chart::{
+    self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart, decades,
+};
+use crate::report::notation::angle;
+use crate::tables::{Airframe, Level, QualityRow, Quantity, RootRow};
+
+/// A chart with its caption.
+#[derive(Clone, Debug, Serialize)]
+pub struct QualityChart {
+    pub anchor: String,
+    pub title: String,
+    pub svg: String,
+    pub caption: String,
+}
+
+/// Points of an ellipse's outline.
+const OUTLINE: u32 = 40;
+
+/// Radius of the 95 % ellipse of two Gaussian variables, standard deviations: χ² with 2 degrees of
+/// freedom, √5.991.
+const ELLIPSE_95: f64 = 2.447_746_830_680_816;
+
+/// Largest damping ratio that a chart reaches for a point.
+const MOST_DAMPING: f64 = 3.0;
+
+/// Number of angles of attack between labels.
+const LABEL_EVERY: usize = 4;
+
+/// The charts of an airframe.
+#[must_use]
+pub fn charts(
+    qualities: &Qualities,
+    specification: &Specification,
+    airframe: Airframe,
+) -> Vec<QualityChart> {
+    let rows: Vec<&QualityRow> = qualities
+        .qualities
+        .iter()
+        .filter(|row| row.airframe == airframe)
+        .collect();
+    let roots: Vec<&RootRow> = qualities
+        .roots
+        .iter()
+        .filter(|row| row.airframe == airframe)
+        .collect();
+    let pairs = [
+        PairChart {
+            id: "short-period",
+            title: "Short period: control anticipation over damping",
+            x: (Quantity::ShortPeriodDamping, "ζ"),
+            y: (Quantity::ControlAnticipation, "ω²/(n/α), 1/(g s²)"),
+            is_logarithmic: true,
+        },
+        PairChart {
+            id: "dutch-roll",
+            title: "Dutch roll: frequency over damping",
+            x: (Quantity::DutchRollDamping, "ζ"),
+            y: (Quantity::DutchRollFrequency, "ω, rad/s"),
+            is_logarithmic: false,
+        },
+    ];
+    let pairs = pairs
+        .iter()
+        .filter_map(|pair| pair.draw(&rows, specification, airframe));
+    let loci = [Axis::Longitudinal, Axis::Lateral].into_iter();
+    pairs
+        .chain(loci.filter_map(|axis| locus(&roots, axis, airframe)))
+        .collect()
+}
+
+/// Chart of two quantities of one mode.
+struct PairChart {
+    id: &'static str,
+    title: &'static str,
+    x: (Quantity, &'static str),
+    y: (Quantity, &'static str),
+    is_logarithmic: bool,
+}
+
+impl PairChart {
+    fn draw(
+        &self,
+        rows: &[&QualityRow],
+        specification: &Specification,
+        airframe: Airframe,
+    ) -> Option<QualityChart> {
+        let points = self.points(rows);
+        let (x, y) = self.axes(&points, specification)?;
+        let levels = [Level::Three, Level::Two, Level::One];
+        let boxes = levels.map(|level| {
+            let sides = |quantity| sides(specification.range_of(quantity, level));
+            LevelBox {
+                label: level_label(level),
+                x: sides(self.x.0),
+                y: sides(self.y.0),
+            }
+        });
+        let id = format!("{}-{airframe}", self.id);
+        let caption =
+            "One point for each angle of attack, with its 95 % ellipse; boxes are levels.";
+        let svg = xy_chart::draw(&XyChart {
+            id: &id,
+            title: self.title,
+            description: caption,
+            x,
+            y,
+            boxes: boxes.to_vec(),
+            series: vec![ChartSeries {
+                colour: INK,
+                points,
+                is_joined: true,
+            }],
+        });
+        Some(QualityChart {
+            anchor: format!("chart-{id}"),
+            title: self.title.to_owned(),
+            svg,
+            caption: caption.to_owned(),
+        })
+    }
+
+    fn points(&self, rows: &[&QualityRow]) -> Vec<ChartPoint> {
+        let of = |quantity: Quantity| rows.iter().filter(move |row| row.quantity == quantity);
+        let mut points = Vec::new();
+        for y in of(self.y.0) {
+            let is_same = |x: &&&QualityRow| (x.alpha_deg - y.alpha_deg).abs() < 1e-9;
+            let Some(x) = of(self.x.0).find(is_same) else {
+                continue;
+            };
+            let (Some(at_x), Some(at_y)) = (x.value, y.value) else {
+                continue;
+            };
+            if at_x > MOST_DAMPING || self.is_logarithmic && at_y <= 0.0 {
+                continue;
+            }
+            let label = if points.len() % LABEL_EVERY == 0 {
+                angle(y.alpha_deg)
+            } else {
+                String::new()
+            };
+            points.push(ChartPoint {
+                at: (at_x, at_y),
+                label,
+                outline: ellipse((x, at_x), (y, at_y)),
+            });
+        }
+        points
+    }
+
+    fn axes(
+        &self,
+        points: &[ChartPoint],
+        specification: &Specification,
+    ) -> Option<(ChartAxis, ChartAxis)> {
+        let limits = |quantity| {
+            let levels = [Level::One, Level::Two];
+            let ranges = levels.map(|level| specification.range_of(quantity, level));
+            ranges
+                .into_iter()
+                .flat_map(|r| r.min.into_iter().chain(r.max))
+        };
+        let (low, high) = extent(points.iter().map(|p| p.at.0).chain(limits(self.x.0)))?;
+        let x = ChartAxis {
+            label: self.x.1.to_owned(),
+            scale: Scale::covering(low.min(0.0), high),
+            is_logarithmic: false,
+        };
+        points.first()?;
+        let (low, high) = extent(points.iter().map(|p| p.at.1).chain(limits(self.y.0)))?;
+        let y = ChartAxis {
+            label: self.y.1.to_owned(),
+            scale: if self.is_logarithmic {
+                decades(low, high)
+            } else {
+                Scale::covering(0.0, high)
+            },
+            is_logarithmic: self.is_logarithmic,
+        };
+        Some((x, y))
+    }
+}
+
+fn sides(range: Range) -> (Option<f64>, Option<f64>) {
+    (range.min, range.max)
+}
+
+fn level_label(level: Level) -> &'static str {
+    match level {
+        Level::One => "Level 1",
+        Level::Two => "Level 2",
+        Level::Three => "Level 3",
+        Level::Worse => "",
+    }
+}
+
+/// Outline of the 95 % ellipse; empty without a correlation.
+fn ellipse((x, at_x): (&QualityRow, f64), (y, at_y): (&QualityRow, f64)) -> Vec<(f64, f64)> {
+    let (Some(sx), Some(sy), Some(correlation)) = (
+        x.standard_deviation,
+        y.standard_deviation,
+        y.damping_correlation,
+    ) else {
+        return vec![];
+    };
+    let across = (1.0 - correlation * correlation).max(0.0).sqrt();
+    let point = |i: u32| {
+        let turn = 2.0 * std::f64::consts::PI * f64::from(i) / f64::from(OUTLINE);
+        let (sin, cos) = turn.sin_cos();
+        (
+            at_x + ELLIPSE_95 * sx * cos,
+            at_y + ELLIPSE_95 * sy * (correlation * cos + across * sin),
+        )
+    };
+    (0..OUTLINE).map(point).collect()
+}
+
+/// Roots of an axis over angle of attack, in the upper half of the plane.
+fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityChart> {
+    let own: Vec<&&RootRow> = roots
+        .iter()
+        .filter(|root| root.axis == axis && root.imaginary >= 0.0)
+        .collect();
+    let scale = |values: &mut dyn Iterator<Item = f64>, least: f64| {
+        let (low, high) = extent(values)?;
+        Some(Scale::covering(low.min(least), high.max(0.0)))
+    };
+    let chart_axis = |label: &str, scale| ChartAxis {
+        label: label.to_owned(),
+        scale,
+        is_logarithmic: false,
+    };
+    let real = scale(&mut own.iter().map(|r| r.real), f64::INFINITY)?;
+    let imaginary = scale(&mut own.iter().map(|r| r.imaginary), 0.0)?;
+    let alphas = extent(own.iter().map(|r| r.alpha_deg))?;
+    let title = match axis {
+        Axis::Longitudinal => "Longitudinal roots over α",
+        Axis::Lateral => "Lateral-directional roots over α",
+    };
+    let id = format!("roots-{axis}-{airframe}");
+    let caption = format!(
+        "From {} (labelled) to {}; to the right of zero the motion diverges.",
+        angle(alphas.0),
+        angle(alphas.1)
+    );
+    let point = |root: &&&RootRow| ChartPoint {
+        at: (root.real, root.imaginary),
+        label: if (root.alpha_deg - alphas.0).abs() < 1e-9 {
+            angle(root.alpha_deg)
+        } else {
+            String::new()
+        },
+        outline: vec![],
+    };
+    let svg = xy_chart::draw(&XyChart {
+        id: &id,
+        title,
+        description: &caption,
+        x: chart_axis("real part, 1/s", real),
+        y: chart_axis("imaginary part, rad/s", imaginary),
+        boxes: vec![],
+        series: vec![ChartSeries {
+            colour: DARK_COLOURS[1],
+            points: own.iter().map(point).collect(),
+            is_joined: false,
+        }],
+    });
+    Some(QualityChart {
+        anchor: format!("chart-{id}"),
+        title: title.to_owned(),
+        svg,
+        caption,
+    })
+}
