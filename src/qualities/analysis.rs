@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::basis::Basis;
+use super::levels;
 use super::linear::{Controls, Flight, LinearModel};
 use super::quantities::{AxisQuantities, Differentiation};
 use super::specification::Specification;
 use super::trim::Trim;
-use super::{Basis, levels};
 use crate::aero::Axis;
 use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
@@ -199,7 +200,9 @@ impl Place<'_> {
     fn quality_rows(&self, analysis: &AxisAnalysis) -> Vec<QualityRow> {
         let row = |(quantity, dual): &(Quantity, Dual)| {
             let uncertainty = analysis.uncertainty(*quantity, dual);
-            let finite = |value: f64| value.is_finite().then_some(value);
+            // A time to double that is none has no deviation, though some draws may have one.
+            let is_some = dual.value.is_finite();
+            let finite = |value: f64| (is_some && value.is_finite()).then_some(value);
             let trim = self.trim;
             QualityRow {
                 airframe: self.airframe,

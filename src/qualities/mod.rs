@@ -8,6 +8,7 @@
 //! adds the standard deviations and the probabilities of the levels.
 
 mod specification;
+mod basis;
 mod trim;
 mod linear;
 mod longitudinal;
@@ -21,14 +22,12 @@ mod tests;
 
 use rayon::prelude::*;
 
-use crate::aero::{Buildup, WindTunnel};
-use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means};
-use crate::model::Model;
 use crate::tables::{LevelRow, QualityRow, RootRow};
 use analysis::Analysis;
 use trim::FlownConditions;
 
+pub use basis::Basis;
 pub use specification::{Range, Specification};
 
 /// States that the feedback of a specification may use.
@@ -48,16 +47,6 @@ pub struct Qualities {
     pub qualities: Vec<QualityRow>,
     pub levels: Vec<LevelRow>,
     pub roots: Vec<RootRow>,
-}
-
-/// Aircraft and its model, whose flying qualities are asked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
-    pub model: &'a Model,
-    pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
-    pub tunnel: &'a WindTunnel,
-    pub specification: &'a Specification,
 }
 
 /// Computes the flying qualities at each angle of attack of the posterior within the flown range.

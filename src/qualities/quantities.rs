@@ -11,7 +11,7 @@ use crate::tables::Quantity;
 /// Quantities of an axis at values of the derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisQuantities {
-    /// Of the modes that exist.
+    /// Quantities of the modes that exist.
     pub quantities: Vec<(Quantity, Dual)>,
     pub modes: Modes,
 }

@@ -192,8 +192,15 @@ const WITHOUT_ROWS: [&str; 7] = [
     "unknown",
 ];
 
-const STAGES: [&str; 7] = [
-    "ingest", "segment", "estimate", "trend", "model", "compare", "report",
+const STAGES: [&str; 8] = [
+    "ingest",
+    "segment",
+    "estimate",
+    "trend",
+    "model",
+    "qualities",
+    "compare",
+    "report",
 ];
 
 /// Two short flights, one maneuver of each axis.

@@ -21,7 +21,7 @@ const MARK: f64 = 2.2;
 #[derive(Clone, Debug)]
 pub struct ChartAxis {
     pub label: String,
-    /// Of the decimal logarithm on a logarithmic axis.
+    /// Limits and ticks; of the decimal logarithm on a logarithmic axis.
     pub scale: Scale,
     pub is_logarithmic: bool,
 }

@@ -295,7 +295,11 @@ mod tests {
     fn the_page_has_the_charts_and_the_answer() {
         let campaign = campaign();
         let page = crate::report::html(&campaign.contents(), None).expect("a page");
-        assert!(page.contains("Level 2 or better"));
+        let (answer, tables) = (page.find("Level 2 or better"), page.find("<table"));
+        assert!(
+            answer < tables && answer.is_some(),
+            "the answer stands before any table"
+        );
         assert!(page.contains("id=\"chart-short-period-bare\""));
         assert!(page.contains("id=\"chart-roots-lateral-bare\""));
         assert!(!page.contains("NaN"));
