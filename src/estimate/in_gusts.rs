@@ -1,6 +1,6 @@
 //! Filter error on one maneuver, and the choice between it and output error.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 use super::alpha_slopes::AlphaSlopes;
 use super::prepared_case::{PreparedCase, all_free};
@@ -32,6 +32,9 @@ const COLOURED: f64 = 0.3;
 
 /// Change by slopes over α, in bounds, up to which they are not held in a second fit.
 const SMALL_CHANGE: f64 = 0.3;
+
+/// Size of a rotary gust over the deviation of its rate from which it may stand for the rate.
+const MOSTLY: f64 = 0.5;
 
 /// Steps to the slopes over α: the effect on the estimates is linear but for products of slopes and
 /// noise.
@@ -78,7 +81,8 @@ impl<'a> Task<'a> {
 
     /// Estimates a maneuver by filter error, from still or from moving air as the residuals of output
     /// error are, then from the other; `None` where neither converges or the data determine no
-    /// covariance.
+    /// covariance. Where rotary gusts account for the rates, both are tried: they can be taken for
+    /// the rates' own effect.
     pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         prepared: &PreparedCase<'a, NX, E>,
@@ -99,7 +103,13 @@ impl<'a> Task<'a> {
         let from = |(own, noise): &(Vec<f64>, Noise)| {
             self.fit_filter::<NX, E, NG, G>(prepared, &constant, own, noise, &resolution)
         };
-        let fitted = from(&first).or_else(|| from(&second))?;
+        let mut fitted = from(&first).or_else(|| from(&second))?;
+        if fitted.is_mostly_air(&case.states)
+            && let Some(other) = from(&second)
+            && other.cost() < fitted.cost()
+        {
+            fitted = other;
+        }
         let start = self.swept(prepared, constant, fitted)?;
         let swept = self.with_slopes(prepared, start, &resolution);
         let Swept {
@@ -471,6 +481,17 @@ struct FilterFit<const NG: usize, G: InGusts<NG>> {
 }
 
 impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
+    /// True where a rotary gust is as large as a good part of the rate that it adds to.
+    fn is_mostly_air<const NX: usize>(&self, states: &[SVector<f64, NX>]) -> bool {
+        let gusts = self.noise().gusts;
+        let mut rates = G::FELT_RATES.iter().zip(gusts);
+        rates.any(|((rate, _), gust)| {
+            let values = states.iter().map(|x| x[*rate]);
+            let values = DVector::from_iterator(states.len(), values);
+            gust > MOSTLY * values.variance().sqrt()
+        })
+    }
+
     /// −log of the likelihood.
     fn cost(&self) -> f64 {
         self.scored.response.cost

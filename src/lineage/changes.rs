@@ -54,7 +54,7 @@ pub struct VerdictChange {
     pub because: String,
 }
 
-/// What flight taught of a derivative since the earlier night.
+/// Information of flight about a derivative since the earlier night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Learnt {
     pub derivative: String,
@@ -96,7 +96,7 @@ pub struct Changes {
     /// Trends that only the earlier night has.
     pub gone_trends: Vec<String>,
     pub verdicts: Vec<VerdictChange>,
-    /// What flight taught, the most first.
+    /// Information of flight about the derivatives, the most first.
     pub learnt: Vec<Learnt>,
     pub contradictions: Vec<Contradiction>,
 }

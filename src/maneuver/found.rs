@@ -165,26 +165,25 @@ table! {
 }
 
 impl Maneuver {
-    /// Condition at which the tunnel is read for this maneuver: its means. The third variable is
-    /// `None` where it is no mean of a maneuver.
+    /// Condition at which the tunnel is read for this maneuver: its means. A third variable that is
+    /// no mean of a maneuver has the tunnel's own value.
     #[must_use]
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
-        let third = tunnel
-            .settings()
-            .third
-            .as_ref()
-            .and_then(|third| match third.name.as_str() {
-                "altitude_ft" => Some(self.altitude_ft),
-                "qbar_psf" => Some(self.qbar_psf),
-                "velocity_ft_s" => Some(self.velocity_ft_s),
-                "mass_slug" => Some(self.mass_slug),
-                "x_cg_ft" => Some(self.x_cg_ft),
-                _ => None,
-            });
+        let third = tunnel.settings().third.as_ref().map(|third| {
+            let mean = match third.name.as_str() {
+                "altitude_ft" => self.altitude_ft,
+                "qbar_psf" => self.qbar_psf,
+                "velocity_ft_s" => self.velocity_ft_s,
+                "mass_slug" => self.mass_slug,
+                "x_cg_ft" => self.x_cg_ft,
+                _ => third.at,
+            };
+            if mean.is_finite() { mean } else { third.at }
+        });
         Condition {
             alpha_deg: self.alpha_deg,
             mach: self.mach,
-            third: third.filter(|v| v.is_finite()),
+            third,
         }
     }
 }

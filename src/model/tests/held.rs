@@ -1,4 +1,4 @@
-//! What maneuvers hold, read from the posterior of the other flights.
+//! Values that maneuvers hold, read from the posterior of the other flights.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 

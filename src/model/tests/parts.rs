@@ -3,8 +3,10 @@
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fixture::{Flown, NAMES, buildup, diagonal, exact, posterior, tunnel};
-use crate::aero::{Coefficient, Condition};
+use super::fixture::{Flown, NAMES, buildup, diagonal, exact, maneuver, posterior, tunnel};
+use crate::aero::wind_tunnel::{self, Third};
+use crate::aero::{Coefficient, Condition, WindTunnel};
+use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
 use crate::model::posterior::{gaussian, information, left_out, of_differences};
 use crate::model::prior::Scale;
@@ -299,4 +301,25 @@ fn draws_have_the_mean_and_covariance_of_the_posterior() {
     let draw = &draws[7];
     let sum = of(draw, NAMES[0], 20.0) + 20.0 * of(draw, NAMES[1], 20.0);
     assert_relative_eq!(sum, of(draw, "CN_ba", 20.0), max_relative = 1e-12);
+}
+
+#[test]
+fn a_maneuver_without_the_third_variable_is_read_where_the_tunnel_is() {
+    let third = |name: &str, maneuver: &Maneuver| {
+        let third = Some(Third {
+            name: name.into(),
+            at: 7.0,
+        });
+        let tunnel = WindTunnel::new(wind_tunnel::Settings {
+            third,
+            ..wind_tunnel::Settings::default()
+        });
+        maneuver.condition(&tunnel).third
+    };
+    let mut own = maneuver("m", "f", 20.0);
+    assert_eq!(third("qbar_psf", &own), Some(50.0));
+    assert_eq!(third("flap_deg", &own), Some(7.0));
+    own.qbar_psf = f64::NAN;
+    assert_eq!(third("qbar_psf", &own), Some(7.0));
+    assert_eq!(own.condition(&tunnel(None)).third, None);
 }

@@ -1,4 +1,4 @@
-//! What the flights since the last night taught of each derivative, in nats.
+//! Information of the flights since the last night about each derivative, in nats.
 //!
 //! With the posterior of a derivative at the tunnel's breakpoints N(m₀, P₀) in the earlier night and
 //! N(m, P) now, it is their Kullback-Leibler divergence
