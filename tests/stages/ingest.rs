@@ -4,8 +4,8 @@
 use std::fs;
 use std::sync::Arc;
 
-use arrow_array::{RecordBatch, StringArray};
-use arrow_schema::DataType;
+use arrow::array::{RecordBatch, StringArray};
+use arrow::datatypes::DataType;
 
 use crate::support::{
     Campaign, pitch_steps, renamed, replaced, values, with_unit, with_values, without,
@@ -309,14 +309,14 @@ fn files_that_overlap_and_a_channel_at_another_rate_in_a_file_of_its_own_are_one
         &main.slice(2500, main.num_rows() - 2500),
         &folder.join("b.parquet"),
     );
-    let every_fourth = arrow_array::UInt32Array::from_iter_values(
+    let every_fourth = arrow::array::UInt32Array::from_iter_values(
         (0..u32::try_from(record.num_rows()).unwrap()).step_by(4),
     );
     let slow = record.project(&[
         record.schema().index_of("time").unwrap(),
         record.schema().index_of("psi").unwrap(),
     ]);
-    let slow = arrow_select::take::take_record_batch(&slow.unwrap(), &every_fourth).unwrap();
+    let slow = arrow::compute::take_record_batch(&slow.unwrap(), &every_fourth).unwrap();
     crate::support::write(&slow, &folder.join("heading.parquet"));
     parted.ends("estimate", 2);
     let problems = parted.table("problems");

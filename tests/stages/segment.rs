@@ -232,7 +232,7 @@ fn a_class_under_another_name_is_a_matter_of_its_file() {
 
 /// The demonstration's flight with a sweep of the stabilator instead of the pilot's steps, between
 /// them and the next maneuver.
-fn with_a_sweep() -> arrow_array::RecordBatch {
+fn with_a_sweep() -> arrow::array::RecordBatch {
     let record = pitch_steps();
     let start = values(&record, "time")[0];
     let sine = |row: usize| {

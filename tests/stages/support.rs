@@ -7,13 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, Int8Type};
-use arrow_array::{ArrayRef, Float64Array, RecordBatch};
-use arrow_schema::{DataType, Field, Schema};
-use arrow_select::concat::concat_batches;
+use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use polars::prelude::{DataFrame, ParquetReader, SerReader};
 
 /// The recorder of the demonstration flights, Hz.
 const RATE_HZ: usize = 40;
@@ -176,13 +175,9 @@ impl Campaign {
         table(&self.path("reports").join(format!("{name}.csv")))
     }
 
-    /// A published table as Parquet has it.
-    pub fn batch(&self, name: &str) -> RecordBatch {
-        let path = self.path("reports").join(format!("{name}.parquet"));
-        let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
-        let schema = reader.schema().clone();
-        let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
-        concat_batches(&schema, &batches).unwrap()
+    pub fn frame(&self, name: &str) -> DataFrame {
+        let file = File::open(self.path("reports").join(format!("{name}.parquet"))).unwrap();
+        ParquetReader::new(file).finish().unwrap()
     }
 
     /// Bytes of every file below a folder of the campaign, by relative path. Left out are files that
@@ -336,13 +331,12 @@ pub fn write(record: &RecordBatch, path: &Path) {
 
 /// The values of a channel.
 pub fn values(record: &RecordBatch, channel: &str) -> Vec<f64> {
-    let column = record.column_by_name(channel).unwrap();
-    if let Some(flags) = column.as_primitive_opt::<Int8Type>() {
-        let numbers = flags.iter().map(|v| v.map_or(f64::NAN, f64::from));
-        return numbers.collect();
-    }
-    let numbers = column.as_primitive::<Float64Type>().iter();
-    numbers.map(|v| v.unwrap_or(f64::NAN)).collect()
+    let numbers = cast(record.column_by_name(channel).unwrap(), &DataType::Float64).unwrap();
+    numbers
+        .as_primitive::<Float64Type>()
+        .iter()
+        .map(|v| v.unwrap_or(f64::NAN))
+        .collect()
 }
 
 /// The record with a channel's field and values replaced.

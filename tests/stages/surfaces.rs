@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use arrow_array::RecordBatch;
+use arrow::array::RecordBatch;
 
 use crate::support::{Campaign, Row, demo, flight, number, values, with_values};
 

@@ -12,10 +12,9 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::Float64Type;
-use arrow_array::{Array, RecordBatch};
-use arrow_schema::{DataType, Field, TimeUnit};
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Float64Type, TimeUnit};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
@@ -29,7 +28,6 @@ use crate::flight::{Channel, RawFlight};
 use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
-use super::numbers::numbers;
 use super::object;
 use file_rules::{flight_id, is_hidden, unreadable};
 
@@ -302,7 +300,7 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
 
 /// Runs the Parquet reader and treats its panic as a fault of the file. The panic is not printed:
 /// its reason becomes a problem.
-pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let before = panic::take_hook();
@@ -479,7 +477,7 @@ fn hand_over(
     array: &dyn Array,
     clock_factor: Option<f64>,
     sink: &mut dyn FnMut(&[f64]),
-) -> Result<(), String> {
+) -> Result<(), arrow::error::ArrowError> {
     if clock_factor.is_none()
         && array.null_count() == 0
         && let Some(plain) = array.as_primitive_opt::<Float64Type>()
@@ -487,9 +485,19 @@ fn hand_over(
         sink(plain.values());
         return Ok(());
     }
-    let plain = numbers(array).ok_or_else(|| format!("type {} is no number", array.data_type()))?;
+    let plain = if clock_factor.is_some() {
+        cast(array, &DataType::Int64)?
+    } else {
+        cast(array, &DataType::Float64)?
+    };
+    let plain = cast(&plain, &DataType::Float64)?;
     let factor = clock_factor.unwrap_or(1.0);
-    let mut numbers: Vec<f64> = plain.values().iter().map(|v| v * factor).collect();
+    let mut numbers: Vec<f64> = plain
+        .as_primitive::<Float64Type>()
+        .values()
+        .iter()
+        .map(|v| v * factor)
+        .collect();
     if let Some(nulls) = plain.nulls().filter(|n| n.null_count() > 0) {
         numbers
             .iter_mut()

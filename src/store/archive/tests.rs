@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use arrow_array::{
+use arrow::array::{
     ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, StringArray,
     TimestampMillisecondArray,
 };
-use arrow_schema::Schema;
+use arrow::datatypes::Schema;
 use parquet::arrow::ArrowWriter;
 use proptest::prelude::*;
 use tempfile::TempDir;

@@ -6,16 +6,12 @@ mod daveml;
 mod tests;
 
 use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::Path;
 
-use arrow_array::cast::AsArray;
-use arrow_array::{Array, RecordBatch};
-use bytes::Bytes;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use polars::prelude::{Column, DataFrame, DataType, ParquetReader, SerReader};
 
-use super::archive;
 use super::files::{self, TunnelRow};
-use super::numbers::numbers;
 use crate::error::{Error, Result};
 
 /// Reads the rows of a tunnel database, each with its line in the file (in Parquet its row, from
@@ -73,111 +69,76 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let bytes = files::bytes(path)?;
-    let refused = |what: String| Error::config(path, None, what);
-    let batches =
-        archive::guarded(|| batches(bytes).map_err(|e| e.to_string())).map_err(refused)?;
-    let mut rows = Vec::new();
-    for batch in &batches {
-        rows.extend(Batch { path, batch }.rows(rows.len(), third)?);
-    }
-    Ok(rows)
-}
-
-fn batches(bytes: Vec<u8>) -> parquet::errors::Result<Vec<RecordBatch>> {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(Bytes::from(bytes))?.build()?;
-    Ok(reader.collect::<std::result::Result<_, _>>()?)
+    let frame = ParquetReader::new(Cursor::new(bytes))
+        .finish()
+        .map_err(|e| Error::config(path, None, e.to_string()))?;
+    let table = Frame {
+        path,
+        frame: &frame,
+    };
+    let [derivative, unit, source] = ["derivative", "unit", "source"].map(|name| table.words(name));
+    let numbers = |name: &str| table.numbers(name);
+    let [alpha, mach, value, uncertainty] =
+        ["alpha_deg", "mach", "value", "uncertainty"].map(numbers);
+    let third = third.map_or(Ok(None), numbers)?;
+    let (derivative, unit, source) = (derivative?, unit?, source?);
+    let (alpha, mach, value, uncertainty) = (alpha?, mach?, value?, uncertainty?);
+    let row = |i: usize| {
+        let lacks = |name: &str| {
+            Error::config(
+                path,
+                Some(i + 1),
+                format!("column `{name}` has no value here, or is missing"),
+            )
+        };
+        let at = |column: &Option<Vec<Option<f64>>>| {
+            column.as_ref().and_then(|c| c.get(i).copied().flatten())
+        };
+        let word = |column: &Option<Vec<Option<String>>>| {
+            column.as_ref().and_then(|c| c.get(i).cloned().flatten())
+        };
+        let row = TunnelRow {
+            derivative: word(&derivative).ok_or_else(|| lacks("derivative"))?,
+            alpha_deg: at(&alpha).ok_or_else(|| lacks("alpha_deg"))?,
+            mach: at(&mach),
+            value: at(&value).ok_or_else(|| lacks("value"))?,
+            unit: word(&unit).ok_or_else(|| lacks("unit"))?,
+            uncertainty: at(&uncertainty),
+            source: word(&source),
+            third: at(&third),
+        };
+        Ok((i + 1, row))
+    };
+    (0..frame.height()).map(row).collect()
 }
 
 /// Rows of a Parquet table.
-struct Batch<'a> {
+struct Frame<'a> {
     path: &'a Path,
-    batch: &'a RecordBatch,
+    frame: &'a DataFrame,
 }
 
-impl Batch<'_> {
-    /// Rows with their numbers, after `before` rows of earlier batches.
-    fn rows(&self, before: usize, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
-        let [derivative, unit, source] =
-            ["derivative", "unit", "source"].map(|name| self.words(name));
-        let numbers = |name: &str| self.numbers(name);
-        let [alpha, mach, value, uncertainty] =
-            ["alpha_deg", "mach", "value", "uncertainty"].map(numbers);
-        let third = third.map_or(Ok(Vec::new()), numbers)?;
-        let (derivative, unit, source) = (derivative?, unit?, source?);
-        let (alpha, mach, value, uncertainty) = (alpha?, mach?, value?, uncertainty?);
-        let row = |i: usize| {
-            let lacks = |name: &str| {
-                let what = format!("column `{name}` has no value here, or is missing");
-                Error::config(self.path, Some(before + i + 1), what)
-            };
-            let number = |column: &[Option<f64>]| column.get(i).copied().flatten();
-            let word = |column: &[Option<String>]| column.get(i).cloned().flatten();
-            let row = TunnelRow {
-                derivative: word(&derivative).ok_or_else(|| lacks("derivative"))?,
-                alpha_deg: number(&alpha).ok_or_else(|| lacks("alpha_deg"))?,
-                mach: number(&mach),
-                value: number(&value).ok_or_else(|| lacks("value"))?,
-                unit: word(&unit).ok_or_else(|| lacks("unit"))?,
-                uncertainty: number(&uncertainty),
-                source: word(&source),
-                third: number(&third),
-            };
-            Ok((before + i + 1, row))
+impl Frame<'_> {
+    fn cast(&self, name: &str, to: &DataType) -> Result<Option<Column>> {
+        let Ok(column) = self.frame.column(name) else {
+            return Ok(None);
         };
-        (0..self.batch.num_rows()).map(row).collect()
+        let cast = column.strict_cast(to);
+        cast.map(Some)
+            .map_err(|e| Error::config(self.path, None, format!("column `{name}`: {e}")))
     }
 
-    /// A column of numbers, or of texts that are numbers; empty where the table has no such column.
-    fn numbers(&self, name: &str) -> Result<Vec<Option<f64>>> {
-        let Some(column) = self.batch.column_by_name(name) else {
-            return Ok(Vec::new());
-        };
-        if let Some(numbers) = numbers(column) {
-            return Ok(numbers.iter().collect());
-        }
-        let number = |text: Option<String>| {
-            let Some(text) = text else { return Ok(None) };
-            let refused = |_| self.refused(name, &format!("`{text}` is no number"));
-            text.trim().parse().map(Some).map_err(refused)
-        };
-        self.words(name)?.into_iter().map(number).collect()
+    fn numbers(&self, name: &str) -> Result<Option<Vec<Option<f64>>>> {
+        let column = self.cast(name, &DataType::Float64)?;
+        Ok(column.and_then(|c| c.f64().map(|c| c.iter().collect()).ok()))
     }
 
-    /// A column of texts; empty where the table has no such column.
-    fn words(&self, name: &str) -> Result<Vec<Option<String>>> {
-        let Some(column) = self.batch.column_by_name(name) else {
-            return Ok(Vec::new());
-        };
-        let texts = texts(column);
-        texts.ok_or_else(|| self.refused(name, &format!("type {} is no text", column.data_type())))
+    fn words(&self, name: &str) -> Result<Option<Vec<Option<String>>>> {
+        let column = self.cast(name, &DataType::String)?;
+        Ok(column.and_then(|c| {
+            c.str()
+                .map(|c| c.iter().map(|w| w.map(str::to_owned)).collect())
+                .ok()
+        }))
     }
-
-    fn refused(&self, column: &str, what: &str) -> Error {
-        Error::config(self.path, None, format!("column `{column}`: {what}"))
-    }
-}
-
-/// Texts of an array, also of a dictionary (a category of pandas); `None` for other types.
-fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
-    if let Some(dictionary) = array.as_any_dictionary_opt() {
-        let words = texts(dictionary.values())?;
-        if words.is_empty() {
-            return Some(vec![None; array.len()]);
-        }
-        let keys = dictionary.normalized_keys();
-        let word = |(row, key): (usize, usize)| {
-            let word = words.get(key).cloned().flatten();
-            word.filter(|_| array.is_valid(row))
-        };
-        return Some(keys.into_iter().enumerate().map(word).collect());
-    }
-    let owned = |text: Option<&str>| text.map(str::to_owned);
-    if let Some(texts) = array.as_string_opt::<i32>() {
-        return Some(texts.iter().map(owned).collect());
-    }
-    if let Some(texts) = array.as_string_opt::<i64>() {
-        return Some(texts.iter().map(owned).collect());
-    }
-    let texts = array.as_string_view_opt()?;
-    Some(texts.iter().map(owned).collect())
 }

@@ -1,14 +1,6 @@
 //! Tunnel databases written in each format, and read.
 
-use std::sync::Arc;
-
 use approx::assert_relative_eq;
-use arrow_array::types::Int8Type;
-use arrow_array::{
-    ArrayRef, DictionaryArray, Float32Array, Float64Array, Int32Array, LargeStringArray,
-    StringArray, StringViewArray,
-};
-use parquet::arrow::ArrowWriter;
 
 use super::*;
 
@@ -54,79 +46,19 @@ fn the_third_variable_is_a_column_of_its_name() {
     assert_eq!(read("tunnel.csv", content, None).unwrap()[0].1.third, None);
 }
 
-fn parquet(columns: Vec<(&str, ArrayRef)>) -> Vec<u8> {
-    let batch = RecordBatch::try_from_iter_with_nullable(
-        columns.into_iter().map(|(name, array)| (name, array, true)),
-    )
-    .unwrap();
-    let mut bytes = Vec::new();
-    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), None).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
-    bytes
-}
-
-#[test]
-fn a_text_in_a_column_of_numbers_is_named() {
-    let text = |words: [&str; 2]| Arc::new(StringArray::from(words.to_vec())) as ArrayRef;
-    let bytes = parquet(vec![
-        ("derivative", text(["CN_q", "CN_q"])),
-        ("alpha_deg", text(["5", "ten"])),
-        ("value", text(["0.1", "0.2"])),
-        ("unit", text(["per_rad", "per_rad"])),
-    ]);
-    let e = read("t.parquet", &bytes, None).unwrap_err();
-    assert_eq!(e, "t.parquet: column `alpha_deg`: `ten` is no number");
-}
-
-#[test]
-fn texts_may_be_categories_and_long_or_short_strings() {
-    let words = ["CN_q", "CN_q"].map(Some);
-    let number = || Arc::new(Float64Array::from(vec![5.0, 10.0])) as ArrayRef;
-    let unit = || Arc::new(StringArray::from(vec!["per_rad", "per_rad"])) as ArrayRef;
-    let read = |words: ArrayRef| {
-        let columns = vec![
-            ("derivative", words),
-            ("alpha_deg", number()),
-            ("value", number()),
-            ("unit", unit()),
-        ];
-        read("t.parquet", &parquet(columns), None).unwrap()
-    };
-    let short = read(Arc::new(StringArray::from_iter(words)));
-    assert_eq!(short[1].1.derivative, "CN_q");
-    let categories: DictionaryArray<Int8Type> = words.into_iter().collect();
-    assert_eq!(read(Arc::new(categories)), short);
-    assert_eq!(read(Arc::new(LargeStringArray::from_iter(words))), short);
-    assert_eq!(read(Arc::new(StringViewArray::from_iter(words))), short);
-}
-
-#[test]
-fn damaged_parquet_is_refused() {
-    let numbers = Arc::new(Float64Array::from(vec![5.0; 2000])) as ArrayRef;
-    let whole = parquet(vec![("alpha_deg", numbers)]);
-    for at in (0..whole.len()).step_by(3) {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 0xff;
-        assert!(read("t.parquet", &bytes, None).is_err(), "{at}");
-    }
-}
-
 #[test]
 fn parquet_says_what_csv_says() {
-    let words = || Arc::new(StringArray::from(vec!["CN_q", "CN_q"])) as ArrayRef;
-    let per_rad = StringArray::from(vec!["per_rad", "per_rad"]);
+    use polars::prelude::{NamedFrom, ParquetWriter, Series};
     let columns = vec![
-        ("derivative", words()),
-        ("alpha_deg", Arc::new(Int32Array::from(vec![5, 10])) as _),
-        (
-            "mach",
-            Arc::new(Float32Array::from(vec![Some(0.25), None])) as _,
-        ),
-        ("value", Arc::new(Float64Array::from(vec![0.1, 0.3])) as _),
-        ("unit", Arc::new(per_rad) as _),
+        Series::new("derivative".into(), ["CN_q", "CN_q"]).into(),
+        Series::new("alpha_deg".into(), [5_i32, 10]).into(),
+        Series::new("mach".into(), [Some(0.25_f32), None]).into(),
+        Series::new("value".into(), [0.1, 0.3]).into(),
+        Series::new("unit".into(), ["per_rad", "per_rad"]).into(),
     ];
-    let bytes = parquet(columns.clone());
+    let mut frame = DataFrame::new(2, columns).unwrap();
+    let mut bytes = Vec::new();
+    ParquetWriter::new(&mut bytes).finish(&mut frame).unwrap();
     let csv =
         b"derivative,alpha_deg,mach,value,unit\nCN_q,5,0.25,0.1,per_rad\nCN_q,10,,0.3,per_rad\n";
     let rows =
@@ -135,8 +67,9 @@ fn parquet_says_what_csv_says() {
         rows(read("t.parquet", &bytes, None).unwrap()),
         rows(read("t.csv", csv, None).unwrap())
     );
-    let lacking = columns.into_iter().filter(|(name, _)| *name != "value");
-    let bytes = parquet(lacking.collect());
+    let mut lacking = frame.drop("value").unwrap();
+    bytes.clear();
+    ParquetWriter::new(&mut bytes).finish(&mut lacking).unwrap();
     let e = read("t.parquet", &bytes, None).unwrap_err();
     assert_eq!(
         e,
