@@ -274,7 +274,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
             .unwrap_or(fit);
     }
     let costs = if fit.final_cost.is_some() {
-        joint.costs(&fit.response, &fit.weights)
+        joint.costs(&fit.response, &weights)
     } else {
         vec![]
     };

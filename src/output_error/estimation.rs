@@ -16,7 +16,7 @@ const WEIGHTS_SETTLED: f64 = 1e-3;
 
 /// Estimates the free parameters of a maneuver, or of several joined, with their bounds.
 ///
-/// `resolution` is the least standard deviation of each output from which weights are estimated.
+/// Costs are those with the weights of the `table`. `resolution` is the least standard deviation of each output from which weights are estimated.
 #[must_use]
 pub fn estimate<D: Bounded>(
     data: &D,
@@ -29,6 +29,9 @@ pub fn estimate<D: Bounded>(
     let mut fit = minimise(data, start, table, settings);
     if weights == Weights::Estimated {
         fit = settle_weights(data, fit, resolution, settings);
+        // The cost of settled weights is one half of every fit: that of the table compares fits.
+        let cost = |_| data.sums(&fit.response, &table).cost();
+        fit.final_cost = fit.final_cost.map(cost);
     }
     add_bounds(data, &mut fit, settings);
     fit

@@ -27,7 +27,8 @@ table! {
         pub iterations: usize ["1"],
         /// Cost J of eq. 1.2 at the start of output error, weights on residuals in deg, deg/s and g.
         pub initial_cost: Option<f64> ["1"],
-        /// Cost J of eq. 1.2 at the end of output error, also where filter error follows.
+        /// Cost J of eq. 1.2 at the end of output error, also where filter error follows. Like the
+        /// initial cost with the weights of the class's table, whatever weights the fit has.
         pub final_cost: Option<f64> ["1"],
         /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
         /// is `unidentifiable`.

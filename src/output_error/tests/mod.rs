@@ -423,6 +423,18 @@ fn estimated_weights_settle_at_the_inverse_of_the_noise_s_variances() {
 }
 
 #[test]
+fn costs_are_those_of_the_table_s_weights_however_the_fit_is_weighted() {
+    let (mut case, parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &[]);
+    measure(&mut case, &parameters, &mut Noise(7), 0.0);
+    let [table, estimated] =
+        [Weights::Table, Weights::Estimated].map(|weights| fit(&case, parameters.clone(), weights));
+    assert_eq!(estimated.initial_cost, table.initial_cost);
+    // The table's own minimum is the least, and the other fit is near it.
+    let ratio = estimated.final_cost.unwrap() / table.final_cost.unwrap();
+    assert!((1.0..1.01).contains(&ratio), "{ratio}");
+}
+
+#[test]
 fn with_estimated_weights_the_bound_is_that_of_cramer_and_rao() {
     let (mut case, parameters) = case::<3, Longitudinal>(&truth(Axis::Longitudinal), &[]);
     measure(&mut case, &parameters, &mut Noise(7), 0.0);
