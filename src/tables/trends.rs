@@ -3,7 +3,7 @@
 use crate::schema::table;
 
 table! {
-    /// Least-squares trends across angle of attack.
+    /// Least-squares trends across angle of attack, and means where maneuvers are too few for a trend.
     pub struct TrendRow in "trends" per "derivative, group and angle of attack" {
         /// Name of the derivative in the model.
         pub derivative: String,
@@ -14,7 +14,7 @@ table! {
         pub group: String,
         /// Angle of attack: multiples of 5° (`alpha_step_deg`) and the tunnel's breakpoints within
         /// the flown range. Up to 0.5° (`alpha_reach_deg`) beyond it the row has the value at the
-        /// last maneuver.
+        /// last maneuver. Of a mean, that of its maneuvers.
         pub alpha_deg: f64 ["deg"],
         /// Value of the polynomial or spline, in the column `unit`.
         pub value: f64,
@@ -31,11 +31,12 @@ table! {
         pub prediction_lower_95: f64,
         /// Upper end of the 95 % interval for one more maneuver's estimate, in the column `unit`.
         pub prediction_upper_95: f64,
-        /// Number of maneuvers through which the trend is fitted; fewer than three have no trend.
+        /// Number of maneuvers through which the trend is fitted. Fewer than three have a mean at each
+        /// flown angle of attack, with the normal interval.
         pub maneuvers: usize ["maneuvers"],
         /// Number of maneuvers far from the trend: rows of `outliers`.
         pub outliers: usize ["maneuvers"],
-        /// `polynomial`, or `spline` with its knots: `knots_deg` of all trends or of a group, else
+        /// `mean`, `polynomial`, or `spline` with its knots: `knots_deg` of all trends or of a group, else
         /// flown angles of attack.
         pub curve: String,
         /// Order of the polynomial, or of the spline between its knots, chosen by the criterion

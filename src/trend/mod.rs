@@ -2,12 +2,14 @@
 //! of classes and for each class alone.
 //!
 //! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights
-//! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds.
+//! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds. Where the
+//! maneuvers are too few for a trend, [`means`] gives a mean at each flown α.
 
 mod basis;
 #[cfg(test)]
 mod coverage;
 mod fit;
+mod means;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -18,9 +20,11 @@ use rayon::prelude::*;
 
 use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
+use crate::numerics::student;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
+use means::{Mean, means};
 
 #[cfg(test)]
 pub use settings::Group;
@@ -28,6 +32,9 @@ pub use settings::Settings;
 
 /// Fewest maneuvers of a trend: from fewer their scatter cannot be estimated.
 const FEWEST_MANEUVERS: usize = 3;
+
+/// Name of a mean in the column `curve`.
+const MEAN: &str = "mean";
 
 /// Trends of all derivatives, outliers and problems.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,8 +49,8 @@ pub struct Trends {
 /// which they first appear.
 ///
 /// `estimates` are those of converged fits. Estimates with status `estimated`, a value and a bound
-/// (the corrected one where there is one) count. A group of fewer than three maneuvers has no trend
-/// and is a problem; a class of fewer is skipped. A trend is published at the multiples of the step
+/// (the corrected one where there is one) count. A group of fewer than three maneuvers has means
+/// instead of a trend; a class of fewer is skipped. A trend is published at the multiples of the step
 /// and at the derivative's `breakpoints`, deg, inside the range of its data.
 #[must_use]
 pub fn trends(
@@ -83,6 +90,9 @@ fn trends_of_derivative(
             .collect();
         let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
         match fit_trend(&members, &group.name, settings, knots, further) {
+            _ if members.len() < FEWEST_MANEUVERS => {
+                trends.rows = mean_rows(&members, &group.name, settings);
+            }
             Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
             Err(reason) => trends
                 .problems
@@ -156,24 +166,7 @@ fn fit_trend(
             members.len()
         ));
     }
-    let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
-    let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
-    let of_class = |e: &EstimateRow| {
-        Some(Point {
-            class: class(e),
-            ..point(e)?
-        })
-    };
-    let mut placed: Vec<(Point, &EstimateRow)> = members
-        .iter()
-        .filter_map(|e| Some((of_class(e)?, *e)))
-        .collect();
-    // Sums do not depend on the order in which the maneuvers come.
-    placed.sort_by(|a, b| {
-        a.0.key()
-            .partial_cmp(&b.0.key())
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
+    let placed = placed(members);
     let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
     let fit = Trend::through(&points, settings, knots_deg)
         .ok_or("the least-squares fit has no solution")?;
@@ -210,6 +203,62 @@ fn fit_trend(
             .collect(),
         outliers,
     ))
+}
+
+/// Estimates with their points, sorted by α: sums do not depend on the order in which the maneuvers
+/// come.
+fn placed<'a>(members: &[&'a EstimateRow]) -> Vec<(Point, &'a EstimateRow)> {
+    let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
+    let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
+    let of_class = |e: &EstimateRow| {
+        Some(Point {
+            class: class(e),
+            ..point(e)?
+        })
+    };
+    let mut placed: Vec<(Point, &EstimateRow)> = members
+        .iter()
+        .filter_map(|e| Some((of_class(e)?, *e)))
+        .collect();
+    placed.sort_by(|a, b| {
+        a.0.key()
+            .partial_cmp(&b.0.key())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    placed
+}
+
+/// Rows of the means of maneuvers that are too few for a trend.
+fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<TrendRow> {
+    let points: Vec<Point> = placed(members).iter().map(|(point, _)| *point).collect();
+    let normal_95 = student::quantile_95(f64::INFINITY);
+    let row = |mean: Mean| {
+        let common = common_error(members, mean.alpha_deg, settings.alpha_step_deg);
+        let standard_error = mean.standard_error.hypot(common);
+        let half = normal_95 * standard_error;
+        let prediction = normal_95 * standard_error.hypot(mean.one_more);
+        TrendRow {
+            derivative: members[0].derivative.clone(),
+            unit: members[0].unit.clone(),
+            group: group.to_owned(),
+            alpha_deg: mean.alpha_deg,
+            value: mean.value,
+            standard_error,
+            lower_95: mean.value - half,
+            upper_95: mean.value + half,
+            prediction_lower_95: mean.value - prediction,
+            prediction_upper_95: mean.value + prediction,
+            maneuvers: mean.maneuvers,
+            outliers: 0,
+            curve: MEAN.to_owned(),
+            order: 0,
+            scatter: mean.scatter,
+        }
+    };
+    means(&points, settings.alpha_step_deg)
+        .into_iter()
+        .map(row)
+        .collect()
 }
 
 /// The maneuvers further than `limit` standard deviations from the trend.

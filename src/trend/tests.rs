@@ -237,15 +237,43 @@ fn held_unbounded_and_left_out_estimates_have_no_part() {
 }
 
 #[test]
-fn too_few_maneuvers_are_a_problem_of_the_group_and_silent_for_a_class() {
-    let few = [
+fn too_few_maneuvers_for_a_trend_have_means_and_no_problem() {
+    let apart = [
         estimate("d", "A", 10.0, 1.0, 0.1),
-        estimate("d", "B", 20.0, 1.0, 0.1),
+        estimate("d", "B", 20.0, 3.0, 0.2),
     ];
-    let Trends { rows, problems, .. } = through(&few, &Settings::default());
-    assert_eq!(rows, []);
-    assert_eq!(problems.len(), 1);
-    assert_eq!(problems[0].place, "d, group all");
+    let Trends { rows, problems, .. } = through(&apart, &Settings::default());
+    assert_eq!(problems, []);
+    let means: Vec<_> = rows
+        .iter()
+        .map(|r| (r.alpha_deg, r.value, r.standard_error))
+        .collect();
+    assert_eq!(means, [(10.0, 1.0, 0.1), (20.0, 3.0, 0.2)]);
+    assert_relative_eq!(rows[1].upper_95 - 3.0, 1.959_964 * 0.2, max_relative = 1e-6);
+    assert!(rows.iter().all(|r| r.curve == "mean" && r.maneuvers == 1));
+    let Trends { rows, problems, .. } = through(&[], &Settings::default());
+    assert_eq!((rows, problems), (vec![], vec![]));
+}
+
+#[test]
+fn a_mean_of_two_weighs_by_bounds_and_scatter() {
+    let two = |apart: f64| {
+        let both = [
+            estimate("d", "A", 10.0, 1.0, 0.3),
+            estimate("d", "A", 10.5, 1.0 + apart, 0.4),
+        ];
+        through(&both, &Settings::default()).rows.remove(0)
+    };
+    // Together as their bounds say: weights 1/0.09 and 1/0.16, so 0.64 and 0.36.
+    let near = two(0.5);
+    assert_relative_eq!(near.value, 1.0 + 0.36 * 0.5, max_relative = 1e-9);
+    assert_relative_eq!(near.standard_error, 0.24, max_relative = 1e-9);
+    assert_relative_eq!(near.scatter, 0.0);
+    assert_eq!(near.maneuvers, 2);
+    // Two further apart: τ² = (9 − 0.25)/2, and (y₁ − y₂)² is the sum of both variances.
+    let far = two(3.0);
+    assert_relative_eq!(far.scatter.powi(2), 4.375, max_relative = 1e-9);
+    assert!(far.standard_error > 1.0 && (far.value - 2.5).abs() < 0.05);
 }
 
 #[test]
