@@ -57,6 +57,8 @@ impl Character {
             &own
         };
         let (noise_floor, noise) = spikes::noise_levels(recorded);
+        let quantisation = quantisation(recorded);
+        let noise_floor = noise_floor.max(0.5 * quantisation.unwrap_or(0.0));
         let stuck_run = if settings.find {
             match stuck_run(recorded, step_s * rate.period as f64, settings) {
                 StuckRun::AtLeast(samples) => Some(samples),
@@ -70,7 +72,7 @@ impl Character {
             rate,
             noise_floor,
             noise,
-            quantisation: quantisation(recorded),
+            quantisation,
             stuck_run,
         }
     }

@@ -16,7 +16,8 @@ pub enum Bridge {
 /// Bridges the gaps (NaN) of at most `longest` samples in place and returns the mark of every
 /// sample.
 ///
-/// A gap at either end of the record has one side only and stays missing. `period` gives the
+/// A gap at either end of the record has one side only and stays missing, unless it lies between two
+/// values of a slow channel: its nearest value then holds. `period` gives the
 /// channel's samples per recorded value at a sample: a gap that is no longer lies between two
 /// recorded values and is no fault.
 pub fn bridge_gaps(
@@ -43,6 +44,10 @@ pub fn bridge_gaps(
                 } else {
                     Mark::Bridged
                 }
+            }
+            (Some(value), None) | (None, Some(value)) if is_between => {
+                values[gap.clone()].fill(value);
+                Mark::Between
             }
             _ => Mark::Missing,
         };
@@ -102,6 +107,18 @@ mod tests {
         let missing: Vec<usize> = (0..7).filter(|&k| marks[k] == Mark::Missing).collect();
         assert_eq!(missing, [0, 2, 3, 4, 6]);
         assert!(missing.iter().all(|&k| values[k].is_nan()));
+    }
+
+    #[test]
+    fn a_slow_channel_holds_its_value_at_the_ends() {
+        let mut values = [GAP, GAP, 1.0, GAP, GAP, 4.0, GAP];
+        let marks = bridge_gaps(&mut values, 0, Bridge::Line, |_| 3);
+        assert_eq!(values, [1.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
+        assert_eq!(marks[0], Mark::Between);
+        // A longer gap is no slow channel's.
+        let mut values = [GAP, GAP, GAP, GAP, 1.0];
+        bridge_gaps(&mut values, 0, Bridge::Line, |_| 3);
+        assert!(values[0].is_nan());
     }
 
     #[test]

@@ -173,7 +173,8 @@ fn local_noise(values: &[f64], k: usize, reach: usize) -> f64 {
 }
 
 /// Deviation off the neighbours' mean that rounding alone causes: half the quantisation step, the
-/// least that is not zero. Zero for a channel that hardly ever changes.
+/// least that is not zero. Of a channel that hardly ever changes, half of the least difference between
+/// its values.
 fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
     let largest = values
         .iter()
@@ -182,10 +183,25 @@ fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
         .fold(0.0, f64::max);
     deviations.retain(|r| *r > SAME_VALUE * largest);
     if deviations.len() < LEAST_ROUNDED {
-        0.0
+        0.5 * least_difference(values, SAME_VALUE * largest)
     } else {
         lower_quantile_in_place(&mut deviations, ROUNDING_QUANTILE).unwrap_or(0.0)
     }
+}
+
+/// Least difference between the values of a channel, beyond that of equal ones; zero for a constant
+/// but for one sample, which may be a spike.
+fn least_difference(values: &[f64], same: f64) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let levels: Vec<&[f64]> = sorted.chunk_by(|a, b| b - a <= same).collect();
+    if let [low, high] = levels[..]
+        && low.len().min(high.len()) == 1
+    {
+        return 0.0;
+    }
+    let differences = levels.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    differences.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -292,6 +308,13 @@ mod tests {
         values[300] = 1.2;
         values.extend((0..400).map(|k| if k % 7 == 0 { 1.1 } else { 1.0 }));
         assert!(spikes(&values).is_empty());
+        // So few changes that no rounding can be read from them.
+        let mut values: Vec<f64> = (0..400).map(|k| 3.0 + 0.1 * f64::from(k / 100)).collect();
+        values[50] -= 0.1;
+        values[250] += 0.2;
+        assert!(spikes(&values).is_empty());
+        values[150] += 5.0;
+        assert_eq!(spikes(&values), [150]);
     }
 
     #[test]

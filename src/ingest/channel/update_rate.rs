@@ -7,6 +7,12 @@ pub const LONGEST_PERIOD: usize = 40;
 /// Shortest period of a slow channel, in samples of the record.
 const SHORTEST_PERIOD: usize = 2;
 
+/// Longest period of a channel with nulls between its values: 1 Hz in a record at 200 Hz.
+const LONGEST_BETWEEN_NULLS: usize = 200;
+
+/// Fewest distances from which a period is inferred where all of them agree.
+const FEW_DISTANCES: usize = 4;
+
 /// Share of the distances between recorded samples, or of the changes of a held value, that must
 /// fit a period: frames are lost and clocks slip now and then.
 const FITTING_SHARE: f64 = 0.95;
@@ -40,7 +46,10 @@ impl UpdateRate {
     pub fn infer(values: &[f64], first: usize) -> Option<UpdateRate> {
         let finite = values.iter().filter(|v| v.is_finite()).count();
         if finite < LEAST_CHANGES {
-            return None;
+            return period_of_few(values).map(|period| UpdateRate {
+                period,
+                held_phase: None,
+            });
         }
         if finite == values.len() {
             // Most channels change so often that no period fits: these need no list of changes.
@@ -89,8 +98,8 @@ pub fn neighbours(values: &[f64]) -> impl Iterator<Item = (&f64, &f64)> {
 }
 
 /// Histogram of the distances between finite values.
-fn distances(values: &[f64]) -> [usize; LONGEST_PERIOD + 1] {
-    let mut distances = [0_usize; LONGEST_PERIOD + 1];
+fn distances(values: &[f64]) -> [usize; LONGEST_BETWEEN_NULLS + 1] {
+    let mut distances = [0_usize; LONGEST_BETWEEN_NULLS + 1];
     let mut last = None;
     for (k, _) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
         if let Some(count) = last.and_then(|last| distances.get_mut(k - last)) {
@@ -112,6 +121,22 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
         before = *value;
     }
     changes
+}
+
+/// The distance that all of a few finite values have, give or take a sample, where it is more than
+/// one: a slow channel in a short record.
+fn period_of_few(values: &[f64]) -> Option<usize> {
+    let distances = distances(values);
+    let total: usize = distances.iter().sum();
+    let finite = values.iter().filter(|v| v.is_finite()).count();
+    let (period, most) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
+    let near: usize = distances
+        .iter()
+        .skip(period.saturating_sub(1))
+        .take(3)
+        .sum();
+    let agree = near == total && total + 1 == finite && 2 * most > total;
+    (period > 1 && total >= FEW_DISTANCES && agree).then_some(period)
 }
 
 /// The distance that nearly all finite values have, where it is more than one. A clock of the
