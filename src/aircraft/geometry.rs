@@ -13,7 +13,9 @@ pub struct Aircraft {
     pub span_ft: f64,
     /// Reference chord c̄, of the pitching moment and of q.
     pub chord_ft: f64,
-    /// `I_xe` of one engine; the gyroscopic moment contains the sum of both engines' momenta.
+    /// `I_xe` of one engine; the gyroscopic moment contains the sum of both engines' momenta. Zero
+    /// leaves it out.
+    #[serde(default)]
     pub engine_inertia_slug_ft2: f64,
     /// Latitude of the campaign; gravity depends on it.
     pub latitude_deg: f64,

@@ -22,7 +22,7 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
         config.buildup.derivatives.len(),
         config.buildup.biases.len()
     );
-    out!("tunnel     {}", config.wind_tunnel.display());
+    out!("tunnel     {}", config.tunnel_name());
     out!(
         "events     {}",
         if config.events.is_empty() {
@@ -50,6 +50,9 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
         None => out!("store      {}", config.store.display()),
     }
     out!("reports    {}", config.reports.display());
+    for absence in config.absences() {
+        out!("without    {absence}");
+    }
     if let Some(warning) = config.estimate.hold.warning() {
         out!("note       {warning}");
     }

@@ -9,7 +9,7 @@ use super::source::{Files, Source};
 use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::estimate::Hold;
-use crate::flight::signal;
+use crate::flight::{StandIn, signal};
 use crate::ingest;
 use crate::maneuver::{Class, Event, Status};
 use crate::store;
@@ -280,7 +280,9 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
         }
     }
     for required in std::iter::once(&"time_s").chain(signal::REQUIRED) {
-        if !signals.contains(required) {
+        let has = |name: &str| signals.contains(&name);
+        let is_needed = StandIn::of(required, has).is_none() || is_misspelt(required, &signals);
+        if !has(required) && is_needed {
             let near = did_you_mean(required, signals.iter().copied());
             return Err(source.error(
                 "channels",
@@ -289,6 +291,14 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// `true` where a signal of the channel map is probably this required one, misspelt.
+fn is_misspelt(required: &str, signals: &[&str]) -> bool {
+    let mut others = signals
+        .iter()
+        .filter(|name| !signal::REQUIRED.contains(name));
+    others.any(|name| similarity(name, required) >= MISSPELT)
 }
 
 /// Names of all signals of the channel map and the constants.
@@ -391,7 +401,7 @@ fn statuses(config: &Config, class: &Class, source: &Source) -> Result<()> {
             ));
         }
         if !config.tunnel.has(name) {
-            let table = config.wind_tunnel.display();
+            let table = config.tunnel_name();
             let what = format!(
                 "class {}: `{name}` is held, and {table} has no value to hold it at",
                 class.name
@@ -528,17 +538,13 @@ fn patterns(class: &Class, source: &Source) -> Result<()> {
 /// Signals and limits of segment.
 fn segment(config: &Config, source: &Source) -> Result<()> {
     let settings = &config.segment;
-    if settings.excitation_flag.is_empty() {
-        let what = "segment: missing field `excitation_flag`: the signal that is up while the on-board excitation \
-                    system moves the surfaces";
-        return Err(source.error("segment", what));
-    }
     let named = settings
         .steps
         .keys()
         .chain(&settings.pilot_controls)
         .chain(settings.quality.actuators.keys());
-    for name in std::iter::once(&settings.excitation_flag).chain(named) {
+    let flag = std::iter::once(&settings.excitation_flag).filter(|flag| !flag.is_empty());
+    for name in flag.chain(named) {
         known_signal(config, source, name, "segment")?;
     }
     if let Some(name) = settings

@@ -22,7 +22,9 @@ pub struct Config {
     /// (`s3://bucket/prefix`).
     pub archive: String,
     /// File of the wind-tunnel tables, as the report names it.
-    pub wind_tunnel: PathBuf,
+    pub wind_tunnel: Option<PathBuf>,
+    /// Number of held derivatives of the classes that are left out without a tunnel.
+    pub held_at_nothing: usize,
     /// Folder of the artefacts.
     pub store: PathBuf,
     /// Place of the artefacts in an object store; `store` is then its cache.
@@ -56,6 +58,13 @@ impl Config {
     #[must_use]
     pub fn class(&self, name: &str) -> Option<&Class> {
         self.classes.iter().find(|c| c.name == name)
+    }
+
+    /// Name of the wind tunnel's file, or that there is none.
+    #[must_use]
+    pub fn tunnel_name(&self) -> String {
+        let file = self.wind_tunnel.as_ref();
+        file.map_or_else(|| "none".to_owned(), |file| file.display().to_string())
     }
 
     /// Names of derivatives and sums in the order of the model.

@@ -1,6 +1,6 @@
 //! Loading of a pipeline's folder: files, options of the command line, checks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::checked::Config;
@@ -8,10 +8,11 @@ use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
 use super::{check, moved, places, qualities, ranges};
-use crate::aero::Axis;
+use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::error::Result;
+use crate::maneuver::{Class, Status};
 use crate::output_error::calibration_errors::Calibration;
-use crate::{compare, ingest, store};
+use crate::{compare, ingest, segment, store};
 
 /// Options of the command line that replace keys of `pipeline.yaml`.
 #[derive(Clone, Debug, Default)]
@@ -40,8 +41,8 @@ impl Config {
         let aircraft = files.aircraft()?;
         share_keys(&mut pipeline, &aircraft.instruments);
         let buildup = files.model()?;
-        let classes = files.classes()?;
-        let wind_tunnel = overrides.wind_tunnel.unwrap_or(pipeline.wind_tunnel);
+        let mut classes = files.classes()?;
+        let wind_tunnel = overrides.wind_tunnel.or(pipeline.wind_tunnel);
         let name = folder.file_name().map_or_else(
             || "pipeline".to_owned(),
             |n| n.to_string_lossy().into_owned(),
@@ -63,8 +64,18 @@ impl Config {
             .unwrap_or_else(|| Path::new("reports").join(&name));
         let archive = overrides.archive.unwrap_or(pipeline.archive);
         places::reachable(Path::new(&archive))?;
+        let tunnel = match &wind_tunnel {
+            Some(file) => check::tunnel(file, &buildup, &pipeline.tunnel)?,
+            None => WindTunnel::new(pipeline.tunnel.clone()),
+        };
+        let held_at_nothing = match &wind_tunnel {
+            Some(_) => 0,
+            None => classes.iter_mut().map(Class::hold_nothing).sum(),
+        };
+        name_surfaces(&mut classes, &buildup, &pipeline.segment);
         let config = Config {
-            tunnel: check::tunnel(&wind_tunnel, &buildup, &pipeline.tunnel)?,
+            tunnel,
+            held_at_nothing,
             events: check::events(events.as_deref(), &classes)?,
             title: pipeline.title,
             archive,
@@ -143,6 +154,19 @@ fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>
     }
     if let Some(prediction) = &mut estimate.prediction {
         prediction.share_constants = estimate.share_constants;
+    }
+}
+
+/// Tells each class the surfaces whose derivatives it estimates and whose steps are found.
+fn name_surfaces(classes: &mut [Class], buildup: &Buildup, segment: &segment::Settings) {
+    for class in classes {
+        let estimated = buildup
+            .derivatives_of(class.axis)
+            .filter(|derivative| class.statuses.get(&derivative.name) == Some(&Status::Estimated));
+        let surfaces = estimated.filter_map(|derivative| derivative.regressor.surface());
+        let stepping = surfaces.filter(|surface| segment.steps.contains_key(*surface));
+        let names: BTreeSet<String> = stepping.map(str::to_owned).collect();
+        class.recognition.surfaces = names.into_iter().collect();
     }
 }
 

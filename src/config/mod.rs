@@ -5,6 +5,7 @@
 //! build-up), `maneuvers/*.yaml` (one class per file) and, where flying qualities are judged,
 //! `qualities.yaml`.
 
+mod absences;
 mod check;
 mod checked;
 mod cluster;

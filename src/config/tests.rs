@@ -363,14 +363,14 @@ fn a_required_signal_without_a_source_is_named() {
     let copy = Copy::new();
     copy.spoil(
         "aircraft.yaml",
-        "  q: { signal: q_deg_s, unit: deg/s }\n",
+        "  Iy: { signal: iy_slug_ft2, unit: slug ft2 }\n",
         "",
     );
     let text = fs::read_to_string(copy.path("aircraft.yaml")).unwrap();
     let line = text.lines().position(|l| l == "channels:").unwrap() + 1;
     let e = copy.error();
     let expected =
-        format!("aircraft.yaml:{line}: no channel or constant gives the signal `q_deg_s`");
+        format!("aircraft.yaml:{line}: no channel or constant gives the signal `iy_slug_ft2`");
     assert!(e.starts_with(&expected), "{e}");
 }
 

@@ -25,8 +25,9 @@ settings! {
         /// Flight archive: a folder, a glob, a tree partitioned as `flight=…/`, or a place in an
         /// object store (`s3://bucket/prefix`).
         pub archive: String,
-        /// Wind-tunnel tables: CSV, Parquet or DAVE-ML.
-        pub wind_tunnel: PathBuf,
+        /// Wind-tunnel tables: CSV, Parquet or DAVE-ML. Without them nothing is held or compared.
+        #[serde(default)]
+        pub wind_tunnel: Option<PathBuf>,
         /// Artefacts: a folder, `data/store/<pipeline>` unless given, or a place in an object store.
         #[serde(default)]
         pub store: Option<PathBuf>,

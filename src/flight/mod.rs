@@ -5,10 +5,12 @@ pub mod correction;
 pub mod interpolation_kernel;
 pub mod record;
 pub mod signal;
+pub mod stand_in;
 
 pub use channel::{Channel, RawFlight};
 pub use correction::Correction;
 pub use record::{Mark, Record};
+pub use stand_in::StandIn;
 
 /// `true` where an id is a flight's own or that of one of its stretches.
 #[must_use]

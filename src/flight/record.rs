@@ -23,6 +23,8 @@ pub enum Mark {
     /// Between two values of a channel that is recorded more slowly than the record: on the line
     /// through them.
     Between = 5,
+    /// Constant or stand-in of a signal that is not recorded.
+    Assumed = 6,
 }
 
 impl Mark {
@@ -35,15 +37,16 @@ impl Mark {
             2 => Mark::Despiked,
             4 => Mark::Stuck,
             5 => Mark::Between,
+            6 => Mark::Assumed,
             _ => Mark::Missing,
         }
     }
 
     /// `true` where the sample was repaired or is missing. The samples between two values of a slow
-    /// channel are no measurements, but they are no faults.
+    /// channel and assumed ones are no measurements, but they are no faults.
     #[must_use]
     pub fn is_fault(self) -> bool {
-        !matches!(self, Mark::Measured | Mark::Between)
+        !matches!(self, Mark::Measured | Mark::Between | Mark::Assumed)
     }
 }
 
@@ -52,6 +55,21 @@ impl Mark {
 pub struct Series {
     pub values: Vec<f64>,
     pub marks: Vec<Mark>,
+}
+
+impl Series {
+    /// Values of a signal that is not recorded.
+    #[must_use]
+    pub fn assumed(values: Vec<f64>) -> Series {
+        let marks = vec![Mark::Assumed; values.len()];
+        Series { values, marks }
+    }
+
+    /// `true` where no sample is from the recorder.
+    #[must_use]
+    pub fn is_assumed(&self) -> bool {
+        self.marks.first() == Some(&Mark::Assumed)
+    }
 }
 
 /// Signals of one flight on one clock: sample `k` is at `start_s + k * step_s` of the record's
@@ -93,6 +111,12 @@ impl Record {
     #[must_use]
     pub fn values(&self, signal: &str) -> Option<&[f64]> {
         self.signals.get(signal).map(|s| s.values.as_slice())
+    }
+
+    /// `true` for a signal with samples from the recorder.
+    #[must_use]
+    pub fn is_recorded(&self, signal: &str) -> bool {
+        self.signals.get(signal).is_some_and(|s| !s.is_assumed())
     }
 
     /// Share of samples with a fault among some signals from one time to another. A signal that the

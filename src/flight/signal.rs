@@ -40,7 +40,14 @@ pub const IXZ: &str = "ixz_slug_ft2";
 /// Required signals that are greater than zero in flight.
 pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
 
-/// Signals that the equations of motion need: each must be a channel or a constant.
+/// `true` for a signal whose fault refuses a flight. The other required signals are left out, and a
+/// stand-in takes their place at little cost.
+#[must_use]
+pub fn is_indispensable(signal: &str) -> bool {
+    REQUIRED.contains(&signal) && ![MACH, RPM_LEFT, RPM_RIGHT].contains(&signal)
+}
+
+/// Signals that the equations of motion need: each is a channel, a constant or a stand-in.
 pub const REQUIRED: &[&str] = &[
     ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST,
     RPM_LEFT, RPM_RIGHT, MASS, X_CG, Y_CG, Z_CG, IX, IY, IZ, IXZ,

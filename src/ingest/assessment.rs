@@ -7,7 +7,8 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::channel::{
-    ChannelStatistics, ConditionedChannel, Signature, empty_channel, stuck_channel, values_beyond,
+    ChannelStatistics, ConditionedChannel, Signature, empty_channel, missing_signal, stuck_channel,
+    values_beyond,
 };
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
@@ -20,7 +21,7 @@ use super::context::Context;
 use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
 use crate::error::Problem;
-use crate::flight::{Channel, Correction, Mark, Record, signal};
+use crate::flight::{Channel, Correction, Mark, Record, StandIn, signal};
 use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, FlightRow, InstrumentRow};
 
 /// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
@@ -37,6 +38,8 @@ pub struct Assessment {
     pub instruments: Vec<InstrumentRow>,
     /// Corrections that are applied to signals when the record is read.
     pub corrections: Vec<Correction>,
+    /// Stand-ins of the signals that the stretch lacks, in the order in which they are computed.
+    pub stand_ins: Vec<(String, StandIn)>,
     pub problems: Vec<Problem>,
     /// Normal force over angle of attack, for the comparison with the tunnel.
     pub lift: Vec<LiftPoint>,
@@ -66,6 +69,7 @@ pub fn assess(
         clock: &stretch.clock,
         context,
         recorded: recording.block_means.keys().cloned().collect(),
+        stand_ins: &recording.stand_ins,
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
@@ -83,12 +87,15 @@ pub fn assess(
         problems.extend(found);
         relations.impossible = impossible;
     }
+    let mut stand_ins = recording.stand_ins;
     if let Some(report) = &relations.report {
-        let problem = relation_problem(report, &findings, flight_id);
+        let left_out = left_out(report, &relations.faulty);
+        let problem = relation_problem(report, &left_out, &findings, flight_id);
         if context.settings.on_failed_check == OnFailedCheck::Refuse && report.required {
             return Err(problem);
         }
         problems.push(problem);
+        stand_ins.extend(left_out);
     }
     let faults = findings.problems(flight_id);
     if context.settings.compatibility.fault == OnFault::Refuse && findings.has_required_fault() {
@@ -108,6 +115,7 @@ pub fn assess(
         checks: relations.check_rows(flight_id),
         instruments: findings.rows(flight_id),
         corrections: findings.corrections(),
+        stand_ins,
         problems,
         lift: lift_curve(&blocks, context.aircraft, &context.settings.checks),
         signature: recording.signature,
@@ -123,6 +131,7 @@ struct Recording<'a> {
     /// Block means by signal, of channels that a relation uses.
     block_means: BTreeMap<String, BlockAverager>,
     problems: Vec<Problem>,
+    stand_ins: Vec<(String, StandIn)>,
     signature: Signature,
 }
 
@@ -133,17 +142,14 @@ impl<'a> Recording<'a> {
         context: &Context,
     ) -> Result<Recording<'a>, Problem> {
         let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
-        let (mut channels, mut problems) = (Vec::new(), Vec::new());
+        let (mut channels, mut problems, mut empty) = (Vec::new(), Vec::new(), Vec::new());
         let mut block_means = BTreeMap::new();
         let mut signature_samples = Vec::new();
         for one in conditioned {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
             if statistics.count(Mark::Missing) == clock.samples {
-                let problem = empty_channel(name, channel, clock.rows).into_problem(flight_id);
-                if !context.is_optional(&channel.signal) {
-                    return Err(problem);
-                }
-                problems.push(problem);
+                let refusal = empty_channel(name, channel, clock.rows);
+                empty.push((channel.signal.as_str(), refusal));
             } else {
                 let stuck = stuck_channel(name, &statistics, clock);
                 let beyond = values_beyond(name, channel, &statistics, clock);
@@ -157,13 +163,34 @@ impl<'a> Recording<'a> {
             }
             channels.push((name, channel, statistics));
         }
+        let is_recorded = |signal: &str| {
+            let mut recorded = channels
+                .iter()
+                .map(|(_, channel, _)| channel.signal.as_str());
+            recorded.any(|s| s == signal) && !empty.iter().any(|(s, _)| *s == signal)
+        };
+        let stand_ins = match context.stand_ins(is_recorded) {
+            Ok(stand_ins) => stand_ins,
+            Err(signal) => return Err(refused_signal(signal, empty).into_problem(flight_id)),
+        };
+        problems.extend(empty.into_iter().map(|(signal, refusal)| {
+            let refusal = refusal.with_stand_in(signal, &stand_ins);
+            refusal.into_problem(flight_id)
+        }));
         Ok(Recording {
             channels,
             block_means,
             problems,
+            stand_ins,
             signature: Signature::of(signature_samples.into_iter()),
         })
     }
+}
+
+/// Refusal of a required signal that nothing stands for, at its empty channel where it has one.
+fn refused_signal(signal: &str, empty: Vec<(&str, Refusal)>) -> Refusal {
+    let own = empty.into_iter().find(|(name, _)| *name == signal);
+    own.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal)
 }
 
 /// Inputs of the relation checks and of flight-path reconstruction.
@@ -172,6 +199,7 @@ struct Examination<'a> {
     context: &'a Context<'a>,
     /// Signals that come from channels.
     recorded: Vec<String>,
+    stand_ins: &'a [(String, StandIn)],
     read: &'a RecordReader<'a>,
 }
 
@@ -205,6 +233,10 @@ impl Examination<'_> {
             return (relations, findings.without_corrections());
         }
         // With a dead channel or with one fault among several there is nothing to go by.
+        if !faulty.is_empty() && !faulty.iter().any(|f| signal::is_indispensable(&f.signal)) {
+            let findings = self.reconstruct(|record| leave_out(record, faulty));
+            return (relations, findings);
+        }
         if faulty.iter().any(|f| f.cause.is_some()) {
             return (relations, Findings::default());
         }
@@ -284,6 +316,9 @@ impl Examination<'_> {
         let parts = (0..count).filter_map(|i| {
             let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
             let mut record = (self.read)(&signals, range)?;
+            for (signal, stand_in) in self.stand_ins {
+                stand_in.fill(signal, &mut record);
+            }
             correct(&mut record);
             Some(record)
         });
@@ -306,6 +341,13 @@ fn correct_by_factors(record: &mut Record, faulty: &[FaultyChannel]) {
             series.values.iter_mut().for_each(|v| *v *= factor);
         }
     }
+}
+
+/// Removes the signals of faulty channels.
+fn leave_out(record: &mut Record, faulty: &[FaultyChannel]) {
+    record
+        .signals
+        .retain(|name, _| !faulty.iter().any(|f| f.signal == *name));
 }
 
 /// Outcome of the kinematic relations of one stretch.
@@ -337,16 +379,38 @@ impl RelationResult {
 }
 
 /// Problem of the failed relations, with the instrument faults found besides.
-fn relation_problem(report: &FaultReport, findings: &Findings, flight_id: &str) -> Problem {
+fn relation_problem(
+    report: &FaultReport,
+    left_out: &[(String, StandIn)],
+    findings: &Findings,
+    flight_id: &str,
+) -> Problem {
+    let left_out: String = left_out
+        .iter()
+        .map(|(signal, stand_in)| format!(". It is left out: `{signal}` {}", stand_in.in_words()))
+        .collect();
     let besides = findings
         .fault_summary()
         .map(|faults| format!(". Besides, {faults}"))
         .unwrap_or_default();
     let refusal = Refusal {
         place: report.place.clone(),
-        reason: format!("{}{besides}", report.reason),
+        reason: format!("{}{left_out}{besides}", report.reason),
     };
     refusal.into_problem(flight_id)
+}
+
+/// Stand-ins of faulty channels that no flight needs; none where the report refuses the stretch.
+fn left_out(report: &FaultReport, faulty: &[FaultyChannel]) -> Vec<(String, StandIn)> {
+    if report.required {
+        return Vec::new();
+    }
+    let is_faulty = |signal: &str| faulty.iter().any(|f| f.signal == signal);
+    let stand_in = |fault: &FaultyChannel| {
+        let stand_in = StandIn::of(&fault.signal, |signal| !is_faulty(signal))?;
+        Some((fault.signal.clone(), stand_in))
+    };
+    faulty.iter().filter_map(stand_in).collect()
 }
 
 /// One problem that joins the places and reasons of several.

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::refusal::Refusal;
 use super::settings::Settings;
 use crate::aircraft::Aircraft;
-use crate::flight::{Channel, signal};
+use crate::flight::stand_in::stand_ins;
+use crate::flight::{Channel, StandIn};
 
 /// Channel map, constants, aircraft and settings of ingest.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +32,14 @@ impl Context<'_> {
         }
     }
 
-    /// `true` where a flight can do without the channel of a signal.
-    pub(super) fn is_optional(&self, signal: &str) -> bool {
-        self.constants.contains_key(signal) || !signal::REQUIRED.contains(&signal)
+    /// Stand-ins of the required signals that neither `recorded` nor a constant gives.
+    ///
+    /// # Errors
+    /// The first signal that nothing stands for.
+    pub(super) fn stand_ins(
+        &self,
+        recorded: impl Fn(&str) -> bool,
+    ) -> Result<Vec<(String, StandIn)>, &'static str> {
+        stand_ins(|signal| recorded(signal) || self.constants.contains_key(signal))
     }
 }

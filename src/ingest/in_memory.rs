@@ -11,7 +11,7 @@ use super::settings::Settings;
 use crate::aircraft::Aircraft;
 use crate::error::Problem;
 use crate::flight::record::Series;
-use crate::flight::{Channel, Mark, RawFlight, Record};
+use crate::flight::{Channel, RawFlight, Record};
 use crate::tables::{ChannelRow, CheckRow, FlightRow, InstrumentRow};
 
 /// One stretch of a flight after ingest.
@@ -99,10 +99,9 @@ fn ingest_stretch(
         conditioned.push(channel);
     }
     for (name, &value) in context.constants {
-        signals.entry(name.clone()).or_insert_with(|| Series {
-            values: vec![value; samples],
-            marks: vec![Mark::Measured; samples],
-        });
+        signals
+            .entry(name.clone())
+            .or_insert_with(|| Series::assumed(vec![value; samples]));
     }
     let mut record = Record {
         flight_id: stretch.flight_id.clone(),
@@ -116,6 +115,9 @@ fn ingest_stretch(
     })?;
     for correction in &assessment.corrections {
         correction.apply(&mut record);
+    }
+    for (signal, stand_in) in &assessment.stand_ins {
+        stand_in.fill(signal, &mut record);
     }
     let Assessment {
         flight,

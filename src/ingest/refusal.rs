@@ -1,6 +1,8 @@
 //! Reasons for which ingest refuses a flight, a stretch or a channel.
 
 use crate::error::{Problem, ProblemStage};
+use crate::flight::stand_in::cost;
+use crate::flight::{StandIn, signal};
 
 /// A place in the recording and the reason for which it cannot be used; a [`Problem`] without its
 /// flight.
@@ -17,6 +19,21 @@ impl Refusal {
         Refusal {
             place: format!("channel `{name}`"),
             reason,
+        }
+    }
+
+    /// This refusal with the stand-in of the signal that is left out, and what its absence costs.
+    #[must_use]
+    pub fn with_stand_in(self, signal: &str, stand_ins: &[(String, StandIn)]) -> Refusal {
+        let stand_in = stand_ins.iter().find(|(name, _)| name == signal);
+        let consequence = match stand_in {
+            Some((name, stand_in)) => format!("; `{name}` {}: {}", stand_in.in_words(), cost(name)),
+            None if signal == signal::PSI => format!("; {}", cost(signal)),
+            None => String::new(),
+        };
+        Refusal {
+            reason: format!("{}{consequence}", self.reason),
+            ..self
         }
     }
 

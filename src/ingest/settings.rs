@@ -29,7 +29,7 @@ settings! {
         pub sampling_rate_hz: Option<f64> = None,
         /// Shortest stretch of a flight that is kept, s. A shorter one holds no maneuver with its
         /// lead-in and decay.
-        pub least_stretch_s: f64 = 10.0,
+        pub least_stretch_s: f64 = 5.0,
         /// Longest stretch of a flight, h. A longer one goes on as another stretch. Larger: more
         /// memory for the clock and the block means.
         pub longest_stretch_h: f64 = 24.0,

@@ -280,13 +280,31 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
 }
 
 #[test]
+fn a_channel_that_nothing_requires_is_left_out_by_name() {
+    let mut flight = Flight::steady();
+    for name in ["psi", "mach"] {
+        flight.raw.columns.get_mut(name).unwrap().unit = Some("furlong".to_owned());
+    }
+    let ingested = flight.ingest().unwrap();
+    let reasons: Vec<&str> = ingested
+        .problems
+        .iter()
+        .map(|p| p.reason.as_str())
+        .collect();
+    assert_eq!(reasons.len(), 2, "{reasons:?}");
+    assert!(
+        reasons[0].contains("`mach` is computed from V"),
+        "{reasons:?}"
+    );
+    assert!(reasons[1].contains("larger bounds"), "{reasons:?}");
+    assert!(!ingested.record.is_recorded(signal::MACH));
+    assert!(!ingested.record.signals.contains_key(signal::PSI));
+}
+
+#[test]
 fn a_missing_or_empty_required_channel_refuses_the_flight_unless_a_constant_stands_in() {
     let mut flight = Flight::steady();
     flight.raw.columns.remove("V");
-    assert_eq!(
-        flight.refused().reason,
-        "channel `V` (signal `velocity_ft_s`) is not in the file"
-    );
     flight.constants.insert(signal::VELOCITY.to_owned(), 600.0);
     let ingested = flight.ingest().unwrap();
     assert_eq!(
@@ -296,20 +314,40 @@ fn a_missing_or_empty_required_channel_refuses_the_flight_unless_a_constant_stan
     assert_eq!(ingested.problems.len(), 1);
 
     let mut flight = Flight::steady();
-    flight.values("qbar").fill(f64::NAN);
+    flight.values("alpha").fill(f64::NAN);
     assert_eq!(
         flight.refused().reason,
-        "channel `qbar` (signal `qbar_psf`) holds no number in 2000 rows"
+        "channel `alpha` (signal `alpha_vane_deg`) holds no number in 2000 rows"
     );
 
     let mut flight = Flight::steady();
-    flight.channels.remove("mach");
+    flight.constants.remove(signal::MASS);
+    flight
+        .channels
+        .retain(|_, channel| channel.signal != signal::MASS);
     assert!(
         flight
             .refused()
             .reason
-            .starts_with("signal `mach` is neither a channel nor a constant")
+            .starts_with("signal `mass_slug` is neither a channel nor a constant")
     );
+}
+
+#[test]
+fn air_data_that_are_missing_are_computed_from_the_others_and_named() {
+    let whole = Flight::steady().ingest().unwrap();
+    for (channel, signal) in [("V", signal::VELOCITY), ("mach", signal::MACH)] {
+        let mut flight = Flight::steady();
+        flight.raw.columns.remove(channel);
+        let ingested = flight.ingest().unwrap();
+        let series = &ingested.record.signals[signal];
+        assert!(series.is_assumed());
+        let truth = whole.record.values(signal).unwrap()[1000];
+        assert_relative_eq!(series.values[1000], truth, max_relative = 0.05);
+        assert_eq!(ingested.problems.len(), 1);
+        let reason = &ingested.problems[0].reason;
+        assert!(reason.contains("is computed from"), "{reason}");
+    }
 }
 
 #[test]

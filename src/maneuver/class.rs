@@ -94,6 +94,10 @@ pub struct Recognition {
     /// Signal → its sweep.
     #[serde(default)]
     pub sweep: BTreeMap<String, Sweep>,
+    /// Surfaces whose derivatives the class estimates. In a record without the pilot's controls their
+    /// steps stand for the controls'. The configuration fills them in.
+    #[serde(skip_deserializing)]
+    pub surfaces: Vec<String>,
     /// Time from the maneuver's start to the first input, s: trimmed flight.
     pub lead_in_s: f64,
     /// Time from the last input to the maneuver's end, s: the response's decay.
@@ -188,6 +192,17 @@ impl Class {
         class
     }
 
+    /// Leaves out the derivatives that the class holds: without a wind tunnel there is no value to
+    /// hold them at. Returns their number.
+    pub fn hold_nothing(&mut self) -> usize {
+        let overrides = self.overrides.iter_mut().map(|o| &mut o.statuses);
+        let statuses = std::iter::once(&mut self.statuses).chain(overrides);
+        let held = statuses
+            .flat_map(BTreeMap::values_mut)
+            .filter(|status| **status == Status::Held);
+        held.map(|status| *status = Status::Inactive).count()
+    }
+
     fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &Overrides> {
         self.overrides
             .iter()
@@ -224,5 +239,12 @@ mod tests {
             (Some(Status::Estimated), Some(6.0))
         );
         assert_eq!(class.at(20.0).status("CY_da", 25.0), Some(Status::Held));
+        let mut without_tunnel = class;
+        assert_eq!(without_tunnel.hold_nothing(), 1);
+        assert_eq!(without_tunnel.status("CY_da", 20.0), Some(Status::Inactive));
+        assert_eq!(
+            without_tunnel.status("CY_da", 25.0),
+            Some(Status::Estimated)
+        );
     }
 }

@@ -93,7 +93,7 @@ fn printed_names(config: &Config) -> BTreeMap<String, String> {
         let fingerprint = Fingerprint::of("text", 1).with(text).finish();
         (name.clone(), fingerprint)
     });
-    let tunnel = config.wind_tunnel.display().to_string();
+    let tunnel = config.tunnel_name();
     files
         .chain([
             ("archive".to_owned(), config.archive.clone()),

@@ -144,12 +144,12 @@ impl<'a> Conductor<'a> {
     ) -> Result<Conductor<'a>> {
         let earlier = trend_stage::read_earlier(config)?;
         let mut flight_contents = FlightContents::gather(&archive, &contents, progress);
-        let tunnel = contents
-            .of(&config.wind_tunnel)
-            .map_err(|why| Error::config(&config.wind_tunnel, None, why))?;
-        flight_contents
-            .sources
-            .push(source_file(&config.wind_tunnel, &tunnel));
+        if let Some(file) = &config.wind_tunnel {
+            let tunnel = contents
+                .of(file)
+                .map_err(|why| Error::config(file, None, why))?;
+            flight_contents.sources.push(source_file(file, &tunnel));
+        }
         Ok(Conductor {
             runner: StepRunner::new(config, store, contents, absent, progress),
             archive,

@@ -80,7 +80,7 @@ impl Flight {
         self.ingested.record.is_some()
     }
 
-    /// Opens the record, with its corrections.
+    /// Opens the record, with its stand-ins and corrections.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
@@ -90,6 +90,7 @@ impl Flight {
             record.ok_or_else(|| Error::store(self.id().as_ref(), &"the flight has no record"))?;
         store.fetch(&record.name, &record.digest)?;
         Ok(record_file::open(&store.path(&record.name))?
+            .completed(self.ingested.assessment.stand_ins.clone())
             .corrected(self.ingested.assessment.corrections.clone()))
     }
 

@@ -108,20 +108,30 @@ fn provenance(conductor: &Conductor) -> report::Provenance {
             methods.join(", ")
         ),
         command: format!(
-            "harvest run {} --archive '{}' --wind-tunnel '{}'",
+            "harvest run {} --archive '{}'{}",
             config.name,
             config.archive,
-            config.wind_tunnel.display()
+            tunnel_option(config)
         ),
         data: conductor.flight_contents.sources.clone(),
         configuration: config.files.clone(),
     }
 }
 
+/// Option of the command line that names the tunnel's file; empty without a tunnel.
+fn tunnel_option(config: &Config) -> String {
+    let file = config.wind_tunnel.as_ref();
+    file.map_or_else(String::new, |file| {
+        format!(" --wind-tunnel '{}'", file.display())
+    })
+}
+
 /// Name of the tunnel database, with the stated sources of its values.
 fn tunnel_and_sources(config: &Config) -> String {
-    let (name, sources) = (config.wind_tunnel.display(), config.tunnel.sources());
-    if sources.is_empty() {
+    let (name, sources) = (config.tunnel_name(), config.tunnel.sources());
+    if config.wind_tunnel.is_none() {
+        name
+    } else if sources.is_empty() {
         format!("{name} (no sources stated)")
     } else {
         format!("{name} (sources: {})", sources.join("; "))

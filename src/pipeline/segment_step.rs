@@ -67,7 +67,7 @@ impl<'a> Step for SegmentStep<'a> {
     type Artefact = FoundManeuvers;
 
     const KIND: Kind = Kind::Segment;
-    const VERSION: u32 = 10;
+    const VERSION: u32 = 11;
 
     fn item(&self) -> &str {
         self.flight.id()

@@ -221,7 +221,9 @@ fn groups(config: &Config) -> SignalGroups {
         .classes
         .iter()
         .flat_map(|c| c.recognition.flags.keys().cloned());
-    let flags = unique(std::iter::once(config.segment.excitation_flag.clone()).chain(in_classes));
+    let own = std::iter::once(config.segment.excitation_flag.clone());
+    let own = own.filter(|flag| !flag.is_empty());
+    let flags = unique(own.chain(in_classes));
     SignalGroups {
         controls: stepping.collect(),
         flags,

@@ -30,7 +30,7 @@ use parquet::schema::types::ColumnPath;
 
 use crate::error::Error;
 use crate::flight::record::Series;
-use crate::flight::{Correction, Mark, Record};
+use crate::flight::{Correction, Mark, Record, StandIn};
 
 /// Suffix of a signal's column of marks.
 const MARK: &str = ":mark";
@@ -315,6 +315,8 @@ pub struct RecordFile {
     pub header: RecordHeader,
     /// Corrections applied as samples are read.
     corrections: Vec<Correction>,
+    /// Stand-ins of signals, in the order in which they are computed.
+    stand_ins: Vec<(String, StandIn)>,
 }
 
 /// Opens a record.
@@ -357,6 +359,7 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
         metadata,
         header,
         corrections: vec![],
+        stand_ins: vec![],
     })
 }
 
@@ -384,6 +387,12 @@ impl RecordFile {
             corrections,
             ..self
         }
+    }
+
+    /// Puts stand-ins in the place of signals, computed from the corrected others.
+    #[must_use]
+    pub fn completed(self, stand_ins: Vec<(String, StandIn)>) -> RecordFile {
+        RecordFile { stand_ins, ..self }
     }
 
     /// Applies further corrections.
@@ -437,10 +446,17 @@ impl RecordFile {
             .unwrap_or(0);
         let wide =
             samples.start.saturating_sub(reach)..(samples.end + reach).min(self.header.samples);
-        let mut record = self.as_written(signals, wide.clone())?;
+        let sources = signals.map(|signals| self.with_sources(signals));
+        let mut record = self.as_written(sources.as_ref(), wide.clone())?;
         self.corrections
             .iter()
             .for_each(|correction| correction.apply(&mut record));
+        for (signal, stand_in) in &self.stand_ins {
+            stand_in.fill(signal, &mut record);
+        }
+        if let Some(signals) = signals {
+            record.signals.retain(|name, _| signals.contains(name));
+        }
         if wide == samples {
             return Ok(record);
         }
@@ -449,6 +465,13 @@ impl RecordFile {
             start_s: self.header.record(&samples).start_s,
             ..record.cut(None, inside)
         })
+    }
+
+    /// Some signals, and those from which the stand-ins of the record are computed.
+    fn with_sources(&self, signals: &BTreeSet<String>) -> BTreeSet<String> {
+        let sources = self.stand_ins.iter().flat_map(|(_, s)| s.sources());
+        let sources = sources.map(|name| (*name).to_owned());
+        signals.iter().cloned().chain(sources).collect()
     }
 
     fn as_written(
@@ -464,10 +487,7 @@ impl RecordFile {
             .iter()
             .filter(|(name, _)| wanted(name))
         {
-            let constant = Series {
-                values: vec![*value; samples.len()],
-                marks: vec![Mark::Measured; samples.len()],
-            };
+            let constant = Series::assumed(vec![*value; samples.len()]);
             record.signals.insert(name.clone(), constant);
         }
         let bad = |what: &dyn std::fmt::Display| not_a_record(&self.path, what);

@@ -178,6 +178,8 @@ words! {
         NoDelay = "ok; its delay is not told",
         /// The flight moves it too little to determine any error.
         NotExcited = "not excited",
+        /// No part of the flight is long enough for a reconstruction.
+        NotExamined = "not examined",
     }
     or text {
         /// The fault, which has a row in `problems` too.
@@ -190,6 +192,15 @@ impl InstrumentVerdict {
     #[must_use]
     pub fn passed(&self) -> bool {
         !matches!(self, InstrumentVerdict::Fault(_))
+    }
+
+    /// True where nothing is known of the instrument.
+    #[must_use]
+    pub fn is_unknown(&self) -> bool {
+        matches!(
+            self,
+            InstrumentVerdict::NotExcited | InstrumentVerdict::NotExamined
+        )
     }
 }
 

@@ -45,18 +45,30 @@ fn plan<'a>(
     context: &Context<'a>,
     flight_id: &str,
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
-    check_units(source, context.channels)?;
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
-    let mut problems = Vec::new();
+    let mut absent: Vec<(&str, Refusal)> = Vec::new();
+    let is_useless = |signal: &str| {
+        let is_known = signal == signal::PSI || signal::REQUIRED.contains(&signal);
+        is_known && !signal::is_indispensable(signal)
+    };
+    let time = context
+        .channels
+        .iter()
+        .find(|(_, c)| c.signal == signal::TIME);
+    time.map_or(Ok(()), |(name, channel)| stated_unit(source, name, channel))?;
     let mapped = context.channels.iter();
     for (name, channel) in mapped.filter(|(_, c)| c.signal != signal::TIME) {
-        let factor = match unit_factor(source, name, channel) {
+        let factor = match stated_unit(source, name, channel)
+            .and_then(|()| unit_factor(source, name, channel))
+        {
             Ok(factor) => factor,
-            Err(refusal) if context.is_optional(&channel.signal) => {
-                problems.push(refusal.into_problem(flight_id));
+            Err(refusal) if is_in_files(source, name) && !is_useless(&channel.signal) => {
+                return Err(refusal);
+            }
+            Err(refusal) => {
+                absent.push((&channel.signal, refusal));
                 continue;
             }
-            Err(refusal) => return Err(refusal),
         };
         let plan = ChannelPlan {
             name,
@@ -67,32 +79,40 @@ fn plan<'a>(
             return Err(duplicate_signal(name, channel));
         }
     }
-    for required in signal::REQUIRED {
-        if !plans.contains_key(required) && !context.constants.contains_key(*required) {
-            return Err(missing_signal(required));
+    let stand_ins = match context.stand_ins(|signal| plans.contains_key(signal)) {
+        Ok(stand_ins) => stand_ins,
+        Err(signal) => {
+            let channel = absent.into_iter().find(|(absent, _)| *absent == signal);
+            return Err(channel.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal));
         }
-    }
+    };
+    let problems = absent.into_iter().map(|(signal, refusal)| {
+        let refusal = refusal.with_stand_in(signal, &stand_ins);
+        refusal.into_problem(flight_id)
+    });
+    let problems = problems.collect();
     Ok((plans.into_values().collect(), problems))
 }
 
-/// Checks that every unit that a file states is the channel map's.
-fn check_units(
+/// Checks that every unit that a file states for a channel is the channel map's.
+fn stated_unit(
     source: &(impl ColumnSource + ?Sized),
-    channels: &BTreeMap<String, Channel>,
+    name: &str,
+    channel: &Channel,
 ) -> Result<(), Refusal> {
-    for (name, channel) in channels {
-        let stated = (0..source.files()).filter_map(|file| source.unit(file, name));
-        let differs = |unit: &&str| !unit.is_empty() && !same_unit(unit, &channel.unit);
-        if let Some(stated) = stated.map(str::trim).find(differs) {
+    let stated = (0..source.files()).filter_map(|file| source.unit(file, name));
+    let differs = |unit: &&str| !unit.is_empty() && !same_unit(unit, &channel.unit);
+    match stated.map(str::trim).find(differs) {
+        None => Ok(()),
+        Some(stated) => {
             let reason = format!(
                 "the file states `{stated}` for channel `{name}`, the channel map `{}`: correct \
                  the channel map, or the file",
                 channel.unit
             );
-            return Err(Refusal::of_channel(name, reason));
+            Err(Refusal::of_channel(name, reason))
         }
     }
-    Ok(())
 }
 
 fn same_unit(stated: &str, mapped: &str) -> bool {
@@ -104,13 +124,17 @@ fn same_unit(stated: &str, mapped: &str) -> bool {
     }
 }
 
+fn is_in_files(source: &(impl ColumnSource + ?Sized), name: &str) -> bool {
+    (0..source.files()).any(|file| source.has(file, name))
+}
+
 /// Factor from a channel's unit into its signal's.
 fn unit_factor(
     source: &(impl ColumnSource + ?Sized),
     name: &str,
     channel: &Channel,
 ) -> Result<f64, Refusal> {
-    if !(0..source.files()).any(|file| source.has(file, name)) {
+    if !is_in_files(source, name) {
         let reason = format!(
             "channel `{name}` (signal `{}`) is not in the file",
             channel.signal
@@ -189,7 +213,8 @@ fn duplicate_signal(name: &str, channel: &Channel) -> Refusal {
     Refusal::of_channel(name, reason)
 }
 
-fn missing_signal(signal: &str) -> Refusal {
+/// Refusal of a required signal that no channel and no constant gives, and that nothing stands for.
+pub fn missing_signal(signal: &str) -> Refusal {
     Refusal {
         place: format!("signal `{signal}`"),
         reason: format!(

@@ -14,7 +14,9 @@ mod unwrap;
 mod update_rate;
 
 pub use channel_plan::{ChannelPlan, plan_channels};
-pub(in crate::ingest) use channel_plan::{empty_channel, stuck_channel, values_beyond};
+pub(in crate::ingest) use channel_plan::{
+    empty_channel, missing_signal, stuck_channel, values_beyond,
+};
 pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use conditioner::ChannelStatistics;
 pub use signature::{Overlap, Signature};

@@ -374,7 +374,7 @@ pub fn report(faulty: &[FaultyChannel], checks: &[Check]) -> Option<FaultReport>
         format!("{names} {do_not} agree with the other channels ({failures})")
     };
     let cause = likely_cause(faulty);
-    let is_required = |f: &FaultyChannel| signal::REQUIRED.contains(&f.signal.as_str());
+    let is_required = |f: &FaultyChannel| signal::is_indispensable(&f.signal);
     Some(FaultReport {
         place: format!("{} {names}", if is_one { "channel" } else { "channels" }),
         reason: format!(

@@ -41,6 +41,8 @@ pub struct ErrorEstimate {
 pub struct InstrumentFinding {
     pub signal: &'static str,
     pub channel: String,
+    /// `false` where no window of the flight could be reconstructed.
+    pub examined: bool,
     pub estimates: [Option<ErrorEstimate>; KINDS],
 }
 
@@ -69,6 +71,7 @@ impl Findings {
                 .then(|| InstrumentFinding {
                     signal,
                     channel: channel.clone(),
+                    examined: errors.is_some(),
                     estimates,
                 })
         };
@@ -86,7 +89,7 @@ impl Findings {
     pub fn has_required_fault(&self) -> bool {
         self.0
             .iter()
-            .any(|f| signal::REQUIRED.contains(&f.signal) && !f.faults().is_empty())
+            .any(|f| signal::is_indispensable(f.signal) && !f.faults().is_empty())
     }
 
     /// These findings with every fault corrected.
@@ -301,7 +304,8 @@ impl InstrumentFinding {
             (false, _) => InstrumentVerdict::Fault(faults.join(", ")),
             (true, true) if of(Kind::Delay).is_none() => InstrumentVerdict::NoDelay,
             (true, true) => InstrumentVerdict::Ok,
-            (true, false) => InstrumentVerdict::NotExcited,
+            (true, false) if self.examined => InstrumentVerdict::NotExcited,
+            (true, false) => InstrumentVerdict::NotExamined,
         };
         InstrumentRow {
             flight_id: flight_id.to_owned(),

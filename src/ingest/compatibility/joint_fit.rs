@@ -102,10 +102,11 @@ pub fn fit(
 /// Parameters of recorded instruments that are observable.
 fn estimated(windows: &[Window]) -> [bool; PARAMETERS] {
     let is_recorded = |i: usize| {
-        i < INPUTS
-            || windows
-                .iter()
-                .any(|w| w.outputs[i - INPUTS].iter().any(|v| v.is_finite()))
+        let of_window = |w: &Window| match i.checked_sub(INPUTS) {
+            None => w.is_recorded[i],
+            Some(output) => w.outputs[output].iter().any(|v| v.is_finite()),
+        };
+        windows.iter().any(of_window)
     };
     let mut estimated = [false; PARAMETERS];
     for i in (0..INSTRUMENTS).filter(|i| is_recorded(*i)) {

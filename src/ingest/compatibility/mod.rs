@@ -43,6 +43,16 @@ pub fn signals() -> BTreeSet<String> {
         .collect()
 }
 
+/// Removes a heading that is missing in most of a record: windows need it throughout where there is
+/// one, and the other instruments are found without it.
+fn leave_out_rare_heading(record: &mut Record) {
+    let heading = record.values(signal::PSI).unwrap_or_default();
+    let finite = heading.iter().filter(|v| v.is_finite()).count();
+    if 2 * finite < heading.len() {
+        record.signals.remove(signal::PSI);
+    }
+}
+
 /// Examines the instruments of a record; `recorded` are the signals that come from channels. A long
 /// record comes in `count` parts, each of which has its share of the windows.
 #[must_use]
@@ -59,7 +69,8 @@ pub fn examine(
     }
     let share = settings.windows.div_ceil(count.max(1));
     let mut windows = Vec::new();
-    for record in parts {
+    for mut record in parts {
+        leave_out_rare_heading(&mut record);
         let ranges = choose_windows(&record, share, settings).into_iter();
         windows.extend(ranges.map(|range| Window::of(&record, range, aircraft, settings)));
     }

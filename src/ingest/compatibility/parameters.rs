@@ -44,6 +44,23 @@ pub const SIGNALS: [&str; INSTRUMENTS] = [
     s::MACH,
 ];
 
+/// Outputs that the motion along each input decides, by their signals. Without the input their
+/// equations lack a term, and they are not compared.
+const DECIDED_BY: [(&str, &[&str]); INPUTS] = [
+    (s::P, &[s::PHI]),
+    (s::Q, &[s::THETA, s::ALPHA_VANE]),
+    (s::R, &[s::PSI, s::BETA_VANE]),
+    (s::AX, &[s::VELOCITY, s::QBAR, s::MACH]),
+    (s::AY, &[s::BETA_VANE]),
+    (s::AN, &[s::ALPHA_VANE, s::ALTITUDE]),
+];
+
+/// `true` for an output whose motion some input of a record does not decide.
+pub fn lacks_input(output: usize, is_recorded: impl Fn(&str) -> bool) -> bool {
+    let mut lacking = DECIDED_BY.iter().filter(|(input, _)| !is_recorded(input));
+    lacking.any(|(_, decided)| decided.contains(&SIGNALS[INPUTS + output]))
+}
+
 /// Index of a parameter among all.
 pub fn place(instrument: usize, kind: Kind) -> usize {
     instrument * KINDS + kind as usize

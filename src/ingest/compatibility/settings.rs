@@ -33,7 +33,7 @@ settings! {
         /// proportion.
         pub windows: usize = 20,
         /// Fewest windows for a result. Larger: short flights stay unexamined.
-        pub least_windows: usize = 3,
+        pub least_windows: usize = 1,
         /// Longest delay of a channel that is searched, s. A larger one is not found.
         pub longest_delay_s: f64 = 0.3,
         /// Change of the wind along the flight path within a window, ft/s². A climb of 100 ft/s

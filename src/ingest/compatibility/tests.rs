@@ -14,7 +14,7 @@ use super::window::{self, Window, choose_windows, input_factor};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
-use crate::flight::{Mark, signal as s};
+use crate::flight::{Mark, StandIn, signal as s};
 use crate::numerics::random::RandomStream;
 use crate::tables::InstrumentVerdict;
 use crate::units::{DEG, G0_FT_S2};
@@ -628,15 +628,88 @@ fn an_error_as_large_as_a_fault_but_not_as_sure_is_not_corrected() {
 
 #[test]
 fn a_flight_too_short_for_windows_has_no_estimates() {
-    // Too short for the least number of windows.
-    let findings = examined(&flight(15.0), &settings());
+    // A quarter of a window and both margins are 4.3 s.
+    let findings = examined(&flight(4.0), &settings());
     assert!(findings.0.iter().all(|f| f.estimates == [None; 3]));
     assert!(
         findings
             .rows("f")
             .iter()
-            .all(|r| r.verdict == InstrumentVerdict::NotExcited && r.applied.is_empty())
+            .all(|r| r.verdict == InstrumentVerdict::NotExamined && r.applied.is_empty())
     );
+}
+
+/// Puts a stand-in in the place of a recorded signal; a constant for α, and nothing for ψ.
+fn assume(record: &mut Record, lacking: &str) {
+    record.signals.remove(lacking);
+    if lacking == s::ALPHA_VANE {
+        let constant = Series::assumed(vec![11.3; record.samples]);
+        record.signals.insert(lacking.to_owned(), constant);
+    } else if let Some(stand_in) = StandIn::of(lacking, |other| other != lacking) {
+        stand_in.fill(lacking, record);
+    }
+}
+
+/// Share of the estimates within 1.96 bounds of the truth, over flights with other ordinary errors,
+/// and the number of estimates a flight.
+fn coverage(exact: &Record, seeds: u64, lacking: &[&str]) -> (f64, f64) {
+    let (mut within, mut count) = (0_u32, 0_u32);
+    for seed in 0..seeds {
+        let truth = ordinary(seed);
+        let mut record = recorded(exact, &truth, seed);
+        lacking.iter().for_each(|name| assume(&mut record, name));
+        let findings = examined(&record, &settings());
+        assert_eq!(faults(&findings), [], "seed {seed} without {lacking:?}");
+        for finding in findings.0 {
+            let i = SIGNALS.iter().position(|s| *s == finding.signal).unwrap();
+            for (kind, e) in finding.estimates.iter().enumerate() {
+                let Some(e) = e else { continue };
+                count += 1;
+                within += u32::from((e.value - truth[i * 3 + kind]).abs() < 1.96 * e.bound);
+            }
+        }
+    }
+    (
+        f64::from(within) / f64::from(count),
+        f64::from(count) / seeds as f64,
+    )
+}
+
+#[test]
+fn without_one_redundant_channel_the_others_are_found_with_bounds_that_hold() {
+    let exact = flight(65.0);
+    let (_, with_all) = coverage(&exact, 2, &[]);
+    for lacking in [
+        s::PSI,
+        s::ALTITUDE,
+        s::QBAR,
+        s::MACH,
+        s::THETA,
+        s::PHI,
+        s::BETA_VANE,
+        s::ALPHA_VANE,
+        s::VELOCITY,
+    ] {
+        let (within, count) = coverage(&exact, 2, &[lacking]);
+        assert!(
+            within > 0.9,
+            "without {lacking}: {within:.3} of {count} hold"
+        );
+        // Those of the channel itself, and few more, are not found.
+        assert!(
+            count > with_all - 9.0,
+            "without {lacking}: {count} of {with_all}"
+        );
+    }
+}
+
+#[test]
+fn one_window_has_bounds_that_hold() {
+    for seconds in [8.0, 15.0] {
+        let (within, count) = coverage(&flight(seconds), 12, &[]);
+        assert!(within > 0.9, "{seconds} s: {within:.3} of {count} hold");
+        assert!(count > 25.0, "{seconds} s: {count} found");
+    }
 }
 
 #[test]
@@ -684,6 +757,7 @@ fn marks_move_with_an_applied_correction() {
     let findings = Findings(vec![InstrumentFinding {
         signal: s::THETA,
         channel: "theta".into(),
+        examined: true,
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
     }]);
     findings
@@ -703,4 +777,41 @@ fn units_of_inputs_are_those_of_the_equations() {
     assert_abs_diff_eq!(input_factor(0) * DEG, 1.0);
     assert_abs_diff_eq!(input_factor(5), -G0_FT_S2);
     assert_eq!(equations::STATES, 7);
+}
+
+#[test]
+fn bounds_grow_without_a_redundant_channel() {
+    let exact = flight(65.0);
+    let record = recorded(&exact, &ordinary(3), 3);
+    let mut without_heading = record.clone();
+    assume(&mut without_heading, s::PSI);
+    let bound = |record: &Record, signal: &str, kind: Kind| {
+        let findings = examined(record, &settings()).0;
+        let own = findings.into_iter().find(|f| f.signal == signal).unwrap();
+        own.estimates[kind as usize].unwrap().bound
+    };
+    // The heading tells the yaw rate's bias more closely than anything else.
+    let [with, without] = [&record, &without_heading].map(|record| bound(record, s::R, Kind::Bias));
+    assert!(without > 1.2 * with, "{without} with {with}");
+}
+
+#[test]
+fn a_stand_in_is_no_instrument() {
+    let mut record = recorded(&flight(40.0), &ordinary(4), 4);
+    for lateral in [s::P, s::R, s::AY, s::PHI, s::BETA_VANE] {
+        let zeros = Series::assumed(vec![0.0; record.samples]);
+        record.signals.insert(lateral.to_owned(), zeros);
+    }
+    let windows = windows(&record);
+    assert!(!windows.is_empty());
+    for window in &windows {
+        assert_eq!(window.is_recorded, [false, true, false, true, false, true]);
+        // Without p, r and ay neither φ, ψ nor β follow.
+        let compared = window
+            .outputs
+            .iter()
+            .map(|v| v.iter().any(|v| v.is_finite()));
+        let expected = [true, false, true, true, false, false, true, true, true];
+        assert_eq!(compared.collect::<Vec<_>>(), expected);
+    }
 }

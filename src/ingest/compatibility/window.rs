@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 use super::equations::{MeasuredTerms, State};
-use super::parameters::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS};
+use super::parameters::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS, lacks_input};
 use super::settings::Compatibility;
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::earth::gravity_ft_s2;
@@ -42,7 +42,10 @@ pub struct Window {
     pub terms: Vec<MeasuredTerms>,
     /// Values of the inputs in the signals' units.
     pub inputs: [Vec<f64>; INPUTS],
-    /// Values of the outputs in the signals' units; NaN where a sample does not count.
+    /// `true` for an input with an instrument; the others have stand-ins.
+    pub is_recorded: [bool; INPUTS],
+    /// Values of the outputs in the signals' units; NaN where a sample does not count, and throughout
+    /// for an output without instrument.
     pub outputs: [Vec<f64>; OUTPUTS],
     /// The state as measured at the first sample.
     pub start: State,
@@ -98,8 +101,11 @@ pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
     samples(settings.longest_delay_s, step_s) + 3
 }
 
+/// Least share of a window's length of the only window of a record.
+const ONLY_WINDOW: usize = 4;
+
 /// Windows of the configured length, or at least half of it, over which the equations can be
-/// integrated.
+/// integrated. Of a record too short for one its longest part is the window.
 fn usable_windows(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     let decimation = decimation(record.step_s);
     let length = samples(settings.window_s, record.step_s).max(2 * decimation);
@@ -112,6 +118,12 @@ fn usable_windows(record: &Record, settings: &Compatibility) -> Vec<Range<usize>
             found.push(first..end);
             first = end;
         }
+    }
+    if found.is_empty() {
+        let runs = usable_runs(record).into_iter();
+        let inner = runs.map(|run| run.start + margin..run.end.saturating_sub(margin));
+        let longest = inner.max_by_key(ExactSizeIterator::len);
+        found.extend(longest.filter(|run| run.len() >= length / ONLY_WINDOW));
     }
     found
 }
@@ -195,8 +207,12 @@ impl Window {
                 decimation,
             )
         };
-        let output =
-            |o: usize| decimate(&measured(record, SIGNALS[INPUTS + o], &range), decimation);
+        let output = |o: usize| {
+            if lacks_input(o, |signal| record.is_recorded(signal)) {
+                return vec![f64::NAN; samples];
+            }
+            decimate_measured(record, SIGNALS[INPUTS + o], &range, decimation)
+        };
         let centres: Vec<usize> = range
             .clone()
             .step_by(decimation)
@@ -218,6 +234,7 @@ impl Window {
             ),
             terms,
             inputs: std::array::from_fn(input),
+            is_recorded: std::array::from_fn(|i| record.is_recorded(SIGNALS[i])),
             outputs: std::array::from_fn(output),
         }
     }
@@ -251,16 +268,33 @@ fn decimate(values: &[f64], decimation: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Measured values of a signal over a range; NaN where a sample was repaired or not recorded.
-fn measured(record: &Record, name: &str, range: &Range<usize>) -> Vec<f64> {
-    let Some(series) = record.signals.get(name) else {
-        return vec![f64::NAN; range.len()];
+/// Measured values of a signal over a range; NaN where a sample was repaired or not recorded. Beside a
+/// measured value of a slow channel the samples on the line to the next are averaged with it, so that
+/// the mean is that at the middle.
+fn decimate_measured(
+    record: &Record,
+    name: &str,
+    range: &Range<usize>,
+    decimation: usize,
+) -> Vec<f64> {
+    let series = record.signals.get(name);
+    let Some((values, marks)) =
+        series.and_then(|s| Some((s.values.get(range.clone())?, s.marks.get(range.clone())?)))
+    else {
+        return vec![f64::NAN; range.len() / decimation];
     };
-    let sample = |k: usize| match series.marks.get(k) {
-        Some(Mark::Measured) => series.values[k],
-        _ => f64::NAN,
+    let means = decimate(values, decimation).into_iter();
+    let counts = |marks: &[Mark]| {
+        marks.contains(&Mark::Measured)
+            && marks
+                .iter()
+                .all(|m| matches!(m, Mark::Measured | Mark::Between))
     };
-    range.clone().map(sample).collect()
+    let counted = marks.chunks_exact(decimation).map(counts);
+    means
+        .zip(counted)
+        .map(|(mean, counts)| if counts { mean } else { f64::NAN })
+        .collect()
 }
 
 fn measured_terms(record: &Record, k: usize, aircraft: &Aircraft) -> MeasuredTerms {

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::equations::STATES;
 use super::parameters::{INPUTS, Kind, OUTPUTS, Parameters};
 use super::reconstruction::{LOCAL, Local, WIND, reconstruct};
 use super::settings::Compatibility;
@@ -16,6 +17,13 @@ use crate::output_error::coloured;
 /// Least standard deviation of an output's residuals, as a share of its ordinary bias: keeps the
 /// weights of exact (simulated) data finite.
 const LEAST_DEVIATION: f64 = 1e-3;
+
+/// Output whose instrument reads each state: V, β, α, φ, θ, ψ, altitude.
+const READ_BY: [usize; STATES] = [2, 1, 0, 4, 3, 5, 6];
+
+/// Standard deviations about the assumed value of an initial state that no instrument reads, ft/s,
+/// rad and ft: wide, so that the other outputs decide what they can.
+const UNREAD_START: [f64; STATES] = [100.0, 100.0, 100.0, 1.0, 1.0, 1.0, 5_000.0];
 
 /// Inputs of the fit that are common to all windows.
 pub struct FitContext<'a> {
@@ -117,7 +125,8 @@ impl<'a> WindowFit<'a> {
         WindowFit::at(self.window, context, local, self.variances, shared)
     }
 
-    /// Adds up the outputs' sums, each with its weight 1/R, and the prior of the wind's change.
+    /// Adds up the outputs' sums, each with its weight 1/R, and the priors of the wind's change and of
+    /// initial states without instrument.
     fn weigh(&mut self, context: &FitContext) {
         let mut sums = WindowSums::zero();
         for (output, own) in self.output_sums.iter().enumerate() {
@@ -129,8 +138,20 @@ impl<'a> WindowFit<'a> {
             sums.local_gradient[j] -= self.local[j] / (wind * wind);
             sums.cost += (self.local[j] / wind).powi(2);
         }
+        for j in (0..STATES).filter(|j| !self.reads(READ_BY[*j], context)) {
+            let (from_start, size) = (self.local[j] - self.window.start[j], UNREAD_START[j]);
+            sums.local_information[(j, j)] += 1.0 / (size * size);
+            sums.local_gradient[j] -= from_start / (size * size);
+            sums.cost += (from_start / size).powi(2);
+        }
         (self.information, self.gradient) = sums.reduced();
         self.sums = sums;
+    }
+
+    /// `true` where an output is compared.
+    fn reads(&self, output: usize, context: &FitContext) -> bool {
+        let compared = self.window.outputs[output].get(context.compared(self.window));
+        compared.is_some_and(|values| values.iter().any(|v| v.is_finite()))
     }
 
     /// Estimates R anew from the residuals: coloured noise counts as white noise as strong as its

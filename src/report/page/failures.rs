@@ -11,7 +11,7 @@ use crate::report::table_view::TableView;
 use crate::schema::Words;
 use crate::tables::{
     ALL_FLIGHTS, ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, FlightRow, InstrumentRow,
-    InstrumentVerdict, Outcome,
+    Outcome,
 };
 
 /// The tables of failures, without empty ones.
@@ -193,7 +193,7 @@ fn instruments(contents: &Contents) -> TableView {
     for row in contents
         .instruments
         .iter()
-        .filter(|row| row.verdict != InstrumentVerdict::NotExcited)
+        .filter(|row| !row.verdict.is_unknown())
         .filter(|row| row.flight_id != ALL_FLIGHTS)
     {
         by_channel

@@ -1,0 +1,273 @@
+//! Stand-ins: what takes the place of a signal that a flight does not record.
+//!
+//! The equations of motion read every signal of [`signal::REQUIRED`]. Few of them decide the
+//! derivatives of an axis; the others can be assumed or computed, at a cost that is stated.
+
+use serde::{Deserialize, Serialize};
+
+use super::record::{Record, Series};
+use super::signal as s;
+use crate::earth::air;
+
+/// Source of the values of a signal that is not recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum StandIn {
+    /// One value throughout, in the signal's unit.
+    Value(f64),
+    /// V over the speed of sound of the standard atmosphere.
+    MachOfVelocity,
+    /// Mach number times the speed of sound of the standard atmosphere.
+    VelocityOfMach,
+    /// √(2 q̄/ρ) in the standard atmosphere.
+    VelocityOfPressure,
+    /// ρ V²/2 in the standard atmosphere.
+    PressureOfVelocity,
+    /// Altitude of the standard atmosphere with the density 2 q̄/V².
+    AltitudeOfPressure,
+    /// Pitch attitude of level flight: θ = α.
+    ThetaOfAlpha,
+}
+
+/// Signals that only the lateral derivatives need. Without one of them the longitudinal equations
+/// take straight flight with level wings.
+pub const LATERAL: [&str; 5] = [s::BETA_VANE, s::P, s::R, s::PHI, s::AY];
+
+/// Signals that only the longitudinal derivatives need. α is not among them: the lateral equations
+/// need it, if only as a constant.
+pub const LONGITUDINAL: [&str; 4] = [s::Q, s::THETA, s::AN, s::AX];
+
+impl StandIn {
+    /// Stand-in of a signal, where there is one. `has` is `true` for a signal that is recorded or
+    /// given as a constant.
+    #[must_use]
+    pub fn of(signal: &str, has: impl Fn(&str) -> bool) -> Option<StandIn> {
+        let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
+        match signal {
+            s::RPM_LEFT | s::RPM_RIGHT | s::THRUST | s::IXZ => Some(StandIn::Value(0.0)),
+            s::MACH if has(s::VELOCITY) || has(s::QBAR) => Some(StandIn::MachOfVelocity),
+            s::VELOCITY if has_all(&[s::MACH, s::ALTITUDE]) => Some(StandIn::VelocityOfMach),
+            s::VELOCITY if has_all(&[s::QBAR, s::ALTITUDE]) => Some(StandIn::VelocityOfPressure),
+            s::QBAR if has(s::ALTITUDE) && (has(s::VELOCITY) || has(s::MACH)) => {
+                Some(StandIn::PressureOfVelocity)
+            }
+            s::ALTITUDE if has_all(&[s::VELOCITY, s::QBAR]) => Some(StandIn::AltitudeOfPressure),
+            s::THETA if has_all(&LATERAL) => Some(StandIn::ThetaOfAlpha),
+            s::AN if has_all(&LATERAL) => Some(StandIn::Value(1.0)),
+            s::Q | s::AX if has_all(&LATERAL) => Some(StandIn::Value(0.0)),
+            lateral if LATERAL.contains(&lateral) => {
+                has_all(&LONGITUDINAL).then_some(StandIn::Value(0.0))
+            }
+            _ => None,
+        }
+    }
+
+    /// The stand-in in words: `is taken as 0`.
+    #[must_use]
+    pub fn in_words(self) -> String {
+        match self {
+            StandIn::Value(value) => format!("is taken as {value}"),
+            StandIn::MachOfVelocity => "is computed from V in the standard atmosphere".to_owned(),
+            StandIn::VelocityOfMach => "is computed from Mach and altitude".to_owned(),
+            StandIn::VelocityOfPressure | StandIn::PressureOfVelocity => {
+                "is computed from the other air data in the standard atmosphere".to_owned()
+            }
+            StandIn::AltitudeOfPressure => "is computed from V and q̄".to_owned(),
+            StandIn::ThetaOfAlpha => "is taken as α, as in level flight".to_owned(),
+        }
+    }
+
+    /// Signals that a computed stand-in is computed from.
+    #[must_use]
+    pub fn sources(self) -> &'static [&'static str] {
+        match self {
+            StandIn::Value(_) => &[],
+            StandIn::MachOfVelocity | StandIn::PressureOfVelocity => &[s::VELOCITY, s::ALTITUDE],
+            StandIn::VelocityOfMach => &[s::MACH, s::ALTITUDE],
+            StandIn::VelocityOfPressure => &[s::QBAR, s::ALTITUDE],
+            StandIn::AltitudeOfPressure => &[s::VELOCITY, s::QBAR],
+            StandIn::ThetaOfAlpha => &[s::ALPHA_VANE],
+        }
+    }
+
+    /// Values from those of the sources, sample by sample.
+    fn value(self, sources: &[f64]) -> f64 {
+        let [a, b] = [0, 1].map(|i| sources.get(i).copied().unwrap_or(f64::NAN));
+        match self {
+            StandIn::Value(value) => value,
+            StandIn::MachOfVelocity => a / air(b).sound_ft_s,
+            StandIn::VelocityOfMach => a * air(b).sound_ft_s,
+            StandIn::VelocityOfPressure => (2.0 * a / air(b).density_slug_ft3).sqrt(),
+            StandIn::PressureOfVelocity => 0.5 * air(b).density_slug_ft3 * a * a,
+            StandIn::AltitudeOfPressure => altitude_ft(2.0 * b / (a * a)),
+            StandIn::ThetaOfAlpha => a,
+        }
+    }
+
+    /// Puts the stand-in in the place of the signal.
+    pub fn fill(self, signal: &str, record: &mut Record) {
+        let sources: Option<Vec<&[f64]>> = self
+            .sources()
+            .iter()
+            .map(|name| record.values(name))
+            .collect();
+        let Some(sources) = sources else {
+            return;
+        };
+        let value = |k: usize| {
+            let at_sample: Vec<f64> = sources.iter().map(|values| values[k]).collect();
+            self.value(&at_sample)
+        };
+        let values: Vec<f64> = (0..record.samples).map(value).collect();
+        record
+            .signals
+            .insert(signal.to_owned(), Series::assumed(values));
+    }
+}
+
+/// Altitudes between which a density is looked for, ft.
+const ALTITUDES_FT: (f64, f64) = (-2_000.0, 100_000.0);
+
+/// Halvings of that range: to less than a thousandth of a foot.
+const HALVINGS: usize = 28;
+
+/// Altitude of the standard atmosphere with a density, ft; NaN for a density of no altitude.
+fn altitude_ft(density_slug_ft3: f64) -> f64 {
+    let (mut low, mut high) = ALTITUDES_FT;
+    let is_inside = air(high).density_slug_ft3 <= density_slug_ft3
+        && density_slug_ft3 <= air(low).density_slug_ft3;
+    if !is_inside {
+        return f64::NAN;
+    }
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if air(middle).density_slug_ft3 > density_slug_ft3 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Order in which stand-ins are computed: each after those that it may be computed from.
+const FIRST: [&str; 2] = [s::VELOCITY, s::ALTITUDE];
+
+/// Stand-ins of the required signals that a flight lacks, in the order in which they are computed.
+/// `has` is `true` for a signal that is recorded or given as a constant.
+///
+/// # Errors
+/// The first required signal that nothing stands for.
+pub fn stand_ins(has: impl Fn(&str) -> bool) -> Result<Vec<(String, StandIn)>, &'static str> {
+    let others = s::REQUIRED.iter().filter(|name| !FIRST.contains(name));
+    let lacking = FIRST.iter().chain(others).filter(|name| !has(name));
+    let of_signal = |name: &&'static str| match StandIn::of(name, &has) {
+        Some(stand_in) => Ok(((*name).to_owned(), stand_in)),
+        None => Err(*name),
+    };
+    lacking.map(of_signal).collect()
+}
+
+/// Cost of the absence of a signal, in words.
+#[must_use]
+pub fn cost(signal: &str) -> &'static str {
+    match signal {
+        s::RPM_LEFT | s::RPM_RIGHT => {
+            "the gyroscopic moment of this engine is charged to the moments of q and r"
+        }
+        s::THRUST => "the constant of CA is that of the axial force less the thrust",
+        s::IXZ => {
+            "roll and yaw are taken as uncoupled: Cl and Cn derivatives take a share of each other"
+        }
+        s::MACH => "tunnel tables over Mach are read at the standard atmosphere's",
+        s::VELOCITY | s::QBAR => {
+            "every derivative has the error of the standard atmosphere and of the other air data"
+        }
+        s::ALTITUDE => "gravity and the density have the error of the other air data",
+        s::PSI => "the errors of the other instruments are found with larger bounds",
+        signal if LATERAL.contains(&signal) => {
+            "there are no lateral derivatives; the longitudinal ones take level wings without sideslip"
+        }
+        signal if LONGITUDINAL.contains(&signal) => {
+            "there are no longitudinal derivatives; the lateral ones take level flight"
+        }
+        _ => "nothing stands for it",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Mark;
+    use approx::assert_relative_eq;
+
+    /// Signals of a recorder that has all of the required ones but some.
+    fn all_but<'a>(missing: &'a [&'a str]) -> impl Fn(&str) -> bool + 'a {
+        move |signal| s::REQUIRED.contains(&signal) && !missing.contains(&signal)
+    }
+
+    fn record(signals: &[(&str, f64)]) -> Record {
+        let series = |value: f64| Series {
+            values: vec![value; 3],
+            marks: vec![Mark::Measured; 3],
+        };
+        Record {
+            flight_id: "f".to_owned(),
+            start_s: 0.0,
+            step_s: 0.02,
+            samples: 3,
+            signals: signals
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), series(*value)))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn one_axis_can_be_assumed_but_not_both() {
+        let level = StandIn::of(s::PHI, all_but(&[s::PHI, s::P]));
+        assert_eq!(level, Some(StandIn::Value(0.0)));
+        assert_eq!(
+            StandIn::of(s::THETA, all_but(&[s::THETA, s::Q])),
+            Some(StandIn::ThetaOfAlpha)
+        );
+        let neither = [s::PHI, s::THETA];
+        assert_eq!(StandIn::of(s::PHI, all_but(&neither)), None);
+        assert_eq!(StandIn::of(s::THETA, all_but(&neither)), None);
+        for needed in [s::MASS, s::IX, s::IY, s::IZ, s::X_CG, s::ALPHA_VANE] {
+            assert_eq!(StandIn::of(needed, all_but(&[needed])), None, "{needed}");
+        }
+    }
+
+    #[test]
+    fn air_data_follow_from_each_other() {
+        // 25,000 ft: density 0.00106525 slug/ft3 and sound 1016.1 ft/s (U.S. Standard Atmosphere).
+        let (altitude, velocity) = (25_000.0, 500.0);
+        let qbar = 0.5 * air(altitude).density_slug_ft3 * velocity * velocity;
+        let mach = velocity / air(altitude).sound_ft_s;
+        assert_relative_eq!(qbar, 0.5 * 0.001_065_25 * 250_000.0, max_relative = 1e-3);
+        let all = [
+            (s::ALTITUDE, altitude),
+            (s::VELOCITY, velocity),
+            (s::QBAR, qbar),
+            (s::MACH, mach),
+        ];
+        for (lacking, truth) in all {
+            let given: Vec<(&str, f64)> = all.into_iter().filter(|(n, _)| *n != lacking).collect();
+            let mut record = record(&given);
+            StandIn::of(lacking, all_but(&[lacking]))
+                .unwrap()
+                .fill(lacking, &mut record);
+            assert_relative_eq!(
+                record.values(lacking).unwrap()[1],
+                truth,
+                max_relative = 1e-6
+            );
+            assert_eq!(record.signals[lacking].marks[1], Mark::Assumed);
+        }
+    }
+
+    #[test]
+    fn a_density_of_no_altitude_has_no_altitude() {
+        assert!(altitude_ft(1.0).is_nan() && altitude_ft(f64::NAN).is_nan());
+    }
+}
