@@ -3,7 +3,7 @@
 use crate::aircraft::Aircraft;
 use crate::error::did_you_mean;
 use crate::flight::Record;
-use crate::maneuver::{Class, Event, Maneuver};
+use crate::maneuver::{Class, Event, Maneuver, Unknown};
 use crate::tables::{EventRow, EventVerdict};
 
 use super::segmented::Segmented;
@@ -53,6 +53,11 @@ pub fn with_events(
             Err(reason) => problems.push(problems::at_time(record, event.start_s, reason)),
         }
     }
+    let (explained, unknown): (Vec<Unknown>, Vec<Unknown>) = unknown
+        .into_iter()
+        .partition(|u| given.iter().any(|g| explains(g, u)));
+    let explained = problems::of_unknown(record, &explained);
+    problems.retain(|problem| !explained.contains(problem));
     let kept: Vec<Maneuver> = found
         .into_iter()
         .filter(|f| !given.iter().any(|g| replaces(g, f)))
@@ -112,6 +117,12 @@ fn replaces(given: &Maneuver, found: &Maneuver) -> bool {
     overlap_s(found, given.start_s, given.end_s) > REPLACING_SHARE * shorter_s
 }
 
+/// True for excitation of no class of which the analyst's maneuver has more than half.
+fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
+    let lasting_s = unknown.end_s - unknown.start_s;
+    overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s
+}
+
 /// The maneuver of an event.
 ///
 /// # Errors
@@ -134,11 +145,12 @@ fn maneuver_of_event(
         record.time_s(0),
         record.time_s(record.samples.saturating_sub(1)),
     );
-    // Times in the analyst's list may be rounded by half a sample.
-    let half = record.step_s / 2.0;
-    let inside = first_s - half <= event.start_s
-        && event.start_s < event.end_s
-        && event.end_s <= last_s + half;
+    // The analyst reads times from a chart: an event may reach beyond the record by as much as events
+    // and maneuvers that agree may differ. It is cut at the end.
+    let inside = first_s - AGREEMENT_S <= event.start_s
+        && event.start_s < event.end_s.min(last_s)
+        && event.end_s.max(first_s) > event.start_s
+        && event.end_s <= last_s + AGREEMENT_S;
     if !inside {
         let (start, end) = (event.start_s, event.end_s);
         return Err(format!(

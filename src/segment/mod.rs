@@ -28,6 +28,8 @@ use crate::flight::Record;
 use crate::maneuver::Class;
 use recognition::detections::Detections;
 use recognition::recognise::recognise;
+use recognition::stand_ins::with_surfaces_for_controls;
+use recognition::unclassified::nothing_found;
 use recognition::windows::windows;
 
 pub use events::with_events;
@@ -68,8 +70,11 @@ pub fn maneuvers(
     settings: &Settings,
 ) -> Segmented {
     let detections = Detections::of(record, settings);
-    let mut recognition = recognise(&detections, classes);
+    let recognised_as = with_surfaces_for_controls(record, classes, settings);
+    let mut recognition = recognise(&detections, &recognised_as);
     recognition.remove_overlaps();
+    let nothing = nothing_found(&detections, &recognition);
+    recognition.unknown.extend(nothing);
     let windows = windows(&detections, &recognition.found);
     let mut problems = problems::of_unknown(record, &recognition.unknown);
     problems.extend(problems::of_missing_signals(record, classes, settings));

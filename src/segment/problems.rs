@@ -50,6 +50,7 @@ pub(super) fn of_missing_signals(
         .iter()
         .flat_map(|c| c.recognition.flags.keys())
         .chain([&settings.excitation_flag])
+        .filter(|flag| !flag.is_empty())
         .collect();
     let counted = classes.iter().flat_map(|c| c.recognition.counted());
     let needed: BTreeSet<&String> = counted

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 
 use super::settings::{Actuator, Limits};
 use crate::aero::Axis;
+use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
@@ -60,8 +61,15 @@ pub(super) fn measure(
         marked_share: marked_share(record, class, maneuver),
         ..Quality::default()
     };
-    let reason = reasons(&measured, limits).join("; ");
-    let verdict = if reason.is_empty() || is_given {
+    let not_recorded = outputs_not_recorded(record, class.axis);
+    let beyond = reasons(&measured, limits);
+    let all: Vec<&str> = not_recorded
+        .iter()
+        .chain(&beyond)
+        .map(String::as_str)
+        .collect();
+    let reason = all.join("; ");
+    let verdict = if reason.is_empty() || is_given && not_recorded.is_none() {
         Acceptance::Accepted
     } else {
         Acceptance::Rejected
@@ -71,6 +79,15 @@ pub(super) fn measure(
         reason,
         ..measured
     }
+}
+
+/// The reason for which the axis cannot be estimated: outputs that have stand-ins in the record.
+fn outputs_not_recorded(record: &Record, axis: Axis) -> Option<String> {
+    let outputs = axis.outputs().into_iter().map(|output| output.signal());
+    let lacking: Vec<&str> = outputs
+        .filter(|signal| record.signals.get(*signal).is_some_and(Series::is_assumed))
+        .collect();
+    (!lacking.is_empty()).then(|| format!("{} is not recorded", lacking.join(", ")))
 }
 
 /// The angular rates of an axis and of the other axis.

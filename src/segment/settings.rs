@@ -7,8 +7,8 @@ use crate::settings::{elements, settings};
 settings! {
     /// Settings of the search for maneuvers; times in s.
     pub struct Settings {
-        /// Flag signal that is up while the on-board excitation system moves the surfaces. It is
-        /// drawn, and a flight without it is listed in `problems`. A surface that steps while it is
+        /// Flag signal that is up while the on-board excitation system moves the surfaces; may be
+        /// left out. It is drawn, and a flight without it is listed in `problems`. A surface that steps while it is
         /// up is not taken for feedback to the pilot, unless the flag is stuck.
         pub excitation_flag: String = String::new(),
         /// Signals of the pilot's controls. A surface that steps with one of them is geared to it,

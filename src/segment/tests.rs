@@ -904,15 +904,124 @@ fn a_missing_signal_is_a_problem_and_the_rest_is_segmented() {
 }
 
 #[test]
-fn without_pilot_controls_only_a_flag_attributes_steps_to_the_system() {
+fn without_pilot_controls_steps_of_surfaces_stand_for_them_with_less_confidence() {
     let mut r = flight(60);
     three_two_one_one(&mut r, 21.0);
+    let confidence = |r: &Record| {
+        let segmented = found(r);
+        assert_eq!(classes_of(&segmented), ["3211"]);
+        segmented.maneuvers[0].recognised.confidence.unwrap()
+    };
+    let with_controls = confidence(&r);
     for name in ["stick_pitch_in", "stick_lat_in", "pedal_in"] {
         r.signals.remove(name);
     }
-    assert_eq!(found(&r).maneuvers, []);
+    let without = confidence(&r);
+    assert_abs_diff_eq!(without, 0.9 * with_controls, epsilon = 1e-12);
+    let evidence = &found(&r).maneuvers[0].recognised.evidence;
+    assert!(evidence.contains("stand for the pilot's"), "{evidence}");
+}
+
+#[test]
+fn a_class_that_the_pilot_flies_is_found_by_its_surfaces_where_no_stick_is_recorded() {
+    let mut r = flight(60);
+    pilot_steps(&mut r, "de_deg", 20.0, 4.0, 7, 1.4);
+    let mut own = classes();
+    own.retain(|class| class.name == "PITCH");
+    own[0].recognition.surfaces = vec!["de_deg".to_owned()];
+    let find = |r: &Record| maneuvers(r, &own, &aircraft(), &settings());
+    assert_eq!(find(&r).maneuvers, []);
+    for name in ["stick_pitch_in", "stick_lat_in", "pedal_in"] {
+        r.signals.remove(name);
+    }
+    assert_eq!(classes_of(&find(&r)), ["PITCH"]);
+}
+
+#[test]
+fn a_recording_that_is_the_maneuver_is_found_without_quiet_flight() {
+    // The record begins as the inputs do, and the pulses go on to its end.
+    let mut r = flight(12);
+    three_two_one_one(&mut r, 0.5);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["3211"]);
+    let found = &segmented.maneuvers[0];
+    assert_abs_diff_eq!(found.start_s, 0.0, epsilon = 0.1);
+    assert_abs_diff_eq!(found.end_s, 12.0, epsilon = 0.1);
+}
+
+#[test]
+fn a_recording_in_which_nothing_is_recognised_says_so() {
+    let mut single = flight(20);
+    edges(&mut single, "de_deg", &[(8.0, 3.0), (9.0, -3.0)]);
+    let segmented = found(&single);
+    assert_eq!(segmented.unknown.len(), 1, "{:?}", segmented.unknown);
+    assert_eq!(segmented.unknown[0].inputs, "de_deg 2");
+    let segmented = found(&flight(20));
+    let reason = &segmented.unknown[0].reason;
+    assert!(
+        reason.contains("de_deg 0.") && reason.contains(" of 2"),
+        "{reason}"
+    );
+    // In a longer flight ordinary flying is no news.
+    assert_eq!(found(&flight(60)).unknown, []);
+}
+
+#[test]
+fn a_signal_that_no_class_moves_is_unknown() {
+    let mut r = flight(60);
+    doublet(&mut r, "dsa_deg", 20.0, 5.0);
+    let mut pilots = classes();
+    pilots.retain(|class| class.name == "PITCH");
+    let segmented = maneuvers(&r, &pilots, &aircraft(), &settings());
+    assert_eq!(segmented.unknown.len(), 1);
+    assert_eq!(segmented.unknown[0].inputs, "dsa_deg 3");
+}
+
+#[test]
+fn an_event_that_touches_the_ends_is_taken_and_explains_what_was_unknown() {
+    let mut r = flight(20);
+    edges(&mut r, "de_deg", &[(8.0, 3.0), (9.0, -3.0)]);
+    let event = |start_s, end_s| Event {
+        flight_id: "f1".into(),
+        class: "3211".into(),
+        start_s,
+        end_s,
+    };
+    let taken = |event: Event| {
+        let limits = settings().quality;
+        with_events(found(&r), &r, &[event], &classes(), &aircraft(), &limits).0
+    };
+    let whole = taken(event(-0.05, 20.1));
+    assert_eq!(
+        (whole.unknown.len(), whole.problems.len()),
+        (0, 0),
+        "{whole:?}"
+    );
+    assert_abs_diff_eq!(whole.maneuvers[0].start_s, 0.0);
+    assert_abs_diff_eq!(whole.maneuvers[0].end_s, 20.0);
+    assert_eq!(taken(event(-3.0, 20.0)).maneuvers, []);
+    assert_eq!(taken(event(20.5, 20.9)).maneuvers, []);
+}
+
+#[test]
+fn a_maneuver_of_an_axis_whose_output_is_not_recorded_is_rejected_and_named() {
+    let mut r = flight(60);
     up(&mut r, "obes", 20.0, 33.0);
-    assert_eq!(classes_of(&found(&r)), ["3211"]);
+    three_two_one_one(&mut r, 21.0);
+    let verdict = |r: &Record| found(r).maneuvers[0].quality.clone();
+    assert_eq!(verdict(&r).verdict, Acceptance::Accepted);
+    let assume = |r: &mut Record, name: &str| {
+        let samples = r.samples;
+        r.signals
+            .insert(name.into(), Series::assumed(vec![0.0; samples]));
+    };
+    // Of the other axis.
+    assume(&mut r, signal::PHI);
+    assert_eq!(verdict(&r).verdict, Acceptance::Accepted);
+    assume(&mut r, signal::THETA);
+    let rejected = verdict(&r);
+    assert_eq!(rejected.verdict, Acceptance::Rejected);
+    assert!(rejected.reason.contains("theta_deg is not recorded"));
 }
 
 /// A sine whose frequency rises evenly, its size as given, from one time to another.
@@ -1282,7 +1391,7 @@ fn samples_of_one_axis_count_once() {
 
 #[test]
 fn without_events_nothing_is_compared() {
-    let r = flight(10);
+    let r = flight(60);
     assert_eq!(
         with_events(
             found(&r),

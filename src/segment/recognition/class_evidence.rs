@@ -80,7 +80,8 @@ fn findings(segment: &Segment, class: &Class) -> Vec<Finding> {
         }
     }
     if !segment.detections.pilot_is_recorded {
-        let words = "no pilot control is recorded".to_owned();
+        let words =
+            "no pilot control is recorded: steps of surfaces stand for the pilot's".to_owned();
         findings.push(Finding::new(PILOT_NOT_RECORDED, words));
     }
     findings

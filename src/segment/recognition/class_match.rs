@@ -29,7 +29,7 @@ pub(super) fn mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
         }
     }
     if segment.is_onboard() {
-        mismatches.extend(pilot_mismatch(segment, class));
+        mismatches.extend(pilot_mismatch(segment));
     }
     mismatches
 }
@@ -53,21 +53,10 @@ fn step_mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
     mismatches
 }
 
-/// The reason why steps of surfaces are not attributed to the on-board system.
-fn pilot_mismatch(segment: &Segment, class: &Class) -> Option<Mismatch> {
+/// The reason why steps of surfaces are not attributed to the on-board system. Without recorded pilot
+/// controls they stand for the pilot's steps, and nothing contradicts.
+fn pilot_mismatch(segment: &Segment) -> Option<Mismatch> {
     let detections = segment.detections;
-    let flags = &class.recognition.flags;
-    let a_flag_is_up = || {
-        flags
-            .iter()
-            .any(|(flag, up)| *up && segment.flag_is_up(flag) == Some(true))
-    };
-    if !detections.pilot_is_recorded && !a_flag_is_up() {
-        return Some(Mismatch::contradiction(
-            "no pilot control is recorded and no flag says that the surfaces moved by themselves"
-                .to_owned(),
-        ));
-    }
     let n = detections.count_pilot_steps(segment.from_s, segment.to_s);
     (n > CORRECTION_STEPS)
         .then(|| Mismatch::contradiction(format!("the pilot's controls step {n} times meanwhile")))

@@ -18,6 +18,7 @@ mod pilot_sequences;
 pub(super) mod recognise;
 mod segment;
 mod sequences;
+pub(super) mod stand_ins;
 mod sweeps;
-mod unclassified;
+pub(super) mod unclassified;
 pub(super) mod windows;

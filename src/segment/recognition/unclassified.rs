@@ -4,9 +4,12 @@ use std::collections::BTreeSet;
 
 use super::class_match::mismatches;
 use super::cuts::CutSearch;
+use super::detections::Detections;
+use super::found::Recognition;
 use super::mismatch::Mismatch;
 use super::segment::Segment;
 use crate::maneuver::{Class, Unknown};
+use crate::segment::steps::detection::{is_maneuver_alone, largest_change};
 
 /// Fewest steps of pilot controls that are more than ordinary flying: four reversals.
 const FEWEST_PILOT_STEPS: usize = 4;
@@ -18,10 +21,11 @@ const CUT_AT_START_S: f64 = 1.0;
 ///
 /// They are reported where a signal goes to one side, to the other by more than in ordinary flying,
 /// and back. Pilots move their controls anyway: a few of their steps, or steps among which no class
-/// has one of its inputs complete, are not reported.
+/// has one of its inputs complete, are not reported. In a recording that may be one maneuver everything
+/// is reported.
 pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<Unknown> {
     let segment = search.segment(steps);
-    let (class, mismatches) = search
+    let nearest = search
         .classes
         .iter()
         .map(|class| (*class, mismatches(&segment, class)))
@@ -30,17 +34,59 @@ pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<U
                 usize::MAX - segment.count_explained(class),
                 mismatches.len(),
             )
-        })?;
+        });
     let signals: BTreeSet<&str> = search.sequence.steps.iter().map(|s| s.signal).collect();
-    if !signals.into_iter().any(|s| segment.is_excitation(s)) {
+    let reports_all = is_maneuver_alone(search.detections.record);
+    if !reports_all && !signals.iter().any(|s| segment.is_excitation(s)) {
         return None;
     }
+    let Some((class, mismatches)) = nearest else {
+        let reason = "no class has inputs of this kind".to_owned();
+        return Some(unknown(search, &segment, String::new(), reason));
+    };
     let is_incomplete = mismatches.iter().any(Mismatch::is_shortfall);
-    if !segment.is_onboard() && is_incomplete && !is_series(&segment, class) {
+    let is_flying = !segment.is_onboard() && is_incomplete && !is_series(&segment, class);
+    if is_flying && !reports_all {
         return None;
     }
     let reason = reason_in_words(&segment, class, &mismatches);
     Some(unknown(search, &segment, class.name.clone(), reason))
+}
+
+/// Reports a recording that may be one maneuver and in which nothing was found.
+pub(in crate::segment) fn nothing_found(
+    detections: &Detections,
+    recognition: &Recognition,
+) -> Option<Unknown> {
+    let record = detections.record;
+    let is_empty = recognition.found.is_empty() && recognition.unknown.is_empty();
+    if !is_empty || !is_maneuver_alone(record) {
+        return None;
+    }
+    let (start_s, end_s) = (
+        record.start_s,
+        record.time_s(record.samples.saturating_sub(1)),
+    );
+    let change = |(signal, set): (&String, &f64)| {
+        let settings = detections.settings;
+        let largest = largest_change(record, signal, settings, (start_s, end_s));
+        let is_recorded = record.signals.contains_key(signal);
+        is_recorded.then(|| format!("{signal} {largest:.2} of {set}"))
+    };
+    let changes = detections.settings.steps.iter().filter_map(change);
+    let changes: Vec<String> = changes.collect();
+    Some(Unknown {
+        flight_id: record.flight_id.clone(),
+        start_s,
+        end_s,
+        inputs: String::new(),
+        nearest_class: String::new(),
+        reason: format!(
+            "no signal steps enough for a maneuver; largest changes and the smallest that is a step \
+             (segment: steps): {}",
+            changes.join(", ")
+        ),
+    })
 }
 
 /// Reports a segment that fits several classes alike.
@@ -67,6 +113,8 @@ fn unknown(
         .iter()
         .flat_map(|c| c.recognition.counted())
         .map(String::as_str);
+    let own = search.sequence.steps.iter().map(|step| step.signal);
+    let counted = counted.chain(own.filter(|_| search.classes.is_empty()));
     Unknown {
         flight_id: segment.detections.record.flight_id.clone(),
         start_s: segment.from_s,

@@ -15,8 +15,16 @@
 
 use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::numerics::order_statistics::{
+    SIGMA_PER_MAD, lower_quantile_in_place, upper_median_in_place,
+};
 use crate::segment::settings::Settings;
+
+/// Share of a recording that is the maneuver in which its inputs rest.
+const QUIET_SHARE: f64 = 0.1;
+
+/// Quantile of the size of normal noise at [`QUIET_SHARE`], standard deviations.
+const QUIET_DEVIATIONS: f64 = 0.125_661;
 
 /// Share of a run's largest change from which its changes form the near-maximum. The flat top of a
 /// step keeps 5 % of slope and noise; a lower share would shift the middle of a skewed step.
@@ -25,8 +33,10 @@ const NEAR_MAXIMUM: f64 = 0.95;
 /// Detects the steps and the deflections of every signal that has a smallest step.
 ///
 /// The smallest step is the one in the settings, or `steps_over_noise` times the noise of the
-/// signal's own changes where that is larger: feedback moves a surface in turbulence. Deflections
-/// are all changes of at least `deflection_share` of the smallest step; every step is one.
+/// signal's own changes where that is larger: feedback moves a surface in turbulence. In a recording
+/// that is the maneuver it is no larger than the share of the largest change below which steps count as
+/// feedback. Deflections are all changes of at least `deflection_share` of the smallest step; every step
+/// is one.
 pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
@@ -35,8 +45,12 @@ pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps
             continue;
         };
         let levels = levels(values, window.level);
-        let own_noise = noise(&levels, window);
-        let smallest = set.max(settings.steps_over_noise * own_noise);
+        let own_noise = noise(&levels, window, is_maneuver_alone(record));
+        let mut over_noise = settings.steps_over_noise * own_noise;
+        if is_maneuver_alone(record) {
+            over_noise = over_noise.min(settings.outstanding_share * largest(&levels, window));
+        }
+        let smallest = set.max(over_noise);
         let noise = if smallest > *set { own_noise } else { 0.0 };
         let larger_than = |smallest: f64| SignalSteps {
             steps: on_record_clock(steps_of_levels(&levels, smallest, window), record),
@@ -81,15 +95,37 @@ pub(in crate::segment) fn largest_change(
         .fold(0.0, f64::max)
 }
 
-/// Standard deviation of uncommanded changes, from the median size of all changes: steps are few.
-fn noise(levels: &[f64], window: Window) -> f64 {
+/// Standard deviation of uncommanded changes, from the median size of all changes: steps are few. In
+/// a recording that is the maneuver they are not, and the rests between the inputs tell the noise.
+fn noise(levels: &[f64], window: Window, is_maneuver_alone: bool) -> f64 {
     let mut sizes: Vec<f64> = changes(levels, window)
         .map(|change| change.size())
         .collect();
     if sizes.len() < 2 {
         return 0.0;
     }
-    SIGMA_PER_MAD * upper_median_in_place(&mut sizes).unwrap_or(0.0)
+    let of_all = SIGMA_PER_MAD * upper_median_in_place(&mut sizes).unwrap_or(0.0);
+    if !is_maneuver_alone {
+        return of_all;
+    }
+    let quiet = lower_quantile_in_place(&mut sizes, QUIET_SHARE).unwrap_or(0.0);
+    of_all.min(quiet / QUIET_DEVIATIONS)
+}
+
+/// Largest change of a signal.
+fn largest(levels: &[f64], window: Window) -> f64 {
+    changes(levels, window)
+        .map(|change| change.size())
+        .fold(0.0, f64::max)
+}
+
+/// Longest recording that may be one maneuver alone, s: the longest maneuvers take 40 s with their
+/// decay.
+const MANEUVER_ALONE_S: f64 = 45.0;
+
+/// True for a recording that may hold one maneuver and little else.
+pub(in crate::segment) fn is_maneuver_alone(record: &Record) -> bool {
+    record.samples as f64 * record.step_s <= MANEUVER_ALONE_S
 }
 
 /// Converts a time to whole samples, at least one.
@@ -326,6 +362,58 @@ mod tests {
         for values in [chatter, slow, spike] {
             assert_eq!(steps(&values), []);
         }
+    }
+
+    /// Record of a surface at 40 Hz with the settings for steps of 2.
+    fn record_of(values: Vec<f64>) -> (Record, Settings) {
+        let series = crate::flight::record::Series {
+            marks: vec![crate::flight::Mark::Measured; values.len()],
+            values,
+        };
+        let record = Record {
+            flight_id: "f".to_owned(),
+            start_s: 0.0,
+            step_s: 0.025,
+            samples: series.values.len(),
+            signals: [("de_deg".to_owned(), series)].into(),
+        };
+        let settings = Settings {
+            steps: [("de_deg".to_owned(), 2.0)].into(),
+            ..Settings::default()
+        };
+        (record, settings)
+    }
+
+    #[test]
+    fn the_noise_of_a_maneuver_alone_is_not_taken_from_its_inputs() {
+        // Pulses of 9 all the way, an edge every 0.6 s.
+        let mut value = 0.0;
+        let pulses: Vec<f64> = (0..800)
+            .map(|k| {
+                let target = if k / 24 % 2 == 0 { 9.0 } else { -9.0 };
+                value += 0.3 * (target - value);
+                value
+            })
+            .collect();
+        let (record, settings) = record_of(pulses.clone());
+        let (steps, _) = detect(&record, &settings);
+        assert!(steps.smallest("de_deg") < 7.0);
+        assert!((30..=33).contains(&steps.of("de_deg").len()));
+        // The same in a flight of three minutes of it: the median is the inputs', and hides them.
+        let long: Vec<f64> = pulses.iter().cycle().take(7200).copied().collect();
+        let (record, settings) = record_of(long);
+        let (steps, _) = detect(&record, &settings);
+        assert!(steps.smallest("de_deg") > 8.0);
+    }
+
+    #[test]
+    fn noise_alone_is_the_same_by_its_quiet_tenth_as_by_its_median() {
+        let mut random = crate::numerics::random::RandomStream::new(5, "levels");
+        let levels: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
+        let [median, quiet] = [false, true].map(|alone| noise(&levels, WINDOW, alone));
+        // Differences of white levels: √2 of their deviation.
+        assert_abs_diff_eq!(median, 2.0_f64.sqrt(), epsilon = 0.05);
+        assert_abs_diff_eq!(quiet, median, epsilon = 0.08);
     }
 
     #[test]
