@@ -109,9 +109,9 @@ fn a_record_without_rows_is_refused() {
 #[test]
 fn a_record_without_a_required_channel_is_refused() {
     record_is_refused(
-        &without(&yaw_and_roll_steps(), "beta_vane"),
-        "channel `beta_vane`",
-        &["channel `beta_vane`", "`beta_vane_deg`", "not in the file"],
+        &without(&yaw_and_roll_steps(), "mass"),
+        "channel `mass`",
+        &["channel `mass`", "`mass_slug`", "not in the file"],
     );
 }
 
@@ -376,9 +376,9 @@ fn a_stuck_surface_rejects_its_maneuver_with_the_reason() {
 #[test]
 fn a_required_channel_without_any_number_is_refused() {
     record_is_refused(
-        &with_values(&yaw_and_roll_steps(), "q", |_, _| f64::NAN),
-        "channel `q`",
-        &["`q_deg_s`", "holds no number"],
+        &with_values(&yaw_and_roll_steps(), "Iy", |_, _| f64::NAN),
+        "channel `Iy`",
+        &["`iy_slug_ft2`", "holds no number"],
     );
 }
 
