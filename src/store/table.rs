@@ -164,9 +164,10 @@ fn series_of_csv(column: &Column) -> Series {
     }
 }
 
-/// A text that a spreadsheet would take for a formula, behind an apostrophe: then it is text there.
+/// A text that a spreadsheet would take for a formula, behind an apostrophe: then it is text there. The
+/// unit `-`, as every single character, is none.
 fn no_formula(text: &str) -> Cow<'_, str> {
-    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+    if text.len() > 1 && text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         format!("'{text}").into()
     } else {
         text.into()
@@ -234,6 +235,7 @@ mod tests {
             ("+x", "'+x"),
             ("\tx", "'\tx"),
             ("flights/a=1.parquet", "flights/a=1.parquet"),
+            ("-", "-"),
             ("", ""),
         ] {
             assert_eq!(no_formula(text), written);
