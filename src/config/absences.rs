@@ -1,7 +1,7 @@
 //! Parts of a campaign that a pipeline does without, and what each absence costs.
 
 use super::checked::Config;
-use crate::aero::Axis;
+use crate::aero::{Axis, Output};
 use crate::flight::signal;
 use crate::flight::stand_in::{StandIn, cost};
 
@@ -62,7 +62,7 @@ impl Config {
     fn lost_axes(&self) -> Vec<String> {
         let line = |axis: Axis| {
             let outputs = axis.outputs().into_iter();
-            let lacking = outputs.map(|output| output.signal());
+            let lacking = outputs.map(Output::signal);
             let lacking = lacking.filter(|signal| !self.is_recorded(signal));
             let lacking: Vec<&str> = lacking.collect();
             let classes = self.classes.iter().filter(|class| class.axis == axis);

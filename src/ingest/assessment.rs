@@ -385,10 +385,12 @@ fn relation_problem(
     findings: &Findings,
     flight_id: &str,
 ) -> Problem {
-    let left_out: String = left_out
+    let left_out = left_out
         .iter()
-        .map(|(signal, stand_in)| format!(". It is left out: `{signal}` {}", stand_in.in_words()))
-        .collect();
+        .fold(String::new(), |words, (signal, stand_in)| {
+            let one = format!(". It is left out: `{signal}` {}", stand_in.in_words());
+            words + &one
+        });
     let besides = findings
         .fault_summary()
         .map(|faults| format!(". Besides, {faults}"))

@@ -5,7 +5,7 @@
 use std::ops::RangeInclusive;
 
 use super::settings::{Actuator, Limits};
-use crate::aero::Axis;
+use crate::aero::{Axis, Output};
 use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
@@ -83,7 +83,7 @@ pub(super) fn measure(
 
 /// The reason for which the axis cannot be estimated: outputs that have stand-ins in the record.
 fn outputs_not_recorded(record: &Record, axis: Axis) -> Option<String> {
-    let outputs = axis.outputs().into_iter().map(|output| output.signal());
+    let outputs = axis.outputs().into_iter().map(Output::signal);
     let lacking: Vec<&str> = outputs
         .filter(|signal| record.signals.get(*signal).is_some_and(Series::is_assumed))
         .collect();

@@ -145,7 +145,7 @@ fn a_pipeline_does_without_tunnel_and_sticks_and_check_says_what_it_costs() {
     let maneuvers = campaign.table("maneuvers");
     assert_eq!(maneuvers.len(), 1, "{maneuvers:?}");
     assert_eq!(maneuvers[0]["class"], "PPSS");
-    assert!(number(&maneuvers[0], "confidence") < 0.9);
+    assert!(number(&maneuvers[0], "confidence") <= 0.9);
     assert!(maneuvers[0]["evidence"].contains("stand for the pilot's"));
     let means = campaign.table("trends");
     assert!(!means.is_empty() && means.iter().all(|row| row["curve"] == "mean"));
