@@ -21,6 +21,7 @@ pub const M_PER_FT: f64 = 0.304_8;
 pub enum Quantity {
     Angle,
     AngularRate,
+    AngularAcceleration,
     Acceleration,
     Velocity,
     Length,
@@ -28,6 +29,8 @@ pub enum Quantity {
     Force,
     Mass,
     Inertia,
+    Density,
+    Temperature,
     RotationalSpeed,
     Time,
     Number,
@@ -65,60 +68,253 @@ const LBF: f64 = 1.0 / 4.448_221_615_260_5;
 /// Slugs in a kilogram.
 const SLUG: f64 = 1.0 / 14.593_902_937_206;
 
+/// Pounds-force per square foot in a pascal.
+const PSF: f64 = LBF * M_PER_FT * M_PER_FT;
+/// Pascals in an inch of mercury (conventional, NIST SP 811).
+const INCH_OF_MERCURY_PA: f64 = 3386.389;
+
 /// All units. Signals are kept in the first unit of a quantity.
 const UNITS: &[Unit] = &[
     unit("deg", Some("_deg"), Quantity::Angle, 1.0),
     unit("rad", None, Quantity::Angle, DEG),
     unit("deg/s", Some("_deg_s"), Quantity::AngularRate, 1.0),
     unit("rad/s", None, Quantity::AngularRate, DEG),
+    unit(
+        "deg/s2",
+        Some("_deg_s2"),
+        Quantity::AngularAcceleration,
+        1.0,
+    ),
+    unit("rad/s2", None, Quantity::AngularAcceleration, DEG),
     unit("g", Some("_g"), Quantity::Acceleration, 1.0),
     unit("ft/s2", None, Quantity::Acceleration, 1.0 / G0_FT_S2),
     unit("m/s2", None, Quantity::Acceleration, FT / G0_FT_S2),
     unit("ft/s", Some("_ft_s"), Quantity::Velocity, 1.0),
     unit("m/s", None, Quantity::Velocity, FT),
     unit("kt", None, Quantity::Velocity, 1852.0 / 3600.0 * FT),
+    unit("km/h", None, Quantity::Velocity, FT / 3.6),
     unit("ft", Some("_ft"), Quantity::Length, 1.0),
     unit("in", Some("_in"), Quantity::Length, 1.0 / 12.0),
     unit("m", None, Quantity::Length, FT),
+    unit("cm", None, Quantity::Length, 0.01 * FT),
+    unit("mm", None, Quantity::Length, 0.001 * FT),
+    unit("km", None, Quantity::Length, 1000.0 * FT),
     unit("lbf/ft2", Some("_psf"), Quantity::Pressure, 1.0),
     unit("psf", None, Quantity::Pressure, 1.0),
-    unit("Pa", None, Quantity::Pressure, LBF * M_PER_FT * M_PER_FT),
+    unit("psi", None, Quantity::Pressure, 144.0),
+    unit("Pa", None, Quantity::Pressure, PSF),
+    unit("hPa", None, Quantity::Pressure, 100.0 * PSF),
+    unit("mbar", None, Quantity::Pressure, 100.0 * PSF),
+    unit("kPa", None, Quantity::Pressure, 1000.0 * PSF),
+    unit("inHg", None, Quantity::Pressure, INCH_OF_MERCURY_PA * PSF),
     unit("lbf", Some("_lbf"), Quantity::Force, 1.0),
+    unit("klbf", None, Quantity::Force, 1000.0),
     unit("N", None, Quantity::Force, LBF),
+    unit("kN", None, Quantity::Force, 1000.0 * LBF),
     unit("slug", Some("_slug"), Quantity::Mass, 1.0),
     unit("lb", None, Quantity::Mass, 1.0 / G0_FT_S2),
     unit("kg", None, Quantity::Mass, SLUG),
     unit("slug ft2", Some("_slug_ft2"), Quantity::Inertia, 1.0),
     unit("lb ft2", None, Quantity::Inertia, 1.0 / G0_FT_S2),
     unit("kg m2", None, Quantity::Inertia, SLUG * FT * FT),
+    unit("slug/ft3", Some("_slug_ft3"), Quantity::Density, 1.0),
+    unit("kg/m3", None, Quantity::Density, SLUG / (FT * FT * FT)),
+    unit("K", Some("_kelvin"), Quantity::Temperature, 1.0),
+    unit("degR", None, Quantity::Temperature, 1.0 / 1.8),
     unit("rpm", Some("_rpm"), Quantity::RotationalSpeed, 1.0),
     unit("s", Some("_s"), Quantity::Time, 1.0),
+    unit("min", None, Quantity::Time, 60.0),
     unit("ms", None, Quantity::Time, 1e-3),
     unit("us", None, Quantity::Time, 1e-6),
     unit("ns", None, Quantity::Time, 1e-9),
     unit("-", None, Quantity::Number, 1.0),
     unit("0/1", None, Quantity::Number, 1.0),
+    unit("%", None, Quantity::Number, 0.01),
 ];
 
+/// Other spellings of units, in lower case and without signs.
+const SPELLINGS: &[(&str, &str)] = &[
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("°", "deg"),
+    ("radian", "rad"),
+    ("radians", "rad"),
+    ("deg/sec", "deg/s"),
+    ("degree/s", "deg/s"),
+    ("degrees/s", "deg/s"),
+    ("°/s", "deg/s"),
+    ("dps", "deg/s"),
+    ("rad/sec", "rad/s"),
+    ("rps", "rad/s"),
+    ("deg/sec2", "deg/s2"),
+    ("rad/sec2", "rad/s2"),
+    ("g's", "g"),
+    ("gs", "g"),
+    ("ft/sec", "ft/s"),
+    ("fps", "ft/s"),
+    ("mps", "m/s"),
+    ("m/sec", "m/s"),
+    ("ft/sec2", "ft/s2"),
+    ("m/sec2", "m/s2"),
+    ("kts", "kt"),
+    ("kn", "kt"),
+    ("knot", "kt"),
+    ("knots", "kt"),
+    ("kmh", "km/h"),
+    ("kph", "km/h"),
+    ("feet", "ft"),
+    ("foot", "ft"),
+    ("inch", "in"),
+    ("inches", "in"),
+    ("meter", "m"),
+    ("meters", "m"),
+    ("metre", "m"),
+    ("metres", "m"),
+    ("lb/ft2", "lbf/ft2"),
+    ("lbs/ft2", "lbf/ft2"),
+    ("lbf/in2", "psi"),
+    ("pascal", "Pa"),
+    ("n/m2", "Pa"),
+    ("millibar", "mbar"),
+    ("mb", "mbar"),
+    ("newton", "N"),
+    ("kip", "klbf"),
+    ("slugs", "slug"),
+    ("lbm", "lb"),
+    ("lbs", "lb"),
+    ("kilogram", "kg"),
+    ("kelvin", "K"),
+    ("rankine", "degR"),
+    ("rev/min", "rpm"),
+    ("1/min", "rpm"),
+    ("sec", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("msec", "ms"),
+    ("µs", "us"),
+    ("usec", "us"),
+    ("nsec", "ns"),
+    ("1", "-"),
+    ("nd", "-"),
+    ("none", "-"),
+    ("unitless", "-"),
+    ("bool", "0/1"),
+    ("boolean", "0/1"),
+    ("percent", "%"),
+    ("pct", "%"),
+];
+
+/// Exponents of degree, foot, slug, second, kelvin and revolution.
+type Dimensions = [i32; 6];
+
+impl Quantity {
+    /// Dimensions, and the factor from the base unit of the quantity to the product of degree, foot, slug,
+    /// second, kelvin and revolution.
+    fn dimensions(self) -> (Dimensions, f64) {
+        match self {
+            Quantity::Angle => ([1, 0, 0, 0, 0, 0], 1.0),
+            Quantity::AngularRate => ([1, 0, 0, -1, 0, 0], 1.0),
+            Quantity::AngularAcceleration => ([1, 0, 0, -2, 0, 0], 1.0),
+            Quantity::Acceleration => ([0, 1, 0, -2, 0, 0], G0_FT_S2),
+            Quantity::Velocity => ([0, 1, 0, -1, 0, 0], 1.0),
+            Quantity::Length => ([0, 1, 0, 0, 0, 0], 1.0),
+            Quantity::Pressure => ([0, -1, 1, -2, 0, 0], 1.0),
+            Quantity::Force => ([0, 1, 1, -2, 0, 0], 1.0),
+            Quantity::Mass => ([0, 0, 1, 0, 0, 0], 1.0),
+            Quantity::Inertia => ([0, 2, 1, 0, 0, 0], 1.0),
+            Quantity::Density => ([0, -3, 1, 0, 0, 0], 1.0),
+            Quantity::Temperature => ([0, 0, 0, 0, 1, 0], 1.0),
+            Quantity::RotationalSpeed => ([0, 0, 0, -1, 0, 1], 1.0 / 60.0),
+            Quantity::Time => ([0, 0, 0, 1, 0, 0], 1.0),
+            Quantity::Number => ([0; 6], 1.0),
+        }
+    }
+}
+
+/// A text without the signs that do not matter in a unit.
+fn plain(text: &str) -> String {
+    let is_sign = |c: &char| matches!(c, ' ' | '^' | '·' | '*' | '.');
+    let digit = |c: char| match c {
+        '²' => '2',
+        '³' => '3',
+        c => c,
+    };
+    text.chars().filter(|c| !is_sign(c)).map(digit).collect()
+}
+
+/// A unit and its exponent: `s2`, `s^-2`.
+fn power(word: &str) -> Option<(Unit, i32)> {
+    if word == "1" {
+        return Some((Unit::of_signal(""), 1));
+    }
+    let end = word
+        .find(|c: char| c.is_ascii_digit() || "^-+²³".contains(c))
+        .unwrap_or(word.len());
+    let (name, exponent) = word.split_at(end);
+    let exponent = plain(exponent);
+    let exponent = if exponent.is_empty() {
+        1
+    } else {
+        exponent.parse().ok()?
+    };
+    Some((Unit::named(name)?, exponent)).filter(|_| (-4..=4).contains(&exponent))
+}
+
 impl Unit {
-    /// Parses a unit; spaces, `^`, `*` and a middle dot do not matter.
+    /// Parses a unit, another spelling of one, or a product of units of a quantity that harvest has:
+    /// `N m-1 s`. Spaces, `^`, `*` and a middle dot do not matter otherwise.
     ///
     /// # Errors
     /// A message with the names of all units, for an unknown unit.
     pub fn parse(text: &str) -> Result<Unit, String> {
-        let plain = |s: &str| {
-            s.chars()
-                .filter(|c| !matches!(c, ' ' | '^' | '·' | '*'))
-                .collect::<String>()
-        };
-        UNITS
-            .iter()
-            .find(|u| plain(u.name) == plain(text))
-            .copied()
+        Unit::named(text)
+            .or_else(|| Unit::product(text))
             .ok_or_else(|| {
                 let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
-                format!("unknown unit `{text}`; the units are {}", names.join(", "))
+                format!(
+                    "unknown unit `{text}`; the units are {}, and products of them",
+                    names.join(", ")
+                )
             })
+    }
+
+    fn named(text: &str) -> Option<Unit> {
+        let written = plain(text);
+        let of_name = |name: &str| UNITS.iter().find(|u| plain(u.name) == name).copied();
+        let spelling = || {
+            let lower = written.to_lowercase();
+            let spelling = SPELLINGS.iter().find(|(other, _)| *other == lower);
+            spelling.and_then(|(_, name)| of_name(&plain(name)))
+        };
+        of_name(&written).or_else(spelling)
+    }
+
+    /// Product of units with exponents; what stands behind a slash divides.
+    fn product(text: &str) -> Option<Unit> {
+        let (mut dimensions, mut factor) = ([0; 6], 1.0);
+        for (n, part) in text.split('/').enumerate() {
+            let side = if n == 0 { 1 } else { -1 };
+            let words = part.split([' ', '*', '·', '.', '(', ')']);
+            let mut words = words.filter(|word| !word.is_empty()).peekable();
+            words.peek()?;
+            for word in words {
+                let (unit, exponent) = power(word)?;
+                let (own, base) = unit.quantity.dimensions();
+                for (sum, own) in dimensions.iter_mut().zip(own) {
+                    *sum += side * exponent * own;
+                }
+                factor *= (unit.factor * base).powi(side * exponent);
+            }
+        }
+        let kept = UNITS
+            .iter()
+            .find(|u| u.quantity.dimensions().0 == dimensions)?;
+        Some(Unit {
+            name: "a product of units",
+            suffix: None,
+            quantity: kept.quantity,
+            factor: factor / kept.quantity.dimensions().1,
+        })
     }
 
     /// Unit in which the signal of this name is kept: that of the longest suffix that fits, a pure
@@ -176,6 +372,24 @@ mod tests {
             ("lb", "mass_slug", 0.031_080_95),
             ("in", "stick_pitch_in", 1.0),
             ("deg", "alpha_vane_deg", 1.0),
+            ("km/h", "velocity_ft_s", 0.911_344_415_281_423),
+            ("hPa", "qbar_psf", 2.088_543_423_315_0),
+            ("inHg", "qbar_psf", 70.726_201),
+            ("psi", "qbar_psf", 144.0),
+            ("kg/m3", "density_slug_ft3", 0.001_940_320_331_980),
+            ("klbf", "thrust_lbf", 1000.0),
+            ("rad/s2", "qdot_deg_s2", 57.295_779_513_082_32),
+            ("degR", "air_kelvin", 5.0 / 9.0),
+            ("%", "lever", 0.01),
+            ("Degrees", "alpha_vane_deg", 1.0),
+            ("knots", "velocity_ft_s", 1.687_809_857_101_196),
+            ("ft/sec^2", "an_g", 1.0 / 32.174_049),
+            // Products: N s²/m is kg, lbf s²/ft is slug, N m s² is kg m².
+            ("N s2/m", "mass_slug", 0.068_521_765_85),
+            ("lbf s^2/ft", "mass_slug", 1.0),
+            ("N m s2", "iy_slug_ft2", 0.737_562_149_3),
+            ("kN/m2", "qbar_psf", 20.885_434_233_1),
+            ("m min-1", "velocity_ft_s", 3.280_839_895_013_123 / 60.0),
         ] {
             assert_relative_eq!(
                 factor(from, signal).expect(from),
@@ -196,6 +410,9 @@ mod tests {
     #[test]
     fn quantities_do_not_convert_into_each_other() {
         assert_eq!(factor("deg/s", "alpha_vane_deg"), None);
-        assert!(Unit::parse("degrees").is_err());
+        // A torque is a product of units, but of a quantity that no signal has.
+        for unknown in ["furlong", "N m", "deg//s", "", "m^9", "degC"] {
+            assert!(Unit::parse(unknown).is_err(), "{unknown}");
+        }
     }
 }
