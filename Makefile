@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help init import
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -60,6 +60,14 @@ export: build ## write the flight-updated derivatives for simulators: DAVE-ML, J
 
 nightly: build ## the main job: every stage, to the report
 	$(call harvest,run) $(running)
+
+init: build ## draft the pipeline NAME from the recordings FROM
+	$(if $(and $(NAME),$(FROM)),,$(error make init NAME=<pipeline> FROM=<file or folder>))
+	cargo run --release --locked --quiet -- init '$(NAME)' --from $(FROM)
+
+import: build ## write the recordings FROM (CSV, MATLAB, tall Parquet) as Parquet into the folder TO
+	$(if $(and $(TO),$(FROM)),,$(error make import FROM=<files or folder> TO=<folder>))
+	cargo run --release --locked --quiet -- import $(FROM) --to '$(TO)'
 
 check: build ## check the configuration and print what a run would do
 	$(call harvest,check)

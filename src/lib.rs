@@ -54,6 +54,9 @@ pub mod dynamics;
 pub mod output_error;
 pub mod filter_error;
 
+// A recording that nobody has described yet: which column is which signal.
+pub mod inspection;
+
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;
 pub mod segment;

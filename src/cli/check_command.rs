@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use super::options::Options;
+use crate::config::doubts;
 use crate::maneuver::Status;
 use crate::store::archive;
 
@@ -55,6 +56,13 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     }
     if let Some(warning) = config.estimate.hold.warning() {
         out!("note       {warning}");
+    }
+    let doubts = doubts(&config);
+    for doubt in &doubts {
+        out!("not sure   {}:{}: {}", doubt.file, doubt.line, doubt.text);
+    }
+    if !doubts.is_empty() {
+        out!("           Check these, and delete the word `unsure:` of each that is right.");
     }
     out!("The configuration is right.");
     Ok(ExitCode::SUCCESS)

@@ -7,6 +7,8 @@ mod bars;
 mod check_command;
 mod cluster_commands;
 mod export_command;
+mod import_command;
+mod init_command;
 mod lab;
 mod night_commands;
 mod options;
@@ -45,6 +47,8 @@ where it was. The results of a run are published at once, as a night; the last n
 
 Examples:
   harvest run                                    the pipeline pipelines/harv, to the report
+  harvest import runs/*.csv --to flights/        Parquet of the archive from CSV, MATLAB or tall Parquet
+  harvest init my_campaign --from flights/       a draft of pipelines/my_campaign, from the recordings alone
   harvest check my_campaign                      validate pipelines/my_campaign and list what it uses
   harvest run --archive flights/ --reports out/  the same analysis on another archive
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
@@ -95,6 +99,12 @@ enum Command {
     /// Parquet
     #[command(after_help = EXPORT_HELP)]
     Export(ExportOptions),
+    /// Write recordings of other formats (CSV, MATLAB, tall Parquet) as Parquet of the archive
+    #[command(after_help = import_command::IMPORT_HELP)]
+    Import(import_command::ImportOptions),
+    /// Draft a pipeline for a recorder that harvest has not seen
+    #[command(after_help = init_command::INIT_HELP)]
+    Init(init_command::InitOptions),
     /// Validate a pipeline's configuration and list what it uses
     Check(Options),
     /// Count the fresh, stale and failed artefacts of each stage, with the reasons
@@ -180,6 +190,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Merge(options) => return cluster_commands::merge(&options),
         Command::Submit(options) => return cluster_commands::submit(&options),
         Command::Export(options) => return export_command::export(&options),
+        Command::Import(options) => return import_command::import(&options),
+        Command::Init(options) => return init_command::init(&options),
         Command::Check(options) => return check_command::check(&options),
         Command::Lab(command) => return lab::run(&command),
         Command::Simulate(_) => return Err(renamed("simulate", "simulate")),

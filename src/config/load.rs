@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{check, moved, places, qualities, ranges};
+use super::{check, moved, places, qualities, questions, ranges};
 use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
@@ -37,6 +37,7 @@ impl Config {
     /// first mistake.
     pub fn load(folder: &Path, overrides: Overrides) -> Result<Config> {
         let files = Files::read(folder)?;
+        questions::none_open(&files)?;
         let mut pipeline = pipeline_file(&files.pipeline)?;
         let aircraft = files.aircraft()?;
         share_keys(&mut pipeline, &aircraft.instruments);

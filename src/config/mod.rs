@@ -15,6 +15,7 @@ mod moved;
 mod nesting;
 mod places;
 mod qualities;
+mod questions;
 mod ranges;
 mod source;
 mod written;
@@ -23,6 +24,7 @@ pub(crate) use check::tunnel_rows;
 pub use checked::Config;
 pub use cluster::ClusterSettings;
 pub use load::Overrides;
+pub use questions::{Note, doubts};
 pub(crate) use source::Source;
 pub use written::ReportSettings;
 

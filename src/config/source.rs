@@ -58,6 +58,10 @@ impl Source {
         (name.to_string(), self.text.clone())
     }
 
+    pub fn lines(&self) -> std::str::Lines<'_> {
+        self.text.lines()
+    }
+
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
             let line = e.location().map(|l| l.line());

@@ -11,6 +11,7 @@
 mod campaign;
 mod conductor;
 mod estimate_step;
+pub mod draft;
 mod flight_contents;
 mod group_steps;
 mod ingest_step;

@@ -16,6 +16,7 @@ mod notation;
 mod page;
 mod page_selection;
 mod provenance;
+mod recording_page;
 pub mod strip_chart;
 mod table_view;
 #[cfg(test)]
@@ -26,9 +27,11 @@ use minijinja::{AutoEscape, Environment};
 
 pub use contents::{ConfiguredClass, Contents};
 pub use history::thinned;
+use notation::well_formed;
 use page::Page;
 pub use page_selection::maneuvers_with_page;
 pub use provenance::{Provenance, SourceFile};
+pub use recording_page::recording_page;
 
 /// Renders the report page.
 ///
@@ -47,17 +50,4 @@ pub fn html(contents: &Contents, template: Option<&str>) -> Result<String, Strin
         )
         .map(well_formed)
         .map_err(|error| format!("the report's template: {error:#}"))
-}
-
-/// A page without characters that XML forbids or that reorder a line: names of files may hold them.
-fn well_formed(page: String) -> String {
-    let is_forbidden = |c: char| {
-        c.is_control() && !matches!(c, '\t' | '\n' | '\r')
-            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
-    };
-    if page.contains(is_forbidden) {
-        page.replace(is_forbidden, "\u{fffd}")
-    } else {
-        page
-    }
 }

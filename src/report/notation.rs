@@ -71,6 +71,20 @@ pub fn escaped(text: &str) -> String {
     HtmlEscape(text).to_string()
 }
 
+/// A page without characters that XML forbids or that reorder a line: names of files may hold them.
+#[must_use]
+pub fn well_formed(page: String) -> String {
+    let is_forbidden = |c: char| {
+        c.is_control() && !matches!(c, '\t' | '\n' | '\r')
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
+    };
+    if page.contains(is_forbidden) {
+        page.replace(is_forbidden, "\u{fffd}")
+    } else {
+        page
+    }
+}
+
 /// Unit of a derivative in words; empty for a pure number.
 #[must_use]
 pub fn unit(name: &str) -> String {

@@ -20,28 +20,41 @@ use crate::flight::channel::RawColumn;
 /// # Errors
 /// The reason.
 pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
-    let field = |(name, column): (&String, &RawColumn)| {
-        let unit = column
-            .unit
-            .iter()
-            .map(|unit| (UNIT.to_owned(), unit.clone()));
-        Field::new(name, DataType::Float64, true).with_metadata(unit.collect::<HashMap<_, _>>())
-    };
-    let array = |column: &RawColumn| {
-        let values = column.values.iter().map(|v| v.is_finite().then_some(*v));
-        Arc::new(values.collect::<Float64Array>()) as ArrayRef
-    };
-    let schema = Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()));
-    let batch = RecordBatch::try_new(schema.clone(), columns.values().map(array).collect())
+    let heads = columns
+        .iter()
+        .map(|(name, c)| (name.as_str(), c.unit.as_deref()));
+    let schema = schema(heads);
+    let arrays = columns.values().map(|column| array(&column.values));
+    let batch = RecordBatch::try_new(schema.clone(), arrays.collect())
         .map_err(|e| format!("cannot lay out the flight: {e}"))?;
-    let level = ZstdLevel::try_new(3).map_err(|e| e.to_string())?;
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(level))
-        .build();
+    let properties = properties()?;
     let refused = |e: parquet::errors::ParquetError| format!("cannot write the flight: {e}");
     let mut bytes = Vec::new();
     let mut writer = ArrowWriter::try_new(&mut bytes, schema, Some(properties)).map_err(refused)?;
     writer.write(&batch).map_err(refused)?;
     writer.close().map_err(refused)?;
     Ok(bytes)
+}
+
+/// Schema of columns with their units.
+pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, Option<&'a str>)>) -> Arc<Schema> {
+    let field = |(name, unit): (&str, Option<&str>)| {
+        let unit = unit.map(|unit| (UNIT.to_owned(), unit.to_owned()));
+        let metadata: HashMap<String, String> = unit.into_iter().collect();
+        Field::new(name, DataType::Float64, true).with_metadata(metadata)
+    };
+    Arc::new(Schema::new(columns.map(field).collect::<Vec<_>>()))
+}
+
+/// Values as a column; what is no finite number is a null.
+pub(super) fn array(values: &[f64]) -> ArrayRef {
+    let values = values.iter().map(|v| v.is_finite().then_some(*v));
+    Arc::new(values.collect::<Float64Array>())
+}
+
+/// Properties of the files: Zstandard.
+pub(super) fn properties() -> Result<WriterProperties, String> {
+    let level = ZstdLevel::try_new(3).map_err(|e| e.to_string())?;
+    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level));
+    Ok(properties.build())
 }

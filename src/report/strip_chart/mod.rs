@@ -1,10 +1,11 @@
 //! Strip charts of `harvest show`: a whole flight with its maneuvers, or one maneuver measured
-//! against computed, as an SVG file.
+//! against computed, as an SVG file; and of a recording as `harvest init` finds it.
 
 mod annotations;
 mod envelope;
 mod flight;
 mod maneuver;
+mod recording;
 mod signal_groups;
 mod signal_strips;
 #[cfg(test)]
@@ -12,4 +13,5 @@ mod tests;
 
 pub use flight::{FlightView, draw_flight};
 pub use maneuver::{ManeuverView, draw_maneuver};
+pub use recording::{draw_channels, draw_unused};
 pub use signal_groups::SignalGroups;

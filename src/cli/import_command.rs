@@ -1,0 +1,63 @@
+//! The command `import`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use crate::store::import;
+
+/// Help below the options.
+pub const IMPORT_HELP: &str = "\
+Formats, known by their content:
+  text      one row a sample: any delimiter, decimal commas, units in brackets or in a row of their own, comments above
+  MATLAB    version 5 (-v6, -v7): vectors, matrices and structs; of v7.3 (HDF5) the message says how to convert it
+  Parquet   tall: columns time, name, value and perhaps unit. A Parquet file with one column a channel needs no import
+
+Numbers keep every bit; what is no number becomes a missing value. import.json beside the files names each source with its \
+fingerprint, the columns with their units, and what was left out.
+
+Examples:
+  harvest import recordings/*.csv --to data/mine/flights
+  harvest init mine --from data/mine/flights
+
+Exit codes: 0 written; 1 not written, the message says why.";
+
+#[derive(Args, Debug)]
+pub struct ImportOptions {
+    /// Recordings: files, or folders of files
+    #[arg(value_name = "FILE_OR_FOLDER", required = true)]
+    from: Vec<PathBuf>,
+    /// Folder of the archive to write into
+    #[arg(long, value_name = "FOLDER")]
+    to: PathBuf,
+}
+
+/// Imports recordings and prints what was written.
+pub fn import(options: &ImportOptions) -> anyhow::Result<ExitCode> {
+    let mut imported: Vec<import::Imported> = Vec::new();
+    for place in &options.from {
+        for source in import::sources(place)? {
+            let file = import::target(&source, &options.to);
+            anyhow::ensure!(
+                imported.iter().all(|other| other.file != file),
+                "{}: another source has this name too; import it into another folder",
+                source.display()
+            );
+            let one = import::import(&source, &options.to)?;
+            let (columns, rows) = (one.columns.len(), one.rows);
+            out!(
+                "{}: {columns} columns, {rows} rows from {}",
+                one.file.display(),
+                source.display()
+            );
+            for note in &one.notes {
+                out!("  {note}");
+            }
+            imported.push(one);
+        }
+    }
+    let manifest = import::write_manifest(&options.to, &imported)?;
+    out!("manifest: {}", manifest.display());
+    Ok(ExitCode::SUCCESS)
+}

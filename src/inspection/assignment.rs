@@ -1,0 +1,500 @@
+//! Search for the columns, units and signs with which the equations of motion hold.
+//!
+//! The cost of an assignment is the sum of the logarithms of the equations' misfits; names, stated units
+//! and usual signs break ties. Descent changes one quantity at a time, then two.
+
+use std::collections::BTreeMap;
+
+use super::equations::{Equation, Misfit, Scaled, misfit};
+use super::grid::Grid;
+use super::quantity::Quantity;
+
+/// Cost of a column whose name does not mean the quantity, over one whose name does.
+const NAME_COST: f64 = 2.0;
+/// Cost of an unusual sign: signs are reversed more seldom than the motion misleads.
+const SIGN_COST: f64 = 0.2;
+/// Cost of each place of a unit in the list of usual ones.
+const UNIT_COST: f64 = 0.05;
+/// Least gain of a change: rounding gains nothing.
+const LEAST_GAIN: f64 = 1e-9;
+/// Misfit up to which an equation holds. Wind, lever arms and slow channels leave a few hundredths.
+pub const HOLDS: f64 = 0.1;
+/// Misfit up to which a column whose name means nothing is taken.
+const NAMELESS_FIT: f64 = 0.02;
+/// Factor by which every other nameless column must fit worse.
+const NAMELESS_LEAD: f64 = 10.0;
+/// Most combinations of nameless columns that are tried for one equation.
+const MOST_TRIALS: usize = 4_000;
+/// Misfit up to which a column counts as the integral of another: bank couples the attitudes.
+const INTEGRAL_FIT: f64 = 0.3;
+/// Most such pairs.
+const MOST_INTEGRALS: usize = 5;
+/// Cost by which every other order of attitudes and rates must be worse.
+const ROTATION_LEAD: f64 = 2.0;
+/// Most quantities whose signs are turned at once.
+const SIGNS_AT_ONCE: usize = 5;
+/// Units from which descent starts, instead of the most usual ones: the misfits have valleys where all
+/// angles are in the wrong unit together.
+const STARTS: [&[&str]; 4] = [&[], &["rad"], &["rad/s"], &["rad", "rad/s"]];
+/// Most rounds of descent.
+const ROUNDS: usize = 60;
+
+/// A column that may be a quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    pub column: String,
+    /// Weight of its name, 0 to 1.
+    pub weight: f64,
+    /// Units in which it may be written.
+    pub units: Vec<&'static str>,
+}
+
+/// Column, unit and sign of a quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    pub column: String,
+    pub unit: &'static str,
+    pub sign: f64,
+}
+
+/// Column, unit and sign of each quantity that has one.
+pub type Assignment = BTreeMap<Quantity, Choice>;
+
+/// Candidates of each quantity.
+pub type Candidates = BTreeMap<Quantity, Vec<Candidate>>;
+
+/// Search over one grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Search<'a> {
+    pub grid: &'a Grid,
+    pub candidates: &'a Candidates,
+}
+
+impl Search<'_> {
+    /// Best assignment that descent finds: from the best names with the usual units, and with angles or
+    /// rates in the other unit. Then columns whose names mean nothing, where only one of them fits.
+    #[must_use]
+    pub fn best(&self) -> Assignment {
+        let mut assignment = self.best_start();
+        self.descend(&mut assignment, true);
+        self.seed_rotation(&mut assignment);
+        while self.complete(&mut assignment) {
+            self.descend(&mut assignment, true);
+        }
+        self.usual_side(&mut assignment);
+        assignment
+    }
+
+    /// Best of the assignments to which descent leads from each start without turning several signs at
+    /// once, which takes the longest.
+    fn best_start(&self) -> Assignment {
+        let starts = STARTS.iter().map(|units| self.by_name(units));
+        let mut starts: Vec<Assignment> = starts.collect();
+        starts.dedup();
+        let mut best: Option<(f64, Assignment)> = None;
+        for mut assignment in starts {
+            self.descend(&mut assignment, false);
+            let cost = self.cost(&assignment, &Quantity::ALL);
+            let is_done = self.all_hold(&assignment);
+            if best.as_ref().is_none_or(|best| cost < best.0) {
+                best = Some((cost, assignment));
+            }
+            if is_done {
+                break;
+            }
+        }
+        best.map(|best| best.1).unwrap_or_default()
+    }
+
+    fn descend(&self, assignment: &mut Assignment, turns_signs: bool) {
+        for _ in 0..ROUNDS {
+            let changed = self.improve_single(assignment)
+                || self.improve_pairs(assignment)
+                || (turns_signs && self.improve_signs(assignment));
+            if !changed {
+                break;
+            }
+        }
+    }
+
+    /// Adds the nameless columns that make an equation hold, where no others do; `true` if there are any.
+    fn complete(&self, assignment: &mut Assignment) -> bool {
+        for equation in Equation::ALL {
+            let needed = equation.quantities().0.iter().copied();
+            let missing: Vec<Quantity> = needed.filter(|q| !assignment.contains_key(q)).collect();
+            let mut trials = vec![assignment.clone()];
+            for quantity in &missing {
+                trials = self.extended(&trials, *quantity);
+            }
+            if missing.is_empty() || trials.is_empty() {
+                continue;
+            }
+            let fit = |trial: Assignment| Some((self.misfit(equation, &trial)?.ratio, trial));
+            let mut fits: Vec<(f64, Assignment)> = trials.into_iter().filter_map(fit).collect();
+            fits.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((ratio, best)) = fits.first() else {
+                continue;
+            };
+            let differs = |trial: &Assignment| {
+                missing
+                    .iter()
+                    .any(|q| trial.get(q).map(|c| &c.column) != best.get(q).map(|c| &c.column))
+            };
+            let next = fits.iter().find(|(_, trial)| differs(trial));
+            let next = next.map_or(f64::INFINITY, |next| next.0);
+            if *ratio < NAMELESS_FIT && next > NAMELESS_LEAD * ratio {
+                *assignment = best.clone();
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Assignments with each choice of one more quantity; none where there are too many.
+    fn extended(&self, assignments: &[Assignment], quantity: Quantity) -> Vec<Assignment> {
+        let mut extended = Vec::new();
+        for assignment in assignments {
+            for choice in self.choices(quantity, assignment) {
+                extended.push(with(assignment, [(quantity, choice)]));
+            }
+            if extended.len() > MOST_TRIALS {
+                return Vec::new();
+            }
+        }
+        extended
+    }
+
+    /// Adds attitudes and rates whose names mean nothing: pairs in which one column is the integral of
+    /// the other, in the order in which the equations of all three attitudes hold best.
+    fn seed_rotation(&self, assignment: &mut Assignment) {
+        let pairs = [
+            (Quantity::Theta, Quantity::Q),
+            (Quantity::Phi, Quantity::P),
+            (Quantity::Psi, Quantity::R),
+        ];
+        let rotation = pairs.iter().flat_map(|(a, b)| [a, b]);
+        if rotation.clone().any(|q| assignment.contains_key(q)) {
+            return;
+        }
+        let integrals = self.integrals();
+        let mut ranked: Vec<(f64, Assignment)> = Vec::new();
+        for order in orders(integrals.len()) {
+            for signs in 0..8_u32 {
+                let mut trial = assignment.clone();
+                for (n, ((attitude, rate), member)) in pairs.iter().zip(&order).enumerate() {
+                    let sign = if signs >> n & 1 == 1 { -1.0 } else { 1.0 };
+                    let (angle, velocity) = &integrals[*member];
+                    trial.insert(*attitude, turned(angle, sign));
+                    trial.insert(*rate, turned(velocity, sign));
+                }
+                let distinct: std::collections::BTreeSet<&String> =
+                    trial.values().map(|c| &c.column).collect();
+                if distinct.len() == trial.len() {
+                    let changed = [Quantity::Theta, Quantity::Phi, Quantity::Psi];
+                    ranked.push((self.physical_cost(&trial, &changed), trial));
+                }
+            }
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((cost, best)) = ranked.first() else {
+            return;
+        };
+        let differs =
+            |trial: &Assignment| rotation.clone().any(|q| trial[q].column != best[q].column);
+        let next = ranked.iter().find(|(_, trial)| differs(trial));
+        if next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD) {
+            assignment.clone_from(best);
+        }
+    }
+
+    /// Pairs of columns of which the first is the integral of the second, the best first.
+    fn integrals(&self) -> Vec<(Choice, Choice)> {
+        let none = Assignment::new();
+        let mut found: Vec<(f64, Choice, Choice)> = Vec::new();
+        for rate in self
+            .choices(Quantity::Q, &none)
+            .into_iter()
+            .filter(|c| c.sign > 0.0)
+        {
+            let trials = self
+                .choices(Quantity::Theta, &none)
+                .into_iter()
+                .chain(self.choices(Quantity::Psi, &none));
+            let fits = trials
+                .filter(|angle| angle.column != rate.column)
+                .filter_map(|angle| {
+                    let trial = with(
+                        &none,
+                        [(Quantity::Psi, angle.clone()), (Quantity::R, rate.clone())],
+                    );
+                    let ratio = self.misfit(Equation::Heading, &trial)?.ratio;
+                    (ratio < INTEGRAL_FIT).then_some((ratio, angle, rate.clone()))
+                });
+            found.extend(fits.min_by(|a, b| a.0.total_cmp(&b.0)));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(MOST_INTEGRALS);
+        found
+            .into_iter()
+            .map(|(_, angle, rate)| (angle, rate))
+            .collect()
+    }
+
+    /// Misfit of an equation.
+    #[must_use]
+    pub fn misfit(&self, equation: Equation, assignment: &Assignment) -> Option<Misfit> {
+        misfit(
+            equation,
+            &self.grid.stretches,
+            self.grid.step_s,
+            |quantity| {
+                let choice = assignment.get(&quantity)?;
+                Some(Scaled {
+                    values: self.grid.columns.get(&choice.column)?,
+                    factor: choice.sign * quantity.factor(choice.unit)?,
+                })
+            },
+        )
+    }
+
+    /// Sum of the logarithms of the misfits of the equations that contain one of some quantities.
+    #[must_use]
+    pub fn physical_cost(&self, assignment: &Assignment, changed: &[Quantity]) -> f64 {
+        let contains = |e: &Equation| changed.iter().any(|q| e.contains(*q));
+        let equations = Equation::ALL.into_iter().filter(contains);
+        equations
+            .filter_map(|e| Some(self.misfit(e, assignment)?.ratio.ln()))
+            .sum()
+    }
+
+    /// `true` where every equation whose quantities are there holds.
+    fn all_hold(&self, assignment: &Assignment) -> bool {
+        let mut misfits = Equation::ALL
+            .into_iter()
+            .filter_map(|e| self.misfit(e, assignment));
+        misfits.all(|misfit| misfit.ratio <= HOLDS)
+    }
+
+    fn cost(&self, assignment: &Assignment, changed: &[Quantity]) -> f64 {
+        let own = changed.iter().filter_map(|q| {
+            let choice = assignment.get(q)?;
+            Some(self.prior_cost(*q, choice))
+        });
+        self.physical_cost(assignment, changed) + own.sum::<f64>()
+    }
+
+    /// Cost of a choice by its name, unit and sign alone.
+    fn prior_cost(&self, quantity: Quantity, choice: &Choice) -> f64 {
+        let candidates = self
+            .candidates
+            .get(&quantity)
+            .map_or(&[][..], Vec::as_slice);
+        let candidate = candidates.iter().find(|c| c.column == choice.column);
+        let weight = candidate.map_or(0.0, |c| c.weight);
+        let place = candidate.and_then(|c| c.units.iter().position(|u| *u == choice.unit));
+        let sign = if choice.sign < 0.0 { SIGN_COST } else { 0.0 };
+        -NAME_COST * weight + sign + UNIT_COST * place.unwrap_or(0) as f64
+    }
+
+    /// Each quantity by the best name, each column once, in one of some units where that is possible.
+    fn by_name(&self, units: &[&str]) -> Assignment {
+        let mut all: Vec<(Quantity, &Candidate)> = Vec::new();
+        for (quantity, candidates) in self.candidates {
+            all.extend(candidates.iter().map(|c| (*quantity, c)));
+        }
+        all.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight));
+        let mut assignment = Assignment::new();
+        for (quantity, candidate) in all.into_iter().filter(|(_, c)| c.weight > 0.0) {
+            let is_taken = assignment
+                .values()
+                .any(|c: &Choice| c.column == candidate.column);
+            let preferred = candidate.units.iter().find(|unit| units.contains(unit));
+            let unit = preferred.or(candidate.units.first());
+            if let Some(unit) = unit.filter(|_| !is_taken) {
+                assignment.entry(quantity).or_insert(Choice {
+                    column: candidate.column.clone(),
+                    unit,
+                    sign: 1.0,
+                });
+            }
+        }
+        assignment
+    }
+
+    /// All choices of a quantity whose column no other quantity has.
+    fn choices(&self, quantity: Quantity, assignment: &Assignment) -> Vec<Choice> {
+        let candidates = self
+            .candidates
+            .get(&quantity)
+            .map_or(&[][..], Vec::as_slice);
+        let is_free = |candidate: &&Candidate| {
+            let mut others = assignment.iter().filter(|(other, _)| **other != quantity);
+            !others.any(|(_, choice)| choice.column == candidate.column)
+        };
+        let candidates = candidates.iter().filter(is_free);
+        candidates.flat_map(|c| variants(quantity, c)).collect()
+    }
+
+    /// Other units and signs of an assigned quantity's column.
+    #[must_use]
+    pub fn alternatives(&self, quantity: Quantity, assignment: &Assignment) -> Vec<Choice> {
+        let Some(own) = assignment.get(&quantity) else {
+            return Vec::new();
+        };
+        let choices = self.choices(quantity, assignment).into_iter();
+        choices
+            .filter(|choice| choice.column == own.column && choice != own)
+            .collect()
+    }
+
+    /// Gives each quantity in turn its best choice; `true` where one changed.
+    fn improve_single(&self, assignment: &mut Assignment) -> bool {
+        let mut changed = false;
+        for quantity in Quantity::ALL
+            .into_iter()
+            .filter(|q| assignment.contains_key(q))
+            .collect::<Vec<_>>()
+        {
+            let before = self.cost(assignment, &[quantity]);
+            let trials = self
+                .choices(quantity, assignment)
+                .into_iter()
+                .map(|choice| {
+                    let trial = with(assignment, [(quantity, choice.clone())]);
+                    (self.cost(&trial, &[quantity]), choice)
+                });
+            let best = trials.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, choice)) = best.filter(|(cost, _)| *cost < before - LEAST_GAIN) {
+                assignment.insert(quantity, choice);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    /// Changes unit or sign of two quantities at once; `true` where that improved.
+    fn improve_pairs(&self, assignment: &mut Assignment) -> bool {
+        for (n, first) in Quantity::ALL.into_iter().enumerate() {
+            for second in Quantity::ALL.into_iter().skip(n + 1) {
+                let changed = [first, second];
+                let before = self.cost(assignment, &changed);
+                for trial in self.pair_trials(changed, assignment) {
+                    if self.cost(&trial, &changed) < before - LEAST_GAIN {
+                        *assignment = trial;
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Turns the signs of up to [`SIGNS_AT_ONCE`] quantities; `true` where that improved.
+    fn improve_signs(&self, assignment: &mut Assignment) -> bool {
+        if self.all_hold(assignment) {
+            return false;
+        }
+        let signed = assignment.keys().copied().filter(|q| q.is_signed());
+        let signed: Vec<Quantity> = signed.collect();
+        let before = self.cost(assignment, &Quantity::ALL);
+        let subsets = (0_u32..1 << signed.len())
+            .filter(|subset| (3..=SIGNS_AT_ONCE).contains(&(subset.count_ones() as usize)));
+        let turned = |subset: u32| {
+            let mut trial = assignment.clone();
+            let members = signed
+                .iter()
+                .enumerate()
+                .filter(|(n, _)| subset >> n & 1 == 1);
+            for (_, quantity) in members {
+                if let Some(choice) = trial.get_mut(quantity) {
+                    choice.sign = -choice.sign;
+                }
+            }
+            trial
+        };
+        let trials = subsets.map(|subset| {
+            let trial = turned(subset);
+            (self.cost(&trial, &Quantity::ALL), trial)
+        });
+        let best = trials.min_by(|a, b| a.0.total_cmp(&b.0));
+        match best.filter(|(cost, _)| *cost < before - LEAST_GAIN) {
+            Some((_, trial)) => {
+                *assignment = trial;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Assignments in which unit or sign of two quantities that share an equation are others.
+    #[must_use]
+    pub fn pair_trials(&self, pair: [Quantity; 2], assignment: &Assignment) -> Vec<Assignment> {
+        let shared = |e: &Equation| pair.iter().all(|q| e.contains(*q));
+        if !Equation::ALL.iter().any(shared) {
+            return Vec::new();
+        }
+        let [a, b] = pair.map(|q| self.alternatives(q, assignment));
+        let both = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
+        both.map(|(x, y)| with(assignment, [(pair[0], x.clone()), (pair[1], y.clone())]))
+            .collect()
+    }
+
+    /// Turns the lateral quantities to the side with fewer reversed signs: no equation tells a flight
+    /// from its mirror image.
+    fn usual_side(&self, assignment: &mut Assignment) {
+        let lateral = || Quantity::LATERAL.into_iter();
+        let reversed = lateral().filter(|q| assignment.get(q).is_some_and(|c| c.sign < 0.0));
+        let all = lateral().filter(|q| assignment.contains_key(q)).count();
+        if 2 * reversed.count() > all {
+            for choice in lateral().collect::<Vec<_>>() {
+                if let Some(choice) = assignment.get_mut(&choice) {
+                    choice.sign = -choice.sign;
+                }
+            }
+        }
+    }
+}
+
+/// Orders of three members of a list.
+fn orders(members: usize) -> Vec<[usize; 3]> {
+    let all = (0..members)
+        .flat_map(|a| (0..members).flat_map(move |b| (0..members).map(move |c| [a, b, c])));
+    all.filter(|[a, b, c]| a != b && b != c && a != c).collect()
+}
+
+/// A choice with its sign multiplied.
+fn turned(choice: &Choice, sign: f64) -> Choice {
+    Choice {
+        sign: choice.sign * sign,
+        ..choice.clone()
+    }
+}
+
+fn variants(quantity: Quantity, candidate: &Candidate) -> Vec<Choice> {
+    let signs: &[f64] = if quantity.is_signed() {
+        &[1.0, -1.0]
+    } else {
+        &[1.0]
+    };
+    let units = candidate.units.iter();
+    let choice = |(unit, sign): (&&'static str, &f64)| Choice {
+        column: candidate.column.clone(),
+        unit,
+        sign: *sign,
+    };
+    units
+        .flat_map(|unit| signs.iter().map(move |sign| (unit, sign)))
+        .map(choice)
+        .collect()
+}
+
+/// The assignment with other choices of some quantities.
+#[must_use]
+pub fn with<const N: usize>(
+    assignment: &Assignment,
+    changes: [(Quantity, Choice); N],
+) -> Assignment {
+    let mut trial = assignment.clone();
+    trial.extend(changes);
+    trial
+}

@@ -1,0 +1,261 @@
+//! `aircraft.yaml` of a draft.
+
+use std::fmt::Write;
+
+use super::contents::{Draft, OPEN, UNSURE, comment, scalar};
+use crate::flight::signal;
+use crate::inspection::findings::Channel;
+use crate::inspection::quantity::Quantity;
+
+/// Text of the file.
+pub fn text(draft: &Draft) -> String {
+    let mut text = geometry(draft);
+    text += &channels(draft);
+    text += &unused(draft);
+    text += &constants(draft);
+    text += &instruments(draft);
+    text
+}
+
+fn geometry(draft: &Draft) -> String {
+    let name = scalar(draft.name);
+    let point = format!("x_ft: {OPEN}, y_ft: {OPEN}, z_ft: {OPEN}");
+    format!(
+        "\
+# The aircraft and its recorder, drafted by `harvest init` from the recording. Every {OPEN} is a question: put the value in
+# its place. `harvest check {draft_name}` lists the questions that are open.
+# 1 m = 3.28084 ft, 1 m2 = 10.7639 ft2, 1 kg = 0.0685218 slug, 1 kg m2 = 0.737562 slug ft2.
+aircraft:
+  name: {name}
+  wing_area_ft2: {OPEN} # reference area: every coefficient is divided by it
+  span_ft: {OPEN} # reference span: rolling and yawing moments, p b/2V, r b/2V
+  chord_ft: {OPEN} # mean aerodynamic chord: pitching moment, q c/2V
+  engine_inertia_slug_ft2: 0 # of one engine's rotor; with its speed it couples pitch and yaw, by little
+  latitude_deg: 45 # gravity depends on it: 0.5 % from the equator to a pole
+  # Positions: ft aft (x), right (y) and above (z) of any reference point; those of the centre of gravity count from the
+  # same point. Where a position is not known, give the centre of gravity's: the sensor then counts as mounted there.
+  sensors:
+    an: {{ {point} }} # x times the pitch acceleration is in it
+    ax: {{ {point} }} # z times the pitch acceleration is in it
+    ay: {{ {point} }} # x times the yaw acceleration is in it
+    # A vane reads its factor times the local angle (upwash, sidewash): 1 where that is not known, or for a computed angle.
+    alpha_vane: {{ {point}, factor: 1 }} # x q/V is in it; the factor scales the slopes over alpha
+    beta_vane: {{ {point}, factor: 1 }} # x r/V is in it; the factor scales the slopes over beta
+
+",
+        draft_name = draft.name
+    )
+}
+
+fn channels(draft: &Draft) -> String {
+    let mut text = "\
+# The recorder: each column with its signal and its unit; sign: -1 where the recorder's sign is the opposite of harvest's.
+# Signs: rates and attitudes nose up, right wing down, nose right; accelerations up, forward, right; surfaces trailing edge
+# down, rudder trailing edge left, roll surfaces rolling right; stick aft and right, pedal right; centre of gravity aft,
+# right, above. The mirror image of a flight obeys the same equations: if all lateral channels are reversed together, no
+# recording shows it, and no derivative changes.
+channels:
+"
+    .to_owned();
+    let (sure, unsure): (Vec<&Channel>, Vec<&Channel>) =
+        draft.inspection.channels.iter().partition(|c| c.is_sure);
+    for channel in sure {
+        let _ = writeln!(text, "  {} # {}", line(channel), comment(&channel.evidence));
+    }
+    if !unsure.is_empty() {
+        let _ = writeln!(
+            text,
+            "  # Check these against the recorder's documents, and delete the word `{UNSURE}` of each that is right."
+        );
+    }
+    for channel in unsure {
+        let _ = writeln!(
+            text,
+            "  {} # {UNSURE} {}",
+            line(channel),
+            comment(&channel.evidence)
+        );
+    }
+    text
+}
+
+/// Line of the channel map.
+fn line(channel: &Channel) -> String {
+    let sign = if channel.sign < 0.0 { ", sign: -1" } else { "" };
+    let wraps = channel.wraps_at;
+    let wraps = wraps.map_or_else(String::new, |period| format!(", wraps_at: {period}"));
+    let (column, unit) = (scalar(&channel.column), scalar(&channel.unit));
+    format!(
+        "{column}: {{ signal: {}, unit: {unit}{sign}{wraps} }}",
+        channel.signal
+    )
+}
+
+fn unused(draft: &Draft) -> String {
+    let unused = &draft.inspection.unused;
+    if unused.is_empty() {
+        return String::new();
+    }
+    let mut text =
+        "\n# Columns that no signal takes. To use one, give it a line above.\n".to_owned();
+    for column in unused {
+        let unit = column
+            .unit
+            .as_deref()
+            .map_or_else(String::new, |unit| format!(" [{unit}]"));
+        let _ = writeln!(
+            text,
+            "#   {}{}: {}",
+            comment(&column.column),
+            comment(&unit),
+            comment(&column.reason)
+        );
+    }
+    text
+}
+
+/// A signal that is not recorded: its value in the draft, and the place where it matters.
+const NOT_RECORDED: [(&str, &str, &str); 10] = [
+    (
+        signal::MASS,
+        OPEN,
+        "every force coefficient is proportional to it",
+    ),
+    (
+        signal::IX,
+        OPEN,
+        "every rolling moment coefficient is proportional to it",
+    ),
+    (
+        signal::IY,
+        OPEN,
+        "every pitching moment coefficient is proportional to it",
+    ),
+    (
+        signal::IZ,
+        OPEN,
+        "every yawing moment coefficient is proportional to it",
+    ),
+    (
+        signal::IXZ,
+        OPEN,
+        "+integral of x z dm; it couples rolling and yawing moments; 0 where it is not known",
+    ),
+    (
+        signal::THRUST,
+        "0",
+        "the axial coefficients are then those of drag less thrust",
+    ),
+    (
+        signal::X_CG,
+        "0",
+        "the reference point of all positions is then the centre of gravity",
+    ),
+    (signal::Y_CG, "0", "as x"),
+    (signal::Z_CG, "0", "as x"),
+    (signal::RPM_LEFT, "0", "no gyroscopic moment of the engines"),
+];
+
+fn constants(draft: &Draft) -> String {
+    let mut lines = String::new();
+    for (name, value, effect) in NOT_RECORDED {
+        if !draft.has(name) {
+            let _ = writeln!(lines, "  {name}: {value} # {effect}");
+        }
+    }
+    if !draft.has(signal::RPM_RIGHT) {
+        let left = if draft.has(signal::RPM_LEFT) {
+            "of one engine alone"
+        } else {
+            "as the left one"
+        };
+        let _ = writeln!(lines, "  {}: 0 # {left}", signal::RPM_RIGHT);
+    }
+    let missing = Quantity::ALL
+        .into_iter()
+        .map(Quantity::signal)
+        .filter(|name| !draft.has(name));
+    let missing: Vec<&str> = missing.collect();
+    let note = if missing.is_empty() {
+        String::new()
+    } else {
+        format!("# No column was found for {}.\n", missing.join(", "))
+    };
+    let heading = "\n# Signals that are not recorded and constant: signal -> value, in the unit at the end of the signal's name.\n";
+    if lines.is_empty() {
+        format!("{heading}{note}constants: {{}}\n")
+    } else {
+        format!("{heading}{note}constants:\n{lines}")
+    }
+}
+
+/// Usual errors of an instrument: uncertainty after calibration, ordinary error and fault, each with bias
+/// and scale error in percent.
+struct UsualErrors {
+    quantities: &'static [Quantity],
+    uncertainty: &'static str,
+    ordinary: &'static str,
+    fault: &'static str,
+}
+
+/// Errors of usual flight-test instruments.
+const USUAL: &[UsualErrors] = &[
+    UsualErrors {
+        quantities: &[Quantity::P, Quantity::Q, Quantity::R],
+        uncertainty: "bias: 0.05, scale_pct: 0.1",
+        ordinary: "bias: 0.1, scale_pct: 0.5",
+        fault: "bias: 0.5, scale_pct: 5",
+    },
+    UsualErrors {
+        quantities: &[Quantity::An, Quantity::Ax, Quantity::Ay],
+        uncertainty: "bias: 0.01, scale_pct: 0.1",
+        ordinary: "bias: 0.01, scale_pct: 0.3",
+        fault: "bias: 0.05, scale_pct: 5",
+    },
+    UsualErrors {
+        quantities: &[Quantity::Alpha, Quantity::Beta],
+        uncertainty: "bias: 0.1",
+        ordinary: "bias: 0.3, scale_pct: 2",
+        fault: "bias: 2, scale_pct: 10",
+    },
+    UsualErrors {
+        quantities: &[Quantity::Velocity],
+        uncertainty: "bias: 1, scale_pct: 0.2",
+        ordinary: "bias: 3, scale_pct: 1",
+        fault: "bias: 20, scale_pct: 5",
+    },
+    UsualErrors {
+        quantities: &[Quantity::Theta, Quantity::Phi, Quantity::Psi],
+        uncertainty: "bias: 0.1",
+        ordinary: "bias: 0.2, scale_pct: 0.5",
+        fault: "bias: 1, scale_pct: 5",
+    },
+];
+
+fn instruments(draft: &Draft) -> String {
+    let mut text = "
+# Sizes of the errors of the instruments, in the signal's unit and in percent: what calibration leaves (uncertainty), what a
+# healthy instrument has (ordinary), and what makes it faulty (fault). These are usual ones; give the recorder's own.
+instruments:
+"
+    .to_owned();
+    let before = text.len();
+    for usual in USUAL {
+        let recorded = usual.quantities.iter().filter(|q| draft.has(q.signal()));
+        for quantity in recorded {
+            let _ = writeln!(
+                text,
+                "  {}: {{ uncertainty: {{ {} }}, ordinary: {{ {} }}, fault: {{ {} }} }}",
+                quantity.signal(),
+                usual.uncertainty,
+                usual.ordinary,
+                usual.fault
+            );
+        }
+    }
+    if text.len() == before {
+        text.truncate(before - 1);
+        text += " {}\n";
+    }
+    text
+}

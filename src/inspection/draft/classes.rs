@@ -1,0 +1,171 @@
+//! Maneuver classes of a draft: those that the surfaces and pilot controls of the recording allow.
+
+use std::fmt::Write;
+
+use super::contents::Draft;
+use super::model::{basic, bias, biased, of_surface};
+use crate::aero::Axis;
+use crate::inspection::findings::Channel;
+use crate::inspection::inputs::{Acts, InputColumn};
+use crate::inspection::vocabulary::Input;
+
+/// Fewest steps of an input that make a maneuver: a doublet has three.
+const FEWEST_STEPS: usize = 3;
+/// Most steps of an input that is not the maneuver's: two may be a trim and its return.
+const MOST_OTHER_STEPS: usize = 2;
+
+/// A maneuver class of the draft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DraftClass {
+    pub name: String,
+    title: String,
+    axis: Axis,
+    /// Signals that must step, and those that must not.
+    steps: Vec<String>,
+    rests: Vec<String>,
+}
+
+/// Classes by inputs that move: of the surfaces, and of the pilot's controls.
+pub fn classes(draft: &Draft) -> Vec<DraftClass> {
+    let of_surfaces = Inputs::of(draft, |kind| {
+        kind.is_surface() && kind != Input::OtherSurface
+    });
+    let of_pilot = Inputs::of(draft, |kind| !kind.is_surface());
+    let all = |inputs: &Inputs| {
+        let acts = [Acts::Pitch, Acts::Roll, Acts::Yaw];
+        acts.map(|acts| inputs.of_axis(acts)).concat()
+    };
+    let mut classes = of_surfaces.classes("surface", &all(&of_pilot));
+    classes.extend(of_pilot.classes("pilot", &[]));
+    classes
+}
+
+/// Inputs of one kind that have steps.
+struct Inputs<'a> {
+    inputs: Vec<(&'a Channel, &'a InputColumn)>,
+}
+
+impl<'a> Inputs<'a> {
+    fn of(draft: &'a Draft, is_wanted: impl Fn(Input) -> bool) -> Inputs<'a> {
+        let inputs = draft.inputs();
+        let wanted =
+            inputs.filter(|(channel, input)| channel.step.is_some() && is_wanted(input.kind));
+        Inputs {
+            inputs: wanted.collect(),
+        }
+    }
+
+    fn of_axis(&self, acts: Acts) -> Vec<String> {
+        let of_axis = self.inputs.iter().filter(|(_, input)| input.acts == acts);
+        of_axis.map(|(channel, _)| channel.signal.clone()).collect()
+    }
+
+    /// Pitch, roll, yaw, and roll with yaw. `others` must rest in all of them.
+    fn classes(&self, by: &str, others: &[String]) -> Vec<DraftClass> {
+        let [pitch, roll, yaw] =
+            [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.of_axis(acts));
+        let class = |name: &str, axis: Axis, steps: &[&Vec<String>], rests: &[&Vec<String>]| {
+            let first = |signals: &&Vec<String>| signals.first().cloned();
+            let all_step = steps.iter().all(|signals| !signals.is_empty());
+            all_step.then(|| DraftClass {
+                name: format!("{name}_{by}"),
+                title: title(name, by),
+                axis,
+                steps: steps.iter().filter_map(first).collect(),
+                rests: rests
+                    .iter()
+                    .filter_map(first)
+                    .chain(others.iter().cloned())
+                    .collect(),
+            })
+        };
+        let classes = [
+            class("pitch", Axis::Longitudinal, &[&pitch], &[&roll, &yaw]),
+            class("roll", Axis::Lateral, &[&roll], &[&yaw]),
+            class("yaw", Axis::Lateral, &[&yaw], &[&roll]),
+            class("roll_yaw", Axis::Lateral, &[&roll, &yaw], &[]),
+        ];
+        classes.into_iter().flatten().collect()
+    }
+}
+
+fn title(name: &str, by: &str) -> String {
+    let inputs = name.replace('_', " and ");
+    match by {
+        "pilot" => format!("Steps of the pilot's {inputs} control"),
+        _ => format!("Steps of the {inputs} surfaces"),
+    }
+}
+
+/// Weights of the outputs: those of the paper's pilot inputs (Tables 2 and 4).
+fn weights(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Longitudinal => "{ alpha: 5, q: 8, theta: 4, an: 150, ax: 250 }",
+        Axis::Lateral => "{ beta: 12, p: 3, r: 17, phi: 3, ay: 200 }",
+    }
+}
+
+/// Text of a class's file.
+pub fn text(draft: &Draft, class: &DraftClass) -> String {
+    let mut text = format!(
+        "class: {}\ntitle: {}\naxis: {}\n\
+         # A maneuver has at least {FEWEST_STEPS} steps of its own inputs; the sizes of steps are in pipeline.yaml (segment: steps:).\n\
+         recognise:\n  steps:\n",
+        class.name,
+        class.title,
+        class.axis.name()
+    );
+    for signal in &class.steps {
+        let _ = writeln!(text, "    {signal}: {{ at_least: {FEWEST_STEPS} }}");
+    }
+    for signal in &class.rests {
+        let _ = writeln!(text, "    {signal}: {{ at_most: {MOST_OTHER_STEPS} }}");
+    }
+    text += "  lead_in_s: 1 # trimmed flight before the first step\n  decay_s: 2.4 # response after the last step\n\n";
+    let surfaces = draft.surfaces(class.axis == Axis::Longitudinal);
+    let (own, others): (Vec<_>, Vec<_>) = surfaces
+        .into_iter()
+        .partition(|(_, input)| input.kind != Input::OtherSurface);
+    let of = |surfaces: &[(&Channel, &InputColumn)]| -> Vec<String> {
+        let names = surfaces.iter().flat_map(|(s, _)| of_surface(class.axis, s));
+        names.collect()
+    };
+    let estimated = [
+        basic(class.axis),
+        of(&own),
+        biased(class.axis).map(bias).collect(),
+    ];
+    text += "\
+# estimated: from the maneuver; held: at the wind tunnel's value; inactive: not in the model of this class. Estimate what the
+# maneuver excites: a surface that steps in it belongs under estimated, one that rests under inactive.
+";
+    let _ = writeln!(text, "estimated:\n  [{}]", wrapped(&estimated.concat()));
+    let others = of(&others);
+    if !others.is_empty() {
+        let _ = writeln!(text, "inactive:\n  [{}]", wrapped(&others));
+    }
+    let _ = writeln!(
+        text,
+        "\n# The diagonal of W1, on residuals in deg, deg/s and g, for output error alone.\nweights: {}",
+        weights(class.axis)
+    );
+    text
+}
+
+/// Names in lines of at most a hundred letters.
+fn wrapped(names: &[String]) -> String {
+    let mut lines = vec![String::new()];
+    for name in names {
+        if lines
+            .last()
+            .is_some_and(|line| line.len() + name.len() > 100)
+        {
+            lines.push(String::new());
+        }
+        if let Some(line) = lines.last_mut() {
+            let _ = write!(line, "{name}, ");
+        }
+    }
+    let lines: Vec<&str> = lines.iter().map(|line| line.trim_end()).collect();
+    lines.join("\n   ").trim_end_matches(',').to_owned()
+}

@@ -1,0 +1,76 @@
+//! Effects of inputs on the angular accelerations, by least squares: they tell the signs of surfaces and
+//! pilot controls, and the axis on which a surface acts.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Angular accelerations and what they are regressed on, over samples without gaps.
+#[derive(Clone, Debug)]
+pub struct Regression<'a> {
+    /// Angular acceleration of each sample.
+    pub response: &'a [f64],
+    pub regressors: Vec<&'a [f64]>,
+}
+
+/// Coefficient of one regressor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effect {
+    pub slope: f64,
+    /// Slope over its standard error.
+    pub significance: f64,
+}
+
+/// Effects of all regressors; `None` where they are not told apart.
+#[must_use]
+pub fn effects(regression: &Regression) -> Option<Vec<Effect>> {
+    let columns = regression.regressors.len() + 1;
+    let row = |k: usize| {
+        let mut row = vec![1.0];
+        row.extend(regression.regressors.iter().map(|r| r[k]));
+        (row, regression.response[k])
+    };
+    let rows = (0..regression.response.len()).map(row);
+    let rows: Vec<(Vec<f64>, f64)> = rows
+        .filter(|(row, y)| y.is_finite() && row.iter().all(|x| x.is_finite()))
+        .collect();
+    let degrees = rows.len().checked_sub(columns).filter(|n| *n > columns)?;
+    let x = DMatrix::from_fn(rows.len(), columns, |i, j| rows[i].0[j]);
+    let y = DVector::from_fn(rows.len(), |i, _| rows[i].1);
+    let scale: Vec<f64> = x
+        .column_iter()
+        .map(|c| c.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    let x = DMatrix::from_fn(rows.len(), columns, |i, j| x[(i, j)] / scale[j]);
+    let inverse = (x.transpose() * &x).cholesky()?.inverse();
+    let slopes = &inverse * (x.transpose() * &y);
+    let variance = (&y - &x * &slopes).norm_squared() / degrees as f64;
+    let effect = |j: usize| Effect {
+        slope: slopes[j] / scale[j],
+        significance: slopes[j] / (variance * inverse[(j, j)]).sqrt(),
+    };
+    Some((1..columns).map(effect).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_of_two_inputs_are_told_apart_with_their_signs() {
+        let wave = |w: f64| {
+            (0..400)
+                .map(|k| (w * f64::from(k)).sin())
+                .collect::<Vec<_>>()
+        };
+        let (a, b, noise) = (wave(0.11), wave(0.07), wave(2.9));
+        let response: Vec<f64> = (0..400)
+            .map(|k| -3.0 * a[k] + 0.5 * b[k] + 0.1 * noise[k])
+            .collect();
+        let found = effects(&Regression {
+            response: &response,
+            regressors: vec![&a, &b],
+        })
+        .unwrap();
+        assert!((found[0].slope + 3.0).abs() < 0.02 && found[0].significance < -100.0);
+        assert!((found[1].slope - 0.5).abs() < 0.02 && found[1].significance > 50.0);
+    }
+}

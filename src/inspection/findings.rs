@@ -1,0 +1,401 @@
+//! Findings of an inspection: each column with its signal, unit and sign, and how sure they are.
+
+use std::collections::BTreeSet;
+
+use super::assignment::{Assignment, Candidates, Search};
+use super::certainty::verdict;
+use super::clock::{ClockColumn, find_clock};
+use super::grid::Grid;
+use super::inputs::{InputColumn, inputs, kind_of, moves, step_size};
+use super::plausible::{ColumnFacts, candidates, facts};
+use super::quantity::Quantity;
+use super::recording::Recording;
+use super::vocabulary::meanings;
+use crate::flight::signal;
+use crate::units::{self, Unit};
+
+/// Samples on which the search runs, and those on which its result is judged: the liveliest minutes.
+const SEARCH_SAMPLES: usize = 1_500;
+const JUDGED_SAMPLES: usize = 6_000;
+
+/// Use of a column.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Role {
+    Time,
+    Motion,
+    /// Surface or pilot control.
+    Input(InputColumn),
+    /// Zero and one alone.
+    Flag,
+    /// Mass, inertias, centre of gravity, engines.
+    Constant,
+}
+
+/// A column with the signal that it gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    pub column: String,
+    pub signal: String,
+    pub unit: String,
+    pub sign: f64,
+    /// Period of a heading, in the unit recorded.
+    pub wraps_at: Option<f64>,
+    pub role: Role,
+    pub is_sure: bool,
+    pub evidence: String,
+    /// Range of the values as recorded.
+    pub range: (f64, f64),
+    /// `true` for an input that moves in the recording.
+    pub moves: bool,
+    /// Size of a step of an input, in the signal's unit.
+    pub step: Option<f64>,
+}
+
+/// A column that gives no signal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unused {
+    pub column: String,
+    pub unit: Option<String>,
+    pub reason: String,
+}
+
+/// Findings about a set of recordings.
+#[derive(Clone, Debug, Default)]
+pub struct Inspection {
+    /// Channels in the order of the signals.
+    pub channels: Vec<Channel>,
+    pub unused: Vec<Unused>,
+    /// Recordings on one step, for charts.
+    pub grid: Grid,
+    /// Median step between samples, s.
+    pub step_s: f64,
+}
+
+/// Inspects recordings of one recorder.
+///
+/// # Errors
+/// A message where no column counts time.
+pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
+    let clock = find_clock(recordings).ok_or(
+        "no column counts time: one column must rise evenly from row to row, in s, ms, us or ns",
+    )?;
+    let grid = Grid::of(recordings, &clock);
+    let facts = facts(recordings);
+    let candidates = candidates(&facts, &clock);
+    let (coarse, fine) = (
+        grid.liveliest(SEARCH_SAMPLES),
+        grid.liveliest(JUDGED_SAMPLES),
+    );
+    let search = |grid| Search {
+        grid,
+        candidates: &candidates,
+    };
+    let assignment = search(&coarse).best();
+    let mut findings = Findings {
+        facts: &facts,
+        channels: vec![time_channel(&clock, &facts)],
+    };
+    findings.add_motion(&search(&fine), &assignment);
+    findings.add_inputs(&inputs(&fine, &assignment, &facts), &fine);
+    findings.add_constants();
+    findings.add_flags(recordings);
+    let unused = findings.unused(&candidates, &assignment);
+    let channels = findings.channels;
+    Ok(Inspection {
+        channels,
+        unused,
+        grid,
+        step_s: clock.step_s,
+    })
+}
+
+fn time_channel(clock: &ClockColumn, facts: &[ColumnFacts]) -> Channel {
+    let own = facts.iter().find(|c| c.name == clock.name);
+    Channel {
+        column: clock.name.clone(),
+        signal: signal::TIME.to_owned(),
+        unit: clock.unit.name.to_owned(),
+        sign: 1.0,
+        wraps_at: None,
+        role: Role::Time,
+        is_sure: clock.is_sure,
+        evidence: clock.evidence.clone(),
+        range: own.and_then(|c| c.range).unwrap_or_default(),
+        moves: true,
+        step: None,
+    }
+}
+
+/// Channels found so far.
+struct Findings<'a> {
+    facts: &'a [ColumnFacts],
+    channels: Vec<Channel>,
+}
+
+impl Findings<'_> {
+    fn is_free(&self, facts: &ColumnFacts) -> bool {
+        !self
+            .channels
+            .iter()
+            .any(|channel| channel.column == facts.name)
+    }
+
+    /// A channel of a column, without further findings.
+    fn plain(facts: &ColumnFacts, signal: String, role: Role) -> Channel {
+        let unit = facts.unit.unwrap_or_else(|| Unit::of_signal(&signal));
+        Channel {
+            column: facts.name.clone(),
+            signal,
+            unit: unit.name.to_owned(),
+            sign: 1.0,
+            wraps_at: None,
+            role,
+            is_sure: false,
+            evidence: String::new(),
+            range: facts.range.unwrap_or_default(),
+            moves: true,
+            step: None,
+        }
+    }
+
+    fn add_motion(&mut self, search: &Search, assignment: &Assignment) {
+        for (quantity, choice) in assignment {
+            let Some(facts) = self.facts.iter().find(|c| c.name == choice.column) else {
+                continue;
+            };
+            let verdict = verdict(search, assignment, *quantity);
+            let unit = Unit::parse(choice.unit).ok();
+            let turn = unit.and_then(|u| Unit::of_signal(signal::PSI).factor_to(u));
+            let is_heading = *quantity == Quantity::Psi;
+            let (is_sure, evidence) = unless_unknown_unit(facts, verdict.is_sure, verdict.evidence);
+            self.channels.push(Channel {
+                unit: choice.unit.to_owned(),
+                sign: choice.sign,
+                wraps_at: turn.filter(|_| is_heading).map(|degree| 360.0 * degree),
+                is_sure,
+                evidence,
+                ..Findings::plain(facts, quantity.signal().to_owned(), Role::Motion)
+            });
+        }
+    }
+
+    fn add_inputs(&mut self, inputs: &[InputColumn], grid: &Grid) {
+        for input in inputs {
+            let own = self.facts.iter().find(|c| c.name == input.column);
+            let Some(facts) = own.filter(|c| self.is_free(c)) else {
+                continue;
+            };
+            let (unit, stated) = input_unit(facts, input);
+            let kept = if unit.quantity == units::Quantity::Number {
+                ""
+            } else {
+                suffix(unit)
+            };
+            let signal = self.free_name(&facts.spelling.words.join("_"), kept);
+            let factor = unit.factor_to(Unit::of_signal(&signal)).unwrap_or(1.0);
+            let step = step_size(grid, &facts.name).map(|step| rounded(step * factor));
+            let evidence = if stated {
+                input.evidence.clone()
+            } else {
+                format!("{}; its unit follows from its range alone", input.evidence)
+            };
+            let (is_sure, evidence) = unless_unknown_unit(facts, input.is_sure && stated, evidence);
+            self.channels.push(Channel {
+                unit: unit.name.to_owned(),
+                sign: input.sign,
+                is_sure,
+                evidence,
+                step,
+                moves: moves(grid, facts, input.kind),
+                ..Findings::plain(facts, signal, Role::Input(input.clone()))
+            });
+        }
+    }
+
+    /// A signal's name that no channel has.
+    fn free_name(&self, words: &str, suffix: &str) -> String {
+        let is_taken = |name: &str| self.channels.iter().any(|c| c.signal == name);
+        let name = format!("{words}{suffix}");
+        let numbered = (2..).map(|n| format!("{words}_{n}{suffix}"));
+        std::iter::once(name)
+            .chain(numbered)
+            .find(|name| !is_taken(name))
+            .unwrap_or_default()
+    }
+
+    /// Signals that names and units alone give.
+    fn add_constants(&mut self) {
+        let others = signal::REQUIRED
+            .iter()
+            .filter(|name| Quantity::of_signal(name).is_none());
+        for name in others {
+            let weight = |facts: &ColumnFacts| {
+                let meanings = meanings(&facts.spelling);
+                meanings.into_iter().find(|m| m.0 == *name).map(|m| m.1)
+            };
+            let target = Unit::of_signal(name);
+            let converts =
+                |facts: &&ColumnFacts| facts.unit.is_none_or(|u| u.factor_to(target).is_some());
+            let free = self
+                .facts
+                .iter()
+                .filter(|c| self.is_free(c) && c.range.is_some());
+            let named = free.filter(converts).filter_map(|c| Some((weight(c)?, c)));
+            if let Some((_, facts)) = named.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                self.channels.push(constant_channel(facts, name));
+            }
+        }
+    }
+
+    fn add_flags(&mut self, recordings: &[Recording]) {
+        for facts in self.facts {
+            let values = || {
+                recordings
+                    .iter()
+                    .filter_map(|r| r.column(&facts.name))
+                    .flat_map(|c| &c.values)
+            };
+            let is_number = facts
+                .unit
+                .is_none_or(|u| u.quantity == units::Quantity::Number);
+            #[expect(clippy::float_cmp, reason = "flags are exactly 0 or 1")]
+            let is_flag = values().all(|v| v.is_nan() || *v == 0.0 || *v == 1.0)
+                && [0.0, 1.0].iter().all(|level| values().any(|v| v == level));
+            if is_flag && is_number && facts.range.is_some() && self.is_free(facts) {
+                let name = self.free_name(&facts.spelling.words.join("_"), "");
+                self.channels.push(Channel {
+                    unit: "0/1".to_owned(),
+                    is_sure: true,
+                    evidence: "0 and 1 alone".to_owned(),
+                    ..Findings::plain(facts, name, Role::Flag)
+                });
+            }
+        }
+    }
+
+    /// Columns without a signal, each with the reason.
+    fn unused(&self, candidates: &Candidates, assignment: &Assignment) -> Vec<Unused> {
+        let free = self.facts.iter().filter(|c| self.is_free(c));
+        let unused = |facts: &ColumnFacts| Unused {
+            column: facts.name.clone(),
+            unit: facts
+                .unit
+                .map(|u| u.name.to_owned())
+                .or_else(|| facts.unknown_unit.clone()),
+            reason: reason(facts, candidates, assignment),
+        };
+        free.map(unused).collect()
+    }
+}
+
+/// Reason for which a column has no signal.
+fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment) -> String {
+    if facts.range.is_none() {
+        return "it holds no number".to_owned();
+    }
+    if let Some(unit) = &facts.unknown_unit {
+        return format!("harvest does not have its unit `{unit}`");
+    }
+    let meant: BTreeSet<&str> = meanings(&facts.spelling).into_iter().map(|m| m.0).collect();
+    let better = candidates.iter().find_map(|(quantity, columns)| {
+        let is_candidate = columns
+            .iter()
+            .any(|c| c.column == facts.name && c.weight > 0.0);
+        let taken = assignment.get(quantity).filter(|_| is_candidate)?;
+        Some(format!(
+            "`{}` fits {} better",
+            taken.column,
+            quantity.signal()
+        ))
+    });
+    match (better, meant.first()) {
+        (Some(better), _) => better,
+        (None, Some(signal)) if facts.is_constant() => {
+            format!("it may be {signal}, but is constant")
+        }
+        (None, Some(signal)) => format!("it may be {signal}, but its range or unit does not fit"),
+        (None, None) if kind_of(facts).is_some() => "an input, of which nothing follows".to_owned(),
+        (None, None) => "its name has no meaning that harvest has".to_owned(),
+    }
+}
+
+/// Channel of a signal that name and unit alone give.
+fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
+    let (low, _) = facts.range.unwrap_or_default();
+    let is_stated = facts.unit.is_some();
+    let has_one_sign = signal::POSITIVE.contains(&name)
+        || [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT].contains(&name);
+    let (is_sure, evidence) = match (is_stated, has_one_sign) {
+        (true, true) if low >= 0.0 => (true, "its name and its stated unit"),
+        (true, true) => (false, "it is negative at times"),
+        (true, false) => (
+            false,
+            "its name and its stated unit; no motion tells its sign",
+        ),
+        (false, true) => (false, "its name; its unit is not stated"),
+        (false, false) => (
+            false,
+            "its name; its unit is not stated, and no motion tells its sign",
+        ),
+    };
+    let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence.to_owned());
+    Channel {
+        is_sure,
+        evidence,
+        ..Findings::plain(facts, name.to_owned(), Role::Constant)
+    }
+}
+
+/// A verdict, unsure where the file states a unit that harvest does not have.
+fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String) -> (bool, String) {
+    match &facts.unknown_unit {
+        Some(unit) => (
+            false,
+            format!("{evidence}; but harvest does not have the unit `{unit}` that the file states"),
+        ),
+        None => (is_sure, evidence),
+    }
+}
+
+/// Range beyond which an angle is in degrees: no surface turns as far in radians.
+const LARGEST_RAD: f64 = 1.6;
+
+/// Unit of an input, and whether it is stated. Angles of surfaces that nothing states follow from the
+/// range; controls are numbers.
+fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
+    let number = Unit::of_signal("");
+    if let Some(unit) = facts.unit {
+        return (unit, true);
+    }
+    let (low, high) = facts.range.unwrap_or_default();
+    let degrees = Unit::of_signal("_deg");
+    let radians = degrees
+        .alike()
+        .find(|unit| unit.name == "rad")
+        .unwrap_or(degrees);
+    match (
+        input.kind.is_surface(),
+        low.abs().max(high.abs()) > LARGEST_RAD,
+    ) {
+        (false, _) => (number, false),
+        (true, true) => (degrees, false),
+        (true, false) => (radians, false),
+    }
+}
+
+/// End of the names of signals that are kept in a unit's quantity.
+fn suffix(unit: Unit) -> &'static str {
+    if unit.name == "in" {
+        return unit.suffix.unwrap_or_default();
+    }
+    unit.alike()
+        .find_map(|other| other.suffix)
+        .unwrap_or_default()
+}
+
+/// A number to two digits.
+fn rounded(value: f64) -> f64 {
+    let places = (1.0 - value.abs().log10().floor()).max(0.0);
+    let scale = 10_f64.powf(places);
+    (value * scale).round() / scale
+}

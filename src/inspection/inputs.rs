@@ -1,0 +1,267 @@
+//! Surfaces, pilot controls and flags of a recording: their signs from the motion that they cause.
+
+use super::assignment::Assignment;
+use super::effects::{Effect, Regression, effects};
+use super::grid::Grid;
+use super::plausible::ColumnFacts;
+use super::quantity::Quantity;
+use super::vocabulary::{Input, input, meanings};
+use crate::numerics::order_statistics::quantile;
+use crate::units;
+
+/// Significance from which an effect tells a sign. Residuals are coloured, so that standard errors are
+/// some times too small.
+const TELLS_SIGN: f64 = 12.0;
+/// Range of a surface that moves, deg.
+const MOVES_DEG: f64 = 0.5;
+/// Time over which a pilot control acts, in steps of the grid.
+const CONTROL_STEPS: usize = 3;
+
+/// Axis on which an input acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Acts {
+    Pitch,
+    Roll,
+    Yaw,
+}
+
+/// An input as recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputColumn {
+    pub column: String,
+    pub kind: Input,
+    pub acts: Acts,
+    pub sign: f64,
+    /// `true` where the motion tells the sign.
+    pub is_sure: bool,
+    pub evidence: String,
+}
+
+/// Signs and axes of the inputs that names tell.
+#[must_use]
+pub fn inputs(grid: &Grid, assignment: &Assignment, facts: &[ColumnFacts]) -> Vec<InputColumn> {
+    let is_motion = |c: &&ColumnFacts| assignment.values().any(|choice| choice.column == c.name);
+    let named = facts.iter().filter(|c| !is_motion(c));
+    let named: Vec<(&ColumnFacts, Input)> = named.filter_map(|c| Some((c, kind_of(c)?))).collect();
+    let (surfaces, controls): (Vec<_>, Vec<_>) =
+        named.into_iter().partition(|(_, kind)| kind.is_surface());
+    let (main, others): (Vec<_>, Vec<_>) = surfaces
+        .iter()
+        .copied()
+        .partition(|(_, kind)| *kind != Input::OtherSurface);
+    let mut found = Responses::of(grid, assignment, &main, 1).inputs();
+    // A mixed surface moves with a main one, and shares its effect: the main ones are judged without the others.
+    let all = Responses::of(grid, assignment, &surfaces, 1).inputs();
+    let is_other = |input: &InputColumn| others.iter().any(|(facts, _)| facts.name == input.column);
+    found.extend(all.into_iter().filter(is_other));
+    found.extend(Responses::of(grid, assignment, &controls, CONTROL_STEPS).inputs());
+    found
+}
+
+/// Kind of an input by its name; an angle whose name is a `d` and a few letters is a surface.
+#[must_use]
+pub fn kind_of(facts: &ColumnFacts) -> Option<Input> {
+    let is_delta = || {
+        let joined = facts.spelling.joined();
+        let is_angle = facts
+            .unit
+            .is_some_and(|u| u.quantity == units::Quantity::Angle);
+        is_angle
+            && joined.starts_with('d')
+            && (2..=5).contains(&joined.len())
+            && meanings(&facts.spelling).is_empty()
+    };
+    input(&facts.spelling).or_else(|| is_delta().then_some(Input::OtherSurface))
+}
+
+/// Effects of some inputs on the three angular accelerations.
+struct Responses<'a> {
+    inputs: &'a [(&'a ColumnFacts, Input)],
+    /// Effects of each input on pitch, roll and yaw; empty where nothing is told apart.
+    effects: [Vec<Effect>; 3],
+}
+
+impl<'a> Responses<'a> {
+    fn of(
+        grid: &Grid,
+        assignment: &Assignment,
+        inputs: &'a [(&'a ColumnFacts, Input)],
+        steps: usize,
+    ) -> Responses<'a> {
+        let moving = |facts: &ColumnFacts| {
+            if facts.is_constant() {
+                None
+            } else {
+                grid.columns.get(&facts.name)
+            }
+        };
+        let columns: Vec<Option<&Vec<f64>>> =
+            inputs.iter().map(|(facts, _)| moving(facts)).collect();
+        let motion: Vec<Vec<f64>> = Quantity::ALL
+            .into_iter()
+            .filter(|q| {
+                matches!(
+                    q,
+                    Quantity::Alpha | Quantity::Beta | Quantity::P | Quantity::Q | Quantity::R
+                )
+            })
+            .filter_map(|q| series(grid, assignment, q))
+            .collect();
+        let effects = [Quantity::Q, Quantity::P, Quantity::R].map(|rate| {
+            let Some(rate) = series(grid, assignment, rate) else {
+                return Vec::new();
+            };
+            let response = slopes(grid, &rate, steps);
+            let used = columns.iter().flatten().map(|c| c.as_slice());
+            let regressors: Vec<&[f64]> = used.chain(motion.iter().map(Vec::as_slice)).collect();
+            let found = effects(&Regression {
+                response: &response,
+                regressors,
+            })
+            .unwrap_or_default();
+            let mut found = found.into_iter();
+            columns
+                .iter()
+                .map(|c| c.and_then(|_| found.next()).unwrap_or_default())
+                .collect()
+        });
+        Responses { inputs, effects }
+    }
+
+    fn inputs(&self) -> Vec<InputColumn> {
+        (0..self.inputs.len()).map(|n| self.input(n)).collect()
+    }
+
+    fn input(&self, n: usize) -> InputColumn {
+        let (facts, kind) = self.inputs[n];
+        let significance = |axis: usize| self.effects[axis].get(n).map_or(0.0, |e| e.significance);
+        let acts = usual_axis(kind).unwrap_or_else(|| {
+            let [pitch, roll, yaw] = [0, 1, 2].map(|axis| significance(axis).abs());
+            match (pitch >= roll.max(yaw), roll >= yaw) {
+                (true, _) => Acts::Pitch,
+                (_, true) => Acts::Roll,
+                _ => Acts::Yaw,
+            }
+        });
+        let found = significance(acts as usize);
+        let usual = usual_effect(kind);
+        let sign = if found * usual < 0.0 && found.abs() >= TELLS_SIGN {
+            -1.0
+        } else {
+            1.0
+        };
+        let is_sure = usual != 0.0 && found.abs() >= TELLS_SIGN;
+        let direction = if found * sign > 0.0 {
+            "positive"
+        } else {
+            "negative"
+        };
+        let evidence = match (usual == 0.0, is_sure) {
+            (true, _) => "no motion tells its sign".to_owned(),
+            (_, false) => format!(
+                "the motion does not tell its sign ({:.0} standard errors)",
+                found.abs()
+            ),
+            (_, true) => format!(
+                "{direction} {} follows it ({:.0} standard errors)",
+                acceleration(acts),
+                found.abs()
+            ),
+        };
+        InputColumn {
+            column: facts.name.clone(),
+            kind,
+            acts,
+            sign,
+            is_sure,
+            evidence,
+        }
+    }
+}
+
+fn acceleration(acts: Acts) -> &'static str {
+    match acts {
+        Acts::Pitch => "pitch acceleration",
+        Acts::Roll => "roll acceleration",
+        Acts::Yaw => "yaw acceleration",
+    }
+}
+
+/// Axis on which a kind of input acts on every aircraft.
+fn usual_axis(kind: Input) -> Option<Acts> {
+    match kind {
+        Input::Elevator | Input::PitchStick => Some(Acts::Pitch),
+        Input::Aileron | Input::RollStick => Some(Acts::Roll),
+        Input::Rudder | Input::Pedals => Some(Acts::Yaw),
+        Input::OtherSurface => None,
+    }
+}
+
+/// Sign of the angular acceleration that follows a positive input in harvest's signs; 0 where aircraft
+/// differ.
+fn usual_effect(kind: Input) -> f64 {
+    match kind {
+        Input::Elevator | Input::Rudder => -1.0,
+        Input::Aileron | Input::PitchStick | Input::RollStick | Input::Pedals => 1.0,
+        Input::OtherSurface => 0.0,
+    }
+}
+
+/// A quantity of the motion in rad, ft and s.
+fn series(grid: &Grid, assignment: &Assignment, quantity: Quantity) -> Option<Vec<f64>> {
+    let choice = assignment.get(&quantity)?;
+    let factor = choice.sign * quantity.factor(choice.unit)?;
+    let values = grid.columns.get(&choice.column)?;
+    Some(values.iter().map(|v| v * factor).collect())
+}
+
+/// Slope of a series: about each sample for one step, over the following steps for more.
+fn slopes(grid: &Grid, values: &[f64], steps: usize) -> Vec<f64> {
+    let mut slopes = vec![f64::NAN; values.len()];
+    let back = usize::from(steps == 1);
+    for stretch in &grid.stretches {
+        for k in stretch.start + back..stretch.end.saturating_sub(steps) {
+            let over = (steps + back) as f64 * grid.step_s;
+            slopes[k] = (values[k + steps] - values[k - back]) / over;
+        }
+    }
+    slopes
+}
+
+/// Shares of the samples beyond which an input's range does not reach: maneuvers are short.
+const RARELY: f64 = 0.002;
+
+/// `true` for a surface or a control that moves in the liveliest parts.
+#[must_use]
+pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
+    let values = || grid.columns.get(&facts.name).into_iter().flatten().copied();
+    let range = quantile(values(), 1.0 - RARELY).zip(quantile(values(), RARELY));
+    let is_in_radians = facts.unit.is_some_and(|unit| unit.name == "rad");
+    let least = match (kind.is_surface(), is_in_radians) {
+        (true, true) => MOVES_DEG.to_radians(),
+        (true, false) => MOVES_DEG,
+        (false, _) => 0.0,
+    };
+    range.is_some_and(|(high, low)| high - low > least)
+}
+
+/// Share of changes below the quickest ones: steps are rare.
+const QUICK: f64 = 0.998;
+/// Size of a step over the quickest change: the smallest of several inputs counts as well.
+const STEP_SHARE: f64 = 0.2;
+/// Steps of the grid in which a step happens.
+const STEP_TIME: usize = 3;
+
+/// Size of a step of an input in the unit recorded, to two digits.
+#[must_use]
+pub fn step_size(grid: &Grid, column: &str) -> Option<f64> {
+    let values = grid.columns.get(column)?;
+    let changes = grid.stretches.iter().flat_map(|stretch| {
+        let values = values.get(stretch.clone()).unwrap_or_default();
+        values
+            .windows(STEP_TIME + 1)
+            .map(|w| (w[STEP_TIME] - w[0]).abs())
+    });
+    let size = STEP_SHARE * quantile(changes, QUICK)?;
+    (size > 0.0).then_some(size)
+}

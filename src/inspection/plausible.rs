@@ -1,0 +1,141 @@
+//! Candidates of each quantity: columns whose name, unit and range allow it.
+
+use super::assignment::{Candidate, Candidates};
+use super::clock::ClockColumn;
+use super::quantity::Quantity;
+use super::recording::{Recording, column_names};
+use super::vocabulary::{input, is_one_side, meanings};
+use super::words::Spelling;
+use crate::numerics::order_statistics::quantile;
+use crate::units::Unit;
+
+/// Shares of a column's values that lie below and above its range: spikes do not count.
+const ENDS: f64 = 0.01;
+
+/// Facts about one column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColumnFacts {
+    pub name: String,
+    pub spelling: Spelling,
+    /// Unit that the file or the name states, where harvest has it.
+    pub unit: Option<Unit>,
+    /// Unit that the file states and harvest does not have.
+    pub unknown_unit: Option<String>,
+    /// Range without spikes; `None` without a number.
+    pub range: Option<(f64, f64)>,
+}
+
+impl ColumnFacts {
+    /// `true` where the column has one value alone.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.range
+            .is_some_and(|(low, high)| high - low <= 1e-9 * high.abs().max(low.abs()))
+    }
+}
+
+/// Facts about each column.
+#[must_use]
+pub fn facts(recordings: &[Recording]) -> Vec<ColumnFacts> {
+    let names = column_names(recordings);
+    names
+        .into_iter()
+        .map(|name| column_facts(recordings, name))
+        .collect()
+}
+
+fn column_facts(recordings: &[Recording], name: &str) -> ColumnFacts {
+    let columns = || recordings.iter().filter_map(|r| r.column(name));
+    let spelling = Spelling::of(name);
+    let stated = columns().find_map(|c| c.stated.clone().filter(|unit| !unit.trim().is_empty()));
+    let parsed = stated.as_deref().and_then(|unit| Unit::parse(unit).ok());
+    let values = || columns().flat_map(|c| c.values.iter().copied());
+    let range = quantile(values(), ENDS).zip(quantile(values(), 1.0 - ENDS));
+    ColumnFacts {
+        name: name.to_owned(),
+        unit: parsed.or(spelling.unit.filter(|_| stated.is_none())),
+        unknown_unit: stated.filter(|_| parsed.is_none()),
+        spelling,
+        range,
+    }
+}
+
+/// Candidates of all quantities.
+#[must_use]
+pub fn candidates(facts: &[ColumnFacts], clock: &ClockColumn) -> Candidates {
+    let columns = || {
+        facts
+            .iter()
+            .filter(|c| c.name != clock.name && !c.is_constant())
+    };
+    let of = |quantity: Quantity| {
+        let named: Vec<Candidate> = columns().filter_map(|c| named(quantity, c)).collect();
+        if !named.is_empty() {
+            return named;
+        }
+        let nameless = |c: &&ColumnFacts| {
+            meanings(&c.spelling).is_empty()
+                && input(&c.spelling).is_none()
+                && !is_one_side(&c.spelling)
+        };
+        columns()
+            .filter(nameless)
+            .filter_map(|c| candidate(quantity, c, 0.0))
+            .collect()
+    };
+    Quantity::ALL
+        .into_iter()
+        .map(|quantity| (quantity, of(quantity)))
+        .collect()
+}
+
+fn named(quantity: Quantity, facts: &ColumnFacts) -> Option<Candidate> {
+    let meanings = meanings(&facts.spelling);
+    let (_, weight) = meanings.into_iter().find(|m| m.0 == quantity.signal())?;
+    candidate(quantity, facts, weight)
+}
+
+/// A column as a quantity, where unit and range allow it.
+fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Candidate> {
+    let (low, high) = facts.range?;
+    let fits = |unit: &&'static str| {
+        let factor = quantity.factor(unit);
+        factor.is_some_and(|factor| is_plausible(quantity, low * factor, high * factor))
+    };
+    let units: Vec<&'static str> = match facts.unit {
+        Some(unit) => std::iter::once(unit.name).filter(fits).collect(),
+        None => quantity.units().iter().copied().filter(fits).collect(),
+    };
+    (!units.is_empty()).then(|| Candidate {
+        column: facts.name.clone(),
+        weight,
+        units,
+    })
+}
+
+/// `true` for a range that an aircraft's quantity can have, in rad, ft, s and slug.
+fn is_plausible(quantity: Quantity, low: f64, high: f64) -> bool {
+    let (least, most) = limits(quantity);
+    let size = low.abs().max(high.abs());
+    if quantity.is_signed() && quantity != Quantity::Altitude {
+        return size <= most;
+    }
+    low >= least && high <= most
+}
+
+/// Least and largest value of an aircraft's quantity.
+fn limits(quantity: Quantity) -> (f64, f64) {
+    match quantity {
+        Quantity::Alpha | Quantity::Beta => (-2.0, 2.0),
+        Quantity::Velocity => (0.0, 4000.0),
+        Quantity::Mach => (0.0, 5.0),
+        // Pressure altitudes below the sea's level, and altitudes counted downwards.
+        Quantity::Altitude => (-130_000.0, 130_000.0),
+        Quantity::P | Quantity::Q | Quantity::R => (-12.0, 12.0),
+        Quantity::Theta => (-1.6, 1.6),
+        Quantity::Phi => (-3.2, 3.2),
+        Quantity::Psi => (-6.3, 6.3),
+        Quantity::An | Quantity::Ax | Quantity::Ay => (-650.0, 650.0),
+        Quantity::Qbar => (0.0, 6000.0),
+    }
+}

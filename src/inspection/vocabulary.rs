@@ -1,0 +1,343 @@
+//! Vocabulary of recorders: what names of columns usually mean.
+
+use super::words::Spelling;
+use crate::flight::signal;
+
+/// Weight of a name that is exactly one of the usual ones.
+const EXACT: f64 = 1.0;
+/// Weight of a name that contains the words of a quantity among others.
+const CONTAINED: f64 = 0.6;
+
+/// Names of one signal.
+struct Entry {
+    signal: &'static str,
+    /// Whole names, without signs and units.
+    names: &'static [&'static str],
+    /// Words that together mean the signal, wherever they stand in a name.
+    words: &'static [&'static [&'static str]],
+}
+
+/// Words of columns that are no measurement of what the rest of the name says.
+const DERIVED: &[&str] = &[
+    "cmd",
+    "command",
+    "commanded",
+    "demand",
+    "demanded",
+    "ref",
+    "reference",
+    "target",
+    "desired",
+    "error",
+    "err",
+    "std",
+    "sigma",
+    "valid",
+    "status",
+    "bias",
+    "dot",
+    "rate",
+    "limit",
+    "trim",
+    "sp",
+    "setpoint",
+    "fail",
+    "test",
+    "calibrated",
+    "indicated",
+    "cas",
+    "ias",
+    "kcas",
+    "kias",
+    "ground",
+    "gps",
+    "static",
+    "radar",
+];
+
+/// Pairs of engines, left before right.
+pub const SIDES: [(&str, &str); 5] = [
+    ("l", "r"),
+    ("left", "right"),
+    ("lh", "rh"),
+    ("1", "2"),
+    ("port", "starboard"),
+];
+
+#[rustfmt::skip]
+const ENTRIES: &[Entry] = &[
+    Entry {
+        signal: signal::TIME,
+        names: &["time", "t", "times", "tsec", "tim", "timestamp", "zeit", "irig", "irigtime", "clock", "elapsed",
+            "elapsedtime", "simtime", "systime", "reltime", "relativetime", "utc", "timesec", "recordtime"],
+        words: &[&["time"], &["timestamp"], &["clock"]],
+    },
+    Entry {
+        signal: signal::ALPHA_VANE,
+        names: &["alpha", "alfa", "alf", "aoa", "alphavane", "alphav", "aoavane", "aoatrue", "alphatrue", "incidence"],
+        words: &[&["angle", "attack"], &["alpha"], &["alfa"], &["aoa"], &["incidence"]],
+    },
+    Entry {
+        signal: signal::BETA_VANE,
+        names: &["beta", "aos", "aoss", "betavane", "betav", "sideslip", "sideslipangle", "slip"],
+        words: &[&["sideslip"], &["beta"], &["aos"], &["aoss"], &["slip", "angle"]],
+    },
+    Entry {
+        signal: signal::VELOCITY,
+        names: &["v", "vt", "vtas", "tas", "ktas", "velocity", "airspeed", "speed", "vtrue", "trueairspeed", "va", "vtot",
+            "vinf", "vair"],
+        words: &[&["true", "airspeed"], &["tas"], &["vtas"], &["ktas"], &["velocity"], &["airspeed"]],
+    },
+    Entry {
+        signal: signal::MACH,
+        names: &["mach", "machno", "machnumber", "ma", "m", "mn"],
+        words: &[&["mach"]],
+    },
+    Entry {
+        signal: signal::ALTITUDE,
+        names: &["altitude", "alt", "h", "hp", "palt", "height", "hbaro", "baroalt", "altbaro", "pressurealtitude", "altmsl",
+            "hpress", "hmsl", "zp"],
+        words: &[&["altitude"], &["alt"], &["height"]],
+    },
+    Entry {
+        signal: signal::P,
+        names: &["p", "pb", "pbody", "rollrate", "wx", "omegax", "gyrox", "prate", "rolrate", "rrate"],
+        words: &[&["roll", "rate"], &["omega", "x"], &["gyro", "x"], &["rate", "p"], &["body", "p"]],
+    },
+    Entry {
+        signal: signal::Q,
+        names: &["q", "qb", "qbody", "pitchrate", "wy", "omegay", "gyroy", "qrate", "pitrate"],
+        words: &[&["pitch", "rate"], &["omega", "y"], &["gyro", "y"], &["rate", "q"], &["body", "q"]],
+    },
+    Entry {
+        signal: signal::R,
+        names: &["r", "rb", "rbody", "yawrate", "wz", "omegaz", "gyroz", "yrate"],
+        words: &[&["yaw", "rate"], &["omega", "z"], &["gyro", "z"], &["rate", "r"], &["body", "r"]],
+    },
+    Entry {
+        signal: signal::THETA,
+        names: &["theta", "thet", "the", "tht", "pitch", "pitchangle", "pitchattitude", "pitchatt"],
+        words: &[&["theta"], &["pitch", "angle"], &["pitch", "attitude"], &["pitch", "att"], &["euler", "pitch"]],
+    },
+    Entry {
+        signal: signal::PHI,
+        names: &["phi", "roll", "bank", "bankangle", "rollangle", "rollattitude", "rollatt"],
+        words: &[&["phi"], &["roll", "angle"], &["roll", "attitude"], &["roll", "att"], &["bank"], &["euler", "roll"]],
+    },
+    Entry {
+        signal: signal::PSI,
+        names: &["psi", "yaw", "heading", "hdg", "head", "yawangle", "trueheading", "headingtrue"],
+        words: &[&["psi"], &["heading"], &["hdg"], &["yaw", "angle"], &["yaw", "attitude"], &["euler", "yaw"]],
+    },
+    Entry {
+        signal: signal::AN,
+        names: &["an", "nz", "az", "anz", "normacc", "normalacc", "accz", "loadfactor", "vertacc", "accelz", "nzcg"],
+        words: &[&["normal", "acceleration"], &["normal", "accel"], &["normal", "acc"], &["nz"], &["an"], &["az"],
+            &["load", "factor"], &["accel", "z"], &["acc", "z"], &["vertical", "acceleration"], &["acceleration", "z"]],
+    },
+    Entry {
+        signal: signal::AX,
+        names: &["ax", "nx", "accx", "longacc", "axialacc", "accelx", "nxcg"],
+        words: &[&["longitudinal", "acceleration"], &["axial", "acceleration"], &["long", "acc"], &["axial", "acc"],
+            &["nx"], &["ax"], &["accel", "x"], &["acc", "x"], &["acceleration", "x"], &["longitudinal", "accel"]],
+    },
+    Entry {
+        signal: signal::AY,
+        names: &["ay", "ny", "accy", "latacc", "accely", "nycg"],
+        words: &[&["lateral", "acceleration"], &["lateral", "accel"], &["lat", "acc"], &["ny"], &["ay"], &["accel", "y"],
+            &["acc", "y"], &["side", "acceleration"], &["acceleration", "y"]],
+    },
+    Entry {
+        signal: signal::QBAR,
+        names: &["qbar", "dynamicpressure", "dynpress", "pdyn", "dynpres", "qdyn", "qinf", "q", "qd"],
+        words: &[&["dynamic", "pressure"], &["qbar"], &["pdyn"], &["dyn", "press"]],
+    },
+    Entry {
+        signal: signal::THRUST,
+        names: &["thrust", "netthrust", "totalthrust", "fn", "thr"],
+        words: &[&["thrust"]],
+    },
+    Entry {
+        signal: signal::MASS,
+        names: &["mass", "grossmass", "aircraftmass", "acmass", "m"],
+        words: &[&["mass"]],
+    },
+    Entry { signal: signal::X_CG, names: &["xcg", "cgx"], words: &[&["x", "cg"], &["xcg"]] },
+    Entry { signal: signal::Y_CG, names: &["ycg", "cgy"], words: &[&["y", "cg"], &["ycg"]] },
+    Entry { signal: signal::Z_CG, names: &["zcg", "cgz"], words: &[&["z", "cg"], &["zcg"]] },
+    Entry { signal: signal::IX, names: &["ix", "ixx", "jx", "jxx", "inertiax"], words: &[&["ixx"], &["inertia", "x"]] },
+    Entry { signal: signal::IY, names: &["iy", "iyy", "jy", "jyy", "inertiay"], words: &[&["iyy"], &["inertia", "y"]] },
+    Entry { signal: signal::IZ, names: &["iz", "izz", "jz", "jzz", "inertiaz"], words: &[&["izz"], &["inertia", "z"]] },
+    Entry { signal: signal::IXZ, names: &["ixz", "jxz", "inertiaxz"], words: &[&["ixz"], &["inertia", "xz"]] },
+    Entry {
+        signal: signal::RPM_LEFT,
+        names: &["rpml", "rpmleft", "leftrpm", "rpm1", "n1l", "rpmlh", "rpm", "enginerpm", "lrpm"],
+        words: &[&["rpm", "l"], &["rpm", "left"], &["rpm", "1"], &["rpm", "lh"]],
+    },
+    Entry {
+        signal: signal::RPM_RIGHT,
+        names: &["rpmr", "rpmright", "rightrpm", "rpm2", "n1r", "rpmrh", "rrpm"],
+        words: &[&["rpm", "r"], &["rpm", "right"], &["rpm", "2"], &["rpm", "rh"]],
+    },
+];
+
+/// Signals that a name may mean, each with a weight up to 1.
+#[must_use]
+pub fn meanings(spelling: &Spelling) -> Vec<(&'static str, f64)> {
+    let joined = spelling.joined();
+    let meaning = |entry: &Entry| {
+        if entry.names.contains(&joined.as_str()) {
+            return Some((entry.signal, EXACT));
+        }
+        let is_contained = |words: &&[&str]| words.iter().all(|word| spelling.has(word));
+        let longest = entry
+            .words
+            .iter()
+            .filter(|words| is_contained(words))
+            .map(|w| w.len())
+            .max()?;
+        let derived = spelling.words.iter().filter(|word| {
+            let own = entry
+                .words
+                .iter()
+                .any(|words| words.len() == longest && words.contains(&word.as_str()));
+            DERIVED.contains(&word.as_str()) && !own
+        });
+        (derived.count() == 0).then_some((entry.signal, CONTAINED * (1.0 + 0.1 * longest as f64)))
+    };
+    ENTRIES.iter().filter_map(meaning).collect()
+}
+
+/// Kind of an input of the aircraft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Input {
+    /// Pitch surface behind the wing: positive trailing edge down, nose down.
+    Elevator,
+    /// Roll surface: positive rolls right.
+    Aileron,
+    /// Yaw surface: positive trailing edge left, nose left.
+    Rudder,
+    /// Flap, slat, spoiler, canard, vane: no sign follows from the motion.
+    OtherSurface,
+    /// Longitudinal stick or column: positive aft, nose up.
+    PitchStick,
+    /// Lateral stick or wheel: positive right.
+    RollStick,
+    /// Pedals: positive right, nose right.
+    Pedals,
+}
+
+impl Input {
+    #[must_use]
+    pub fn is_surface(self) -> bool {
+        matches!(
+            self,
+            Input::Elevator | Input::Aileron | Input::Rudder | Input::OtherSurface
+        )
+    }
+}
+
+#[rustfmt::skip]
+const INPUTS: &[(Input, &[&str], &[&[&str]])] = &[
+    (Input::PitchStick, &["dep", "ddep", "lonstk", "stickpitch", "deltastick", "etapilot"],
+        &[&["stick", "pitch"], &["stick", "long"], &["stick", "lon"], &["stick", "longitudinal"], &["stick", "fore"],
+            &["column"], &["stick", "aft"], &["stick", "y"], &["pilot", "pitch"], &["yoke", "pitch"]]),
+    (Input::RollStick, &["dap", "latstk", "sticklat", "wheel"],
+        &[&["stick", "lat"], &["stick", "lateral"], &["stick", "roll"], &["wheel"], &["stick", "x"], &["pilot", "roll"],
+            &["yoke", "roll"]]),
+    (Input::Pedals, &["pedal", "pedals", "dpp", "rudped", "ruddpedal"], &[&["pedal"], &["pedals"], &["pilot", "yaw"]]),
+    (Input::OtherSurface, &["df", "dlef", "dtef", "lef", "tef", "dsp", "dspoil", "dsb", "dc", "dcan", "slat"],
+        &[&["flap"], &["flaps"], &["slat"], &["slats"], &["spoiler"], &["speedbrake"], &["canard"], &["vane"],
+            &["airbrake"], &["tab"], &["symmetric"], &["differential"], &["leading", "edge"], &["trailing", "edge"]]),
+    (Input::Elevator, &["de", "ele", "elev", "dele", "delev", "deltae", "eta", "dh", "dstab", "stab", "ds"],
+        &[&["elevator"], &["stabilator"], &["stabilizer"], &["horizontal", "tail"], &["delta", "e"], &["elev"], &["htail"]]),
+    (Input::Aileron, &["da", "ail", "dail", "deltaa", "xi"], &[&["aileron"], &["ailerons"], &["delta", "a"], &["ail"]]),
+    (Input::Rudder, &["dr", "rud", "drud", "deltar", "zeta"], &[&["rudder"], &["rudders"], &["delta", "r"], &["rud"]]),
+];
+
+/// Input that a name means.
+#[must_use]
+pub fn input(spelling: &Spelling) -> Option<Input> {
+    let joined = spelling.joined();
+    let is_derived = spelling.words.iter().any(|w| DERIVED.contains(&w.as_str()));
+    let fits = |(_, names, words): &&(Input, &[&str], &[&[&str]])| {
+        let contained = || {
+            words
+                .iter()
+                .any(|words| words.iter().all(|word| spelling.has(word)))
+        };
+        names.contains(&joined.as_str()) || (!is_derived && contained())
+    };
+    INPUTS.iter().find(fits).map(|(input, _, _)| *input)
+}
+
+/// `true` for a name of one of two surfaces or engines: `aileron_left`.
+#[must_use]
+pub fn is_one_side(spelling: &Spelling) -> bool {
+    let sides = || SIDES.iter().flat_map(|(left, right)| [left, right]);
+    spelling.words.len() > 1
+        && spelling
+            .words
+            .iter()
+            .any(|word| sides().any(|side| side == word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn best(name: &str) -> Option<&'static str> {
+        let mut meanings = meanings(&Spelling::of(name));
+        meanings.sort_by(|a, b| b.1.total_cmp(&a.1));
+        meanings.first().map(|m| m.0)
+    }
+
+    #[test]
+    fn usual_names_are_known_in_many_spellings() {
+        for (name, signal) in [
+            ("AOA", signal::ALPHA_VANE),
+            ("Angle of Attack [deg]", signal::ALPHA_VANE),
+            ("pitchRate", signal::Q),
+            ("PITCH_RATE_DPS", signal::Q),
+            ("Pitch Attitude (deg)", signal::THETA),
+            ("NZ", signal::AN),
+            ("VTAS_mps", signal::VELOCITY),
+            ("dynamic_pressure_pa", signal::QBAR),
+            ("Altitude_m", signal::ALTITUDE),
+            ("Ixx", signal::IX),
+            ("Time", signal::TIME),
+        ] {
+            assert_eq!(best(name), Some(signal), "{name}");
+        }
+    }
+
+    #[test]
+    fn commands_and_other_speeds_are_no_measurements() {
+        for name in [
+            "theta_cmd",
+            "pitch_angle_command",
+            "airspeed_calibrated",
+            "ground_velocity",
+            "alpha_dot",
+            "KIAS",
+        ] {
+            assert_eq!(best(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn inputs_are_known_by_their_names() {
+        for (name, kind) in [
+            ("elevator_deg", Some(Input::Elevator)),
+            ("de", Some(Input::Elevator)),
+            ("Stick Pitch [in]", Some(Input::PitchStick)),
+            ("RudderPosition", Some(Input::Rudder)),
+            ("pedal", Some(Input::Pedals)),
+            ("flap_deg", Some(Input::OtherSurface)),
+            ("elevator_cmd", None),
+            ("fuel", None),
+        ] {
+            assert_eq!(input(&Spelling::of(name)), kind, "{name}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Draft of a pipeline for a recorder that harvest has not seen, from its recordings.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::inspection::draft::{self, Draft};
+use crate::inspection::{Inspection, inspect};
+use crate::report::recording_page;
+use crate::store::archive::{self, FlightFiles};
+use crate::store::{atomic, files, recording};
+
+/// Most rows that are read of a file: half an hour at 200 Hz.
+const MOST_ROWS: usize = 360_000;
+/// Most files that are read: one maneuver a file, or a day's flights.
+const MOST_FILES: usize = 24;
+
+/// Draft that was written.
+#[derive(Debug)]
+pub struct Drafted {
+    pub folder: PathBuf,
+    /// Page with the strip charts.
+    pub page: PathBuf,
+    pub inspection: Inspection,
+    /// Number of files read, and of those found.
+    pub files: (usize, usize),
+}
+
+/// Inspects recordings and writes a pipeline's folder, with a page of strip charts beside its reports.
+///
+/// # Errors
+/// The folder exists; no recording is found or readable; no column counts time; the disk failed.
+pub fn write(name: &str, from: &[String]) -> Result<Drafted> {
+    let folder = Path::new("pipelines").join(name);
+    if files::is_folder(&folder) {
+        let what =
+            "there is a pipeline of this name already; choose another name, or remove it first";
+        return Err(Error::config(&folder, None, what));
+    }
+    let mut flights: Vec<FlightFiles> = Vec::new();
+    for place in from {
+        flights.extend(archive::find(place)?);
+    }
+    let (mut recordings, mut found) = (Vec::new(), 0);
+    for flight in &flights {
+        found += flight.files.len();
+        if recordings.len() < MOST_FILES {
+            recordings.extend(recording::first_rows(flight, MOST_ROWS)?);
+        }
+    }
+    let read = recordings.len();
+    let archive = archive_of(from);
+    let inspection = inspect(&recordings).map_err(|what| Error::Archive {
+        place: archive.clone().into(),
+        what,
+    })?;
+    let draft = Draft {
+        name,
+        archive: &archive,
+        inspection: &inspection,
+    };
+    let page = Path::new("reports").join(name).join("recording.html");
+    let html = recording_page(name, &inspection).map_err(|e| Error::store(&page, &e))?;
+    atomic::place(&page, html.as_bytes())?;
+    for file in draft::files(&draft) {
+        atomic::place(&folder.join(&file.path), file.text.as_bytes())?;
+    }
+    Ok(Drafted {
+        folder,
+        page,
+        inspection,
+        files: (read, found),
+    })
+}
+
+/// Archive that holds all places: the place itself, or the folder of several.
+fn archive_of(from: &[String]) -> String {
+    match from {
+        [one] => one.clone(),
+        several => {
+            let parents = several.iter().filter_map(|place| Path::new(place).parent());
+            let shortest = parents.min_by_key(|parent| parent.components().count());
+            let folder = shortest.filter(|folder| !folder.as_os_str().is_empty());
+            folder.unwrap_or(Path::new(".")).display().to_string()
+        }
+    }
+}

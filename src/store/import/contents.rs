@@ -1,0 +1,43 @@
+//! Contents of an imported file, and the refusal of one that is no recording.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::error::Error;
+
+/// A file that was imported.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Imported {
+    pub source: PathBuf,
+    /// Fingerprint of the source's bytes.
+    pub fingerprint: String,
+    pub file: PathBuf,
+    pub rows: usize,
+    pub columns: Vec<ImportedColumn>,
+    /// Things that were left out or replaced, in words.
+    pub notes: Vec<String>,
+}
+
+/// A column of an imported file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImportedColumn {
+    pub name: String,
+    pub unit: Option<String>,
+}
+
+/// Rows, columns and notes of one source.
+#[derive(Debug, Default)]
+pub struct Contents {
+    pub rows: usize,
+    pub columns: Vec<ImportedColumn>,
+    pub notes: Vec<String>,
+}
+
+/// Error of a file that is no recording.
+pub fn refused(source: &Path, what: &str) -> Error {
+    Error::Archive {
+        place: source.to_owned(),
+        what: what.to_owned(),
+    }
+}

@@ -1,0 +1,147 @@
+//! Import: recordings in other formats, written as Parquet of the archive with the units of the columns,
+//! and a manifest that names the source of each file.
+//!
+//! CSV and tall Parquet pass row by row, in bounded memory. A MATLAB file is in memory whole: its columns
+//! stand one after the other.
+
+mod contents;
+mod csv_text;
+mod flight_file;
+mod matlab;
+mod tall;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::{Digest, atomic};
+use crate::error::{Error, Result};
+
+use contents::refused;
+
+pub use contents::{Imported, ImportedColumn};
+
+/// Name of the manifest in the folder of imported files.
+pub const MANIFEST: &str = "import.json";
+
+/// Extensions of files that may be recordings.
+const EXTENSIONS: [&str; 7] = ["csv", "txt", "tsv", "dat", "asc", "mat", "parquet"];
+
+/// Sources in a file or a folder, sorted.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::NotFound`] naming the place.
+pub fn sources(place: &Path) -> Result<Vec<PathBuf>> {
+    if !place.is_dir() {
+        return Ok(vec![place.to_owned()]);
+    }
+    let entries = std::fs::read_dir(place).map_err(Error::io(place, "cannot list the folder"))?;
+    let is_recording = |path: &PathBuf| {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
+    };
+    let paths = entries.flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = paths.filter(is_recording).collect();
+    files.sort();
+    if files.is_empty() {
+        let what = format!(
+            "no recording here: looked for files *.{}",
+            EXTENSIONS.join(", *.")
+        );
+        return Err(Error::not_found(place, what));
+    }
+    Ok(files)
+}
+
+/// File of the archive that a source becomes.
+#[must_use]
+pub fn target(source: &Path, folder: &Path) -> PathBuf {
+    let stem = source.file_stem().map(|s| s.to_string_lossy().into_owned());
+    folder.join(format!("{}.parquet", stem.unwrap_or_default()))
+}
+
+/// Imports a file into a folder.
+///
+/// # Errors
+/// [`Error::Archive`] for a file that is no recording, with the reason; [`Error::Io`] for the disk.
+pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
+    let file = target(source, folder);
+    let same = source.canonicalize().ok().zip(file.canonicalize().ok());
+    if same.is_some_and(|(a, b)| a == b) {
+        return Err(refused(
+            source,
+            "the imported file would take its place: choose another folder",
+        ));
+    }
+    let contents = match Format::of(source)? {
+        Format::Csv => csv_text::import(source, &file)?,
+        Format::Matlab => matlab::import(source, &file)?,
+        Format::Parquet => tall::import(source, &file)?,
+        Format::Hdf5 => return Err(refused(source, HDF5)),
+    };
+    let digest = Digest::of_file(source)?;
+    Ok(Imported {
+        source: source.to_owned(),
+        fingerprint: digest.blake3,
+        file,
+        rows: contents.rows,
+        columns: contents.columns,
+        notes: contents.notes,
+    })
+}
+
+/// Writes the manifest of imported files beside them.
+///
+/// # Errors
+/// [`Error::Io`] or [`Error::Store`] naming the manifest.
+pub fn write_manifest(folder: &Path, imported: &[Imported]) -> Result<PathBuf> {
+    let path = folder.join(MANIFEST);
+    let mut text = serde_json::to_string_pretty(imported).map_err(|e| Error::store(&path, &e))?;
+    text.push('\n');
+    atomic::place(&path, text.as_bytes())?;
+    Ok(path)
+}
+
+/// Way out for files that harvest cannot read.
+const HDF5: &str = "an HDF5 file (MATLAB v7.3), which harvest does not read: in MATLAB, save it with `save('flight.mat', \
+                    '-struct', 's', '-v7')` or write its table with `writetable(t, 'flight.csv')`; in Python, `h5py` and \
+                    `pandas.DataFrame(...).to_parquet('flight.parquet')`";
+
+/// Format of a source, by its first bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Matlab,
+    Parquet,
+    Hdf5,
+}
+
+impl Format {
+    fn of(source: &Path) -> Result<Format> {
+        let file = File::open(source).map_err(Error::io(source, "cannot open it"))?;
+        let mut head = Vec::new();
+        file.take(520)
+            .read_to_end(&mut head)
+            .map_err(Error::io(source, "cannot read it"))?;
+        const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+        let is_hdf5 = head.starts_with(HDF5_SIGNATURE)
+            || head
+                .get(512..)
+                .is_some_and(|rest| rest.starts_with(HDF5_SIGNATURE));
+        Ok(if is_hdf5 || head.starts_with(b"MATLAB 7.3") {
+            Format::Hdf5
+        } else if head.starts_with(b"MATLAB 5.0") {
+            Format::Matlab
+        } else if head.starts_with(b"PAR1") {
+            Format::Parquet
+        } else if source
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mat"))
+        {
+            let what = "no MATLAB 5 file: save it with `save('flight.mat', '-v7')`";
+            return Err(refused(source, what));
+        } else {
+            Format::Csv
+        })
+    }
+}

@@ -1,0 +1,266 @@
+//! Import: recordings in other formats come back from the archive bit by bit, with their units.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
+use harvest::inspection::{Column, Recording};
+use harvest::store::{archive, recording};
+
+use crate::support::{Outcome, Random, harvest, run, write};
+
+/// Values that a careless reader spoils.
+const HARD: [f64; 8] = [
+    0.1 + 0.2,
+    1.0 / 3.0,
+    -5e-324,
+    1.797_693_134_862_315_7e308,
+    123_456_789.123_456_78,
+    -0.0,
+    2.5e-7,
+    1.0,
+];
+
+/// Three columns of random bits between hard values.
+fn columns(rows: u32) -> Vec<(&'static str, &'static str, Vec<f64>)> {
+    let mut random = Random::new(11);
+    let mut values = |k: u32| match HARD.get(k as usize) {
+        Some(value) => *value,
+        None => (random.unit() - 0.5) * 10_f64.powi(i32::try_from(k % 40).unwrap() - 20),
+    };
+    let q = (0..rows).map(&mut values).collect();
+    let de = (0..rows).map(&mut values).collect();
+    let time = (0..rows).map(|k| f64::from(k) * 0.02).collect();
+    vec![("time", "s", time), ("q", "rad/s", q), ("de", "deg", de)]
+}
+
+fn import(folder: &Path, file: &str) -> Outcome {
+    let mut command = harvest();
+    command
+        .current_dir(folder)
+        .args(["import", file, "--to", "flights"]);
+    run(&mut command)
+}
+
+/// The imported recording.
+fn imported(folder: &Path) -> Recording {
+    let flights = archive::find(&folder.join("flights").display().to_string()).unwrap();
+    assert_eq!(flights.len(), 1);
+    recording::first_rows(&flights[0], usize::MAX)
+        .unwrap()
+        .remove(0)
+}
+
+fn check(recording: &Recording, name: &str, unit: Option<&str>, values: &[f64]) {
+    let column: &Column = recording
+        .column(name)
+        .unwrap_or_else(|| panic!("no {name}"));
+    assert_eq!(column.stated.as_deref(), unit, "{name}");
+    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&column.values), bits(values), "{name}");
+}
+
+#[test]
+fn text_with_decimal_commas_and_a_row_of_units_comes_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(40_000);
+    let mut text = "# Messung\ntime;q;de;mode\ns;rad/s;deg;\n".to_owned();
+    for k in 0..columns[0].2.len() {
+        let row = columns
+            .iter()
+            .map(|(_, _, v)| format!("{:?}", v[k]).replace('.', ","));
+        text += &(row.collect::<Vec<_>>().join(";") + ";AUTO\r\n");
+    }
+    fs::write(folder.path().join("f.csv"), text).unwrap();
+    let outcome = import(folder.path(), "f.csv");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(
+        outcome
+            .stdout
+            .contains("columns of text are left out: mode"),
+        "{}",
+        outcome.stdout
+    );
+    let recording = imported(folder.path());
+    for (name, unit, values) in &columns {
+        check(&recording, name, Some(unit), values);
+    }
+    let manifest = fs::read_to_string(folder.path().join("flights/import.json")).unwrap();
+    let bytes = fs::read(folder.path().join("f.csv")).unwrap();
+    assert!(manifest.contains(&blake3::hash(&bytes).to_hex().to_string()));
+    assert!(
+        manifest.contains("rad/s") && manifest.contains("40000"),
+        "{manifest}"
+    );
+}
+
+#[test]
+fn a_tall_file_in_any_order_becomes_one_column_a_name() {
+    let columns = columns(20_000);
+    let time = &columns[0].2;
+    for by_time in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rows: Vec<(f64, &str, f64)> = Vec::new();
+        for (name, _, values) in &columns[1..] {
+            // The second channel is recorded at a fifth of the rate.
+            let every = if *name == "de" { 5 } else { 1 };
+            let each = time.iter().zip(values).step_by(every);
+            rows.extend(each.map(|(t, v)| (*t, *name, *v)));
+        }
+        if by_time {
+            rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        let array = |f: &dyn Fn(&(f64, &str, f64)) -> f64| {
+            Arc::new(rows.iter().map(f).map(Some).collect::<Float64Array>()) as ArrayRef
+        };
+        let names = Arc::new(rows.iter().map(|r| Some(r.1)).collect::<StringArray>()) as ArrayRef;
+        let unit = |r: &(f64, &str, f64)| if r.1 == "q" { "rad/s" } else { "deg" };
+        let units =
+            Arc::new(rows.iter().map(|r| Some(unit(r))).collect::<StringArray>()) as ArrayRef;
+        let batch = RecordBatch::try_from_iter([
+            ("Time", array(&|r| r.0)),
+            ("Parameter", names),
+            ("Value", array(&|r| r.2)),
+            ("Unit", units),
+        ])
+        .unwrap();
+        write(&batch, &folder.path().join("tall.parquet"));
+        let outcome = import(folder.path(), "tall.parquet");
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        let recording = imported(folder.path());
+        check(&recording, "Time", None, time);
+        check(&recording, "q", Some("rad/s"), &columns[1].2);
+        let de = &recording.column("de").unwrap().values;
+        for (k, (value, recorded)) in de.iter().zip(&columns[2].2).enumerate() {
+            assert_eq!(value.is_nan(), k % 5 != 0, "{k}");
+            assert!(k % 5 != 0 || value.to_bits() == recorded.to_bits(), "{k}");
+        }
+    }
+}
+
+/// Element of a MATLAB file: tag, bytes, padding.
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut bytes = kind.to_le_bytes().to_vec();
+    bytes.extend(u32::try_from(data.len()).unwrap().to_le_bytes());
+    bytes.extend(data);
+    if kind != 15 {
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+    }
+    bytes
+}
+
+/// Matrix of a MATLAB file: class, dimensions, name, and what follows.
+fn matrix(class: u8, dimensions: [i32; 2], name: &str, rest: &[u8]) -> Vec<u8> {
+    let mut data = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
+    data.extend(element(5, &dimensions.map(i32::to_le_bytes).concat()));
+    data.extend(element(1, name.as_bytes()));
+    data.extend(rest);
+    element(14, &data)
+}
+
+fn doubles(name: &str, dimensions: [i32; 2], values: &[f64]) -> Vec<u8> {
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    matrix(6, dimensions, name, &element(9, &bytes))
+}
+
+fn characters(name: &str, text: &str) -> Vec<u8> {
+    let codes: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    matrix(
+        4,
+        [1, i32::try_from(text.len()).unwrap()],
+        name,
+        &element(4, &codes),
+    )
+}
+
+fn matlab(folder: &Path, variables: &[Vec<u8>]) {
+    let mut bytes = format!("{:124}", "MATLAB 5.0 MAT-file").into_bytes();
+    bytes.extend([0, 1, b'I', b'M']);
+    bytes.extend(variables.concat());
+    fs::write(folder.join("f.mat"), bytes).unwrap();
+}
+
+/// The element as MATLAB's `-v7` writes it.
+fn compressed(variable: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(variable).unwrap();
+    element(15, &encoder.finish().unwrap())
+}
+
+#[test]
+fn matlab_vectors_structs_and_matrices_come_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(3_000);
+    let signal = [
+        element(5, &8_i32.to_le_bytes()),
+        element(1, b"data\0\0\0\0unit\0\0\0\0"),
+        doubles("", [1, 3_000], &columns[2].2),
+        characters("", "deg"),
+    ];
+    let pair: Vec<f64> = columns[1].2.iter().chain(&columns[2].2).copied().collect();
+    let names = [characters("", "roll"), characters("", "yaw")].concat();
+    matlab(
+        folder.path(),
+        &[
+            doubles("time", [3_000, 1], &columns[0].2),
+            compressed(&doubles("q", [3_000, 1], &columns[1].2)),
+            compressed(&matrix(2, [1, 1], "de", &signal.concat())),
+            doubles("rates", [3_000, 2], &pair),
+            matrix(1, [1, 2], "names", &names),
+            doubles("gain", [1, 1], &[4.0]),
+            doubles("slow", [7, 1], &[1.0; 7]),
+        ],
+    );
+    let outcome = import(folder.path(), "f.mat");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(
+        outcome.stdout.contains("`slow` is left out: 7 values"),
+        "{}",
+        outcome.stdout
+    );
+    let recording = imported(folder.path());
+    check(&recording, "time", None, &columns[0].2);
+    check(&recording, "q", None, &columns[1].2);
+    check(&recording, "de", Some("deg"), &columns[2].2);
+    check(&recording, "roll", None, &columns[1].2);
+    check(&recording, "yaw", None, &columns[2].2);
+    assert_eq!(recording.columns.len(), 5);
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut hdf5 = format!("{:512}", "MATLAB 7.3 MAT-file").into_bytes();
+    hdf5.extend(b"\x89HDF\r\n\x1a\n");
+    let cut = doubles("time", [3, 1], &[1.0, 2.0, 3.0]);
+    for (file, bytes, words) in [
+        ("f.mat", hdf5, "'-v7'"),
+        (
+            "prose.txt",
+            b"Dear reader,\nno numbers here.\n".to_vec(),
+            "no table of numbers",
+        ),
+        ("old.mat", vec![0; 400], "no MATLAB 5 file"),
+    ] {
+        fs::write(folder.path().join(file), bytes).unwrap();
+        let outcome = import(folder.path(), file);
+        assert_eq!(outcome.code, Some(1), "{file}");
+        assert!(outcome.stderr.contains(words), "{file}: {}", outcome.stderr);
+    }
+    matlab(folder.path(), &[cut[..40].to_vec()]);
+    let outcome = import(folder.path(), "f.mat");
+    assert!(outcome.stderr.contains("cut off"), "{}", outcome.stderr);
+    let wide =
+        RecordBatch::try_from_iter([("a", Arc::new(Float64Array::from(vec![1.0])) as ArrayRef)])
+            .unwrap();
+    write(&wide, &folder.path().join("wide.parquet"));
+    let outcome = import(folder.path(), "wide.parquet");
+    assert!(
+        outcome.stderr.contains("time, name, value"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(!folder.path().join("flights").exists());
+}

@@ -1,0 +1,419 @@
+//! Init: a recording that nobody has described becomes a pipeline. Channels are found in copies of the
+//! demonstration that are renamed, in other units, with reversed signs, or incomplete.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use harvest::inspection::{Column, Inspection, Recording, inspect};
+use harvest::store::{archive, recording};
+
+use crate::support::{harvest, run};
+
+/// Rows of each flight: enough maneuvers of both axes.
+const ROWS: usize = 24_000;
+
+/// Two flights of the demonstration as recorded.
+fn demonstration() -> Vec<Recording> {
+    static FLIGHTS: OnceLock<Vec<Recording>> = OnceLock::new();
+    let read = || {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights");
+        let flights = archive::find(&root.display().to_string()).unwrap();
+        let two = flights.iter().take(2);
+        two.flat_map(|flight| recording::first_rows(flight, ROWS).unwrap())
+            .collect()
+    };
+    FLIGHTS.get_or_init(read).clone()
+}
+
+/// Signal, factor into the signal's unit, and sign of a column.
+type Truth = BTreeMap<String, (String, f64)>;
+
+/// Channels as the shipped pipeline has them: all in the signals' units and signs.
+fn truth() -> Truth {
+    let text = fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv/aircraft.yaml"),
+    )
+    .unwrap();
+    let mut truth = Truth::new();
+    for line in text.lines().filter(|line| line.contains("{ signal: ")) {
+        let (column, rest) = line.trim().split_once(": { signal: ").unwrap();
+        let (signal, _) = rest.split_once(',').unwrap();
+        truth.insert(column.to_owned(), (signal.to_owned(), 1.0));
+    }
+    assert!(truth.len() > 40);
+    truth
+}
+
+/// Units of the demonstration that an SI recorder does not have.
+const SI: [(&str, &str, f64); 10] = [
+    ("deg", "rad", std::f64::consts::PI / 180.0),
+    ("deg/s", "rad/s", std::f64::consts::PI / 180.0),
+    ("ft/s", "m/s", 0.3048),
+    ("ft", "m", 0.3048),
+    ("g", "m/s2", 9.806_65),
+    ("lbf/ft2", "Pa", 47.880_259),
+    ("lbf", "N", 4.448_221_6),
+    ("slug", "kg", 14.593_903),
+    ("slug ft2", "kg m2", 1.355_817_95),
+    ("in", "m", 0.0254),
+];
+
+/// A copy of the demonstration, and what its columns truly are.
+struct Copy {
+    recordings: Vec<Recording>,
+    truth: Truth,
+}
+
+impl Copy {
+    fn new() -> Copy {
+        Copy {
+            recordings: demonstration(),
+            truth: truth(),
+        }
+    }
+
+    fn each(mut self, change: impl Fn(&mut Column)) -> Copy {
+        let columns = self.recordings.iter_mut().flat_map(|r| &mut r.columns);
+        columns.for_each(change);
+        self
+    }
+
+    fn in_si(mut self) -> Copy {
+        let columns = &demonstration()[0].columns;
+        for column in columns {
+            let unit = SI
+                .iter()
+                .find(|(from, _, _)| column.stated.as_deref() == Some(from));
+            if let (Some((_, _, factor)), Some(truth)) = (unit, self.truth.get_mut(&column.name)) {
+                truth.1 /= factor;
+            }
+        }
+        self.each(|column| {
+            let unit = SI
+                .iter()
+                .find(|(from, _, _)| column.stated.as_deref() == Some(from));
+            if let Some((_, to, factor)) = unit {
+                column.stated = Some((*to).to_owned());
+                column.values.iter_mut().for_each(|v| *v *= factor);
+            }
+        })
+    }
+
+    fn without_units(self) -> Copy {
+        self.each(|column| column.stated = None)
+    }
+
+    fn reversed(mut self, names: &[&str]) -> Copy {
+        for name in names {
+            self.truth.get_mut(*name).unwrap().1 *= -1.0;
+        }
+        self.each(|column| {
+            if names.contains(&column.name.as_str()) {
+                column.values.iter_mut().for_each(|v| *v = -*v);
+            }
+        })
+    }
+
+    fn without(mut self, names: &[&str]) -> Copy {
+        for recording in &mut self.recordings {
+            recording
+                .columns
+                .retain(|c| !names.contains(&c.name.as_str()));
+        }
+        self.truth.retain(|name, _| !names.contains(&name.as_str()));
+        self
+    }
+
+    fn renamed(mut self, names: &[(&str, &str)]) -> Copy {
+        for (from, to) in names {
+            let truth = self.truth.remove(*from).unwrap();
+            self.truth.insert((*to).to_owned(), truth);
+        }
+        self.each(|column| {
+            if let Some((_, to)) = names.iter().find(|(from, _)| *from == column.name) {
+                (*to).clone_into(&mut column.name);
+            }
+        })
+    }
+
+    fn shuffled(mut self) -> Copy {
+        for recording in &mut self.recordings {
+            let key = |name: &str| {
+                name.bytes()
+                    .fold(7_u32, |h, b| (h * 31 + u32::from(b)) % 8191)
+            };
+            recording.columns.sort_by_key(|c| key(&c.name));
+        }
+        self
+    }
+
+    /// Columns that are wrong and sure, and the share of columns that are right or unsure.
+    fn judged(&self) -> (Inspection, Vec<String>, f64) {
+        let found = inspect(&self.recordings).unwrap();
+        let mut wrong = Vec::new();
+        for channel in found.channels.iter().filter(|c| c.is_sure) {
+            // Names of surfaces, controls and flags are the recorder's: only unit and sign count.
+            let free = !matches!(
+                channel.role,
+                harvest::inspection::Role::Motion | harvest::inspection::Role::Constant
+            );
+            let is_right = self
+                .truth
+                .get(&channel.column)
+                .is_some_and(|(signal, factor)| {
+                    let own = channel.sign * factor_into_signal(&channel.unit, &channel.signal);
+                    let named = free || *signal == channel.signal;
+                    named && (own / factor - 1.0).abs() < 1e-3
+                });
+            if !is_right {
+                wrong.push(format!(
+                    "{}: {} {} {}",
+                    channel.column, channel.signal, channel.unit, channel.sign
+                ));
+            }
+        }
+        let all = self.truth.len() as f64;
+        let share = 1.0 - wrong.len() as f64 / all;
+        (found, wrong, share)
+    }
+
+    /// Checks that nothing is wrong and sure, and that at least so many columns are sure.
+    fn check(&self, least_sure: usize) {
+        let (found, wrong, _) = self.judged();
+        assert!(wrong.is_empty(), "wrong and sure: {wrong:#?}");
+        let sure: BTreeSet<&str> = found
+            .channels
+            .iter()
+            .filter(|c| c.is_sure)
+            .map(|c| c.column.as_str())
+            .collect();
+        let unsure: Vec<String> = found
+            .channels
+            .iter()
+            .filter(|c| !c.is_sure)
+            .map(|c| {
+                format!(
+                    "{}: {} {} {}: {}",
+                    c.column, c.signal, c.unit, c.sign, c.evidence
+                )
+            })
+            .collect();
+        assert!(
+            sure.len() >= least_sure,
+            "{} are sure; not sure: {unsure:#?}",
+            sure.len()
+        );
+    }
+}
+
+/// Factor from a unit to the unit at the end of a signal's name, from the definitions of the units.
+fn factor_into_signal(unit: &str, signal: &str) -> f64 {
+    let si = |name: &str| match name {
+        "rad" => 180.0 / std::f64::consts::PI,
+        "rad/s" => 180.0 / std::f64::consts::PI,
+        "m/s" | "m" => 1.0 / 0.3048,
+        "m/s2" => 1.0 / 9.806_65,
+        "ft/s2" => 1.0 / 32.174,
+        "Pa" => 1.0 / 47.880_259,
+        "N" => 1.0 / 4.448_221_6,
+        "kg" => 1.0 / 14.593_903,
+        "kg m2" => 1.0 / 1.355_817_95,
+        "kt" => 1.687_81,
+        "km/h" => 0.911_344,
+        "hPa" => 100.0 / 47.880_259,
+        "kPa" => 1000.0 / 47.880_259,
+        _ => 1.0,
+    };
+    // A control recorded in metres is kept in feet; in the demonstration it is in inches.
+    let inches = if signal.ends_with("_ft")
+        && !signal.contains("cg")
+        && unit == "m"
+        && signal != "altitude_ft"
+    {
+        12.0
+    } else {
+        1.0
+    };
+    si(unit) * inches
+}
+
+#[test]
+fn the_demonstration_is_found_as_it_is() {
+    Copy::new().check(30);
+}
+
+#[test]
+fn units_follow_from_the_motion_where_nothing_states_them() {
+    Copy::new().in_si().without_units().shuffled().check(14);
+}
+
+#[test]
+fn reversed_signs_follow_from_the_motion() {
+    let reversed = [
+        "alpha_vane",
+        "q",
+        "p",
+        "theta",
+        "ax",
+        "de",
+        "stick_lat",
+        "pedal",
+    ];
+    let copy = Copy::new().reversed(&reversed);
+    copy.check(25);
+    let (found, _, _) = copy.judged();
+    for name in ["alpha_vane", "q", "p", "theta", "de"] {
+        let channel = found.channels.iter().find(|c| c.column == name).unwrap();
+        assert!(channel.sign < 0.0, "{name}");
+    }
+}
+
+#[test]
+fn other_names_mean_the_same() {
+    let copy = Copy::new().in_si().renamed(&[
+        ("time", "Time"),
+        ("alpha_vane", "AOA"),
+        ("beta_vane", "SideslipAngle"),
+        ("V", "TrueAirspeed"),
+        ("mach", "MachNo"),
+        ("altitude", "PressureAltitude"),
+        ("p", "RollRate"),
+        ("q", "PitchRate"),
+        ("r", "YawRate"),
+        ("theta", "PitchAngle"),
+        ("phi", "BankAngle"),
+        ("psi", "Heading"),
+        ("an", "NZ"),
+        ("ax", "NX"),
+        ("ay", "NY"),
+        ("qbar", "DynamicPressure"),
+        ("de", "Elevator"),
+        ("da", "Aileron"),
+        ("dr", "Rudder"),
+        ("mass", "GrossMass"),
+        ("Ix", "Ixx"),
+        ("Iy", "Iyy"),
+        ("Iz", "Izz"),
+    ]);
+    copy.check(25);
+}
+
+#[test]
+fn columns_without_names_are_found_by_their_motion() {
+    let names: Vec<String> = truth().into_keys().collect();
+    let numbers: Vec<String> = (0..names.len()).map(|n| format!("CH{n:03}")).collect();
+    let pairs = names.iter().zip(&numbers);
+    let pairs: Vec<(&str, &str)> = pairs.map(|(a, b)| (a.as_str(), b.as_str())).collect();
+    let copy = Copy::new().renamed(&pairs).shuffled();
+    copy.check(12);
+    let (found, _, _) = copy.judged();
+    for name in ["alpha_vane", "V", "q", "theta", "an"] {
+        let number = pairs.iter().find(|pair| pair.0 == name).unwrap().1;
+        let channel = found.channels.iter().find(|c| c.column == number);
+        assert!(channel.is_some_and(|c| c.is_sure), "{name}");
+    }
+}
+
+#[test]
+fn an_incomplete_recording_is_not_filled_up_with_other_columns() {
+    let gone = ["psi", "beta_vane", "mach", "altitude", "tvcs", "obes", "q"];
+    let copy = Copy::new().without(&gone);
+    copy.check(12);
+    let (found, _, _) = copy.judged();
+    for signal in ["psi_deg", "beta_vane_deg", "mach", "altitude_ft"] {
+        assert!(
+            found.channels.iter().all(|c| c.signal != signal),
+            "{signal}"
+        );
+    }
+}
+
+#[test]
+fn a_recording_without_time_is_refused_in_words() {
+    let error = inspect(&Copy::new().without(&["time"]).recordings).unwrap_err();
+    assert!(error.contains("no column counts time"), "{error}");
+}
+
+#[test]
+fn init_writes_a_pipeline_whose_questions_check_lists() {
+    let folder = tempfile::tempdir().unwrap();
+    let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights/flight_001.parquet");
+    let init = || {
+        let mut command = harvest();
+        command
+            .current_dir(folder.path())
+            .args(["init", "mine", "--from"])
+            .arg(&flight);
+        run(&mut command)
+    };
+    let outcome = init();
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(
+        outcome.stdout.contains("alpha_vane is alpha_vane_deg"),
+        "{}",
+        outcome.stdout
+    );
+    let page = fs::read_to_string(folder.path().join("reports/mine/recording.html")).unwrap();
+    roxmltree::Document::parse_with_options(
+        &page,
+        roxmltree::ParsingOptions {
+            allow_dtd: true,
+            ..Default::default()
+        },
+    )
+    .unwrap();
+    assert_eq!(init().code, Some(1), "a pipeline is not overwritten");
+
+    let check = || {
+        let mut command = harvest();
+        command.current_dir(folder.path()).args(["check", "mine"]);
+        run(&mut command)
+    };
+    let open = check();
+    assert_eq!(open.code, Some(1));
+    for word in [
+        "wing_area_ft2: FILL_IN",
+        "aircraft.yaml:",
+        "every coefficient is divided by it",
+        "8 lines",
+    ] {
+        assert!(
+            open.stderr.contains(word),
+            "`{word}` is not in\n{}",
+            open.stderr
+        );
+    }
+    let aircraft = folder.path().join("pipelines/mine/aircraft.yaml");
+    let text = fs::read_to_string(&aircraft).unwrap();
+    fs::write(&aircraft, text.replace("FILL_IN", "10")).unwrap();
+    let pipeline = folder.path().join("pipelines/mine/pipeline.yaml");
+    let text = fs::read_to_string(&pipeline).unwrap();
+    let tunnel = folder.path().join("tunnel.csv");
+    fs::write(
+        &tunnel,
+        "derivative,alpha_deg,value,unit\nCm_q,10,-4,per_rad\n",
+    )
+    .unwrap();
+    let tunnel = format!("wind_tunnel: {} #", tunnel.display());
+    fs::write(
+        &pipeline,
+        text.replace("# wind_tunnel: tunnel.csv #", &tunnel),
+    )
+    .unwrap();
+    let right = check();
+    assert_eq!(right.code, Some(0), "{}", right.stderr);
+    for word in [
+        "The configuration is right",
+        "not sure",
+        "pitch_surface",
+        "roll_pilot",
+    ] {
+        assert!(
+            right.stdout.contains(word),
+            "`{word}` is not in\n{}",
+            right.stdout
+        );
+    }
+}
