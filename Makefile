@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help init import
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -105,6 +105,11 @@ shown:
 # The bar counts crates on a terminal and in a log alike.
 build: ## build the binary (the first time takes minutes)
 	CARGO_TERM_PROGRESS_WHEN=always CARGO_TERM_PROGRESS_WIDTH=100 cargo build --release --locked
+
+PREFIX ?= /usr/local
+install: build ## install program, man pages and shell completions under PREFIX
+	install -D -m 755 "$(or $(CARGO_TARGET_DIR),target)/release/harvest" "$(DESTDIR)$(PREFIX)/bin/harvest"
+	"$(DESTDIR)$(PREFIX)/bin/harvest" manual --to "$(DESTDIR)$(PREFIX)"
 
 test: ## run the tests and name the ten slowest
 	bash tests/run.sh

@@ -10,6 +10,7 @@ mod export_command;
 mod import_command;
 mod init_command;
 mod lab;
+mod manual_command;
 mod night_commands;
 mod options;
 mod run_commands;
@@ -35,11 +36,19 @@ use crate::lineage::Stage;
 /// attack, compares them with a wind-tunnel database, and writes tables (Parquet and CSV) and a
 /// report (HTML).
 #[derive(Debug, Parser)]
-#[command(version, after_long_help = AFTER)]
+#[command(version = VERSION, after_long_help = AFTER)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
 }
+
+/// Version with the fingerprint of the sources that the lineage of a night states.
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (sources ",
+    env!("HARVEST_SOURCE"),
+    ")"
+);
 
 const AFTER: &str = "\
 Every stage first brings its predecessors up to date. Work that is up to date is not repeated, and a killed run goes on
@@ -126,6 +135,8 @@ enum Command {
     /// Draw a strip chart of a flight or a maneuver, SVG
     #[command(subcommand)]
     Show(Show),
+    /// Write man pages and shell completions; `make install` calls it
+    Manual(manual_command::ManualOptions),
     /// Simulate a campaign with known derivatives, validate the bounds on it, time the estimator
     #[command(subcommand)]
     Lab(lab::LabCommand),
@@ -191,6 +202,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Submit(options) => return cluster_commands::submit(&options),
         Command::Export(options) => return export_command::export(&options),
         Command::Import(options) => return import_command::import(&options),
+        Command::Manual(options) => return manual_command::manual(Cli::command(), &options),
         Command::Init(options) => return init_command::init(&options),
         Command::Check(options) => return check_command::check(&options),
         Command::Lab(command) => return lab::run(&command),

@@ -191,3 +191,45 @@ fn output_that_nobody_takes_ends_no_command_and_output_that_is_lost_is_named() {
         "{stderr}"
     );
 }
+
+#[test]
+fn the_version_states_the_sources_that_the_lineage_states() {
+    let outcome = run(harvest().arg("--version"));
+    let version = outcome.stdout.trim();
+    let (_, sources) = version.split_once("(sources ").unwrap();
+    let sources = sources.trim_end_matches(')');
+    assert_eq!(sources.len(), 16, "{version}");
+    let lineage = &crate::support::demo().bytes;
+    let parquet = lineage.iter().find(|(p, _)| p.ends_with("trends.parquet"));
+    let (_, bytes) = parquet.unwrap();
+    let has = bytes.windows(16).any(|window| window == sources.as_bytes());
+    assert!(has, "{version}");
+}
+
+#[test]
+fn manual_writes_a_page_for_every_command_and_completions() {
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = run(harvest().arg("manual").arg("--to").arg(folder.path()));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let text = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    for page in [
+        "harvest",
+        "harvest-run",
+        "harvest-show-flight",
+        "harvest-lab-simulate",
+    ] {
+        let page = text(&format!("share/man/man1/{page}.1"));
+        assert!(page.contains(".SH NAME"), "{page}");
+    }
+    assert!(text("share/man/man1/harvest-run.1").contains("wind\\-tunnel"));
+    for shell in [
+        "share/bash-completion/completions/harvest",
+        "share/zsh/site-functions/_harvest",
+        "share/fish/vendor_completions.d/harvest.fish",
+    ] {
+        let script = text(shell);
+        assert!(script.contains("wind-tunnel"), "{shell}");
+    }
+    let bench = folder.path().join("share/man/man1/harvest-bench-case.1");
+    assert!(!bench.exists(), "a hidden command has no page");
+}

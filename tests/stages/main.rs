@@ -23,6 +23,7 @@ mod object_store;
 mod pages;
 mod paper;
 mod qualities;
+mod python;
 mod report;
 mod rows;
 mod run;
