@@ -36,6 +36,15 @@ const SIGNS_AT_ONCE: usize = 5;
 /// Units from which descent starts, instead of the most usual ones: the misfits have valleys where all
 /// angles are in the wrong unit together.
 const STARTS: [&[&str]; 4] = [&[], &["rad"], &["rad/s"], &["rad", "rad/s"]];
+/// Units that all angles or rates of a recorder may have together.
+const KINDS: [&[&str]; 6] = [
+    &["deg"],
+    &["rad"],
+    &["deg/s"],
+    &["rad/s"],
+    &["deg", "deg/s"],
+    &["rad", "rad/s"],
+];
 /// Most rounds of descent.
 const ROUNDS: usize = 60;
 
@@ -108,7 +117,8 @@ impl Search<'_> {
 
     fn descend(&self, assignment: &mut Assignment, turns_signs: bool) {
         for _ in 0..ROUNDS {
-            let changed = self.improve_single(assignment)
+            let changed = self.improve_units(assignment)
+                || self.improve_single(assignment)
                 || self.improve_pairs(assignment)
                 || (turns_signs && self.improve_signs(assignment));
             if !changed {
@@ -370,6 +380,47 @@ impl Search<'_> {
             }
         }
         changed
+    }
+
+    /// Gives all angles or rates of one axis or of both the same unit; `true` where that improved. One by
+    /// one they do not leave the valley in which all are in the wrong unit.
+    fn improve_units(&self, assignment: &mut Assignment) -> bool {
+        let before = self.cost(assignment, &Quantity::ALL);
+        let trials = KINDS.iter().flat_map(|units| {
+            let groups = [(true, true), (true, false), (false, true)];
+            groups.map(|group| self.in_units(assignment, units, group))
+        });
+        let costs = trials.map(|trial| (self.cost(&trial, &Quantity::ALL), trial));
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+        match best.filter(|(cost, _)| *cost < before - LEAST_GAIN) {
+            Some((_, trial)) => {
+                *assignment = trial;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// The assignment with the angles and rates of the longitudinal and the lateral axis in some units, where
+    /// their columns may have them.
+    fn in_units(
+        &self,
+        assignment: &Assignment,
+        units: &[&str],
+        (longitudinal, lateral): (bool, bool),
+    ) -> Assignment {
+        let mut trial = assignment.clone();
+        for (quantity, choice) in &mut trial {
+            let is_lateral = Quantity::LATERAL.contains(quantity);
+            let is_member = if is_lateral { lateral } else { longitudinal };
+            let candidates = self.candidates.get(quantity).into_iter().flatten();
+            let own = candidates.filter(|c| c.column == choice.column);
+            let mut possible = own.flat_map(|c| c.units.iter().copied());
+            if let Some(unit) = possible.find(|unit| is_member && units.contains(unit)) {
+                choice.unit = unit;
+            }
+        }
+        trial
     }
 
     /// Changes unit or sign of two quantities at once; `true` where that improved.

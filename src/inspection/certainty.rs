@@ -4,6 +4,8 @@ use super::assignment::{Assignment, HOLDS, Search, with};
 use super::equations::Equation;
 use super::quantity::Quantity;
 
+/// Misfit from which an equation contradicts the columns in it: one of them is wrong.
+const CONTRADICTS: f64 = 0.3;
 /// Least cost of every other unit and sign: the misfits grow by this factor's logarithm, together.
 const LEAST_MARGIN: f64 = 0.4;
 /// Usual signs that must outnumber reversed ones among the lateral quantities, whose common sign no
@@ -39,6 +41,13 @@ pub fn verdict(search: &Search, assignment: &Assignment, quantity: Quantity) -> 
             evidence: format!("{held} only"),
         };
     }
+    if let Some(other) = contradiction(search, assignment, quantity) {
+        return Verdict {
+            is_sure: false,
+            margin: 0.0,
+            evidence: format!("{held}; but {} does not", other.name()),
+        };
+    }
     let margin = margin(search, assignment, quantity);
     let mirrored = Quantity::LATERAL.contains(&quantity) && !has_usual_side(assignment);
     let evidence = if mirrored {
@@ -53,6 +62,15 @@ pub fn verdict(search: &Search, assignment: &Assignment, quantity: Quantity) -> 
         margin,
         evidence,
     }
+}
+
+/// Equation with the quantity that contradicts what is recorded.
+fn contradiction(search: &Search, assignment: &Assignment, quantity: Quantity) -> Option<Equation> {
+    let mut equations = Equation::ALL.into_iter().filter(|e| e.contains(quantity));
+    equations.find(|e| {
+        let misfit = search.misfit(*e, assignment);
+        misfit.is_some_and(|misfit| misfit.ratio > CONTRADICTS)
+    })
 }
 
 /// Equation that holds best among those that contain a quantity.
