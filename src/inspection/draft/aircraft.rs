@@ -115,7 +115,7 @@ fn unused(draft: &Draft) -> String {
 }
 
 /// A signal that is not recorded: its value in the draft, and the place where it matters.
-const NOT_RECORDED: [(&str, &str, &str); 10] = [
+const NOT_RECORDED: [(&str, &str, &str); 7] = [
     (
         signal::MASS,
         OPEN,
@@ -137,23 +137,12 @@ const NOT_RECORDED: [(&str, &str, &str); 10] = [
         "every yawing moment coefficient is proportional to it",
     ),
     (
-        signal::IXZ,
-        OPEN,
-        "+integral of x z dm; it couples rolling and yawing moments; 0 where it is not known",
-    ),
-    (
-        signal::THRUST,
-        "0",
-        "the axial coefficients are then those of drag less thrust",
-    ),
-    (
         signal::X_CG,
         "0",
         "the reference point of all positions is then the centre of gravity",
     ),
     (signal::Y_CG, "0", "as x"),
     (signal::Z_CG, "0", "as x"),
-    (signal::RPM_LEFT, "0", "no gyroscopic moment of the engines"),
 ];
 
 fn constants(draft: &Draft) -> String {
@@ -162,14 +151,6 @@ fn constants(draft: &Draft) -> String {
         if !draft.has(name) {
             let _ = writeln!(lines, "  {name}: {value} # {effect}");
         }
-    }
-    if !draft.has(signal::RPM_RIGHT) {
-        let left = if draft.has(signal::RPM_LEFT) {
-            "of one engine alone"
-        } else {
-            "as the left one"
-        };
-        let _ = writeln!(lines, "  {}: 0 # {left}", signal::RPM_RIGHT);
     }
     let missing = Quantity::ALL
         .into_iter()
