@@ -300,7 +300,7 @@ pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result
 
 /// Runs the Parquet reader and treats its panic as a fault of the file. The panic is not printed:
 /// its reason becomes a problem.
-fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let before = panic::take_hook();
