@@ -23,15 +23,15 @@ words! {
     /// Class of aircraft.
     pub enum AirplaneClass {
         /// Small and light.
-        I = "I",
+        Light = "I",
         /// Medium weight, land-based.
-        IIL = "II-L",
+        MediumOnLand = "II-L",
         /// Medium weight, carrier-based.
-        IIC = "II-C",
+        MediumOnCarriers = "II-C",
         /// Large and heavy.
-        III = "III",
+        Heavy = "III",
         /// High maneuverability.
-        IV = "IV",
+        Maneuverable = "IV",
     }
 }
 

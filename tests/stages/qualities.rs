@@ -32,7 +32,7 @@ fn every_angle_of_attack_has_every_paragraph_with_probabilities_that_add_up() {
         );
         // All together are no better than the worst.
         let level_1 = |row: &&Row| number(row, "level_1_pct");
-        let worst = rows[..7].iter().map(|r| level_1(r)).fold(100.0, f64::min);
+        let worst = rows[..7].iter().map(level_1).fold(100.0, f64::min);
         assert!(level_1(&rows[7]) <= worst + 1e-9);
     }
 }

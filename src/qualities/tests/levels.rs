@@ -42,12 +42,12 @@ fn short_period_damping_has_the_levels_of_table_iv() {
 #[test]
 fn limits_follow_the_class_of_the_aircraft() {
     for (class, constant, expected) in [
-        (AirplaneClass::IV, 0.9, Level::One),
-        (AirplaneClass::IV, 1.2, Level::Two),
-        (AirplaneClass::IV, 2.0, Level::Three),
-        (AirplaneClass::III, 1.2, Level::One),
-        (AirplaneClass::III, 2.0, Level::Two),
-        (AirplaneClass::IV, f64::INFINITY, Level::Worse),
+        (AirplaneClass::Maneuverable, 0.9, Level::One),
+        (AirplaneClass::Maneuverable, 1.2, Level::Two),
+        (AirplaneClass::Maneuverable, 2.0, Level::Three),
+        (AirplaneClass::Heavy, 1.2, Level::One),
+        (AirplaneClass::Heavy, 2.0, Level::Two),
+        (AirplaneClass::Maneuverable, f64::INFINITY, Level::Worse),
     ] {
         let specification = Specification {
             class,
