@@ -139,9 +139,16 @@ words! {
     }
 }
 
+/// Longest text that is compared as a name, bytes: the time of a comparison grows with both lengths, and
+/// a damaged file has names of megabytes.
+const LONGEST_NAME: usize = 200;
+
 /// Similarity of two names from 0 to 1, whatever their case (Jaro and Winkler).
 #[must_use]
 pub fn similarity(a: &str, b: &str) -> f64 {
+    if a.len().max(b.len()) > LONGEST_NAME {
+        return 0.0;
+    }
     strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
 }
 
@@ -183,5 +190,8 @@ mod tests {
             "; did you mean `CN_alpha`?"
         );
         assert_eq!(did_you_mean("xyz", ["CN_0"]), "");
+        let long = format!("CN_0{}", "x".repeat(LONGEST_NAME));
+        assert!(similarity("CN_0", "CN_0x") > 0.9);
+        assert!(similarity("CN_0", &long) <= 0.0, "no name is that long");
     }
 }
