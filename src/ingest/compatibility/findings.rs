@@ -106,6 +106,21 @@ impl Findings {
         corrected
     }
 
+    /// These findings with every fault in doubt: neither named nor corrected.
+    #[must_use]
+    pub fn without_faults(mut self) -> Findings {
+        let estimates = self
+            .0
+            .iter_mut()
+            .flat_map(|f| f.estimates.iter_mut().flatten());
+        for estimate in estimates.filter(|estimate| estimate.fault) {
+            estimate.doubtful = true;
+            estimate.fault = false;
+            estimate.applied = false;
+        }
+        self
+    }
+
     /// These findings with nothing corrected.
     #[must_use]
     pub fn without_corrections(mut self) -> Findings {

@@ -43,6 +43,9 @@ pub fn signals() -> BTreeSet<String> {
         .collect()
 }
 
+/// Fewest windows from which a fault is named: with fewer their scatter does not confirm it.
+const FEWEST_TO_NAME: usize = 3;
+
 /// Removes a heading that is missing in most of a record: windows need it throughout where there is
 /// one, and the other instruments are found without it.
 fn leave_out_rare_heading(record: &mut Record) {
@@ -75,5 +78,10 @@ pub fn examine(
         windows.extend(ranges.map(|range| Window::of(&record, range, aircraft, settings)));
     }
     let errors = joint_fit::fit(&windows, aircraft, settings);
-    Findings::of(errors.as_ref(), channels, recorded, settings)
+    let findings = Findings::of(errors.as_ref(), channels, recorded, settings);
+    if windows.len() < FEWEST_TO_NAME {
+        findings.without_faults()
+    } else {
+        findings
+    }
 }

@@ -782,6 +782,20 @@ fn units_of_inputs_are_those_of_the_equations() {
 }
 
 #[test]
+fn one_window_names_no_fault() {
+    let (vane, j) = (INPUTS, place(INPUTS, Kind::Scale));
+    let mut errors = ordinary(60);
+    errors[j] = 0.3;
+    let findings = examined(&recorded(&flight(15.0), &errors, 9), &settings());
+    assert_eq!(faults(&findings), []);
+    let scale = findings.0[vane].estimates[Kind::Scale as usize].unwrap();
+    assert!(
+        scale.value > 0.1 && scale.doubtful && !scale.applied,
+        "{scale:?}"
+    );
+}
+
+#[test]
 fn bounds_grow_without_a_redundant_channel() {
     let exact = flight(65.0);
     let record = recorded(&exact, &ordinary(3), 3);
