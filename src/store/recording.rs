@@ -63,9 +63,10 @@ fn channels(path: &Path) -> Result<BTreeMap<String, Channel>, String> {
         let is_clock = matches!(kind, DataType::Timestamp(..) | DataType::Duration(_));
         let is_number = kind.is_numeric() || *kind == DataType::Boolean;
         let unit = field.metadata().get(UNIT).cloned();
-        let (signal, unit) = match is_clock {
-            true => (signal::TIME.to_owned(), "s".to_owned()),
-            false => (field.name().clone(), unit.unwrap_or_default()),
+        let (signal, unit) = if is_clock {
+            (signal::TIME.to_owned(), "s".to_owned())
+        } else {
+            (field.name().clone(), unit.unwrap_or_default())
         };
         (is_clock || is_number).then(|| {
             let channel = Channel {

@@ -211,8 +211,7 @@ impl Copy {
 /// Factor from a unit to the unit at the end of a signal's name, from the definitions of the units.
 fn factor_into_signal(unit: &str, signal: &str) -> f64 {
     let si = |name: &str| match name {
-        "rad" => 180.0 / std::f64::consts::PI,
-        "rad/s" => 180.0 / std::f64::consts::PI,
+        "rad" | "rad/s" => 180.0 / std::f64::consts::PI,
         "m/s" | "m" => 1.0 / 0.3048,
         "m/s2" => 1.0 / 9.806_65,
         "ft/s2" => 1.0 / 32.174,

@@ -107,6 +107,9 @@ const HDF5: &str = "an HDF5 file (MATLAB v7.3), which harvest does not read: in 
                     '-struct', 's', '-v7')` or write its table with `writetable(t, 'flight.csv')`; in Python, `h5py` and \
                     `pandas.DataFrame(...).to_parquet('flight.parquet')`";
 
+/// First bytes of HDF5, at the beginning or behind MATLAB's header.
+const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+
 /// Format of a source, by its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
@@ -123,7 +126,6 @@ impl Format {
         file.take(520)
             .read_to_end(&mut head)
             .map_err(Error::io(source, "cannot read it"))?;
-        const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
         let is_hdf5 = head.starts_with(HDF5_SIGNATURE)
             || head
                 .get(512..)
