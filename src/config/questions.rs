@@ -26,7 +26,9 @@ pub(super) fn none_open(files: &Files) -> Result<()> {
     for source in files.all() {
         for (line, text) in (1..).zip(source.lines()) {
             let is_open = without_comment(text).contains(OPEN);
-            open.extend(is_open.then(|| (&source.path, line, text)));
+            if is_open {
+                open.push((&source.path, line, text));
+            }
         }
     }
     let Some((first, further)) = open.split_first() else {

@@ -14,8 +14,8 @@ use crate::dynamics::motion::Window;
 use crate::output_error::{Case, Model};
 use crate::units::DEG;
 
-/// Distance of the angles of attack between which the tunnel's change is linear, deg.
-const STEP_DEG: f64 = 0.25;
+/// Intervals of the swept angles of attack, in each of which the tunnel's change is linear.
+const INTERVALS: usize = 200;
 
 /// Slopes over α that act in a maneuver, with its window.
 #[derive(Clone)]
@@ -30,7 +30,8 @@ struct Swept {
     alphas: Vec<f64>,
     mean: f64,
     lowest: f64,
-    steps: usize,
+    /// Length of an interval.
+    step: f64,
 }
 
 impl Task<'_> {
@@ -108,7 +109,7 @@ impl Swept {
         let lowest = alphas.iter().copied().fold(mean, f64::min);
         let highest = alphas.iter().copied().fold(mean, f64::max);
         Swept {
-            steps: ((highest - lowest) / STEP_DEG).ceil() as usize + 1,
+            step: ((highest - lowest) / INTERVALS as f64).max(f64::MIN_POSITIVE),
             alphas,
             mean,
             lowest,
@@ -117,7 +118,7 @@ impl Swept {
 
     /// Angles from the lowest to the highest.
     fn angles(&self) -> impl Iterator<Item = f64> {
-        (0..=self.steps).map(|i| self.lowest + STEP_DEG * i as f64)
+        (0..=INTERVALS).map(|i| self.lowest + self.step * i as f64)
     }
 
     /// Values at the samples of a quantity that is linear between the angles.
@@ -128,9 +129,14 @@ impl Swept {
             .collect()
     }
 
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the number of an interval"
+    )]
     fn read(&self, quantity: &[f64], alpha: f64) -> f64 {
-        let place = ((alpha - self.lowest) / STEP_DEG).max(0.0);
-        let low = (place as usize).min(self.steps - 1);
+        let place = ((alpha - self.lowest) / self.step).clamp(0.0, INTERVALS as f64);
+        let low = (place as usize).min(INTERVALS - 1);
         let share = place - low as f64;
         quantity[low] + share * (quantity[low + 1] - quantity[low])
     }
@@ -140,7 +146,7 @@ impl Swept {
         let mut sum = 0.0;
         let mut integral = vec![0.0];
         for pair in quantity.windows(2) {
-            sum += 0.5 * STEP_DEG * (pair[0] + pair[1]);
+            sum += 0.5 * self.step * (pair[0] + pair[1]);
             integral.push(sum);
         }
         let at_mean = self.read(&integral, self.mean);
@@ -191,7 +197,7 @@ mod tests {
         }
         let integral = swept.along(&swept.integral(&changes));
         for (value, alpha) in integral.iter().zip(&swept.alphas) {
-            assert_relative_eq!(*value, 1.5 * (alpha - 12.0f64).powi(2), epsilon = 0.05);
+            assert_relative_eq!(*value, 1.5 * (alpha - 12.0f64).powi(2), epsilon = 1e-3);
         }
         assert_relative_eq!(integral[1], 0.0);
     }

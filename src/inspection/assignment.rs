@@ -90,7 +90,7 @@ impl Search<'_> {
         while self.complete(&mut assignment) {
             self.descend(&mut assignment, true);
         }
-        self.usual_side(&mut assignment);
+        Self::usual_side(&mut assignment);
         assignment
     }
 
@@ -492,7 +492,7 @@ impl Search<'_> {
 
     /// Turns the lateral quantities to the side with fewer reversed signs: no equation tells a flight
     /// from its mirror image.
-    fn usual_side(&self, assignment: &mut Assignment) {
+    fn usual_side(assignment: &mut Assignment) {
         let lateral = || Quantity::LATERAL.into_iter();
         let reversed = lateral().filter(|q| assignment.get(q).is_some_and(|c| c.sign < 0.0));
         let all = lateral().filter(|q| assignment.contains_key(q)).count();

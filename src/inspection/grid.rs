@@ -137,7 +137,7 @@ impl Grid {
             grid.stretches.push(start..start + part.len());
         }
         for (name, values) in &self.columns {
-            let kept = parts.iter().flat_map(|part| values.get(part.clone()));
+            let kept = parts.iter().filter_map(|part| values.get(part.clone()));
             grid.columns
                 .insert(name.clone(), kept.flatten().copied().collect());
         }
@@ -214,7 +214,7 @@ mod tests {
         };
         let clock = super::super::clock::find_clock(std::slice::from_ref(&recording)).unwrap();
         let grid = Grid::of(&[recording], &clock);
-        assert_eq!(grid.stretches, [0..20]);
+        assert_eq!(grid.stretches, vec![0..20; 1]);
         let x = &grid.columns["x"];
         for (k, value) in x.iter().enumerate() {
             assert!(

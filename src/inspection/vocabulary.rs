@@ -237,8 +237,15 @@ impl Input {
     }
 }
 
+/// An input, its abbreviations, and the words that name it together.
+type InputWords = (
+    Input,
+    &'static [&'static str],
+    &'static [&'static [&'static str]],
+);
+
 #[rustfmt::skip]
-const INPUTS: &[(Input, &[&str], &[&[&str]])] = &[
+const INPUTS: &[InputWords] = &[
     (Input::PitchStick, &["dep", "ddep", "lonstk", "stickpitch", "deltastick", "etapilot"],
         &[&["stick", "pitch"], &["stick", "long"], &["stick", "lon"], &["stick", "longitudinal"], &["stick", "fore"],
             &["column"], &["stick", "aft"], &["stick", "y"], &["pilot", "pitch"], &["yoke", "pitch"]]),

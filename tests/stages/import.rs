@@ -54,9 +54,7 @@ fn imported(folder: &Path) -> Recording {
 }
 
 fn check(recording: &Recording, name: &str, unit: Option<&str>, values: &[f64]) {
-    let column: &Column = recording
-        .column(name)
-        .unwrap_or_else(|| panic!("no {name}"));
+    let column: &Column = recording.column(name).unwrap();
     assert_eq!(column.stated.as_deref(), unit, "{name}");
     let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&column.values), bits(values), "{name}");

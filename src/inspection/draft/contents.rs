@@ -38,6 +38,7 @@ impl Draft<'_> {
     }
 
     /// Surfaces that move and act on the longitudinal or on the lateral axis.
+    #[must_use]
     pub fn surfaces(&self, is_longitudinal: bool) -> Vec<(&Channel, &InputColumn)> {
         let of_axis = |acts: Acts| (acts == Acts::Pitch) == is_longitudinal;
         let inputs = self.inputs();
@@ -46,6 +47,7 @@ impl Draft<'_> {
             .collect()
     }
 
+    #[must_use]
     pub fn has(&self, signal: &str) -> bool {
         self.inspection.channels.iter().any(|c| c.signal == signal)
     }

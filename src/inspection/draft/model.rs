@@ -71,7 +71,9 @@ derivatives:
                 );
             };
             line("0", "constant");
-            motion(axis).iter().for_each(|m| line(m, m));
+            for m in motion(axis) {
+                line(m, m);
+            }
             for (surface, _) in &surfaces {
                 line(short(&surface.signal), &surface.signal);
             }

@@ -58,7 +58,7 @@ segment:
             );
         }
         None => {
-            text += "  # excitation_flag: … # flag that is up while an on-board system moves the surfaces\n"
+            text += "  # excitation_flag: … # flag that is up while an on-board system moves the surfaces\n";
         }
     }
     let steps: Vec<_> = draft

@@ -162,7 +162,7 @@ impl Layout {
             let numbers = fields.iter().filter(|f| value(f).is_some()).count();
             fields.len() >= 2 && numbers * 2 > fields.len()
         };
-        let first = lines.iter().position(|line| is_data(line))?;
+        let first = lines.iter().position(is_data)?;
         let width = fields(lines[first]).len();
         let headers: Vec<(usize, Vec<String>)> = lines[..first]
             .iter()

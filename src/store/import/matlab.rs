@@ -422,7 +422,8 @@ fn characters(element: &Element, is_little: bool) -> std::result::Result<String,
 /// Numbers of an element of any numeric type.
 #[expect(
     clippy::cast_precision_loss,
-    reason = "64-bit integers beyond 2^53 are no measurements"
+    clippy::cast_lossless,
+    reason = "one conversion for all types; 64-bit integers beyond 2^53 are no measurements"
 )]
 fn numbers(element: &Element, is_little: bool) -> std::result::Result<Vec<f64>, String> {
     macro_rules! of {
