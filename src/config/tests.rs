@@ -274,11 +274,11 @@ fn an_unknown_unit_is_answered_with_the_known_ones() {
     let line = copy.spoil(
         "aircraft.yaml",
         "alpha_vane_deg, unit: deg }",
-        "alpha_vane_deg, unit: degrees }",
+        "alpha_vane_deg, unit: gons }",
     );
     let e = copy.error();
     let expected = format!(
-        "aircraft.yaml:{line}: channel `alpha_vane`: unknown unit `degrees`; the units are deg, rad, "
+        "aircraft.yaml:{line}: channel `alpha_vane`: unknown unit `gons`; the units are deg, rad, "
     );
     assert!(e.starts_with(&expected), "{e}");
 }

@@ -142,9 +142,24 @@ fn maneuvers_hold_the_tunnel_s_values_until_the_posterior_of_the_other_flights_h
     demo().fill_store(&campaign);
     campaign.copy_pipeline();
     let (posterior, tunnel) = ("held_values: posterior", "held_values: tunnel");
-    assert_eq!(campaign.edit("pipeline.yaml", posterior, tunnel), 1);
+    campaign.edit("pipeline.yaml", posterior, tunnel);
     campaign.finishes("compare");
-    assert_eq!(off(&campaign.table("estimates")), 0);
+    let estimates = campaign.table("estimates");
+    assert_eq!(off(&estimates), 0);
+    // Trends and their outliers are of these estimates.
+    let outliers = campaign.table("outliers");
+    assert!(!outliers.is_empty() && outliers == demo().tables["outliers"]);
+    for outlier in outliers {
+        let is_own = |row: &&Row| {
+            row["maneuver_id"] == outlier["maneuver_id"]
+                && row["derivative"] == outlier["derivative"]
+        };
+        let row = estimates.iter().find(is_own);
+        assert!(
+            row.is_none_or(|row| row["value"] == outlier["value"]),
+            "{outlier:?}"
+        );
+    }
 }
 
 #[test]

@@ -52,13 +52,7 @@ fn sums_are_constant_plus_slope_times_alpha() {
 
 #[test]
 fn outliers_are_estimates_more_than_three_standard_deviations_from_their_trend() {
-    let estimates = estimates();
     for outlier in rows("outliers") {
-        let of = (
-            outlier["maneuver_id"].as_str(),
-            outlier["derivative"].as_str(),
-        );
-        assert_eq!(outlier["value"], estimates[&of]["value"], "{outlier:?}");
         let z = number(outlier, "z");
         let off = number(outlier, "value") - number(outlier, "trend");
         assert!(z.abs() > 3.0 && z.signum() == off.signum(), "{outlier:?}");
