@@ -1,10 +1,11 @@
 //! Python: the blocks of docs/python.md on the tables of the demonstration.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{demo, skip};
+use crate::support::demo;
 
 /// Blocks of Python in a page.
 fn blocks(page: &str) -> Vec<&str> {
@@ -39,7 +40,13 @@ fn the_blocks_of_the_page_run_on_published_tables() {
         match Command::new(&python).args(["-c", &import]).output() {
             Ok(tried) if tried.status.success() => {}
             _ => {
-                skip(&format!("docs/python.md: {python} cannot `{import}`"));
+                // Packages of the analyst's choice: no machine must have them, CI's neither.
+                let mut stderr = std::io::stderr();
+                writeln!(
+                    stderr,
+                    "skipped: docs/python.md: {python} cannot `{import}`"
+                )
+                .unwrap();
                 continue;
             }
         }
