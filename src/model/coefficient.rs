@@ -109,28 +109,19 @@ impl Data {
             places: places.into_values().collect(),
             estimated,
         };
-        data.flights = (0..data.places.len())
-            .map(|flight| FlightData::new(&data.observed(flight), terms, &data.unknowns))
-            .collect();
+        let flights = data
+            .places
+            .iter()
+            .map(|own| FlightData::new(&observed(own, &data.observations), terms, &data.unknowns));
+        data.flights = flights.collect();
         data
     }
 
-    /// Observations of a flight.
-    fn observed(&self, flight: usize) -> Vec<Observed<'_>> {
-        let places = self.places[flight].iter().map(|&(place, i)| {
-            let (class, observation) = &self.observations[i];
-            (place, *class, observation)
-        });
-        places.collect()
-    }
-
-    /// Adds to the noise what lies between the points of the grids.
+    /// Sets the noise to the maneuvers' own and what lies between the points of the grids.
     pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
-        let mut flights = std::mem::take(&mut self.flights);
-        for (i, flight) in flights.iter_mut().enumerate() {
-            flight.set_between(&self.observed(i), terms, scales);
+        for (flight, own) in self.flights.iter_mut().zip(&self.places) {
+            flight.set_between(&observed(own, &self.observations), terms, scales);
         }
-        self.flights = flights;
     }
 
     /// Most probable scales, from a start, and the Gaussian that they give.
@@ -214,4 +205,16 @@ impl Data {
             gaussian,
         })
     }
+}
+
+/// Maneuvers of a flight from their places in the evidence and among the observations.
+fn observed<'o>(
+    places: &[(usize, usize)],
+    observations: &'o [(usize, Observation)],
+) -> Vec<Observed<'o>> {
+    let own = places.iter().map(|&(place, i)| {
+        let (class, observation) = &observations[i];
+        (place, *class, observation)
+    });
+    own.collect()
 }

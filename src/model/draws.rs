@@ -45,7 +45,7 @@ impl Sampler<'_> {
             let deviates = DVector::from_fn(own.root.ncols(), |_, _| stream.normal());
             let differences = &own.mean + &own.root * deviates;
             for quantity in &own.quantities {
-                values.extend(quantity.values(differences.as_slice()));
+                values.extend(quantity.values(&differences));
             }
         }
         let rows = self.rows.iter().zip(values);

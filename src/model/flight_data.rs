@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::observation::Observation;
 use super::prior::Scale;
-use super::term::Term;
+use super::term::{Term, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::output_error::error_effect::SharedError;
 
@@ -20,9 +20,8 @@ pub struct FlightData {
     pub differences: DVector<f64>,
     /// A.
     pub rows: Vec<SparseRow>,
-    /// Covariance of e, maneuver by maneuver, without what lies between the points of the grids.
-    own_noise: Vec<DMatrix<f64>>,
-    /// Covariance of e, maneuver by maneuver.
+    /// Covariance of e, maneuver by maneuver; with what lies between the points of the grids once it is
+    /// set.
     noise: Vec<DMatrix<f64>>,
     /// K Kᵀ.
     calibration: DMatrix<f64>,
@@ -57,7 +56,6 @@ impl FlightData {
             maneuvers: vec![],
             differences: DVector::zeros(count),
             rows: vec![],
-            own_noise: vec![],
             noise: vec![],
             calibration: DMatrix::zeros(count, count),
         };
@@ -75,24 +73,22 @@ impl FlightData {
                     .or_insert_with(|| DVector::zeros(count));
                 effect.rows_range_mut(range.clone()).copy_from(change);
             }
-            data.own_noise.push(observation.noise.clone());
+            data.noise.push(observation.noise.clone());
             data.maneuvers.push((place, range));
         }
         for effect in effects.values() {
             data.calibration += effect * effect.transpose();
         }
-        data.noise.clone_from(&data.own_noise);
         data
     }
 
-    /// Adds to each maneuver's noise what lies between the points of the grids.
+    /// Sets each maneuver's noise to its own and what lies between the points of the grids.
     pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
-        for (i, (_, _, observation)) in observed.iter().enumerate() {
-            let both = terms.iter().zip(scales);
-            let variances = both.map(|(t, s)| t.prior.between(s, &observation.condition));
-            let variances = DMatrix::from_diagonal(&DVector::from_iterator(terms.len(), variances));
-            let design = &observation.design;
-            self.noise[i] = &self.own_noise[i] + design * variances * design.transpose();
+        for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
+            let Observation {
+                design, condition, ..
+            } = observation;
+            *noise = &observation.noise + between_points(terms, scales, design, condition);
         }
     }
 
@@ -117,7 +113,6 @@ impl FlightData {
             maneuvers: maneuvers.collect(),
             differences: self.differences.select_rows(&places),
             rows: places.iter().map(|&i| self.rows[i].clone()).collect(),
-            own_noise: kept.iter().map(|&i| self.own_noise[i].clone()).collect(),
             noise: kept.iter().map(|&i| self.noise[i].clone()).collect(),
             calibration: self
                 .calibration

@@ -6,8 +6,8 @@ use super::evidence::Evidence;
 use super::others::Others;
 use super::posterior::Gaussian;
 use super::prior::Scale;
-use super::term::Term;
-use super::unknowns::{SparseRow, Unknowns};
+use super::term::{Term, between_points};
+use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
@@ -57,17 +57,9 @@ impl Evidence<'_> {
         }
         let condition = self.maneuver.condition(tunnel);
         let design = self.design_of(terms, &names);
-        let shares = terms.iter().map(|t| t.prior.grid.shares(&condition));
-        let shares: Vec<SparseRow> = shares.collect();
-        let rows = design.row_iter();
-        let rows: Vec<SparseRow> = rows
-            .map(|row| unknowns.row(row.iter().copied(), &shares))
-            .collect();
+        let rows = unknowns.difference_rows(terms, &design, &condition);
         let (values, covariance) = others.of(&rows);
-        let both = terms.iter().zip(scales);
-        let between = both.map(|(t, s)| t.prior.between(s, &condition));
-        let between = DVector::from_iterator(terms.len(), between);
-        let between = &design * DMatrix::from_diagonal(&between) * design.transpose();
+        let between = between_points(terms, scales, &design, &condition);
         Some(HeldDifferences {
             derivatives: names.into_iter().map(str::to_owned).collect(),
             values,

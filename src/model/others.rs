@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::flight_data::FlightData;
 use super::posterior::Gaussian;
-use super::unknowns::{SparseRow, between};
+use super::unknowns::{SparseRow, between, sum};
 
 /// The other flights, seen from one flight.
 pub struct Others<'a> {
@@ -48,8 +48,8 @@ impl<'a> Others<'a> {
     #[must_use]
     pub fn of(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
         let Gaussian { mean, covariance } = self.whole;
-        let sum = |row: &SparseRow| row.iter().map(|(place, w)| w * mean[*place]).sum::<f64>();
-        let mut values = DVector::from_iterator(rows.len(), rows.iter().map(sum));
+        let sums = rows.iter().map(|row| sum(row, mean));
+        let mut values = DVector::from_iterator(rows.len(), sums);
         let mut spread = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
             between(&rows[i], &rows[j], covariance)
         });

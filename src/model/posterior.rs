@@ -1,6 +1,6 @@
 //! Posterior of a coefficient's differences from the tunnel, given scales and weights: a Gaussian.
 
-use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -75,40 +75,47 @@ pub struct LeftOut {
     pub covariance: DMatrix<f64>,
 }
 
-/// Flight as the other flights predict it, and each of its maneuvers as all others predict it.
-#[derive(Clone, Debug)]
-pub struct FlightLeftOut {
-    pub flight: LeftOut,
-    /// By place in the evidence.
-    pub maneuvers: BTreeMap<usize, LeftOut>,
-}
-
-/// Prediction of a flight's rows without them, in closed form.
+/// Predictions of a flight's rows without them, in closed form.
 ///
 /// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision
 /// V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r; a part of them likewise from the part of V⁻¹.
-#[must_use]
-pub fn left_out(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<FlightLeftOut> {
-    let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
-    let inverse = flight.cholesky(weights)?.inverse();
-    let precision = &inverse - &inverse * spread * &inverse;
-    let weighted = inverse * (&flight.differences - predicted);
-    let all = 0..weighted.len();
-    let part = |rows: &std::ops::Range<usize>| {
-        let own = precision.view((rows.start, rows.start), (rows.len(), rows.len()));
+#[derive(Clone, Debug)]
+pub struct LeavingOut {
+    /// V⁻¹.
+    precision: DMatrix<f64>,
+    /// Σ⁻¹ r.
+    weighted: DVector<f64>,
+}
+
+impl LeavingOut {
+    /// Predictions of a flight's rows; `None` where their covariance is not positive definite.
+    #[must_use]
+    pub fn new(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<LeavingOut> {
+        let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
+        let inverse = flight.cholesky(weights)?.inverse();
+        Some(LeavingOut {
+            precision: &inverse - &inverse * spread * &inverse,
+            weighted: inverse * (&flight.differences - predicted),
+        })
+    }
+
+    /// The flight as the other flights predict it.
+    #[must_use]
+    pub fn flight(&self) -> Option<LeftOut> {
+        self.rows(&(0..self.weighted.len()))
+    }
+
+    /// Some rows as all others predict them.
+    #[must_use]
+    pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
+        let own = (rows.start, rows.start);
+        let own = self.precision.view(own, (rows.len(), rows.len()));
         let covariance = Cholesky::new(own.into_owned())?.inverse();
         Some(LeftOut {
-            differences: &covariance * weighted.rows_range(rows.clone()),
+            differences: &covariance * self.weighted.rows_range(rows.clone()),
             covariance,
         })
-    };
-    let maneuvers = flight.maneuvers.iter();
-    Some(FlightLeftOut {
-        flight: part(&all)?,
-        maneuvers: maneuvers
-            .filter_map(|(place, rows)| Some((*place, part(rows)?)))
-            .collect(),
-    })
+    }
 }
 
 /// Weights of the maneuvers by Student's t: a maneuver far from what all others predict weighs less.
@@ -123,11 +130,11 @@ pub fn reweighted(
 ) -> Vec<f64> {
     let mut next = weights.to_vec();
     for flight in flights {
-        let Some(left_out) = left_out(flight, weights, whole) else {
+        let Some(leaving_out) = LeavingOut::new(flight, weights, whole) else {
             continue;
         };
         for (i, (place, rows)) in flight.maneuvers.iter().enumerate() {
-            let Some(alone) = left_out.maneuvers.get(place) else {
+            let Some(alone) = leaving_out.rows(rows) else {
                 continue;
             };
             let added = flight.noise(i) * (1.0 / weights[*place] - 1.0);

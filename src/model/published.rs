@@ -1,9 +1,11 @@
 //! Quantities of a coefficient's posterior that are published: its terms, and the constants of sums.
 
+use nalgebra::DVector;
+
 use super::coefficient::CoefficientPosterior;
 use super::grid::Node;
 use super::term::Term;
-use super::unknowns::{SparseRow, between};
+use super::unknowns::{SparseRow, between, sum};
 use crate::tables::Knowledge;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.
@@ -69,7 +71,7 @@ impl CoefficientPosterior {
     /// Value of a quantity at each of its points.
     #[must_use]
     pub fn values(&self, quantity: &Quantity) -> Vec<f64> {
-        quantity.values(self.gaussian.mean.as_slice())
+        quantity.values(&self.gaussian.mean)
     }
 
     /// Mean over the points of the correlation of two quantities on one grid.
@@ -102,13 +104,10 @@ impl CoefficientPosterior {
 impl Quantity {
     /// Value at each point, of given differences from the tunnel.
     #[must_use]
-    pub fn values(&self, differences: &[f64]) -> Vec<f64> {
+    pub fn values(&self, differences: &DVector<f64>) -> Vec<f64> {
         let points = self.rows.iter().zip(&self.tunnel);
         points
-            .map(|(row, tunnel)| {
-                let difference: f64 = row.iter().map(|(place, w)| w * differences[*place]).sum();
-                tunnel + difference
-            })
+            .map(|(row, tunnel)| tunnel + sum(row, differences))
             .collect()
     }
 }

@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeftOut, gaussian, information, left_out};
+use super::posterior::{Gaussian, LeavingOut, LeftOut, gaussian, information};
 use crate::numerics::root::BlockRoot;
 use crate::numerics::student::NORMAL_95;
 
@@ -51,7 +51,8 @@ impl LeftOut {
 /// Agreement of a flight with the other flights.
 #[must_use]
 pub fn flight(data: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<Agreement> {
-    Some(left_out(data, weights, whole)?.flight.agreement())
+    let left_out = LeavingOut::new(data, weights, whole)?.flight()?;
+    Some(left_out.agreement())
 }
 
 /// Agreement of some maneuvers with all others. What their flights' calibration errors are is not

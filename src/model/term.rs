@@ -4,11 +4,13 @@
 //! tunnel both know better. A constant about which nothing is known is no term: each maneuver keeps
 //! its own.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::evidence::Evidence;
 use super::grid::{Grid, refined};
 use super::prior::{Prior, Scale, Table};
 use super::settings::Settings;
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::tables::Knowledge;
@@ -24,6 +26,21 @@ pub struct Term {
     pub prior: Prior,
     /// Tunnel's breakpoints; all of the grid's without a table.
     pub breakpoints_deg: Vec<f64>,
+}
+
+/// Covariance of weighted sums of the terms at a condition, by what lies between the points of their
+/// grids; one sum per row of `design`.
+#[must_use]
+pub fn between_points(
+    terms: &[Term],
+    scales: &[Scale],
+    design: &DMatrix<f64>,
+    condition: &Condition,
+) -> DMatrix<f64> {
+    let both = terms.iter().zip(scales);
+    let variances = both.map(|(t, s)| t.prior.between(s, condition));
+    let variances = DVector::from_iterator(terms.len(), variances);
+    design * DMatrix::from_diagonal(&variances) * design.transpose()
 }
 
 /// Data from which the terms follow.

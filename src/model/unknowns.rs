@@ -6,12 +6,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::grid::Grid;
 use super::observation::Observation;
 use super::prior::{Scale, fading};
 use super::term::Term;
+use crate::aero::Condition;
 use crate::numerics::root::{BlockRoot, root};
 use crate::output_error::error_effect::SharedError;
 
@@ -94,12 +95,8 @@ impl Unknowns {
     /// Rows of an observation over the unknowns.
     #[must_use]
     pub fn rows(&self, terms: &[Term], class: usize, observation: &Observation) -> Vec<SparseRow> {
-        let shares: Vec<SparseRow> = terms
-            .iter()
-            .map(|t| t.prior.grid.shares(&observation.condition))
-            .collect();
-        let rows = observation.terms.iter().enumerate().map(|(i, &term)| {
-            let mut row = self.row(observation.design.row(i).iter().copied(), &shares);
+        let mut rows = self.difference_rows(terms, &observation.design, &observation.condition);
+        for (i, (row, &term)) in rows.iter_mut().zip(&observation.terms).enumerate() {
             let bound = observation.noise[(i, i)].sqrt();
             if let Some(error) = self.classes.get(&(class, term)) {
                 let own = error.grid.shares(&observation.condition).into_iter();
@@ -109,25 +106,33 @@ impl Unknowns {
                 let place = self.campaign.get(error);
                 row.extend(place.map(|place| (*place, change[i])));
             }
-            row
-        });
-        rows.collect()
+        }
+        rows
     }
 
-    /// Row over the differences alone, from weights of the terms and shares of their points.
+    /// Rows over the differences alone, from weights of the terms at a condition: one row of `design`
+    /// each.
     #[must_use]
-    pub fn row(&self, weights: impl Iterator<Item = f64>, shares: &[SparseRow]) -> SparseRow {
-        let mut row = Vec::new();
-        for ((start, shares), weight) in self.starts.iter().zip(shares).zip(weights) {
-            if weight != 0.0 {
-                row.extend(
-                    shares
-                        .iter()
-                        .map(|(node, share)| (start + node, weight * share)),
-                );
-            }
-        }
-        row
+    pub fn difference_rows(
+        &self,
+        terms: &[Term],
+        design: &DMatrix<f64>,
+        condition: &Condition,
+    ) -> Vec<SparseRow> {
+        let shares = terms.iter().map(|t| t.prior.grid.shares(condition));
+        let shares: Vec<SparseRow> = shares.collect();
+        let row = |i: usize| {
+            let terms = self.starts.iter().zip(&shares).enumerate();
+            let acting = terms.filter(|(j, _)| design[(i, *j)] != 0.0);
+            let weighted = acting.flat_map(|(j, (start, shares))| {
+                let weight = design[(i, j)];
+                shares
+                    .iter()
+                    .map(move |(node, share)| (start + node, weight * share))
+            });
+            weighted.collect()
+        };
+        (0..design.nrows()).map(row).collect()
     }
 
     /// Root of the prior covariance of all unknowns but the differences, without directions below `least`
@@ -186,6 +191,14 @@ fn class_grid((lowest, highest): (f64, f64)) -> Grid {
         alphas.push(alpha);
     }
     Grid::of_alpha(alphas)
+}
+
+/// Weighted sum of the unknowns.
+#[must_use]
+pub fn sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
+    row.iter()
+        .map(|(place, weight)| weight * unknowns[*place])
+        .sum()
 }
 
 /// Covariance of two weighted sums of the unknowns.

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::evidence::Evidence;
 use super::held_values::HeldDifferences;
-use super::unknowns::{SparseRow, between};
+use super::unknowns::{SparseRow, between, sum};
 use crate::aero::Combined;
 use crate::maneuver::Status;
 use crate::output_error::error_effect::ErrorEffect;
@@ -82,7 +82,7 @@ impl<'a> WithHeld<'a> {
             }
             Status::Estimated => {
                 if let Some(weights) = self.weights(&row.derivative, sums) {
-                    let change: f64 = weights.iter().map(|(i, w)| w * self.change[*i]).sum();
+                    let change = sum(&weights, &self.change);
                     let variance = between(&weights, &weights, &self.covariance);
                     let bound = |b: Option<f64>| b.map(|b| (b * b + variance).max(0.0).sqrt());
                     new.value = row.value.map(|v| v + change);

@@ -8,7 +8,7 @@ use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
-use crate::model::posterior::{gaussian, information, left_out, of_differences};
+use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
 use crate::model::prior::Scale;
 use crate::model::scales::negative_log_posterior;
 use crate::model::term::{Basis, Term};
@@ -200,40 +200,34 @@ fn what_is_left_out_is_predicted_as_if_it_had_not_been_there() {
         &information(&data.flights, &weights, data.unknowns.count),
     )
     .unwrap();
-    let left = left_out(&data.flights[1], &weights, &whole).unwrap();
+    let leaving_out = LeavingOut::new(&data.flights[1], &weights, &whole).unwrap();
+    let left = leaving_out.flight().unwrap();
     // The flight: the others are fitted anew.
     let mut others = data.flights.clone();
     let own = others.remove(1);
     let rest = gaussian(&root, &information(&others, &weights, data.unknowns.count)).unwrap();
     let (predicted, spread) = own.image(&rest.mean, &rest.covariance);
     let expected = &own.differences - predicted;
-    assert_relative_eq!(left.flight.differences, expected, epsilon = 1e-9);
+    assert_relative_eq!(left.differences, expected, epsilon = 1e-9);
     let expected = spread + own.covariance(&weights);
-    assert_relative_eq!(left.flight.covariance, expected, epsilon = 1e-9);
+    assert_relative_eq!(left.covariance, expected, epsilon = 1e-9);
     // One of its maneuvers: the flight's calibration errors are as its other maneuvers say.
-    let (place, rows) = own.maneuvers[0].clone();
+    let (_, rows) = own.maneuvers[0].clone();
+    let alone = leaving_out.rows(&rows).unwrap();
     // Of the flight's rows, those of the maneuver given the others.
-    let joint = left.flight.covariance.clone();
+    let joint = left.covariance.clone();
     let kept: Vec<usize> = (0..own.rows.len()).filter(|i| !rows.contains(i)).collect();
     let out: Vec<usize> = rows.clone().collect();
     let cross = joint.select_rows(&out).select_columns(&kept);
     let inverse = Cholesky::new(joint.select_rows(&kept).select_columns(&kept))
         .unwrap()
         .inverse();
-    let differences = left.flight.differences.select_rows(&out)
-        - &cross * &inverse * left.flight.differences.select_rows(&kept);
+    let differences = left.differences.select_rows(&out)
+        - &cross * &inverse * left.differences.select_rows(&kept);
     let covariance =
         joint.select_rows(&out).select_columns(&out) - &cross * inverse * cross.transpose();
-    assert_relative_eq!(
-        left.maneuvers[&place].differences,
-        differences,
-        epsilon = 1e-9
-    );
-    assert_relative_eq!(
-        left.maneuvers[&place].covariance,
-        covariance,
-        epsilon = 1e-9
-    );
+    assert_relative_eq!(alone.differences, differences, epsilon = 1e-9);
+    assert_relative_eq!(alone.covariance, covariance, epsilon = 1e-9);
 }
 
 #[test]
