@@ -25,13 +25,14 @@ pub(super) struct AlphaSlopes {
     pub window: Window,
 }
 
-/// Angles of attack of a maneuver and their mean, deg.
-struct Swept {
-    alphas: Vec<f64>,
+/// Range of a maneuver's angles of attack, deg.
+struct AlphaRange {
     mean: f64,
     lowest: f64,
     /// Length of an interval.
     step: f64,
+    /// Interval of each sample, and its share of it.
+    samples: Vec<(usize, f64)>,
 }
 
 impl Task<'_> {
@@ -42,7 +43,8 @@ impl Task<'_> {
         wide: &Case<NX, E>,
     ) -> AlphaSlopes {
         let motion = window.motion(self.context.aircraft);
-        let swept = Swept::new(motion.points().step_by(2).map(|m| DEG * m.alpha).collect());
+        let alphas: Vec<f64> = motion.points().step_by(2).map(|m| DEG * m.alpha).collect();
+        let range = AlphaRange::of(&alphas);
         let mut slopes = AlphaSlopes {
             derivatives: vec![],
             window: window.clone(),
@@ -55,13 +57,13 @@ impl Task<'_> {
                 continue;
             }
             let (along, regressor) = match derivative.regressor {
-                Regressor::Alpha => (self.change_along_alpha(name, &swept), None),
-                _ => (self.change(name, &swept), Some(wide.measured_regressor(j))),
+                Regressor::Alpha => (self.change_along_alpha(name, &range), None),
+                _ => (self.change(name, &range), Some(wide.measured_regressor(j))),
             };
             let Some(along) = along.filter(|a| a.iter().any(|c| *c != 0.0)) else {
                 continue;
             };
-            let mut values = swept.along(&along);
+            let mut values = range.along(&along);
             for (value, r) in values.iter_mut().zip(regressor.iter().flatten()) {
                 *value *= r;
             }
@@ -72,48 +74,50 @@ impl Task<'_> {
 
     /// Tunnel's change of a derivative, or tabulated sum, from the mean angle of attack to those swept.
     /// `None` without a table.
-    fn change(&self, name: &str, swept: &Swept) -> Option<Vec<f64>> {
-        let mean = self.tunnel_at(name, swept.mean)?;
-        let at = |alpha_deg| Some(self.tunnel_at(name, alpha_deg)? - mean);
-        swept.angles().map(at).collect()
+    fn change(&self, name: &str, range: &AlphaRange) -> Option<Vec<f64>> {
+        let table = self.table(name);
+        let mean = table(range.mean)?;
+        let at = |alpha_deg| Some(table(alpha_deg)? - mean);
+        range.angles().map(at).collect()
     }
 
     /// Tunnel's change of a coefficient beyond that by its slope along α at the mean.
-    fn change_along_alpha(&self, slope: &str, swept: &Swept) -> Option<Vec<f64>> {
+    fn change_along_alpha(&self, slope: &str, range: &AlphaRange) -> Option<Vec<f64>> {
         let sums = &self.context.buildup.combined;
         let sum = sums.iter().find(|sum| sum.slope == slope);
-        let Some(change) = sum.and_then(|sum| self.change(&sum.name, swept)) else {
-            return Some(swept.integral(&self.change(slope, swept)?));
+        let Some(change) = sum.and_then(|sum| self.change(&sum.name, range)) else {
+            return Some(range.integral(&self.change(slope, range)?));
         };
-        let mean = self.tunnel_at(slope, swept.mean)?;
-        let both = change.iter().zip(swept.angles());
-        Some(
-            both.map(|(c, alpha)| c - mean * (alpha - swept.mean))
-                .collect(),
-        )
+        let mean = self.table(slope)(range.mean)?;
+        let both = change.iter().zip(range.angles());
+        let beyond = both.map(|(c, alpha)| c - mean * (alpha - range.mean));
+        Some(beyond.collect())
     }
 
-    fn tunnel_at(&self, name: &str, alpha_deg: f64) -> Option<f64> {
+    /// Tunnel's table of a derivative over α in deg, at the maneuver's condition.
+    fn table(&self, name: &str) -> impl Fn(f64) -> Option<f64> {
         let tunnel = self.context.tunnel;
-        let condition = Condition {
-            alpha_deg,
-            ..self.maneuver.condition(tunnel)
-        };
-        tunnel.at(name, &condition).map(|v| v.value)
+        let flown = self.maneuver.condition(tunnel);
+        move |alpha_deg| {
+            let condition = Condition { alpha_deg, ..flown };
+            tunnel.at(name, &condition).map(|v| v.value)
+        }
     }
 }
 
-impl Swept {
-    fn new(alphas: Vec<f64>) -> Swept {
+impl AlphaRange {
+    fn of(alphas: &[f64]) -> AlphaRange {
         let mean = alphas.iter().sum::<f64>() / alphas.len().max(1) as f64;
         let lowest = alphas.iter().copied().fold(mean, f64::min);
         let highest = alphas.iter().copied().fold(mean, f64::max);
-        Swept {
-            step: ((highest - lowest) / INTERVALS as f64).max(f64::MIN_POSITIVE),
-            alphas,
+        let mut range = AlphaRange {
             mean,
             lowest,
-        }
+            step: ((highest - lowest) / INTERVALS as f64).max(f64::MIN_POSITIVE),
+            samples: vec![],
+        };
+        range.samples = alphas.iter().map(|alpha| range.place(*alpha)).collect();
+        range
     }
 
     /// Angles from the lowest to the highest.
@@ -123,22 +127,20 @@ impl Swept {
 
     /// Values at the samples of a quantity that is linear between the angles.
     fn along(&self, quantity: &[f64]) -> Vec<f64> {
-        self.alphas
-            .iter()
-            .map(|alpha| self.read(quantity, *alpha))
-            .collect()
+        let samples = self.samples.iter();
+        samples.map(|place| read(quantity, *place)).collect()
     }
 
+    /// Interval of an angle, and its share of it.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "the number of an interval"
     )]
-    fn read(&self, quantity: &[f64], alpha: f64) -> f64 {
+    fn place(&self, alpha: f64) -> (usize, f64) {
         let place = ((alpha - self.lowest) / self.step).clamp(0.0, INTERVALS as f64);
         let low = (place as usize).min(INTERVALS - 1);
-        let share = place - low as f64;
-        quantity[low] + share * (quantity[low + 1] - quantity[low])
+        (low, place - low as f64)
     }
 
     /// Integral over α from the mean.
@@ -149,9 +151,14 @@ impl Swept {
             sum += 0.5 * self.step * (pair[0] + pair[1]);
             integral.push(sum);
         }
-        let at_mean = self.read(&integral, self.mean);
+        let at_mean = read(&integral, self.place(self.mean));
         integral.iter().map(|value| value - at_mean).collect()
     }
+}
+
+/// Value of a quantity at a place between two angles.
+fn read(quantity: &[f64], (low, share): (usize, f64)) -> f64 {
+    quantity[low] + share * (quantity[low + 1] - quantity[low])
 }
 
 impl AlphaSlopes {
@@ -189,14 +196,15 @@ mod tests {
 
     #[test]
     fn a_quantity_is_read_between_the_angles_and_integrated_from_the_mean() {
-        let swept = Swept::new(vec![9.9, 12.0, 14.1]);
+        let alphas = [9.9, 12.0, 14.1];
+        let range = AlphaRange::of(&alphas);
         // t(α) − t(ᾱ) = 3 (α − 12): its integral is 1.5 (α − 12)².
-        let changes: Vec<f64> = swept.angles().map(|a| 3.0 * (a - 12.0)).collect();
-        for (value, alpha) in swept.along(&changes).iter().zip(&swept.alphas) {
+        let changes: Vec<f64> = range.angles().map(|a| 3.0 * (a - 12.0)).collect();
+        for (value, alpha) in range.along(&changes).iter().zip(&alphas) {
             assert_relative_eq!(*value, 3.0 * (alpha - 12.0), epsilon = 1e-12);
         }
-        let integral = swept.along(&swept.integral(&changes));
-        for (value, alpha) in integral.iter().zip(&swept.alphas) {
+        let integral = range.along(&range.integral(&changes));
+        for (value, alpha) in integral.iter().zip(&alphas) {
             assert_relative_eq!(*value, 1.5 * (alpha - 12.0f64).powi(2), epsilon = 1e-3);
         }
         assert_relative_eq!(integral[1], 0.0);

@@ -103,13 +103,16 @@ impl<'a> Task<'a> {
         let from = |(own, noise): &(Vec<f64>, Noise)| {
             self.fit_filter::<NX, E, NG, G>(prepared, &constant, own, noise, &resolution)
         };
-        let mut fitted = from(&first).or_else(|| from(&second))?;
-        if fitted.is_mostly_air(&case.states)
-            && let Some(other) = from(&second)
-            && other.cost() < fitted.cost()
-        {
-            fitted = other;
-        }
+        let fitted = match from(&first) {
+            None => from(&second)?,
+            Some(fitted) if fitted.is_mostly_air(&case.states) => {
+                let both = [Some(fitted), from(&second)];
+                let by_cost =
+                    |a: &FilterFit<_, _>, b: &FilterFit<_, _>| a.cost().total_cmp(&b.cost());
+                both.into_iter().flatten().min_by(by_cost)?
+            }
+            Some(fitted) => fitted,
+        };
         let start = self.swept(prepared, constant, fitted)?;
         let swept = self.with_slopes(prepared, start, &resolution);
         let Swept {

@@ -16,6 +16,7 @@ use crate::numerics::dual::Dual;
 use crate::numerics::order_statistics::quantile;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
+use crate::numerics::student::NORMAL_95;
 use crate::tables::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
 
 /// Seed of the draws. All angles of attack take the same random numbers, so probabilities are as
@@ -24,9 +25,6 @@ const SEED: u64 = 21;
 
 /// Share of draws with another pattern of modes from which the draws give the standard deviation.
 const COALESCED: f64 = 0.01;
-
-/// Standard normal quantile of 97.5 %.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Paragraph of the worst level of all.
 const ALL: &str = "all";

@@ -18,8 +18,7 @@ use crate::units::RAD;
 /// Angles of attack within which maneuvers count as one condition, deg.
 const TOGETHER_DEG: f64 = 2.5;
 
-/// Names of the mean angle of attack and the tunnel's third variable among a condition's values.
-const ALPHA: &str = "alpha";
+/// Name of the tunnel's third variable among a condition's quantities.
 const THIRD: &str = "third";
 
 /// Steady wings-level flight, in rad, ft, s, slug, lbf.
@@ -80,134 +79,156 @@ impl Trim {
     }
 }
 
-/// Values of one flown condition, by name.
-type Values = BTreeMap<String, f64>;
+/// Values of one flown condition.
+#[derive(Clone, Debug, PartialEq)]
+struct Flown {
+    alpha_deg: f64,
+    /// By signal; the tunnel's third variable where it has one.
+    quantities: BTreeMap<&'static str, f64>,
+    /// By channel.
+    surfaces_deg: BTreeMap<String, f64>,
+}
 
 /// Conditions in which a campaign was flown, by ascending angle of attack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlownConditions {
-    conditions: Vec<Values>,
+    conditions: Vec<Flown>,
 }
 
 impl FlownConditions {
     /// Means of maneuvers that were flown at nearly the same angle of attack.
     #[must_use]
     pub fn new(flown: &[(&Maneuver, &Means)], tunnel: &WindTunnel) -> FlownConditions {
-        let mut all: Vec<Values> = flown
-            .iter()
-            .map(|(m, means)| values(m, means, tunnel))
-            .collect();
-        all.sort_by(|a, b| a[ALPHA].total_cmp(&b[ALPHA]));
-        let mut groups: Vec<Vec<Values>> = Vec::new();
+        let of_maneuver = |(m, means): &(&Maneuver, &Means)| Flown::of(m, means, tunnel);
+        let mut all: Vec<Flown> = flown.iter().map(of_maneuver).collect();
+        all.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg));
+        let mut groups: Vec<Vec<Flown>> = Vec::new();
         for own in all {
             match groups.last_mut() {
-                Some(group) if own[ALPHA] - group[0][ALPHA] <= TOGETHER_DEG => group.push(own),
+                Some(group) if own.alpha_deg - group[0].alpha_deg <= TOGETHER_DEG => {
+                    group.push(own);
+                }
                 _ => groups.push(vec![own]),
             }
         }
         FlownConditions {
-            conditions: groups.iter().map(|group| mean_of(group)).collect(),
+            conditions: groups
+                .iter()
+                .filter_map(|group| Flown::mean(group))
+                .collect(),
         }
     }
 
     /// Steady flight at an angle of attack; `None` well beyond the flown ones.
     #[must_use]
     pub fn trim(&self, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
-        let is_near = |c: &&Values| (c[ALPHA] - alpha_deg).abs() <= TOGETHER_DEG;
-        let upper = self.conditions.iter().find(|c| c[ALPHA] >= alpha_deg);
-        let lower = self.conditions.iter().rfind(|c| c[ALPHA] <= alpha_deg);
+        let is_near = |c: &&Flown| (c.alpha_deg - alpha_deg).abs() <= TOGETHER_DEG;
+        let upper = self.conditions.iter().find(|c| c.alpha_deg >= alpha_deg);
+        let lower = self.conditions.iter().rfind(|c| c.alpha_deg <= alpha_deg);
         let upper_end = self.conditions.last().filter(is_near);
         let lower_end = self.conditions.first().filter(is_near);
         let (lower, upper) = (lower.or(lower_end)?, upper.or(upper_end)?);
-        trim(&between(lower, upper, alpha_deg), alpha_deg, aircraft)
+        Flown::between(lower, upper, alpha_deg).trim(alpha_deg, aircraft)
     }
 }
 
-fn values(maneuver: &Maneuver, means: &Means, tunnel: &WindTunnel) -> Values {
-    let known = [
-        (ALPHA, Some(maneuver.alpha_deg)),
-        (THIRD, maneuver.condition(tunnel).third),
-        (signal::THETA, Some(means.theta_deg)),
-        (signal::MACH, Some(maneuver.mach)),
-        (signal::QBAR, Some(maneuver.qbar_psf)),
-        (signal::VELOCITY, Some(maneuver.velocity_ft_s)),
-        (signal::ALTITUDE, Some(maneuver.altitude_ft)),
-        (signal::MASS, Some(maneuver.mass_slug)),
-        (signal::IX, Some(means.ix_slug_ft2)),
-        (signal::IY, Some(means.iy_slug_ft2)),
-        (signal::IZ, Some(means.iz_slug_ft2)),
-        (signal::IXZ, Some(means.ixz_slug_ft2)),
-    ];
-    let known = known
-        .into_iter()
-        .filter_map(|(name, value)| Some((name.to_owned(), value?)));
-    known.chain(means.surfaces_deg.clone()).collect()
+impl Flown {
+    fn of(maneuver: &Maneuver, means: &Means, tunnel: &WindTunnel) -> Flown {
+        let known = [
+            (THIRD, maneuver.condition(tunnel).third),
+            (signal::THETA, Some(means.theta_deg)),
+            (signal::MACH, Some(maneuver.mach)),
+            (signal::QBAR, Some(maneuver.qbar_psf)),
+            (signal::VELOCITY, Some(maneuver.velocity_ft_s)),
+            (signal::ALTITUDE, Some(maneuver.altitude_ft)),
+            (signal::MASS, Some(maneuver.mass_slug)),
+            (signal::IX, Some(means.ix_slug_ft2)),
+            (signal::IY, Some(means.iy_slug_ft2)),
+            (signal::IZ, Some(means.iz_slug_ft2)),
+            (signal::IXZ, Some(means.ixz_slug_ft2)),
+        ];
+        let known = known
+            .into_iter()
+            .filter_map(|(name, value)| Some((name, value?)));
+        Flown {
+            alpha_deg: maneuver.alpha_deg,
+            quantities: known.collect(),
+            surfaces_deg: means.surfaces_deg.clone(),
+        }
+    }
+
+    /// Mean of several; `None` of none.
+    fn mean(group: &[Flown]) -> Option<Flown> {
+        Some(Flown {
+            alpha_deg: finite_mean(group.iter().map(|own| own.alpha_deg))?,
+            quantities: mean_of(group.iter().map(|own| &own.quantities)),
+            surfaces_deg: mean_of(group.iter().map(|own| &own.surfaces_deg)),
+        })
+    }
+
+    /// Values between two conditions.
+    fn between(lower: &Flown, upper: &Flown, alpha_deg: f64) -> Flown {
+        let width = upper.alpha_deg - lower.alpha_deg;
+        let share = if width > 0.0 {
+            (alpha_deg - lower.alpha_deg) / width
+        } else {
+            1.0
+        };
+        Flown {
+            alpha_deg: lower.alpha_deg + share * width,
+            quantities: between(&lower.quantities, &upper.quantities, share),
+            surfaces_deg: between(&lower.surfaces_deg, &upper.surfaces_deg, share),
+        }
+    }
+
+    /// Steady flight at an angle of attack near this condition's. The path is as flown, so pitch
+    /// attitude follows the angle of attack.
+    fn trim(&self, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
+        let get = |name: &str| self.quantities.get(name).copied();
+        let theta_deg = get(signal::THETA)? - self.alpha_deg + alpha_deg;
+        Some(Trim {
+            condition: Condition {
+                alpha_deg,
+                mach: get(signal::MACH)?,
+                third: get(THIRD),
+            },
+            alpha: RAD * alpha_deg,
+            theta: RAD * theta_deg,
+            velocity: get(signal::VELOCITY)?,
+            qbar: get(signal::QBAR)?,
+            mass: get(signal::MASS)?,
+            gravity: gravity_ft_s2(aircraft.latitude_deg, get(signal::ALTITUDE)?),
+            ix: get(signal::IX)?,
+            iy: get(signal::IY)?,
+            iz: get(signal::IZ)?,
+            ixz: get(signal::IXZ)?,
+            surfaces_deg: self.surfaces_deg.clone(),
+        })
+    }
 }
 
-fn mean_of(group: &[Values]) -> Values {
-    let names: BTreeSet<&String> = group.iter().flat_map(BTreeMap::keys).collect();
-    let mean = |name: &String| finite_mean(group.iter().filter_map(|own| own.get(name).copied()));
+/// Mean of each value over those that have it.
+fn mean_of<'a, K: Ord + Clone + 'a>(
+    group: impl Iterator<Item = &'a BTreeMap<K, f64>> + Clone,
+) -> BTreeMap<K, f64> {
+    let names: BTreeSet<&K> = group.clone().flat_map(BTreeMap::keys).collect();
+    let mean = |name: &K| finite_mean(group.clone().filter_map(|own| own.get(name).copied()));
     names
         .into_iter()
         .filter_map(|name| Some((name.clone(), mean(name)?)))
         .collect()
 }
 
-/// Values between two conditions; a value that one of them lacks is the other's.
-fn between(lower: &Values, upper: &Values, alpha_deg: f64) -> Values {
-    let width = upper[ALPHA] - lower[ALPHA];
-    let share = if width > 0.0 {
-        (alpha_deg - lower[ALPHA]) / width
-    } else {
-        1.0
-    };
+/// Values a share of the way; a value that one of them lacks is the other's.
+fn between<K: Ord + Clone>(
+    lower: &BTreeMap<K, f64>,
+    upper: &BTreeMap<K, f64>,
+    share: f64,
+) -> BTreeMap<K, f64> {
     let mut values = lower.clone();
     for (name, value) in upper {
         let below = lower.get(name).unwrap_or(value);
         values.insert(name.clone(), below + share * (value - below));
     }
     values
-}
-
-fn trim(values: &Values, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
-    let get = |name: &str| values.get(name).copied();
-    // The path is as flown, so pitch attitude follows the angle of attack.
-    let theta_deg = get(signal::THETA)? - get(ALPHA)? + alpha_deg;
-    let known = [
-        ALPHA,
-        THIRD,
-        signal::THETA,
-        signal::MACH,
-        signal::QBAR,
-        signal::VELOCITY,
-        signal::ALTITUDE,
-        signal::MASS,
-        signal::IX,
-        signal::IY,
-        signal::IZ,
-        signal::IXZ,
-    ];
-    let surfaces = values
-        .iter()
-        .filter(|(name, _)| !known.contains(&name.as_str()));
-    Some(Trim {
-        condition: Condition {
-            alpha_deg,
-            mach: get(signal::MACH)?,
-            third: get(THIRD),
-        },
-        alpha: RAD * alpha_deg,
-        theta: RAD * theta_deg,
-        velocity: get(signal::VELOCITY)?,
-        qbar: get(signal::QBAR)?,
-        mass: get(signal::MASS)?,
-        gravity: gravity_ft_s2(aircraft.latitude_deg, get(signal::ALTITUDE)?),
-        ix: get(signal::IX)?,
-        iy: get(signal::IY)?,
-        iz: get(signal::IZ)?,
-        ixz: get(signal::IXZ)?,
-        surfaces_deg: surfaces
-            .map(|(name, value)| (name.clone(), *value))
-            .collect(),
-    })
 }

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
-use crate::numerics::student;
+use crate::numerics::student::NORMAL_95;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::{Point, Trend};
@@ -89,14 +89,15 @@ fn trends_of_derivative(
             .copied()
             .collect();
         let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
-        match fit_trend(&members, &group.name, settings, knots, further) {
-            _ if members.len() < FEWEST_MANEUVERS => {
-                trends.rows = mean_rows(&members, &group.name, settings);
+        if members.len() < FEWEST_MANEUVERS {
+            trends.rows = mean_rows(&members, &group.name, settings);
+        } else {
+            match fit_trend(&members, &group.name, settings, knots, further) {
+                Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
+                Err(reason) => trends
+                    .problems
+                    .push(problem(derivative, &group.name, reason)),
             }
-            Ok((rows, outliers)) => (trends.rows, trends.outliers) = (rows, outliers),
-            Err(reason) => trends
-                .problems
-                .push(problem(derivative, &group.name, reason)),
         }
     }
     if settings.per_class {
@@ -231,12 +232,11 @@ fn placed<'a>(members: &[&'a EstimateRow]) -> Vec<(Point, &'a EstimateRow)> {
 /// Rows of the means of maneuvers that are too few for a trend.
 fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<TrendRow> {
     let points: Vec<Point> = placed(members).iter().map(|(point, _)| *point).collect();
-    let normal_95 = student::quantile_95(f64::INFINITY);
     let row = |mean: Mean| {
         let common = common_error(members, mean.alpha_deg, settings.alpha_step_deg);
         let standard_error = mean.standard_error.hypot(common);
-        let half = normal_95 * standard_error;
-        let prediction = normal_95 * standard_error.hypot(mean.one_more);
+        let half = NORMAL_95 * standard_error;
+        let prediction = NORMAL_95 * standard_error.hypot(mean.one_more);
         TrendRow {
             derivative: members[0].derivative.clone(),
             unit: members[0].unit.clone(),

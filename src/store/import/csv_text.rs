@@ -146,7 +146,7 @@ impl Layout {
         let best = sensible
             .filter_map(|(delimiter, comma)| Layout::with(lines, delimiter, comma))
             // Of layouts that read as many numbers the first counts: a space also separates `1, 2`.
-            .rev_max_by_key(|(numbers, _)| *numbers);
+            .reduce(|best, other| if other.0 > best.0 { other } else { best });
         best.map(|(_, layout)| layout).ok_or_else(|| {
             "no table of numbers: harvest imports text with one row a sample and a header, MATLAB 5 and Parquet".to_owned()
         })
@@ -244,18 +244,6 @@ impl Layout {
         }
     }
 }
-
-/// Maximum by a key, the first of several.
-trait FirstMaximum: Iterator + Sized {
-    fn rev_max_by_key<K: Ord>(self, key: impl Fn(&Self::Item) -> K) -> Option<Self::Item> {
-        self.fold(None, |best: Option<Self::Item>, item| match best {
-            Some(best) if key(&best) >= key(&item) => Some(best),
-            _ => Some(item),
-        })
-    }
-}
-
-impl<I: Iterator> FirstMaximum for I {}
 
 /// Names and units from the lines above the numbers: the header is the nearest line of text, and the line
 /// below it holds units if there are two.
