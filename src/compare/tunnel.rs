@@ -219,9 +219,7 @@ fn condition_near<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::aero::Axis;
     use crate::aero::wind_tunnel::TunnelPoint;
-    use crate::maneuver::ManeuverOrigin;
     use approx::assert_relative_eq;
 
     fn flight(value: f64, standard_deviation: f64) -> PosteriorRow {
@@ -244,23 +242,9 @@ mod tests {
 
     fn maneuver(class: &str, alpha_deg: f64, mach: f64) -> Maneuver {
         Maneuver {
-            maneuver_id: String::new(),
-            flight_id: String::new(),
             class: class.into(),
-            axis: Axis::Longitudinal,
-            start_s: 0.0,
-            end_s: 10.0,
-            alpha_deg,
             mach,
-            qbar_psf: 50.0,
-            velocity_ft_s: 300.0,
-            altitude_ft: 25e3,
-            mass_slug: 1050.0,
-            x_cg_ft: 38.0,
-            samples: 401,
-            origin: ManeuverOrigin::Found,
-            recognised: crate::maneuver::Recognised::default(),
-            quality: crate::maneuver::Quality::default(),
+            ..Maneuver::example("m", alpha_deg)
         }
     }
 
@@ -466,31 +450,12 @@ mod tests {
                 },
             );
         }
-        let maneuvers = [Maneuver {
-            maneuver_id: "m".into(),
-            ..maneuver("A", 25.0, 0.3)
-        }];
+        let maneuvers = [maneuver("A", 25.0, 0.3)];
         let mut estimate = EstimateRow {
-            maneuver_id: "m".into(),
-            flight_id: "f".into(),
-            class: "A".into(),
-            alpha_deg: 25.0,
-            mach: 0.3,
-            derivative: "d".into(),
-            unit: "per_deg".into(),
-            status: Status::Estimated,
             value: Some(4.0),
             bound: Some(0.1),
-            bound_held: None,
-            bound_calibration: None,
             bound_corrected: Some(0.4),
-            wind_tunnel: None,
-            variance_inflation: None,
-            excitation: None,
-            contribution_pct: None,
-            equation_error: None,
-            equation_error_bound: None,
-            held_because: None,
+            ..EstimateRow::without_results(&maneuvers[0], "d", "per_deg", Status::Estimated)
         };
         let rows = compare_maneuvers(
             std::slice::from_ref(&estimate),

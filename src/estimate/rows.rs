@@ -96,26 +96,8 @@ impl<'a> Task<'a> {
     /// Row without results.
     fn estimate_row(&self, name: &str, unit: &str, status: Status) -> EstimateRow {
         EstimateRow {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            flight_id: self.maneuver.flight_id.clone(),
-            class: self.class.name.clone(),
-            alpha_deg: self.maneuver.alpha_deg,
-            mach: self.maneuver.mach,
-            derivative: name.to_owned(),
-            unit: unit.to_owned(),
-            status,
-            value: None,
-            bound: None,
-            bound_held: None,
-            bound_calibration: None,
-            bound_corrected: None,
             wind_tunnel: self.tunnel_value(name),
-            variance_inflation: None,
-            excitation: None,
-            contribution_pct: None,
-            equation_error: None,
-            equation_error_bound: None,
-            held_because: None,
+            ..EstimateRow::without_results(self.maneuver, name, unit, status)
         }
     }
 

@@ -67,6 +67,30 @@ impl Maneuver {
     pub fn is_rejected(&self) -> bool {
         self.quality.verdict == Acceptance::Rejected
     }
+
+    /// Longitudinal maneuver of class `A` in flight `f`, for tests.
+    #[cfg(test)]
+    pub fn example(id: &str, alpha_deg: f64) -> Maneuver {
+        Maneuver {
+            maneuver_id: id.into(),
+            flight_id: "f".into(),
+            class: "A".into(),
+            axis: Axis::Longitudinal,
+            start_s: 0.0,
+            end_s: 10.0,
+            alpha_deg,
+            mach: 0.3,
+            qbar_psf: 52.0,
+            velocity_ft_s: 320.0,
+            altitude_ft: 25_000.0,
+            mass_slug: 1050.0,
+            x_cg_ft: 38.0,
+            samples: 401,
+            origin: ManeuverOrigin::Found,
+            recognised: Recognised::default(),
+            quality: Quality::default(),
+        }
+    }
 }
 
 table! {

@@ -7,7 +7,7 @@ use super::provenance::{Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;
-use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
+use crate::maneuver::{Maneuver, Status};
 use crate::output_error::identifiability::Limits;
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
@@ -252,25 +252,15 @@ pub fn problem(reason: &str) -> Problem {
 
 fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
     let maneuver_id = format!("1-{class}-{alpha_deg}");
-    campaign.maneuvers.push(Maneuver {
-        maneuver_id: maneuver_id.clone(),
+    let maneuver = Maneuver {
         flight_id: "1".into(),
         class: class.into(),
         axis,
         start_s: 10.0,
         end_s: 25.0,
-        alpha_deg,
-        mach: 0.3,
-        qbar_psf: 60.0,
-        velocity_ft_s: 350.0,
-        altitude_ft: 25_000.0,
-        mass_slug: 1_050.0,
-        x_cg_ft: 20.0,
         samples: 600,
-        origin: ManeuverOrigin::Found,
-        recognised: Recognised::default(),
-        quality: Quality::default(),
-    });
+        ..Maneuver::example(&maneuver_id, alpha_deg)
+    };
     campaign.fits.push(FitRow {
         maneuver_id: maneuver_id.clone(),
         class: class.into(),
@@ -298,18 +288,8 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         LATERAL
     } {
         campaign.estimates.push(EstimateRow {
-            maneuver_id: maneuver_id.clone(),
-            flight_id: "1".into(),
-            class: class.into(),
-            alpha_deg,
-            mach: 0.3,
-            derivative: name.into(),
-            unit: unit.into(),
-            status: Status::Estimated,
             value: Some(0.05 - 0.001 * alpha_deg),
             bound: Some(0.002),
-            bound_held: None,
-            bound_calibration: None,
             bound_corrected: Some(0.004),
             wind_tunnel: Some(0.05),
             variance_inflation: Some(12.0),
@@ -317,9 +297,10 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             contribution_pct: Some(40.0),
             equation_error: Some(0.05),
             equation_error_bound: Some(0.01),
-            held_because: None,
+            ..EstimateRow::without_results(&maneuver, name, unit, Status::Estimated)
         });
     }
+    campaign.maneuvers.push(maneuver);
     campaign.pages.insert(maneuver_id.clone());
     campaign
         .histories

@@ -1,6 +1,6 @@
 //! Tables of maneuvers' estimates: fits, derivatives, correlations, joint estimation.
 
-use crate::maneuver::Status;
+use crate::maneuver::{Maneuver, Status};
 use crate::schema::{table, words};
 
 table! {
@@ -200,6 +200,38 @@ impl EstimateRow {
     #[must_use]
     pub fn is_joint(&self) -> bool {
         self.flight_id == JOINT_FLIGHT
+    }
+
+    /// Row of a maneuver's derivative without results.
+    #[must_use]
+    pub fn without_results(
+        maneuver: &Maneuver,
+        derivative: &str,
+        unit: &str,
+        status: Status,
+    ) -> EstimateRow {
+        EstimateRow {
+            maneuver_id: maneuver.maneuver_id.clone(),
+            flight_id: maneuver.flight_id.clone(),
+            class: maneuver.class.clone(),
+            alpha_deg: maneuver.alpha_deg,
+            mach: maneuver.mach,
+            derivative: derivative.to_owned(),
+            unit: unit.to_owned(),
+            status,
+            value: None,
+            bound: None,
+            bound_held: None,
+            bound_calibration: None,
+            bound_corrected: None,
+            wind_tunnel: None,
+            variance_inflation: None,
+            excitation: None,
+            contribution_pct: None,
+            equation_error: None,
+            equation_error_bound: None,
+            held_because: None,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::*;
+use crate::maneuver::Maneuver;
 
 pub(super) fn estimate(
     derivative: &str,
@@ -11,27 +12,15 @@ pub(super) fn estimate(
     value: f64,
     bound: f64,
 ) -> EstimateRow {
-    EstimateRow {
-        maneuver_id: format!("f1_t{alpha_deg:05.1}"),
-        flight_id: "f1".into(),
+    let maneuver = Maneuver {
         class: class.into(),
-        alpha_deg,
-        mach: 0.3,
-        derivative: derivative.into(),
-        unit: "per_deg".into(),
-        status: Status::Estimated,
+        ..Maneuver::example(&format!("f1_t{alpha_deg:05.1}"), alpha_deg)
+    };
+    EstimateRow {
         value: Some(value),
         bound: Some(bound / 5.0),
-        bound_held: None,
-        bound_calibration: None,
         bound_corrected: Some(bound),
-        wind_tunnel: None,
-        variance_inflation: None,
-        excitation: None,
-        contribution_pct: None,
-        equation_error: None,
-        equation_error_bound: None,
-        held_because: None,
+        ..EstimateRow::without_results(&maneuver, derivative, "per_deg", Status::Estimated)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::dynamics::tests::aircraft;
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
-use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Recognition, Status};
+use crate::maneuver::{Class, Maneuver, Recognition, Status};
 use crate::output_error::tests::{NOISE, Noise, SAMPLES, TABLE, record, truth};
 use crate::output_error::{Case, InitialState, Measurements, Model};
 use crate::tables::{EstimateRow, FitRow, Outcome, Participation, PredictionStatus};
@@ -128,23 +128,12 @@ impl Bench {
 
 fn maneuver(id: &str, alpha_deg: f64) -> Maneuver {
     Maneuver {
-        maneuver_id: id.into(),
-        flight_id: "f".into(),
         class: "steps".into(),
-        axis: Axis::Longitudinal,
-        start_s: 0.0,
         end_s: 100.0,
-        alpha_deg,
-        mach: 0.3,
-        qbar_psf: 52.0,
-        velocity_ft_s: 320.0,
-        altitude_ft: 25_000.0,
         mass_slug: 1040.0,
         x_cg_ft: 38.2,
         samples: SAMPLES,
-        origin: ManeuverOrigin::Found,
-        recognised: crate::maneuver::Recognised::default(),
-        quality: crate::maneuver::Quality::default(),
+        ..Maneuver::example(id, alpha_deg)
     }
 }
 

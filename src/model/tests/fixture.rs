@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Axis, Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
+use crate::aero::{Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::estimate::Covariance;
-use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised, Status};
+use crate::maneuver::{Maneuver, Status};
 use crate::model::{Evidence, Model, Settings, model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::EstimateRow;
@@ -65,28 +65,11 @@ pub fn tunnel(uncertainty: Option<f64>) -> WindTunnel {
     tunnel
 }
 
-fn row(id: &str, derivative: &str, status: Status, value: f64, tunnel: f64) -> EstimateRow {
+fn row(own: &Maneuver, derivative: &str, status: Status, value: f64, tunnel: f64) -> EstimateRow {
     EstimateRow {
-        maneuver_id: id.into(),
-        flight_id: String::new(),
-        class: "A".into(),
-        alpha_deg: 0.0,
-        mach: 0.3,
-        derivative: derivative.into(),
-        unit: "-".into(),
-        status,
         value: Some(value),
-        bound: None,
-        bound_held: None,
-        bound_calibration: None,
-        bound_corrected: None,
         wind_tunnel: Some(tunnel),
-        variance_inflation: None,
-        excitation: None,
-        contribution_pct: None,
-        equation_error: None,
-        equation_error_bound: None,
-        held_because: None,
+        ..EstimateRow::without_results(own, derivative, "-", status)
     }
 }
 
@@ -100,12 +83,13 @@ impl Flown {
         estimates: &[(&str, f64)],
         covariance: &DMatrix<f64>,
     ) -> Flown {
+        let own = maneuver(id, flight, alpha_deg);
         let tunnel = tunnel(None);
         let known = |name: &str| tunnel.value(name, alpha_deg, 0.3).map_or(0.0, |v| v.value);
         let rows = NAMES.iter().map(|name| {
             match estimates.iter().find(|(estimated, _)| estimated == name) {
-                Some((_, value)) => row(id, name, Status::Estimated, *value, known(name)),
-                None => row(id, name, Status::Held, known(name), known(name)),
+                Some((_, value)) => row(&own, name, Status::Estimated, *value, known(name)),
+                None => row(&own, name, Status::Held, known(name), known(name)),
             }
         });
         Flown {
@@ -117,7 +101,7 @@ impl Flown {
                 corrected: covariance.transpose().as_slice().to_vec(),
                 shared_errors: vec![],
             },
-            maneuver: maneuver(id, flight, alpha_deg),
+            maneuver: own,
         }
     }
 
@@ -145,23 +129,8 @@ impl Flown {
 
 pub fn maneuver(id: &str, flight: &str, alpha_deg: f64) -> Maneuver {
     Maneuver {
-        maneuver_id: id.into(),
         flight_id: flight.into(),
-        class: "A".into(),
-        axis: Axis::Longitudinal,
-        start_s: 0.0,
-        end_s: 10.0,
-        alpha_deg,
-        mach: 0.3,
-        qbar_psf: 50.0,
-        velocity_ft_s: 300.0,
-        altitude_ft: 25e3,
-        mass_slug: 1050.0,
-        x_cg_ft: 38.0,
-        samples: 401,
-        origin: ManeuverOrigin::Found,
-        recognised: Recognised::default(),
-        quality: Quality::default(),
+        ..Maneuver::example(id, alpha_deg)
     }
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::lineage::Lineage;
+use crate::maneuver::Maneuver;
 use crate::tables::TunnelVerdict;
 
 #[derive(Clone)]
@@ -52,27 +53,16 @@ impl Campaign {
             end_s: 20.0,
         });
         self.fits.push(fit(&maneuver_id, class));
-        self.estimates.push(EstimateRow {
-            maneuver_id,
+        let maneuver = Maneuver {
             flight_id: flight.into(),
             class: class.into(),
-            alpha_deg: 30.0,
-            mach: 0.3,
-            derivative: "Cm_de".into(),
-            unit: "per_deg".into(),
-            status: Status::Estimated,
+            ..Maneuver::example(&maneuver_id, 30.0)
+        };
+        self.estimates.push(EstimateRow {
             value: Some(value),
             bound: Some(0.05),
-            bound_held: None,
-            bound_calibration: None,
             bound_corrected: Some(0.1),
-            wind_tunnel: None,
-            variance_inflation: None,
-            excitation: None,
-            contribution_pct: None,
-            equation_error: None,
-            equation_error_bound: None,
-            held_because: None,
+            ..EstimateRow::without_results(&maneuver, "Cm_de", "per_deg", Status::Estimated)
         });
     }
 }

@@ -3,29 +3,14 @@
 use approx::assert_relative_eq;
 
 use super::fixture::aircraft;
-use crate::aero::{Axis, WindTunnel};
-use crate::maneuver::{Maneuver, ManeuverOrigin, Means, Quality, Recognised};
+use crate::aero::WindTunnel;
+use crate::maneuver::{Maneuver, Means};
 use crate::qualities::trim::FlownConditions;
 
 fn flown(alpha_deg: f64, qbar_psf: f64, theta_deg: f64, surface: Option<f64>) -> (Maneuver, Means) {
     let maneuver = Maneuver {
-        maneuver_id: "m".into(),
-        flight_id: "f".into(),
-        class: "A".into(),
-        axis: Axis::Longitudinal,
-        start_s: 0.0,
-        end_s: 10.0,
-        alpha_deg,
-        mach: 0.3,
         qbar_psf,
-        velocity_ft_s: 300.0,
-        altitude_ft: 25e3,
-        mass_slug: 1050.0,
-        x_cg_ft: 38.0,
-        samples: 401,
-        origin: ManeuverOrigin::Found,
-        recognised: Recognised::default(),
-        quality: Quality::default(),
+        ..Maneuver::example("m", alpha_deg)
     };
     let means = Means {
         theta_deg,

@@ -8,7 +8,7 @@ use super::*;
 use crate::aero::Axis;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record};
-use crate::maneuver::{Maneuver, ManeuverOrigin};
+use crate::maneuver::Maneuver;
 use crate::tables::{EventRow, EventVerdict, FitRow, History, HistoryOutput, Outcome};
 
 fn groups() -> SignalGroups {
@@ -52,23 +52,10 @@ fn record(samples: usize) -> Record {
 
 fn maneuver_at(start_s: f64) -> Maneuver {
     Maneuver {
-        maneuver_id: format!("f_t{start_s:05}"),
-        flight_id: "f".into(),
         class: "STEPS".into(),
-        axis: Axis::Longitudinal,
         start_s,
         end_s: start_s + 10.0,
-        alpha_deg: 10.0,
-        mach: 0.4,
-        qbar_psf: 90.0,
-        velocity_ft_s: 400.0,
-        altitude_ft: 25_000.0,
-        mass_slug: 1000.0,
-        x_cg_ft: 32.0,
-        samples: 401,
-        origin: ManeuverOrigin::Found,
-        recognised: crate::maneuver::Recognised::default(),
-        quality: crate::maneuver::Quality::default(),
+        ..Maneuver::example(&format!("f_t{start_s:05}"), 10.0)
     }
 }
 
