@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::derivative_unit::DerivativeUnit;
+use super::regressor::Regressor;
 use crate::flight::signal;
 use crate::schema::words;
 
@@ -138,40 +139,6 @@ impl Output {
     }
 }
 
-/// Factor of a derivative.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Regressor {
-    /// One: the coefficient at zero of everything else.
-    Constant,
-    /// Angle of attack, deg.
-    Alpha,
-    /// Sideslip, deg.
-    Beta,
-    /// p b/2V, rad.
-    RollRate,
-    /// q c̄/2V, rad.
-    PitchRate,
-    /// r b/2V, rad.
-    YawRate,
-    /// A control surface or any other recorded signal, in its own unit (deg).
-    Surface(String),
-    /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in
-    /// ft·lbf/deg over q̄S and the reference length (the bracketed terms of 2.10, 2.12, 2.13, 3.9,
-    /// 3.12, 3.13).
-    Vane(String),
-}
-
-impl Regressor {
-    /// Signal of the surface or vane; `None` for other regressors.
-    #[must_use]
-    pub fn surface(&self) -> Option<&str> {
-        match self {
-            Regressor::Surface(signal) | Regressor::Vane(signal) => Some(signal),
-            _ => None,
-        }
-    }
-}
-
 /// One term of the build-up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Derivative {
@@ -184,13 +151,10 @@ impl Derivative {
     #[must_use]
     pub fn unit(&self) -> DerivativeUnit {
         match self.regressor {
-            Regressor::Constant => DerivativeUnit::Number,
-            Regressor::Alpha | Regressor::Beta | Regressor::Surface(_) => DerivativeUnit::PerDeg,
-            Regressor::RollRate | Regressor::PitchRate | Regressor::YawRate => {
-                DerivativeUnit::PerRad
-            }
             Regressor::Vane(_) if self.coefficient.is_moment() => DerivativeUnit::FtLbfPerDeg,
             Regressor::Vane(_) => DerivativeUnit::LbfPerDeg,
+            // The model file has no regressor without a unit.
+            _ => self.regressor.unit().unwrap_or(DerivativeUnit::Number),
         }
     }
 }

@@ -12,6 +12,18 @@ words! {
         PerDeg = "per_deg",
         /// Per radian of p b/2V, q c̄/2V or r b/2V: rate derivatives.
         PerRad = "per_rad",
+        /// Per foot per second of airspeed.
+        PerFtS = "per_ft_s",
+        /// Per product of two angles in degrees.
+        PerDeg2 = "per_deg2",
+        /// Per product of two reduced rates.
+        PerRad2 = "per_rad2",
+        /// Per product of an angle in degrees and a reduced rate.
+        PerDegRad = "per_deg_rad",
+        /// Per product of an angle in degrees and an airspeed.
+        PerDegFtS = "per_deg_ft_s",
+        /// Per product of a reduced rate and an airspeed.
+        PerRadFtS = "per_rad_ft_s",
         /// Force of a thrust-vectoring vane, lbf per degree.
         LbfPerDeg = "lbf_per_deg",
         /// Moment of a thrust-vectoring vane, ft·lbf per degree.
@@ -32,6 +44,9 @@ impl DerivativeUnit {
     /// Exactly one for its own name; `None` for a unit of another quantity.
     #[must_use]
     pub fn factor_from(self, written: &str) -> Option<f64> {
+        if written.trim() == self.name() {
+            return Some(1.0);
+        }
         let (from, to) = (ParsedUnit::parse(written)?, ParsedUnit::parse(self.name())?);
         let per_angle = match (from.per, to.per) {
             (None, None) => 1.0,

@@ -6,10 +6,12 @@ pub mod buildup;
 pub mod derivative;
 mod derivative_unit;
 pub mod interpolation;
+mod regressor;
 pub mod wind_tunnel;
 
 pub use buildup::{Bias, Buildup, Combined};
-pub use derivative::{Axis, Coefficient, Derivative, Output, Regressor};
+pub use derivative::{Axis, Coefficient, Derivative, Output};
 pub use derivative_unit::DerivativeUnit;
 pub use interpolation::Interpolation;
+pub use regressor::Regressor;
 pub use wind_tunnel::{Condition, WindTunnel};

@@ -6,12 +6,13 @@ use std::path::Path;
 use super::checked::Config;
 use super::instruments::Instrument;
 use super::source::{Files, Source};
-use crate::aero::{Buildup, Output, WindTunnel, wind_tunnel};
+use crate::aero::{Axis, Buildup, Output, Regressor, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::estimate::Hold;
 use crate::flight::{StandIn, signal};
 use crate::ingest;
 use crate::maneuver::{Class, Event, Status};
+use crate::output_error::MOST_PRODUCTS;
 use crate::store;
 use crate::store::files::{self, TunnelRow};
 use crate::units::Unit;
@@ -333,10 +334,11 @@ fn model(config: &Config, source: &Source) -> Result<()> {
         return Err(source.error(twice[0], format!("`{}` is defined twice", twice[0])));
     }
     for derivative in &buildup.derivatives {
-        if let Some(surface) = derivative.regressor.surface() {
-            known_signal(config, source, surface, &derivative.name)?;
+        for signal in derivative.regressor.signals() {
+            known_signal(config, source, signal, &derivative.name)?;
         }
     }
+    few_products(config, source)?;
     for combined in &buildup.combined {
         for part in [&combined.constant, &combined.slope] {
             if buildup.derivative(part).is_none() {
@@ -345,6 +347,28 @@ fn model(config: &Config, source: &Source) -> Result<()> {
                     part,
                     format!("{}: unknown derivative `{part}`{near}", combined.name),
                 ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the kernel has room for the products in which states are.
+fn few_products(config: &Config, source: &Source) -> Result<()> {
+    for axis in [Axis::Longitudinal, Axis::Lateral] {
+        let mut products: Vec<&Regressor> = Vec::new();
+        for derivative in config.buildup.derivatives_of(axis) {
+            let regressor = &derivative.regressor;
+            let is_composed = matches!(regressor, Regressor::Product(_) | Regressor::Magnitude(_));
+            if is_composed && !products.contains(&regressor) {
+                products.push(regressor);
+            }
+            if products.len() > MOST_PRODUCTS {
+                let what = format!(
+                    "{}: the {axis} axis has more than {MOST_PRODUCTS} products and magnitudes as regressors",
+                    derivative.name
+                );
+                return Err(source.error(&derivative.name, what));
             }
         }
     }
@@ -710,7 +734,7 @@ fn trends_and_tunnel(config: &Config, source: &Source) -> Result<()> {
             .buildup
             .derivatives
             .iter()
-            .filter_map(|d| d.regressor.surface())
+            .flat_map(|d| d.regressor.signals())
     };
     if let Some(signal) = given.find(|signal| !used().any(|s| s == signal.as_str())) {
         let near = did_you_mean(signal, used());

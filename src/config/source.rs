@@ -178,7 +178,9 @@ impl Files {
     }
 
     pub fn model(&self) -> Result<Buildup> {
-        self.model.parse::<ModelFile>().map(Buildup::from)
+        let file = self.model.parse::<ModelFile>()?;
+        file.buildup()
+            .map_err(|(name, what)| self.model.error(&name, format!("{name}: {what}")))
     }
 
     pub fn qualities(&self) -> Result<Option<Specification>> {

@@ -139,32 +139,40 @@ struct CombinedLine {
     slope: String,
 }
 
-impl From<ModelFile> for Buildup {
-    fn from(file: ModelFile) -> Buildup {
-        let derivative = |line: DerivativeLine| {
-            let regressor = match (line.regressor.as_str(), line.vane) {
-                (_, true) => Regressor::Vane(line.regressor),
-                ("constant", _) => Regressor::Constant,
-                ("alpha", _) => Regressor::Alpha,
-                ("beta", _) => Regressor::Beta,
-                ("p", _) => Regressor::RollRate,
-                ("q", _) => Regressor::PitchRate,
-                ("r", _) => Regressor::YawRate,
-                _ => Regressor::Surface(line.regressor),
-            };
-            Derivative {
-                name: line.name,
-                coefficient: line.coefficient,
-                regressor,
-            }
+impl DerivativeLine {
+    /// The derivative, or the name of its line and what is wrong with its regressor.
+    fn derivative(self) -> Result<Derivative, (String, String)> {
+        let regressor = if self.vane {
+            Ok(Regressor::Vane(self.regressor))
+        } else {
+            Regressor::parse(&self.regressor)
         };
+        match regressor {
+            Ok(regressor) => Ok(Derivative {
+                name: self.name,
+                coefficient: self.coefficient,
+                regressor,
+            }),
+            Err(what) => Err((self.name, what)),
+        }
+    }
+}
+
+impl ModelFile {
+    /// Build-up of the file; the name of a derivative and what is wrong with it where its regressor is
+    /// none.
+    pub fn buildup(self) -> Result<Buildup, (String, String)> {
+        let file = self;
         let combined = |line: CombinedLine| Combined {
             name: line.name,
             constant: line.constant,
             slope: line.slope,
         };
-        Buildup {
-            derivatives: file.derivatives.into_iter().map(derivative).collect(),
+        let derivatives = file.derivatives.into_iter();
+        Ok(Buildup {
+            derivatives: derivatives
+                .map(DerivativeLine::derivative)
+                .collect::<Result<_, _>>()?,
             biases: file
                 .biases
                 .into_iter()
@@ -174,7 +182,7 @@ impl From<ModelFile> for Buildup {
                 })
                 .collect(),
             combined: file.combined.into_iter().map(combined).collect(),
-        }
+        })
     }
 }
 

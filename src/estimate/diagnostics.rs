@@ -173,6 +173,7 @@ impl Task<'_> {
                 Regressor::Surface(name) | Regressor::Vane(name) => {
                     (name.clone(), samples(window, name))
                 }
+                other => (other.to_string(), one.history.clone()),
             };
             if active && !seen.iter().any(|(other, _)| *other == name) {
                 seen.push((name, history));

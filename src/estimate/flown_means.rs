@@ -12,7 +12,7 @@ pub fn means(record: &Record, maneuver: &Maneuver, buildup: &Buildup) -> Option<
     let last = record.sample_at(maneuver.end_s);
     let mean = |name: &str| finite_mean(record.values(name)?.get(first..=last)?.iter().copied());
     let surfaces = buildup.derivatives.iter();
-    let surfaces = surfaces.filter_map(|d| d.regressor.surface());
+    let surfaces = surfaces.flat_map(|d| d.regressor.signals());
     Some(Means {
         theta_deg: mean(signal::THETA)?,
         ix_slug_ft2: mean(signal::IX)?,

@@ -71,7 +71,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .free
             .iter()
             .chain(all_free.held.iter().map(|(d, _)| d))
-            .filter_map(|d| d.regressor.surface());
+            .flat_map(|d| d.regressor.signals());
         let window = Window::cut(
             task.record,
             range.clone(),

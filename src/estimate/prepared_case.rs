@@ -31,7 +31,7 @@ impl<'a> Task<'a> {
             .iter()
             .copied()
             .chain(model.held.iter().map(|(d, _)| *d));
-        let surfaces: Vec<&str> = derivatives.filter_map(|d| d.regressor.surface()).collect();
+        let surfaces: Vec<&str> = derivatives.flat_map(|d| d.regressor.signals()).collect();
         let settings = self.context.settings;
         self.check_flagged_share(&surfaces)?;
         let window = Window::cut(

@@ -7,7 +7,9 @@ use super::contents::{COEFFICIENTS, Contents, terms};
 use super::derivative_table::{DerivativeTable, GridCell};
 use super::xml::{Xml, escaped};
 use crate::aero::{Coefficient, Derivative, Regressor};
+use crate::flight::signal;
 use crate::model::CorrelatedDerivatives;
+use crate::units::Unit;
 
 const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n\
     <!DOCTYPE DAVEfunc PUBLIC \"-//AIAA//DTD for Flight Dynamic Models - Functions 2.0//EN\" \
@@ -159,21 +161,22 @@ fn inputs(contents: &Contents, tables: &[DerivativeTable], xml: &mut Xml) {
         .buildup
         .derivatives
         .iter()
-        .filter_map(|d| d.regressor.surface())
+        .flat_map(|d| d.regressor.signals())
         .collect();
     surfaces.sort_unstable();
     surfaces.dedup();
-    // A surface that is a table's third variable is already an input.
-    for signal in surfaces
-        .into_iter()
-        .filter(|s| Some(*s) != third(contents, tables))
-    {
+    // What tables depend on is already an input.
+    let is_input = |signal: &&str| {
+        let has_machs = *signal == signal::MACH && tables.iter().any(|t| !t.machs.is_empty());
+        has_machs || Some(*signal) == third(contents, tables)
+    };
+    for signal in surfaces.into_iter().filter(|s| !is_input(s)) {
         variable(
             xml,
             signal,
             signal,
-            "deg",
-            "surface or vane, in the unit of its name",
+            Unit::of_signal(signal).name,
+            "surface, vane or other signal, in the unit of its name",
             Mark::Input,
         );
     }
@@ -231,8 +234,26 @@ fn coefficients(
 }
 
 fn term(derivative: &Derivative, xml: &mut Xml) {
-    let regressor = match &derivative.regressor {
-        Regressor::Constant => return xml.text("ci", &[], &derivative.name),
+    if derivative.regressor == Regressor::Constant {
+        return xml.text("ci", &[], &derivative.name);
+    }
+    xml.open("apply", &[]);
+    xml.empty("times", &[]);
+    xml.text("ci", &[], &derivative.name);
+    factors(&derivative.regressor, xml);
+    xml.close();
+}
+
+fn factors(regressor: &Regressor, xml: &mut Xml) {
+    let name = match regressor {
+        Regressor::Magnitude(of) => {
+            xml.open("apply", &[]);
+            xml.empty("abs", &[]);
+            factors(of, xml);
+            return xml.close();
+        }
+        Regressor::Product(both) => return both.iter().for_each(|r| factors(r, xml)),
+        Regressor::Constant => return,
         Regressor::Alpha => "alpha",
         Regressor::Beta => "beta",
         Regressor::Surface(signal) | Regressor::Vane(signal) => signal,
@@ -241,11 +262,7 @@ fn term(derivative: &Derivative, xml: &mut Xml) {
             .find(|(r, ..)| r == rate)
             .map_or("", |(_, id, _)| id),
     };
-    xml.open("apply", &[]);
-    xml.empty("times", &[]);
-    xml.text("ci", &[], &derivative.name);
-    xml.text("ci", &[], regressor);
-    xml.close();
+    xml.text("ci", &[], name);
 }
 
 /// Writes the breakpoints of every variable of a table.
@@ -405,8 +422,9 @@ fn numbers(values: &[f64]) -> String {
 fn unit(unit: &str) -> String {
     match unit {
         "-" => "nd".to_owned(),
-        "per_deg" => "1/deg".to_owned(),
-        "per_rad" => "1/rad".to_owned(),
-        other => escaped(&other.replace("_per_", "/")),
+        other => match other.strip_prefix("per_") {
+            Some(per) => format!("1/{per}"),
+            None => escaped(&other.replace("_per_", "/")),
+        },
     }
 }

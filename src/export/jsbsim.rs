@@ -40,7 +40,7 @@ pub fn section(contents: &Contents, tables: &[DerivativeTable]) -> String {
         );
         let text = format!("{} without thrust-vectoring vanes", word(coefficient));
         xml.text("description", &[], &text);
-        let products: Vec<Vec<String>> = terms(contents, tables, coefficient, false)
+        let products: Vec<Vec<Factor>> = terms(contents, tables, coefficient, false)
             .map(|d| factors(contents, d))
             .collect();
         sum(&mut xml, &products);
@@ -76,6 +76,7 @@ fn property(contents: &Contents, signal: &str) -> String {
         "altitude_ft" => "position/h-sl-ft".to_owned(),
         "qbar_psf" => "aero/qbar-psf".to_owned(),
         "velocity_ft_s" => "velocities/vt-fps".to_owned(),
+        "mach" => "velocities/mach".to_owned(),
         "mass_slug" => "inertia/mass-slugs".to_owned(),
         _ => format!("harvest/{signal}"),
     })
@@ -101,7 +102,7 @@ fn own_properties(contents: &Contents, tables: &[DerivativeTable]) -> Vec<String
     let derivatives =
         all.flat_map(|(c, vanes)| terms(contents, tables, c, vanes).collect::<Vec<_>>());
     let surfaces = derivatives
-        .filter_map(|d| d.regressor.surface())
+        .flat_map(|d| d.regressor.signals())
         .map(|signal| property(contents, signal));
     let mut properties: Vec<String> = surfaces
         .chain(third(contents, tables))
@@ -112,28 +113,54 @@ fn own_properties(contents: &Contents, tables: &[DerivativeTable]) -> Vec<String
     properties
 }
 
+/// Factor of a product.
+struct Factor {
+    property: String,
+    /// `true` for the property's magnitude.
+    is_magnitude: bool,
+}
+
+impl Factor {
+    fn of(property: impl Into<String>) -> Factor {
+        Factor {
+            property: property.into(),
+            is_magnitude: false,
+        }
+    }
+}
+
 /// Factors of one term: the derivative and its regressor.
-fn factors(contents: &Contents, derivative: &Derivative) -> Vec<String> {
-    let mut factors = vec![format!("aero/harvest/{}", derivative.name)];
-    factors.extend(match &derivative.regressor {
-        Regressor::Constant => vec![],
-        Regressor::Alpha => vec!["aero/alpha-deg".to_owned()],
-        Regressor::Beta => vec!["aero/beta-deg".to_owned()],
-        Regressor::RollRate => vec![
-            "velocities/p-aero-rad_sec".to_owned(),
-            "aero/bi2vel".to_owned(),
-        ],
-        Regressor::PitchRate => vec![
-            "velocities/q-aero-rad_sec".to_owned(),
-            "aero/ci2vel".to_owned(),
-        ],
-        Regressor::YawRate => vec![
-            "velocities/r-aero-rad_sec".to_owned(),
-            "aero/bi2vel".to_owned(),
-        ],
-        Regressor::Surface(signal) | Regressor::Vane(signal) => vec![property(contents, signal)],
-    });
+fn factors(contents: &Contents, derivative: &Derivative) -> Vec<Factor> {
+    let mut factors = vec![Factor::of(format!("aero/harvest/{}", derivative.name))];
+    factors.extend(regressor_factors(contents, &derivative.regressor));
     factors
+}
+
+fn regressor_factors(contents: &Contents, regressor: &Regressor) -> Vec<Factor> {
+    let all = |properties: &[&str]| properties.iter().map(|p| Factor::of(*p)).collect();
+    match regressor {
+        Regressor::Constant => vec![],
+        Regressor::Alpha => all(&["aero/alpha-deg"]),
+        Regressor::Beta => all(&["aero/beta-deg"]),
+        Regressor::RollRate => all(&["velocities/p-aero-rad_sec", "aero/bi2vel"]),
+        Regressor::PitchRate => all(&["velocities/q-aero-rad_sec", "aero/ci2vel"]),
+        Regressor::YawRate => all(&["velocities/r-aero-rad_sec", "aero/bi2vel"]),
+        Regressor::Surface(signal) | Regressor::Vane(signal) => {
+            vec![Factor::of(property(contents, signal))]
+        }
+        Regressor::Magnitude(of) => {
+            let magnitude = |factor: Factor| Factor {
+                is_magnitude: true,
+                ..factor
+            };
+            let own = regressor_factors(contents, of);
+            own.into_iter().map(magnitude).collect()
+        }
+        Regressor::Product(both) => {
+            let both = both.iter();
+            both.flat_map(|r| regressor_factors(contents, r)).collect()
+        }
+    }
 }
 
 fn axis(contents: &Contents, tables: &[DerivativeTable], coefficient: Coefficient, xml: &mut Xml) {
@@ -155,14 +182,15 @@ fn axis(contents: &Contents, tables: &[DerivativeTable], coefficient: Coefficien
     whole.extend(length.map(str::to_owned));
     whole.push(format!("aero/harvest/{}", word(coefficient)));
     let vanes = terms(contents, tables, coefficient, true).map(|d| factors(contents, d));
-    let products: Vec<Vec<String>> = std::iter::once(whole).chain(vanes).collect();
+    let whole = whole.into_iter().map(Factor::of).collect();
+    let products: Vec<Vec<Factor>> = std::iter::once(whole).chain(vanes).collect();
     sum(xml, &products);
     xml.close();
     xml.close();
 }
 
 /// Writes a sum of products of properties. JSBSim requires two operands or more in each.
-fn sum(xml: &mut Xml, products: &[Vec<String>]) {
+fn sum(xml: &mut Xml, products: &[Vec<Factor>]) {
     if products.is_empty() {
         xml.text("value", &[], "0");
     }
@@ -174,7 +202,13 @@ fn sum(xml: &mut Xml, products: &[Vec<String>]) {
             xml.open("product", &[]);
         }
         for factor in product {
-            xml.text("property", &[], factor);
+            if factor.is_magnitude {
+                xml.open("abs", &[]);
+            }
+            xml.text("property", &[], &factor.property);
+            if factor.is_magnitude {
+                xml.close();
+            }
         }
         if product.len() > 1 {
             xml.close();

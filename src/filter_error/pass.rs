@@ -176,6 +176,8 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
 struct ChunkCorrections<'a, const NX: usize, E> {
     corrections: &'a Corrections<'a, NX>,
     width: usize,
+    /// Slots of products of a state: (slot, state).
+    products: &'a [(usize, usize)],
     /// Factors of the first vector's regressors at the predicted states.
     factors: [[f64; VECTOR]; CHUNK],
     innovations: [[f64; OUTPUTS]; CHUNK],
@@ -238,10 +240,11 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
 }
 
 impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
-    fn new(corrections: &'a Corrections<'a, NX>, width: usize) -> Self {
+    fn new(corrections: &'a Corrections<'a, NX>, layout: &'a LaneLayout) -> Self {
         ChunkCorrections {
             corrections,
-            width,
+            width: layout.width(),
+            products: &layout.products,
             factors: [[1.0; VECTOR]; CHUNK],
             innovations: [[0.0; OUTPUTS]; CHUNK],
             patterns: [0; CHUNK],
@@ -262,6 +265,9 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
         measured: &[f64; OUTPUTS],
     ) -> (SVector<f64, NX>, [f64; OUTPUTS]) {
         for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
+            self.factors[k][slot] = x[state];
+        }
+        for &(slot, state) in self.products {
             self.factors[k][slot] = x[state];
         }
         let pattern = self.corrections.pattern_of[sample];
@@ -300,7 +306,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut history = StageHistory::<NX>::EMPTY;
         let mut propagators = Propagators::<NX>::ZERO;
-        let mut chunk = ChunkCorrections::<NX, E>::new(self.corrections, layout.width());
+        let mut chunk = ChunkCorrections::<NX, E>::new(self.corrections, layout);
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
             let count = CHUNK.min(samples - first);

@@ -16,7 +16,7 @@ use crate::dynamics::{
 };
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::tests::{
-    Noise as Draws, SAMPLES, biases, nothing_measured, truth, window,
+    Noise as Draws, SAMPLES, biases, nothing_measured, truth, window, with_products,
 };
 use crate::output_error::theil::Agreement;
 use crate::output_error::{Case, InitialState, Model};
@@ -121,13 +121,13 @@ fn plain_step<const NX: usize, E: Equations<NX>>(
 
 /// Compares the slopes of the cost with finite differences, some samples being left out.
 fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>() {
-    let mut simulated = prepared::<NX, E>(&truth(E::AXIS), &biases(E::AXIS));
+    let truth = with_products(E::AXIS);
+    let mut simulated = prepared::<NX, E>(&truth, &biases(E::AXIS));
     simulated.fly(&light(), &mut Draws(20_261_122));
     let mut measurements = simulated.filter.case.measurements.clone();
     for k in (0..SAMPLES).filter(|k| k % 7 == 3) {
         measurements.used[k][k % OUTPUTS] = false;
     }
-    let truth = truth(E::AXIS);
     let given = biases(E::AXIS);
     let model = Model {
         free: truth.iter().map(|(d, _)| d).collect(),

@@ -21,6 +21,7 @@ pub mod likelihood;
 
 pub use bounds::bounded::Bounded;
 pub use bounds::{calibration_errors, coloured, consider, cramer_rao};
+pub use case::layout::MOST_PRODUCTS;
 pub use case::surface_noise;
 pub use case::{Case, InitialState, Measurements, Model};
 pub use identifiability::holding;

@@ -140,7 +140,7 @@ fn delays_of_axis<'a>(
     axis: Axis,
 ) -> Vec<&'a DelayCorrection> {
     let surfaces = config.buildup.derivatives_of(axis);
-    let surfaces: Vec<&str> = surfaces.filter_map(|d| d.regressor.surface()).collect();
+    let surfaces: Vec<&str> = surfaces.flat_map(|d| d.regressor.signals()).collect();
     let is_of_axis = |delay: &&DelayCorrection| surfaces.contains(&delay.surface.as_str());
     delays.iter().filter(is_of_axis).collect()
 }

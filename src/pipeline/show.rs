@@ -8,7 +8,6 @@ use super::conductor::Conductor;
 use super::estimate_step::estimate_maneuver;
 use super::ingested::Flight;
 use super::progress::Progress;
-use crate::aero::Regressor;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result, did_you_mean};
 use crate::flight::is_stretch;
@@ -206,11 +205,9 @@ fn maneuvers_of(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
 /// Sorts the configured signals into groups: surfaces have derivatives, pilot controls have counted
 /// steps, flags are up or down in a class.
 fn groups(config: &Config) -> SignalGroups {
-    let surface = |d: &crate::aero::Derivative| match &d.regressor {
-        Regressor::Surface(name) | Regressor::Vane(name) => Some(name.clone()),
-        _ => None,
-    };
-    let surfaces = unique(config.buildup.derivatives.iter().filter_map(surface));
+    let derivatives = config.buildup.derivatives.iter();
+    let signals = derivatives.flat_map(|d| d.regressor.signals());
+    let surfaces = unique(signals.map(str::to_owned));
     let stepping = config
         .segment
         .steps

@@ -9,6 +9,7 @@ use super::trim::Trim;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::COEFFICIENTS;
+use crate::flight::signal;
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::units::DEG;
 
@@ -58,6 +59,24 @@ pub struct Effect {
     pub by_control: f64,
     /// Share of the coefficient at trim.
     pub at_trim: f64,
+}
+
+impl Effect {
+    fn constant(at_trim: f64) -> Effect {
+        Effect {
+            at_trim,
+            ..Effect::default()
+        }
+    }
+
+    fn times(self, factor: f64) -> Effect {
+        Effect {
+            by_state: self.by_state.map(|slope| slope * factor),
+            by_control: self.by_control * factor,
+            at_trim: self.at_trim * factor,
+            ..self
+        }
+    }
 }
 
 /// State that a regressor is proportional to, and the factor of proportion.
@@ -112,32 +131,83 @@ impl Flight<'_> {
         posterior: &LocalPosterior,
         states: &AxisStates,
     ) -> Effect {
-        let per_pressure = self.per_pressure(derivative);
-        let has_sum = has_sum(posterior, value.coefficient);
-        let at_trim = self.at_trim(value, &derivative.regressor, has_sum) * per_pressure;
-        let mut effect = Effect {
-            coefficient: value.coefficient.index(),
-            ..Effect::default()
+        let mut effect = match value.kind {
+            LocalKind::Sum => Effect::constant(1.0),
+            LocalKind::Derivative => {
+                let regressor = self.regressor(&derivative.regressor, states);
+                regressor.times(self.per_pressure(derivative))
+            }
         };
+        effect.coefficient = value.coefficient.index();
+        if derivative.regressor == Regressor::Alpha && has_sum(posterior, value.coefficient) {
+            // The sum has α's share at trim.
+            effect.at_trim = 0.0;
+        }
         if value.is_mach_slope {
+            let at_trim = effect.at_trim;
+            effect = Effect::constant(0.0);
+            effect.coefficient = value.coefficient.index();
             if let Some(velocity) = states.velocity {
                 effect.by_state[velocity] = at_trim * self.trim.condition.mach / self.trim.velocity;
             }
-            return effect;
+        } else if let (Regressor::Vane(_), Some(velocity)) =
+            (&derivative.regressor, states.velocity)
+        {
+            // The force of a vane does not grow with dynamic pressure, as a coefficient's does.
+            effect.by_state[velocity] = -2.0 * effect.at_trim / self.trim.velocity;
         }
-        effect.at_trim = at_trim;
-        if value.kind == LocalKind::Sum {
-            return effect;
+        effect
+    }
+
+    /// Value and slopes of a regressor at trim.
+    fn regressor(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
+        match regressor {
+            Regressor::Magnitude(of) => {
+                let own = self.regressor(of, states);
+                // At zero the magnitude has no slope.
+                let sign = if own.at_trim == 0.0 {
+                    0.0
+                } else {
+                    own.at_trim.signum()
+                };
+                own.times(sign)
+            }
+            Regressor::Product(both) => {
+                let [first, second] = [&both[0], &both[1]].map(|r| self.regressor(r, states));
+                let (by_first, by_second) =
+                    (first.times(second.at_trim), second.times(first.at_trim));
+                Effect {
+                    at_trim: by_first.at_trim,
+                    by_control: by_first.by_control + by_second.by_control,
+                    by_state: std::array::from_fn(|i| by_first.by_state[i] + by_second.by_state[i]),
+                    ..Effect::default()
+                }
+            }
+            part => self.part(part, states),
         }
-        if let Some((state, factor)) = (states.of_regressor)(&derivative.regressor) {
+    }
+
+    fn part(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
+        let trim = self.trim;
+        let mut effect = Effect::constant(match regressor {
+            Regressor::Constant => 1.0,
+            Regressor::Alpha => DEG * trim.alpha,
+            Regressor::Surface(name) if name == signal::VELOCITY => trim.velocity,
+            Regressor::Surface(name) if name == signal::MACH => trim.condition.mach,
+            Regressor::Surface(name) | Regressor::Vane(name) => {
+                trim.surfaces_deg.get(name).copied().unwrap_or(0.0)
+            }
+            _ => 0.0,
+        });
+        if let Some((state, factor)) = (states.of_regressor)(regressor) {
             effect.by_state[state] = factor;
         }
-        if let Some(surface) = derivative.regressor.surface() {
-            self.add_surface(surface, DEG * per_pressure, states, &mut effect);
-        }
-        if let (Regressor::Vane(_), Some(velocity)) = (&derivative.regressor, states.velocity) {
-            // The force of a vane does not grow with dynamic pressure, as a coefficient's does.
-            effect.by_state[velocity] = -2.0 * at_trim / self.trim.velocity;
+        match (regressor.surface(), states.velocity) {
+            (Some(signal::VELOCITY | signal::MACH), Some(velocity)) => {
+                effect.by_state[velocity] = effect.at_trim / trim.velocity;
+            }
+            (Some(surface), _) => self.add_surface(surface, DEG, states, &mut effect),
+            (None, _) => {}
         }
         effect
     }
@@ -150,17 +220,6 @@ impl Flight<'_> {
         }
         let gearing = self.controls.pitch.get(surface);
         effect.by_control = factor * gearing.copied().unwrap_or(0.0);
-    }
-
-    /// Regressor at trim.
-    fn at_trim(&self, value: &LocalValue, regressor: &Regressor, has_sum: bool) -> f64 {
-        let surface = |name: &String| self.trim.surfaces_deg.get(name).copied();
-        match (value.kind, regressor) {
-            (LocalKind::Sum, _) | (_, Regressor::Constant) => 1.0,
-            (_, Regressor::Alpha) if !has_sum => DEG * self.trim.alpha,
-            (_, Regressor::Surface(name) | Regressor::Vane(name)) => surface(name).unwrap_or(0.0),
-            _ => 0.0,
-        }
     }
 
     /// Factor to a coefficient: one, for a vane 1/q̄S and, of a moment, one over the reference length.

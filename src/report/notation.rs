@@ -95,7 +95,10 @@ pub fn unit(name: &str) -> String {
         "lbf_per_deg" => "lbf/deg".to_owned(),
         "ftlbf_per_deg" => "ft·lbf/deg".to_owned(),
         "deg_s" => "deg/s".to_owned(),
-        other => other.to_owned(),
+        other => other.strip_prefix("per_").map_or_else(
+            || other.to_owned(),
+            |per| format!("per {}", per.replace('_', " ")),
+        ),
     }
 }
 

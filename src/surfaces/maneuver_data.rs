@@ -122,8 +122,8 @@ impl ManeuverData {
 /// are not recorded.
 fn derivatives<'a>(record: &Record, axis: Axis, buildup: &'a Buildup) -> Vec<&'a Derivative> {
     let is_recorded = |d: &&Derivative| {
-        let surface = d.regressor.surface();
-        surface.is_none_or(|s| record.signals.contains_key(s))
+        let mut signals = d.regressor.signals();
+        signals.all(|s| record.signals.contains_key(s))
     };
     buildup
         .derivatives_of(axis)

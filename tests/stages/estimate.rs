@@ -255,6 +255,33 @@ fn a_new_derivative_is_a_line_in_the_model_and_one_in_each_class() {
 }
 
 #[test]
+fn a_product_of_regressors_is_a_line_in_the_model_and_one_that_is_none_is_refused_with_its_line() {
+    let campaign = Campaign::of_pitch_steps();
+    campaign.copy_pipeline();
+    let first = "  - { name: CN_alpha,";
+    let line = |regressor: &str| {
+        format!("  - {{ name: CN_alpha_de, coefficient: CN, regressor: {regressor} }}\n{first}")
+    };
+    campaign.edit("model.yaml", first, &line("alpha ^ 2"));
+    for file in campaign.class_files() {
+        let text = std::fs::read_to_string(campaign.path("pipeline").join(&file)).unwrap();
+        if text.contains("axis: longitudinal") {
+            campaign.edit(&file, "estimated: [", "estimated: [CN_alpha_de, ");
+        }
+    }
+    let refused = campaign.ends("estimate", 1);
+    let place = "model.yaml:11: CN_alpha_de: `alpha ^ 2` is no regressor";
+    assert!(refused.stderr.contains(place), "{}", refused.stderr);
+    campaign.edit("model.yaml", "alpha ^ 2", "alpha * de_deg");
+    campaign.harvest("estimate");
+    let rows = campaign.table("estimates");
+    let row = rows.iter().find(|r| r["derivative"] == "CN_alpha_de");
+    let row = row.unwrap();
+    assert_eq!((&*row["unit"], &*row["status"]), ("per_deg2", "estimated"));
+    assert!(number(row, "bound") > 0.0);
+}
+
+#[test]
 fn a_bias_less_is_a_line_less() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();

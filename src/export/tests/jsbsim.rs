@@ -72,6 +72,10 @@ fn evaluate(node: Node, all: &BTreeMap<String, f64>) -> f64 {
             assert!(operands().len() > 1);
             operands().iter().product()
         }
+        "abs" => {
+            assert_eq!(operands().len(), 1);
+            operands()[0].abs()
+        }
         "table" => table(node, all),
         other => panic!("{other}"),
     }

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use super::derivative_table::{DerivativeTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Condition, WindTunnel, wind_tunnel};
+use crate::aero::{Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
@@ -114,6 +114,34 @@ impl Flown {
             correlations: &self.correlations,
             settings: &self.config.export,
         }
+    }
+
+    /// Further derivatives along products, magnitudes and airspeed.
+    fn with_products(mut self) -> Flown {
+        for (name, coefficient, regressor, value) in [
+            ("CN_alpha2", Coefficient::CN, "alpha * alpha", 1e-4),
+            ("Cm_alpha_de", Coefficient::Cm, "alpha * de_deg", -2e-5),
+            ("Cn_abs_beta", Coefficient::Cn, "abs(beta)", 3e-4),
+            ("Cl_mach_r", Coefficient::Cl, "mach * r", 0.2),
+            ("CA_V", Coefficient::CA, "velocity_ft_s", 1e-5),
+        ] {
+            self.config.buildup.derivatives.push(Derivative {
+                name: name.into(),
+                coefficient,
+                regressor: Regressor::parse(regressor).unwrap(),
+            });
+            for alpha_deg in ALPHAS {
+                let point = TunnelPoint {
+                    alpha_deg,
+                    mach: None,
+                    value,
+                    uncertainty: None,
+                    source: None,
+                };
+                self.config.tunnel.insert(name, point);
+            }
+        }
+        self
     }
 
     /// A tunnel of one derivative over two Mach numbers and two altitudes.
@@ -340,7 +368,7 @@ fn states() -> Vec<(f64, f64, Vector3<f64>)> {
 
 #[test]
 fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
-    let flown = Flown::new();
+    let flown = Flown::new().with_products();
     let contents = flown.contents();
     let (tables, a) = (tables(&contents), contents.aircraft);
     let section = section_of(&contents, &tables);
@@ -380,6 +408,7 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
             ("velocities/q-aero-rad_sec", rates.y),
             ("velocities/r-aero-rad_sec", rates.z),
             ("velocities/mach", 0.3),
+            ("velocities/vt-fps", 310.0),
             ("aero/qbar-psf", 55.0),
             ("metrics/Sw-sqft", a.wing_area_ft2),
             ("metrics/bw-ft", a.span_ft),

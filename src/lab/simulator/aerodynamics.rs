@@ -8,14 +8,18 @@ use nalgebra::Vector3;
 use super::air_data::AirData;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
+use crate::flight::signal;
 use crate::units::DEG;
+
+/// Signals that the air data give.
+const OWN_SIGNALS: [&str; 2] = [signal::VELOCITY, signal::MACH];
 
 /// The build-up with the tables of the true derivatives.
 #[derive(Clone, Debug)]
 pub struct Aerodynamics {
     buildup: Buildup,
-    /// Index of each derivative's surface among the simulated surfaces.
-    surface_indices: Vec<Option<usize>>,
+    /// Names of the simulated surfaces.
+    surfaces: Vec<String>,
     truth: WindTunnel,
 }
 
@@ -29,26 +33,19 @@ impl Aerodynamics {
         truth: WindTunnel,
         surfaces: &[String],
     ) -> Result<Aerodynamics, String> {
-        let surface_index = |d: &Derivative| {
-            let Some(name) = d.regressor.surface() else {
-                return Ok(None);
-            };
-            let index = surfaces.iter().position(|s| s == name);
-            index
-                .map(Some)
-                .ok_or_else(|| format!("{}: `surfaces` has no `{name}`", d.name))
-        };
-        if let Some(d) = buildup.derivatives.iter().find(|d| !truth.has(&d.name)) {
-            return Err(format!("the truth has no value of {}", d.name));
+        for derivative in &buildup.derivatives {
+            if !truth.has(&derivative.name) {
+                return Err(format!("the truth has no value of {}", derivative.name));
+            }
+            let is_known =
+                |name: &str| OWN_SIGNALS.contains(&name) || surfaces.iter().any(|s| s == name);
+            if let Some(name) = derivative.regressor.signals().find(|name| !is_known(name)) {
+                return Err(format!("{}: `surfaces` has no `{name}`", derivative.name));
+            }
         }
-        let surface_indices = buildup
-            .derivatives
-            .iter()
-            .map(surface_index)
-            .collect::<Result<_, _>>()?;
         Ok(Aerodynamics {
             buildup: buildup.clone(),
-            surface_indices,
+            surfaces: surfaces.to_vec(),
             truth,
         })
     }
@@ -83,28 +80,27 @@ impl Aerodynamics {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         let area = air.qbar_psf * aircraft.wing_area_ft2;
         let (span, chord) = (aircraft.span_ft, aircraft.chord_ft);
+        let signal = |name: &str| match name {
+            signal::VELOCITY => air.velocity_ft_s,
+            signal::MACH => air.mach,
+            _ => {
+                let index = self.surfaces.iter().position(|s| s == name);
+                index.and_then(|i| surfaces.get(i)).copied().unwrap_or(0.0)
+            }
+        };
         let per_speed = 0.5 / air.velocity_ft_s;
-        for ((derivative, value), surface_index) in self
-            .buildup
-            .derivatives
-            .iter()
-            .zip(values)
-            .zip(&self.surface_indices)
-        {
-            let deflection = surface_index
-                .and_then(|i| surfaces.get(i))
-                .copied()
-                .unwrap_or(0.0);
-            let (regressor, vane) = match derivative.regressor {
-                Regressor::Constant => (1.0, false),
-                Regressor::Alpha => (air.alpha * DEG, false),
-                Regressor::Beta => (air.beta * DEG, false),
-                Regressor::RollRate => (rates.x * span * per_speed, false),
-                Regressor::PitchRate => (rates.y * chord * per_speed, false),
-                Regressor::YawRate => (rates.z * span * per_speed, false),
-                Regressor::Surface(_) => (deflection, false),
-                Regressor::Vane(_) => (deflection, true),
-            };
+        let part = |part: &Regressor| match part {
+            Regressor::Alpha => air.alpha * DEG,
+            Regressor::Beta => air.beta * DEG,
+            Regressor::RollRate => rates.x * span * per_speed,
+            Regressor::PitchRate => rates.y * chord * per_speed,
+            Regressor::YawRate => rates.z * span * per_speed,
+            Regressor::Surface(name) | Regressor::Vane(name) => signal(name),
+            _ => 1.0,
+        };
+        for (derivative, value) in self.buildup.derivatives.iter().zip(values) {
+            let vane = matches!(derivative.regressor, Regressor::Vane(_));
+            let regressor = derivative.regressor.value(&part);
             let term = value * regressor * if vane { 1.0 } else { area };
             let arm = |length: f64| term * if vane { 1.0 } else { length };
             match derivative.coefficient {

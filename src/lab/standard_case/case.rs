@@ -157,7 +157,7 @@ impl StandardCase {
     /// The message for a signal that the record lacks.
     pub fn window(&self) -> Result<Window, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
-        let surfaces = derivatives.filter_map(|d| d.regressor.surface());
+        let surfaces = derivatives.flat_map(|d| d.regressor.signals());
         Window::cut(
             &self.record,
             0..self.record.samples,

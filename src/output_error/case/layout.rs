@@ -3,9 +3,10 @@
 //! the integration.
 //!
 //! The derivatives of one coefficient form a group of whole vectors, so one coefficient's slope
-//! serves all lanes of a vector. Derivatives along a state come first, in the order of the states:
-//! the same lanes of each group. All groups are equally long. Initial states are the last group. Two
-//! spare lanes hold the residual and a one while sums are taken.
+//! serves all lanes of a vector. Derivatives along a state come first, in the order of the states,
+//! then those along products of a state: the same lanes of each group. All groups are equally long.
+//! Initial states are the last group. Two spare lanes hold the residual and a one while sums are
+//! taken.
 //!
 //! Regressors stand in rows, point by point. Where the columns of all coefficients fit into the
 //! widest group, all groups read the same part of a row: most derivatives come three at a time, one
@@ -17,6 +18,13 @@ use std::ops::Range;
 use super::build_up::Term;
 use crate::dynamics::COEFFICIENTS;
 use crate::numerics::simd::VECTOR;
+
+/// Most products of states that are regressors of an axis: with the states themselves they fit into one
+/// vector.
+pub const MOST_PRODUCTS: usize = VECTOR - MOST_STATES;
+
+/// Most states of an axis that regressors are proportional to.
+const MOST_STATES: usize = 3;
 
 /// Groups of lanes: one per coefficient, and the initial states.
 const GROUPS: usize = COEFFICIENTS + 1;
@@ -41,6 +49,8 @@ pub(crate) struct LaneLayout {
     pub row: usize,
     /// Columns that make up a row of regressors: (place in the row, column).
     pub columns: Vec<(usize, usize)>,
+    /// Slots of products of a state: (slot in each group, state).
+    pub products: Vec<(usize, usize)>,
 }
 
 impl LaneLayout {
@@ -54,6 +64,8 @@ impl LaneLayout {
     ) -> LaneLayout {
         let slots = GroupSlots::new(terms, followed);
         let mut layout = LaneLayout::with_groups(&slots);
+        let products = slots.along_states.iter().enumerate().skip(followed.len());
+        layout.products = products.map(|(slot, (state, _))| (slot, *state)).collect();
         layout.place_terms(terms, &slots);
         layout.place_initial_states(initial_states);
         layout.place_spare_lanes(biases);
@@ -134,9 +146,10 @@ fn padded(count: usize) -> usize {
     count.next_multiple_of(VECTOR)
 }
 
-/// Slots of a group: the followed states, then columns of regressors.
-struct GroupSlots<'a> {
-    followed: &'a [usize],
+/// Slots of a group: the followed states, their products, then columns of regressors.
+struct GroupSlots {
+    /// State of each of the first slots, and the column of its factor where a term has it.
+    along_states: Vec<(usize, Option<usize>)>,
     columns: [Vec<usize>; COEFFICIENTS],
     /// Lanes of a group.
     width: usize,
@@ -144,11 +157,12 @@ struct GroupSlots<'a> {
     shared: bool,
 }
 
-impl<'a> GroupSlots<'a> {
-    fn new(terms: &[Term], followed: &'a [usize]) -> GroupSlots<'a> {
+impl GroupSlots {
+    fn new(terms: &[Term], followed: &[usize]) -> GroupSlots {
+        let along_states = slots_along_states(terms, followed);
         let own: [Vec<usize>; COEFFICIENTS] = std::array::from_fn(|k| columns_of(terms, k));
         let all: BTreeSet<usize> = own.iter().flatten().copied().collect();
-        let room = |columns: usize| padded(followed.len() + columns);
+        let room = |columns: usize| padded(along_states.len() + columns);
         let widest = own.iter().map(Vec::len).max().map_or(0, room);
         let width = if terms.is_empty() { 0 } else { widest };
         let shared = room(all.len()) <= width;
@@ -158,7 +172,7 @@ impl<'a> GroupSlots<'a> {
             own
         };
         GroupSlots {
-            followed,
+            along_states,
             columns,
             width,
             shared,
@@ -167,14 +181,35 @@ impl<'a> GroupSlots<'a> {
 
     fn slot(&self, term: &Term) -> usize {
         let slot = match term.state {
-            Some(state) => self.followed.iter().position(|f| *f == state),
+            Some(state) => {
+                let own = (state, Some(term.column));
+                self.along_states.iter().position(|slot| *slot == own)
+            }
             None => self.columns[term.coefficient]
                 .iter()
                 .position(|column| *column == term.column)
-                .map(|slot| self.followed.len() + slot),
+                .map(|slot| self.along_states.len() + slot),
         };
         slot.unwrap_or(0)
     }
+}
+
+/// Slots along states: one for each followed state, for the first column of its factors, and one for
+/// each further column.
+fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<usize>)> {
+    let mut slots: Vec<(usize, Option<usize>)> = followed.iter().map(|s| (*s, None)).collect();
+    for term in terms {
+        let Some(state) = term.state else { continue };
+        let own = (state, Some(term.column));
+        if slots.contains(&own) {
+            continue;
+        }
+        match slots.iter_mut().find(|slot| **slot == (state, None)) {
+            Some(free) => *free = own,
+            None => slots.push(own),
+        }
+    }
+    slots
 }
 
 /// Columns of the terms of one coefficient that no state is a factor of.

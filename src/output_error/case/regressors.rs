@@ -118,7 +118,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
         });
         Term {
             coefficient: derivative.coefficient.index(),
-            state: E::state_of(&derivative.regressor),
+            state: derivative.regressor.find(E::state_of),
             column,
         }
     }
@@ -127,47 +127,89 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     pub fn values(&self, motion: &PreparedMotion<NX, E>) -> Vec<Vec<f64>> {
         let mut columns = Vec::with_capacity(self.derivatives.len());
         for derivative in &self.derivatives {
-            let mut column = Vec::with_capacity(self.window.len() + ZERO_POINTS);
-            self.fill(derivative, motion, &mut column);
+            let mut column = self.column(derivative, motion);
             column.extend([0.0; ZERO_POINTS]);
             columns.push(column);
         }
         columns
     }
 
-    /// A derivative's regressor at every point, or its factor of proportion to a state.
-    fn fill(&self, derivative: &Derivative, motion: &PreparedMotion<NX, E>, column: &mut Vec<f64>) {
-        let aircraft = self.aircraft;
-        match &derivative.regressor {
-            state if E::state_of(state).is_some() => self.fill_state_factor(state, column),
-            Regressor::RollRate => self.fill_reduced_rate(signal::P, aircraft.span_ft, column),
-            Regressor::PitchRate => self.fill_reduced_rate(signal::Q, aircraft.chord_ft, column),
-            Regressor::YawRate => self.fill_reduced_rate(signal::R, aircraft.span_ft, column),
-            Regressor::Constant => column.resize(self.window.len(), 1.0),
-            Regressor::Alpha => column.extend(motion.flow.iter().map(|[alpha, _]| alpha * DEG)),
-            Regressor::Beta => column.extend(motion.flow.iter().map(|[_, beta]| beta * DEG)),
-            Regressor::Surface(name) => column.extend(self.window.signal(name)),
-            Regressor::Vane(name) => {
-                let force = self.window.signal(name).iter();
-                let both = force.zip(self.window.signal(signal::QBAR));
+    /// A derivative's regressor at every point, or its factor of proportion to a state; in coefficients.
+    fn column(&self, derivative: &Derivative, motion: &PreparedMotion<NX, E>) -> Vec<f64> {
+        let mut column = self.factor(&derivative.regressor, motion);
+        if matches!(derivative.regressor, Regressor::Vane(_)) {
+            let qbar = self.window.signal(signal::QBAR).iter();
+            for (force, qbar) in column.iter_mut().zip(qbar) {
+                *force *= surface_factor(self.aircraft, *qbar, derivative);
+            }
+        }
+        column
+    }
+
+    /// Factor of proportion to the first state in a regressor; without a state its measured values.
+    fn factor(&self, regressor: &Regressor, motion: &PreparedMotion<NX, E>) -> Vec<f64> {
+        let measured = |part: &Regressor| self.measured(part, motion);
+        match regressor {
+            Regressor::Magnitude(of) => {
+                let mut column = self.factor(of, motion);
+                let signs = measured(of).into_iter().map(f64::signum);
+                column.iter_mut().zip(signs).for_each(|(c, s)| *c *= s);
                 column
-                    .extend(both.map(|(f, qbar)| f * surface_factor(aircraft, *qbar, derivative)));
+            }
+            Regressor::Product(both) => {
+                let [first, second] = &**both;
+                if first.find(E::state_of).is_some() {
+                    product(self.factor(first, motion), &measured(second))
+                } else {
+                    product(self.factor(second, motion), &measured(first))
+                }
+            }
+            state if E::state_of(state).is_some() => self.state_factor(state),
+            part => measured(part),
+        }
+    }
+
+    fn state_factor(&self, regressor: &Regressor) -> Vec<f64> {
+        let velocity = self.window.signal(signal::VELOCITY).iter();
+        let factor = |v: &f64| E::state_regressor(self.aircraft, *v, regressor);
+        velocity
+            .map(|v| factor(v).map_or(0.0, |(_, factor)| factor))
+            .collect()
+    }
+
+    /// Measured values at every point; a vane's in deg.
+    fn measured(&self, regressor: &Regressor, motion: &PreparedMotion<NX, E>) -> Vec<f64> {
+        let aircraft = self.aircraft;
+        match regressor {
+            Regressor::RollRate => self.reduced_rate(signal::P, aircraft.span_ft),
+            Regressor::PitchRate => self.reduced_rate(signal::Q, aircraft.chord_ft),
+            Regressor::YawRate => self.reduced_rate(signal::R, aircraft.span_ft),
+            Regressor::Constant => vec![1.0; self.window.len()],
+            Regressor::Alpha => motion.flow.iter().map(|[alpha, _]| alpha * DEG).collect(),
+            Regressor::Beta => motion.flow.iter().map(|[_, beta]| beta * DEG).collect(),
+            Regressor::Surface(name) | Regressor::Vane(name) => self.window.signal(name).to_vec(),
+            Regressor::Magnitude(of) => {
+                let values = self.measured(of, motion);
+                values.into_iter().map(f64::abs).collect()
+            }
+            Regressor::Product(both) => {
+                let [first, second] = &**both;
+                product(self.measured(first, motion), &self.measured(second, motion))
             }
         }
     }
 
-    fn fill_state_factor(&self, regressor: &Regressor, column: &mut Vec<f64>) {
-        let velocity = self.window.signal(signal::VELOCITY).iter();
-        column.extend(velocity.map(|v| {
-            E::state_regressor(self.aircraft, *v, regressor).map_or(0.0, |(_, factor)| factor)
-        }));
-    }
-
-    fn fill_reduced_rate(&self, rate: &str, length_ft: f64, column: &mut Vec<f64>) {
+    fn reduced_rate(&self, rate: &str, length_ft: f64) -> Vec<f64> {
         let rate = self.window.signal(rate).iter();
         let both = rate.zip(self.window.signal(signal::VELOCITY));
-        column.extend(both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v)));
+        both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v))
+            .collect()
     }
+}
+
+fn product(mut first: Vec<f64>, second: &[f64]) -> Vec<f64> {
+    first.iter_mut().zip(second).for_each(|(a, b)| *a *= b);
+    first
 }
 
 /// Equality of two derivatives' columns: the same regressor, but a vane's moment is not its force.

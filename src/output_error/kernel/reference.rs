@@ -210,22 +210,29 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         c: &mut Coefficients<NX>,
     ) -> f64 {
         let (k, motion) = (derivative.coefficient.index(), &self.motion[point]);
-        let state = E::state_regressor(self.aircraft, motion.velocity, &derivative.regressor);
-        let regressor = match state {
+        let state = |part: &Regressor| E::state_regressor(self.aircraft, motion.velocity, part);
+        let factor = derivative
+            .regressor
+            .factor(&|part| state(part).map(|(_, factor)| factor), &|part| {
+                self.measured(part, derivative, point)
+            });
+        let regressor = match derivative.regressor.find(E::state_of).zip(factor) {
             Some((i, factor)) => {
                 c.by_state[(k, i)] += value * factor;
                 factor * x[i]
             }
-            None => self.measured_regressor(derivative, point),
+            None => derivative
+                .regressor
+                .value(&|part| self.measured(part, derivative, point)),
         };
         c.values[k] += value * regressor;
         regressor
     }
 
-    /// Regressor that is no state of the axis, from the measured motion.
-    fn measured_regressor(&self, derivative: &Derivative, point: usize) -> f64 {
+    /// Part of a derivative's regressor, from the measured motion.
+    fn measured(&self, part: &Regressor, derivative: &Derivative, point: usize) -> f64 {
         let (aircraft, m) = (self.aircraft, &self.motion[point]);
-        match &derivative.regressor {
+        match part {
             Regressor::Constant => 1.0,
             Regressor::Alpha => DEG * m.alpha,
             Regressor::Beta => DEG * m.beta,
@@ -234,6 +241,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
             Regressor::YawRate => m.rates[2] * aircraft.span_ft / (2.0 * m.velocity),
             Regressor::Surface(name) | Regressor::Vane(name) => {
                 self.window.signal(name)[point] * surface_factor(aircraft, m.qbar, derivative)
+            }
+            Regressor::Magnitude(_) | Regressor::Product(_) => {
+                part.value(&|own| self.measured(own, derivative, point))
             }
         }
     }
@@ -254,17 +264,20 @@ mod tests {
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     use super::*;
+    use crate::aero::Axis;
     use crate::dynamics::tests::aircraft;
     use crate::dynamics::{Lateral, Longitudinal};
     use crate::output_error::likelihood::cost::{Sums, sums};
     use crate::output_error::tests::{
-        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, window,
+        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, window, with_products,
     };
 
     /// Compares kernel and reference off the truth: noise on the measurements, samples that do not
     /// count, one derivative held, biases and initial states free.
-    fn assert_kernel_matches_reference<const NX: usize, E: Equations<NX>>() {
-        let (truth, biases) = (truth(E::AXIS), biases(E::AXIS));
+    fn assert_kernel_matches_reference<const NX: usize, E: Equations<NX>>(
+        truth: &[(Derivative, f64)],
+    ) {
+        let biases = biases(E::AXIS);
         let ((held, value), free) = truth.split_last().unwrap();
         let model = Model {
             free: free.iter().map(|(d, _)| d).collect(),
@@ -323,11 +336,15 @@ mod tests {
 
     #[test]
     fn the_kernel_matches_the_plain_pass_on_the_longitudinal_axis() {
-        assert_kernel_matches_reference::<3, Longitudinal>();
+        let axis = Axis::Longitudinal;
+        assert_kernel_matches_reference::<3, Longitudinal>(&truth(axis));
+        assert_kernel_matches_reference::<3, Longitudinal>(&with_products(axis));
     }
 
     #[test]
     fn the_kernel_matches_the_plain_pass_on_the_lateral_axis() {
-        assert_kernel_matches_reference::<4, Lateral>();
+        let axis = Axis::Lateral;
+        assert_kernel_matches_reference::<4, Lateral>(&truth(axis));
+        assert_kernel_matches_reference::<4, Lateral>(&with_products(axis));
     }
 }

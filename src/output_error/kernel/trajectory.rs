@@ -133,6 +133,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
             for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
                 self.history.factors[self.stage][self.sample][slot] = at[state];
             }
+            for &(slot, state) in &self.case.layout.products {
+                self.history.factors[self.stage][self.sample][slot] = at[state];
+            }
         }
     }
 }

@@ -73,6 +73,35 @@ pub(crate) fn truth(axis: Axis) -> Vec<(Derivative, f64)> {
     }
 }
 
+/// [`truth`] with products, magnitudes and airspeed as further regressors of its coefficients.
+pub(crate) fn with_products(axis: Axis) -> Vec<(Derivative, f64)> {
+    use Coefficient::{CN, Cl, Cm, Cn};
+    let further = match axis {
+        Axis::Longitudinal => vec![
+            ("alpha * alpha", CN, 1e-4),
+            ("alpha * de_deg", Cm, -1e-4),
+            ("alpha * alpha", Cm, -2e-5),
+            ("q * alpha", Cm, -0.05),
+            ("velocity_ft_s", CN, 1e-5),
+        ],
+        Axis::Lateral => vec![
+            ("abs(beta)", Cn, 1e-4),
+            ("alpha * beta", Cl, -2e-5),
+            ("alpha * p", Cl, -0.002),
+        ],
+    };
+    let mut truth = truth(axis);
+    for (written, coefficient, value) in further {
+        let name = format!("{coefficient:?} along {written}");
+        let own = derivative(&name, coefficient, Regressor::parse(written).unwrap());
+        let alike = truth
+            .iter()
+            .rposition(|(d, _)| d.coefficient == coefficient);
+        truth.insert(alike.unwrap(), (own, value));
+    }
+    truth
+}
+
 fn doublet(k: usize, start: usize, half: usize, size: f64) -> f64 {
     match k {
         k if k >= start && k < start + half => size,

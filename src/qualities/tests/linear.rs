@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use approx::assert_relative_eq;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::fixture::{aircraft, linear, linear_with, posterior, trim};
-use crate::aero::{Axis, Coefficient};
+use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
-use crate::qualities::linear::{Matrix, Vector};
+use crate::qualities::linear::{AxisStates, Controls, Effect, Flight, Matrix, Vector};
 use crate::qualities::quantities::Differentiation;
 use crate::tables::Quantity;
 use crate::units::DEG;
@@ -122,6 +122,68 @@ fn the_longitudinal_matrix_is_that_of_differences_of_forces_and_moment() {
     // Each entry that the equations have is exercised.
     assert!((0..4).all(|i| found[(0, i)].abs() > 1e-4 || i == 2));
     assert!(found[(2, 0)].abs() > 1e-7 && found[(1, 3)].abs() > 1e-4);
+}
+
+/// Effect of a derivative of CN along a regressor, with velocity, α and q as states.
+fn effect(regressor: &str) -> Effect {
+    let (aircraft, trim) = (aircraft(), trim());
+    let buildup = Buildup {
+        derivatives: vec![Derivative {
+            name: "own".into(),
+            coefficient: Coefficient::CN,
+            regressor: Regressor::parse(regressor).unwrap(),
+        }],
+        ..Buildup::default()
+    };
+    let posterior = LocalPosterior {
+        values: vec![LocalValue {
+            coefficient: Coefficient::CN,
+            derivative: "own".into(),
+            kind: LocalKind::Derivative,
+            is_mach_slope: false,
+        }],
+        mean: DVector::zeros(1),
+        covariance: DMatrix::zeros(1, 1),
+    };
+    let of_regressor = |part: &Regressor| match part {
+        Regressor::Alpha => Some((1, DEG)),
+        Regressor::PitchRate => Some((2, 0.016)),
+        _ => None,
+    };
+    let states = AxisStates {
+        of_regressor: &of_regressor,
+        velocity: Some(0),
+        feedback: &[],
+    };
+    let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
+    let flight = Flight {
+        aircraft: &aircraft,
+        buildup: &buildup,
+        trim: &trim,
+        controls: Controls {
+            feedback: &BTreeMap::new(),
+            pitch: &pitch,
+        },
+    };
+    flight.effects(&posterior, &states)[0]
+}
+
+#[test]
+fn products_and_magnitudes_have_the_slopes_of_their_factors_at_trim() {
+    // Trim: α 15°, δe −4°, 360 ft/s.
+    let expect = |regressor: &str, at_trim: f64, by_state: [f64; 3], by_control: f64| {
+        let found = effect(regressor);
+        assert_relative_eq!(found.at_trim, at_trim, max_relative = 1e-12);
+        assert_relative_eq!(found.by_state[..3], by_state[..], max_relative = 1e-12);
+        assert_relative_eq!(found.by_control, by_control, max_relative = 1e-12);
+    };
+    expect("alpha * alpha", 225.0, [0.0, 30.0 * DEG, 0.0], 0.0);
+    expect("alpha * q", 0.0, [0.0, 0.0, 15.0 * 0.016], 0.0);
+    expect("alpha * de_deg", -60.0, [0.0, -4.0 * DEG, 0.0], 15.0 * DEG);
+    expect("abs(de_deg)", 4.0, [0.0; 3], -DEG);
+    expect("abs(beta)", 0.0, [0.0; 3], 0.0);
+    expect("velocity_ft_s", 360.0, [1.0, 0.0, 0.0], 0.0);
+    expect("mach * alpha", 5.25, [5.25 / 360.0, 0.35 * DEG, 0.0], 0.0);
 }
 
 #[test]
