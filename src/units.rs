@@ -45,6 +45,9 @@ pub struct Unit {
     pub quantity: Quantity,
     /// Factor from values in this unit to values in the quantity's base unit.
     factor: f64,
+    /// Value in this unit of the zero of the base unit, with the opposite sign. It is added before
+    /// the factor is applied.
+    offset: f64,
 }
 
 const fn unit(
@@ -58,6 +61,35 @@ const fn unit(
         suffix,
         quantity,
         factor,
+        offset: 0.0,
+    }
+}
+
+/// Unit of temperature with a zero of its own.
+const fn thermometer(name: &'static str, offset: f64, factor: f64) -> Unit {
+    Unit {
+        offset,
+        ..unit(name, None, Quantity::Temperature, factor)
+    }
+}
+
+/// Conversion of values: times a factor, plus an offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conversion {
+    pub factor: f64,
+    pub offset: f64,
+}
+
+impl Conversion {
+    /// Converted value.
+    #[must_use]
+    pub fn of(self, value: f64) -> f64 {
+        // The sum with zero would turn -0 into 0.
+        if self.offset == 0.0 {
+            value * self.factor
+        } else {
+            value * self.factor + self.offset
+        }
     }
 }
 
@@ -121,6 +153,8 @@ const UNITS: &[Unit] = &[
     unit("kg/m3", None, Quantity::Density, SLUG / (FT * FT * FT)),
     unit("K", Some("_kelvin"), Quantity::Temperature, 1.0),
     unit("degR", None, Quantity::Temperature, 1.0 / 1.8),
+    thermometer("degC", 273.15, 1.0),
+    thermometer("degF", 459.67, 1.0 / 1.8),
     unit("rpm", Some("_rpm"), Quantity::RotationalSpeed, 1.0),
     unit("s", Some("_s"), Quantity::Time, 1.0),
     unit("min", None, Quantity::Time, 60.0),
@@ -185,6 +219,10 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("kilogram", "kg"),
     ("kelvin", "K"),
     ("rankine", "degR"),
+    ("celsius", "degC"),
+    ("°c", "degC"),
+    ("fahrenheit", "degF"),
+    ("°f", "degF"),
     ("rev/min", "rpm"),
     ("1/min", "rpm"),
     ("sec", "s"),
@@ -205,7 +243,56 @@ const SPELLINGS: &[(&str, &str)] = &[
 ];
 
 /// Exponents of degree, foot, slug, second, kelvin and revolution.
-type Dimensions = [i32; 6];
+pub type Dimensions = [i32; 6];
+
+/// Names of the units whose exponents are [`Dimensions`].
+const BASE_NAMES: [&str; 6] = ["deg", "ft", "slug", "s", "K", "rev"];
+
+/// Product of units with exponents: its dimensions, and the factor to the product of the base units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Product {
+    pub dimensions: Dimensions,
+    pub factor: f64,
+}
+
+impl Product {
+    /// Parses a product of units, also one of a quantity that no signal has. What stands behind a
+    /// slash divides.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Product> {
+        let (mut dimensions, mut factor) = ([0; 6], 1.0);
+        for (n, part) in text.split('/').enumerate() {
+            let side = if n == 0 { 1 } else { -1 };
+            let words = part.split([' ', '*', '·', '.', '(', ')']);
+            let mut words = words.filter(|word| !word.is_empty()).peekable();
+            words.peek()?;
+            for word in words {
+                let (unit, exponent) = power(word)?;
+                let (own, base) = unit.quantity.dimensions();
+                for (sum, own) in dimensions.iter_mut().zip(own) {
+                    *sum += side * exponent * own;
+                }
+                factor *= (unit.factor * base).powi(side * exponent);
+            }
+        }
+        Some(Product { dimensions, factor })
+    }
+}
+
+/// Name of a quantity's first unit with these dimensions, or their product.
+#[must_use]
+pub fn name_of(dimensions: Dimensions) -> String {
+    let kept = UNITS.iter().find(|u| u.dimensions() == dimensions);
+    if let Some(kept) = kept {
+        return kept.name.to_owned();
+    }
+    let factors = BASE_NAMES.iter().zip(dimensions).filter(|(_, n)| *n != 0);
+    let factors = factors.map(|(name, exponent)| match exponent {
+        1 => (*name).to_owned(),
+        _ => format!("{name}{exponent}"),
+    });
+    factors.collect::<Vec<String>>().join(" ")
+}
 
 impl Quantity {
     /// Dimensions, and the factor from the base unit of the quantity to the product of degree, foot, slug,
@@ -257,7 +344,10 @@ fn power(word: &str) -> Option<(Unit, i32)> {
     } else {
         exponent.parse().ok()?
     };
-    Some((Unit::named(name)?, exponent)).filter(|_| (-4..=4).contains(&exponent))
+    // A product has no zero: degC in it could be a temperature or a difference.
+    let has_no_zero = |unit: &Unit| unit.offset == 0.0;
+    let unit = Unit::named(name).filter(has_no_zero)?;
+    (-4..=4).contains(&exponent).then_some((unit, exponent))
 }
 
 impl Unit {
@@ -289,32 +379,39 @@ impl Unit {
         of_name(&written).or_else(spelling)
     }
 
-    /// Product of units with exponents; what stands behind a slash divides.
+    /// Product of units of a quantity that signals have.
     fn product(text: &str) -> Option<Unit> {
-        let (mut dimensions, mut factor) = ([0; 6], 1.0);
-        for (n, part) in text.split('/').enumerate() {
-            let side = if n == 0 { 1 } else { -1 };
-            let words = part.split([' ', '*', '·', '.', '(', ')']);
-            let mut words = words.filter(|word| !word.is_empty()).peekable();
-            words.peek()?;
-            for word in words {
-                let (unit, exponent) = power(word)?;
-                let (own, base) = unit.quantity.dimensions();
-                for (sum, own) in dimensions.iter_mut().zip(own) {
-                    *sum += side * exponent * own;
-                }
-                factor *= (unit.factor * base).powi(side * exponent);
-            }
-        }
+        let product = Product::parse(text)?;
         let kept = UNITS
             .iter()
-            .find(|u| u.quantity.dimensions().0 == dimensions)?;
-        Some(Unit {
-            name: "a product of units",
-            suffix: None,
-            quantity: kept.quantity,
-            factor: factor / kept.quantity.dimensions().1,
-        })
+            .find(|u| u.dimensions() == product.dimensions)?;
+        let factor = product.factor / kept.quantity.dimensions().1;
+        Some(unit("a product of units", None, kept.quantity, factor))
+    }
+
+    /// Exponents of degree, foot, slug, second, kelvin and revolution.
+    #[must_use]
+    pub fn dimensions(self) -> Dimensions {
+        self.quantity.dimensions().0
+    }
+
+    /// Conversion from values in this unit to the product of the base units of its dimensions.
+    #[must_use]
+    pub fn to_base(self) -> Conversion {
+        let factor = self.factor * self.quantity.dimensions().1;
+        Conversion {
+            factor,
+            offset: self.offset * factor,
+        }
+    }
+
+    /// Conversion from the product of the base units of its dimensions to values in this unit.
+    #[must_use]
+    pub fn from_base(self) -> Conversion {
+        Conversion {
+            factor: 1.0 / self.to_base().factor,
+            offset: -self.offset,
+        }
     }
 
     /// Unit in which the signal of this name is kept: that of the longest suffix that fits, a pure
@@ -339,10 +436,22 @@ impl Unit {
             .filter(move |u| u.quantity == self.quantity)
     }
 
-    /// Factor from values in this unit to values in `target`; `None` for another quantity.
+    /// Factor from values in this unit to values in `target`; `None` for another quantity, and for
+    /// a unit with another zero.
     #[must_use]
     pub fn factor_to(self, target: Unit) -> Option<f64> {
-        (self.quantity == target.quantity).then_some(self.factor / target.factor)
+        let conversion = self.conversion_to(target)?;
+        (conversion.offset == 0.0).then_some(conversion.factor)
+    }
+
+    /// Conversion from values in this unit to values in `target`; `None` for another quantity.
+    #[must_use]
+    pub fn conversion_to(self, target: Unit) -> Option<Conversion> {
+        let factor = self.factor / target.factor;
+        (self.quantity == target.quantity).then_some(Conversion {
+            factor,
+            offset: self.offset * factor - target.offset,
+        })
     }
 }
 
@@ -411,8 +520,46 @@ mod tests {
     fn quantities_do_not_convert_into_each_other() {
         assert_eq!(factor("deg/s", "alpha_vane_deg"), None);
         // A torque is a product of units, but of a quantity that no signal has.
-        for unknown in ["furlong", "N m", "deg//s", "", "m^9", "degC"] {
+        for unknown in ["furlong", "N m", "deg//s", "", "m^9", "J/kg/degC"] {
             assert!(Unit::parse(unknown).is_err(), "{unknown}");
         }
+    }
+
+    #[test]
+    fn thermometers_have_zeros_of_their_own() {
+        let kelvin = |unit: &str, value: f64| {
+            let unit = Unit::parse(unit).expect("a known unit");
+            let into = unit.conversion_to(Unit::of_signal("air_kelvin"));
+            into.expect("a temperature").of(value)
+        };
+        // Boiling water, 373.15 K; the scales of Celsius and Fahrenheit meet at -40.
+        assert_relative_eq!(kelvin("degC", 100.0), 373.15);
+        assert_relative_eq!(kelvin("°F", 212.0), 373.15, max_relative = 1e-12);
+        assert_relative_eq!(
+            kelvin("Celsius", -40.0),
+            kelvin("degF", -40.0),
+            max_relative = 1e-12
+        );
+        assert_eq!(factor("degC", "air_kelvin"), None);
+        let [celsius, fahrenheit] =
+            ["degC", "degF"].map(|name| Unit::parse(name).expect("a known unit"));
+        for unit in [celsius, fahrenheit] {
+            assert_eq!(unit.factor_to(unit), Some(1.0));
+            let there = unit.to_base().of(15.0);
+            assert_relative_eq!(unit.from_base().of(there), 15.0, max_relative = 1e-12);
+        }
+        let celsius = fahrenheit.conversion_to(celsius).expect("a temperature");
+        assert_relative_eq!(celsius.of(59.0), 15.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_product_of_no_quantity_has_its_dimensions() {
+        // The gas constant of air, 287.05 J/(kg K), is 1716.6 ft lbf/(slug degR).
+        let gas = Product::parse("m2/s2/K").expect("a product");
+        assert_eq!(gas.dimensions, [0, 2, 0, -2, -1, 0]);
+        assert_relative_eq!(287.05 * gas.factor / 1.8, 1716.6, max_relative = 1e-4);
+        assert_eq!(name_of(gas.dimensions), "ft2 s-2 K-1");
+        assert_eq!(name_of([0, -1, 1, -2, 0, 0]), "lbf/ft2");
+        assert!(Product::parse("m2/degC").is_none());
     }
 }

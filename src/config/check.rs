@@ -252,7 +252,7 @@ fn channels(config: &Config, source: &Source) -> Result<()> {
             Err(what) => return error(format!("channel `{column}`: {what}")),
         };
         let target = Unit::of_signal(&channel.signal);
-        if unit.factor_to(target).is_none() {
+        if unit.conversion_to(target).is_none() {
             let (unit, target, signal) = (unit.name, target.name, &channel.signal);
             return error(format!(
                 "channel `{column}`: `{unit}` cannot become {target} of `{signal}`"

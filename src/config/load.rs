@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{check, moved, places, qualities, questions, ranges};
+use super::{channel_map, check, moved, places, qualities, questions, ranges};
 use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
@@ -86,7 +86,7 @@ impl Config {
             reports: places::in_folder(reports, "reports are published in a folder")?,
             name,
             aircraft: aircraft.aircraft,
-            channels: aircraft.channels,
+            channels: channel_map::channels(&aircraft.channels, &files.aircraft)?,
             constants: aircraft.constants,
             buildup,
             classes,

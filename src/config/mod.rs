@@ -6,6 +6,7 @@
 //! `qualities.yaml`.
 
 mod absences;
+mod channel_map;
 mod check;
 mod checked;
 mod cluster;

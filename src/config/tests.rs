@@ -312,6 +312,68 @@ fn a_sign_is_one_or_minus_one() {
 }
 
 #[test]
+fn a_formula_is_checked_for_columns_and_units() {
+    let qbar = "  qbar: { signal: qbar_psf, unit: lbf/ft2 }";
+    let computed = |lines: &str| {
+        let copy = Copy::new();
+        let line = copy.spoil("aircraft.yaml", qbar, lines);
+        (line, copy)
+    };
+    let good = "  RHO: { unit: kg/m3 }\n  qbar: { signal: qbar_psf, formula: 0.5 * RHO * V^2 }";
+    let (_, copy) = computed(good);
+    let config = copy.load(Overrides::default()).unwrap();
+    let formula = config.channels["qbar"].formula.as_ref().unwrap();
+    // 1.225 kg/m3 and 100 ft/s: 568.99 Pa, 11.8837 psf.
+    assert_relative_eq!(formula.value(&[1.225, 100.0]), 11.8837, max_relative = 1e-5);
+    assert!(!config.channels.contains_key("RHO"));
+    for (lines, at, words) in [
+        (
+            "  qbar: { signal: qbar_psf, formula: 0.5 * RHO * V^2 }",
+            0,
+            "no column `RHO`",
+        ),
+        (
+            "  RHO: { unit: kg/m3 }\n  qbar: { signal: qbar_psf, formula: 0.5 * RHO * V }",
+            1,
+            "channel `qbar`: formula `0.5 * RHO * V`: it is in ft-2 slug s-1, which is no lbf/ft2",
+        ),
+        (
+            "  RHO: { unit: kg/m3 }\n  qbar: { signal: qbar_psf, unit: Pa, formula: RHO * V^2 }",
+            1,
+            "a formula has no `unit`",
+        ),
+        (
+            "  RHO: { unit: kg/m3 }\n  qbar: { signal: qbar_psf, unit: lbf/ft2 }",
+            0,
+            "channel `RHO`: it has no `signal`, and no formula uses it",
+        ),
+        (
+            "  RHO: { unit: kg/m3, sign: -2 }\n  qbar: { signal: qbar_psf, formula: RHO * V^2 }",
+            1,
+            "`RHO`: sign is 1 or -1, and scale is greater than zero",
+        ),
+        (
+            "  W: { signal: w_deg, formula: da + dr }\n  qbar: { signal: qbar_psf, formula: W }",
+            1,
+            "`W` is a formula itself",
+        ),
+        (
+            "  qbar: { signal: qbar_psf }",
+            0,
+            "channel `qbar`: it has no `unit`",
+        ),
+    ] {
+        let (line, copy) = computed(lines);
+        let error = copy.error();
+        let place = format!("aircraft.yaml:{}: ", line + at);
+        assert!(
+            error.starts_with(&place) && error.contains(words),
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn a_vane_factor_is_greater_than_zero() {
     let copy = Copy::new();
     let line = copy.spoil("aircraft.yaml", "factor: 0.98", "factor: 0");

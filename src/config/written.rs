@@ -11,7 +11,6 @@ use crate::aero::{
     Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
 };
 use crate::aircraft::Aircraft;
-use crate::flight::Channel;
 use crate::maneuver::class::Recognition;
 use crate::maneuver::{Class, Overrides, Status};
 use crate::settings::settings;
@@ -96,11 +95,24 @@ settings! {
 #[serde(deny_unknown_fields)]
 pub struct AircraftFile {
     pub aircraft: Aircraft,
-    pub channels: BTreeMap<String, Channel>,
+    pub channels: BTreeMap<String, ChannelLine>,
     #[serde(default)]
     pub constants: BTreeMap<String, f64>,
     #[serde(default)]
     pub instruments: BTreeMap<String, Instrument>,
+}
+
+/// Line of the channel map: a column with its signal; a formula with its signal; or a column that
+/// only formulas use, without one.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelLine {
+    pub signal: Option<String>,
+    pub unit: Option<String>,
+    pub sign: Option<f64>,
+    pub scale: Option<f64>,
+    pub wraps_at: Option<f64>,
+    pub formula: Option<String>,
 }
 
 /// `model.yaml`.

@@ -3,29 +3,60 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-/// One line of the channel map: conversion of a recorded column to a signal.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+use super::formula::Formula;
+
+/// One line of the channel map: conversion of a recorded column, or of several, to a signal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Channel {
     /// Signal of the column, with the signal's unit as the end of its name: `alpha_vane_deg`.
     pub signal: String,
     /// Unit of the recorded values; they are converted to the signal's unit.
     pub unit: String,
     /// −1 where the recorder's sign is the opposite of the signal's.
-    #[serde(default = "one")]
     pub sign: f64,
     /// Further factor of the recorder (a calibration).
-    #[serde(default = "one")]
     pub scale: f64,
     /// Period at which the value wraps around (a heading: 360), in the recorder's unit.
-    #[serde(default)]
     pub wraps_at: Option<f64>,
+    /// Columns from which the channel is computed, in place of the column of its own name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub formula: Option<Formula>,
 }
 
-fn one() -> f64 {
-    1.0
+impl Channel {
+    /// Channel of a column in a unit, with the signal's sign.
+    #[must_use]
+    pub fn plain(signal: &str, unit: &str) -> Channel {
+        Channel {
+            signal: signal.to_owned(),
+            unit: unit.to_owned(),
+            sign: 1.0,
+            scale: 1.0,
+            wraps_at: None,
+            formula: None,
+        }
+    }
+}
+
+/// Columns that the files must have for the channels: those of channels without a formula, and those
+/// of the formulas.
+#[must_use]
+pub fn columns(channels: &BTreeMap<String, Channel>) -> BTreeMap<String, Channel> {
+    let (computed, recorded): (Vec<_>, Vec<_>) = channels
+        .iter()
+        .partition(|(_, channel)| channel.formula.is_some());
+    let operands = computed
+        .into_iter()
+        .filter_map(|(_, channel)| channel.formula.as_ref())
+        .flat_map(Formula::operands);
+    let mut columns: BTreeMap<String, Channel> = operands
+        .map(|operand| (operand.column.clone(), Channel::plain("", &operand.unit)))
+        .collect();
+    let recorded = recorded.into_iter();
+    columns.extend(recorded.map(|(name, channel)| (name.clone(), channel.clone())));
+    columns
 }
 
 /// A column of a file: the unit that its metadata states, where it states one, and the values (a

@@ -2,6 +2,7 @@
 
 pub mod channel;
 pub mod correction;
+pub mod formula;
 pub mod interpolation_kernel;
 pub mod record;
 pub mod signal;
@@ -9,6 +10,7 @@ pub mod stand_in;
 
 pub use channel::{Channel, RawFlight};
 pub use correction::Correction;
+pub use formula::Formula;
 pub use record::{Mark, Record};
 pub use stand_in::StandIn;
 

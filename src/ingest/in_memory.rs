@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use super::assessment::{Assessment, assess};
 use super::channel::{ChannelPlan, ChannelReader, ConditionedChannel, plan_channels};
 use super::clock::{Stretch, survey};
+use super::column_source::ColumnSource;
+use super::computed_columns::ComputedColumns;
 use super::context::Context;
 use super::refusal::Refusal;
 use super::settings::Settings;
@@ -69,13 +71,14 @@ pub fn records(
     context: &Context,
     piece: usize,
 ) -> Result<Vec<Result<Ingested, Problem>>, Problem> {
-    let (plans, mut problems) = plan_channels(files, context)?;
-    let survey = survey(files, context.channels, context.settings)?;
+    let source = ComputedColumns::of(files, context.channels);
+    let (plans, mut problems) = plan_channels(&source, context)?;
+    let survey = survey(&source, context.channels, context.settings)?;
     problems.extend(survey.problems);
     let mut records: Vec<Result<Ingested, Problem>> = survey
         .stretches
         .iter()
-        .map(|stretch| ingest_stretch(files, &plans, stretch, context, piece))
+        .map(|stretch| ingest_stretch(&source, &plans, stretch, context, piece))
         .collect();
     if let Some(Ok(first)) = records.first_mut() {
         first.problems.splice(0..0, problems);
@@ -84,7 +87,7 @@ pub fn records(
 }
 
 fn ingest_stretch(
-    files: &[RawFlight],
+    source: &impl ColumnSource,
     plans: &[ChannelPlan],
     stretch: &Stretch,
     context: &Context,
@@ -94,7 +97,7 @@ fn ingest_stretch(
     let mut signals = BTreeMap::new();
     let mut conditioned = Vec::new();
     for plan in plans {
-        let (series, channel) = read_whole(files, plan, stretch, context.settings, piece)?;
+        let (series, channel) = read_whole(source, plan, stretch, context.settings, piece)?;
         signals.insert(plan.channel.signal.clone(), series);
         conditioned.push(channel);
     }
@@ -139,7 +142,7 @@ fn ingest_stretch(
 
 /// Reads one channel of a stretch from its first sample to its last.
 fn read_whole<'a>(
-    files: &[RawFlight],
+    source: &impl ColumnSource,
     plan: &ChannelPlan<'a>,
     stretch: &'a Stretch,
     settings: &Settings,
@@ -157,7 +160,7 @@ fn read_whole<'a>(
         Ok(())
     };
     reader
-        .read_until(files, samples, piece.min(samples).max(1), &mut append)
+        .read_until(source, samples, piece.min(samples).max(1), &mut append)
         .map_err(|refusal| refusal.into_problem(&stretch.flight_id))?;
     Ok((whole, reader.finish()))
 }

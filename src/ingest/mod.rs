@@ -18,6 +18,7 @@ mod refusal;
 mod sample_count;
 mod settings;
 mod column_source;
+mod computed_columns;
 
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use channel::{
 pub use checks::LiftPoint;
 pub use clock::{Clock, Stretch, Survey, survey};
 pub use column_source::ColumnSource;
+pub use computed_columns::ComputedColumns;
 pub use context::Context;
 pub use in_memory::{Ingested, record, records};
 pub use refusal::Refusal;

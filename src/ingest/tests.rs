@@ -106,16 +106,7 @@ impl Flight {
                 },
             );
             let (signal, unit) = (signal.to_owned(), unit.to_owned());
-            channels.insert(
-                name.to_owned(),
-                Channel {
-                    signal,
-                    unit,
-                    sign: 1.0,
-                    scale: 1.0,
-                    wraps_at: None,
-                },
-            );
+            channels.insert(name.to_owned(), Channel::plain(&signal, &unit));
         };
         add(
             "time",

@@ -14,11 +14,16 @@ use super::memory_shares::MemoryShares;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result};
 use crate::flight::Record;
-use crate::ingest::{self, Assessment, ChannelPlan, ChannelReader, Context, Refusal, Stretch};
+use crate::ingest::{
+    self, Assessment, ChannelPlan, ChannelReader, ComputedColumns, Context, Refusal, Stretch,
+};
 use crate::store::archive::{self, FlightFiles, Opened};
 use crate::store::atomic::Draft;
 use crate::store::record_file::{self, GROUP, RecordFile, RecordHeader, SignalChunk, SignalWriter};
 use crate::store::{ArtefactName, Kind, Store};
+
+/// Columns of a flight's files, and those that formulas add.
+type Columns<'a> = ComputedColumns<'a, Opened>;
 
 /// Reason that a record is not written.
 enum Halt {
@@ -45,10 +50,13 @@ impl RecordWriting<'_> {
     pub fn ingest(&self, files: &FlightFiles) -> Result<IngestedFlight> {
         let rejected = |problem| Ok(IngestedFlight::rejected(&files.flight_id, problem));
         let basis = self.basis();
-        let opened = match archive::open(files, basis.channels) {
+        let records = ArtefactName::new(Kind::Records, &files.flight_id, self.fingerprint);
+        let scratch = self.store.path(&records);
+        let opened = match archive::open(files, basis.channels, &scratch)? {
             Ok(opened) => opened,
             Err(problem) => return rejected(problem),
         };
+        let opened = ComputedColumns::of(&opened, basis.channels);
         let (plans, mut problems) = match ingest::plan_channels(&opened, &basis) {
             Ok(plans) => plans,
             Err(problem) => return rejected(problem),
@@ -82,7 +90,7 @@ impl RecordWriting<'_> {
     /// Writes and checks the record of a stretch. A rejected stretch leaves no file.
     fn ingest_stretch(
         &self,
-        opened: &Opened,
+        opened: &Columns,
         plans: &[ChannelPlan],
         stretch: &Stretch,
     ) -> Result<IngestedStretch> {
@@ -134,7 +142,7 @@ impl RecordWriting<'_> {
     /// Writes all channels of a stretch, row group by row group.
     fn write(
         &self,
-        opened: &Opened,
+        opened: &Columns,
         stretch: &Stretch,
         readers: &mut [ChannelReader],
         draft: &mut Draft,
@@ -187,7 +195,7 @@ impl RecordWriting<'_> {
 
 /// Encoding of one row group, batch by batch.
 struct GroupEncoding<'f, 'a> {
-    opened: &'f Opened,
+    opened: &'f Columns<'f>,
     shares: MemoryShares,
     /// End of the row group, samples.
     end: usize,
@@ -222,7 +230,7 @@ impl GroupEncoding<'_, '_> {
 fn encode(
     reader: &mut ChannelReader,
     mut signal: SignalWriter,
-    opened: &Opened,
+    opened: &Columns,
     end: usize,
     piece: usize,
 ) -> Result<SignalChunk, Refusal> {

@@ -6,14 +6,16 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array, RecordBatch};
-use arrow::datatypes::{DataType, Field, Schema};
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringDictionaryBuilder};
+use arrow::datatypes::{DataType, Field, Int32Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
-use super::archive::UNIT;
 use crate::flight::channel::RawColumn;
+
+/// Key of the field metadata that states a column's unit.
+pub(super) const UNIT: &str = "unit";
 
 /// Encodes columns of one length as the bytes of a Parquet file.
 ///
@@ -25,13 +27,49 @@ pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
         .map(|(name, c)| (name.as_str(), c.unit.as_deref()));
     let schema = schema(heads);
     let arrays = columns.values().map(|column| array(&column.values));
-    let batch = RecordBatch::try_new(schema.clone(), arrays.collect())
+    let batch = RecordBatch::try_new(schema, arrays.collect())
         .map_err(|e| format!("cannot lay out the flight: {e}"))?;
+    encode(&batch)
+}
+
+/// Encodes columns of one length, one of them the clock, as the bytes of a tall Parquet file: time,
+/// name and value, in the order of time and name. A value that is no number has no row.
+///
+/// # Errors
+/// The reason.
+pub fn tall_bytes(time: &str, columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
+    let clock = columns.get(time).ok_or("a tall file needs a clock")?;
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    let mut names = StringDictionaryBuilder::<Int32Type>::new();
+    for (row, at) in clock.values.iter().enumerate() {
+        let others = columns.iter().filter(|(name, _)| *name != time);
+        for (name, column) in others {
+            let value = column.values.get(row).copied();
+            if let Some(value) = value.filter(|value| value.is_finite()) {
+                times.push(*at);
+                names.append_value(name);
+                values.push(value);
+            }
+        }
+    }
+    let columns: [(&str, ArrayRef); 3] = [
+        (time, array(&times)),
+        ("name", Arc::new(names.finish())),
+        ("value", array(&values)),
+    ];
+    let batch = RecordBatch::try_from_iter(columns)
+        .map_err(|e| format!("cannot lay out the flight: {e}"))?;
+    encode(&batch)
+}
+
+/// Bytes of a Parquet file with one batch.
+fn encode(batch: &RecordBatch) -> Result<Vec<u8>, String> {
     let properties = properties()?;
     let refused = |e: parquet::errors::ParquetError| format!("cannot write the flight: {e}");
     let mut bytes = Vec::new();
-    let mut writer = ArrowWriter::try_new(&mut bytes, schema, Some(properties)).map_err(refused)?;
-    writer.write(&batch).map_err(refused)?;
+    let mut writer =
+        ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).map_err(refused)?;
+    writer.write(batch).map_err(refused)?;
     writer.close().map_err(refused)?;
     Ok(bytes)
 }

@@ -1,12 +1,15 @@
 //! Recordings whose channels nobody has mapped: all columns of numbers.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use arrow::datatypes::DataType;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
-use super::archive::{FlightFiles, UNIT, guarded, open};
+use super::archive::{FlightFiles, guarded, open};
+use super::atomic::Draft;
+use super::import::tall::Tall;
+use super::recorder::UNIT;
 use crate::error::{Error, Result};
 use crate::flight::{Channel, signal};
 use crate::ingest::ColumnSource;
@@ -19,37 +22,68 @@ use crate::inspection::{Column, Recording};
 pub fn first_rows(files: &FlightFiles, rows: usize) -> Result<Vec<Recording>> {
     let mut recordings = Vec::new();
     for path in &files.files {
-        let refused = |what: String| Error::Archive {
-            place: path.clone(),
-            what,
-        };
-        let channels = guarded(|| channels(path)).map_err(refused)?;
-        let one = FlightFiles {
-            flight_id: files.flight_id.clone(),
-            files: vec![path.clone()],
-            rivals: Vec::new(),
-        };
-        let opened = open(&one, &channels).map_err(|problem| refused(problem.reason))?;
-        let column = |(name, channel): (&String, &Channel)| {
-            let mut values = Vec::new();
-            let range = 0..opened.rows(0).min(rows);
-            opened
-                .read(0, name, range, &mut |v| values.extend_from_slice(v))
-                .map_err(refused)?;
-            let is_clock = channel.signal == signal::TIME;
-            let stated = opened.unit(0, name).map(str::to_owned);
-            Ok(Column {
-                name: name.clone(),
-                stated: stated.or_else(|| is_clock.then(|| channel.unit.clone())),
-                values,
-            })
-        };
-        recordings.push(Recording {
-            name: path.display().to_string(),
-            columns: channels.iter().map(column).collect::<Result<_>>()?,
-        });
+        let wide = widened(path)?;
+        let mut places: Vec<&Path> = wide.iter().map(Draft::draft).collect();
+        if places.is_empty() {
+            places.push(path);
+        }
+        for file in places {
+            recordings.push(first_rows_of(path, file, rows)?);
+        }
     }
     Ok(recordings)
+}
+
+/// Reads the first rows of a file, whose content may stand at another place.
+fn first_rows_of(path: &Path, file: &Path, rows: usize) -> Result<Recording> {
+    let refused = |what: String| Error::Archive {
+        place: path.to_owned(),
+        what,
+    };
+    let channels = guarded(|| channels(file)).map_err(refused)?;
+    let one = FlightFiles {
+        flight_id: String::new(),
+        files: vec![file.to_owned()],
+        rivals: Vec::new(),
+    };
+    let opened = open(&one, &channels, &scratch())?;
+    let opened = opened.map_err(|problem| refused(problem.reason))?;
+    let column = |(name, channel): (&String, &Channel)| {
+        let mut values = Vec::new();
+        let range = 0..opened.rows(0).min(rows);
+        opened
+            .read(0, name, range, &mut |v| values.extend_from_slice(v))
+            .map_err(refused)?;
+        let is_clock = channel.signal == signal::TIME;
+        let stated = opened.unit(0, name).map(str::to_owned);
+        Ok(Column {
+            name: name.clone(),
+            stated: stated.or_else(|| is_clock.then(|| channel.unit.clone())),
+            values,
+        })
+    };
+    Ok(Recording {
+        name: path.display().to_string(),
+        columns: channels.iter().map(column).collect::<Result<_>>()?,
+    })
+}
+
+/// Place beside which temporary files are written.
+fn scratch() -> PathBuf {
+    std::env::temp_dir().join("recording")
+}
+
+/// The parts of a tall file with one column a name; none for another file.
+fn widened(path: &Path) -> Result<Vec<Draft>> {
+    let refused = |what: String| Error::Archive {
+        place: path.to_owned(),
+        what,
+    };
+    let widen = || {
+        let tall = Tall::open(path)?.filter(|tall| tall.is_unmapped(|_| false));
+        tall.map_or(Ok(Vec::new()), |tall| tall.widened(&scratch(), |_| true))
+    };
+    guarded(|| Ok(widen())).map_err(refused)?
 }
 
 /// A channel for each column of numbers or times. Times of day count in seconds.
@@ -68,16 +102,7 @@ fn channels(path: &Path) -> Result<BTreeMap<String, Channel>, String> {
         } else {
             (field.name().clone(), unit.unwrap_or_default())
         };
-        (is_clock || is_number).then(|| {
-            let channel = Channel {
-                signal,
-                unit,
-                sign: 1.0,
-                scale: 1.0,
-                wraps_at: None,
-            };
-            (field.name().clone(), channel)
-        })
+        (is_clock || is_number).then(|| (field.name().clone(), Channel::plain(&signal, &unit)))
     };
     Ok(fields.filter_map(channel).collect())
 }

@@ -1,5 +1,5 @@
-//! The channel map compared with the files: which channels are read, with which factor into the
-//! unit of their signal.
+//! The channel map compared with the files: which channels are read, with which conversion into
+//! the unit of their signal.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
 use crate::ingest::refusal::Refusal;
-use crate::units::Unit;
+use crate::units::{Conversion, Unit};
 
 /// Relative difference below which two factors are the same unit: rounding of the factors.
 const SAME_FACTOR: f64 = 1e-12;
@@ -18,12 +18,12 @@ const SAME_FACTOR: f64 = 1e-12;
 /// Most stuck intervals of a channel that a message names by their times.
 const NAMED_INTERVALS: usize = 3;
 
-/// A channel that the files have, with the factor that converts its values into the signal's unit.
+/// A channel that the files have, with the conversion of its values into the signal's unit.
 #[derive(Clone, Copy, Debug)]
 pub struct ChannelPlan<'a> {
     pub name: &'a str,
     pub channel: &'a Channel,
-    pub factor: f64,
+    pub conversion: Conversion,
 }
 
 /// Plans the channels to be read, in the order of their signals, with a problem for each channel
@@ -55,13 +55,15 @@ fn plan<'a>(
         .channels
         .iter()
         .find(|(_, c)| c.signal == signal::TIME);
-    time.map_or(Ok(()), |(name, channel)| stated_unit(source, name, channel))?;
+    time.map_or(Ok(()), |(name, channel)| {
+        stated_units(source, name, channel)
+    })?;
     let mapped = context.channels.iter();
     for (name, channel) in mapped.filter(|(_, c)| c.signal != signal::TIME) {
-        let factor = match stated_unit(source, name, channel)
-            .and_then(|()| unit_factor(source, name, channel))
+        let conversion = match stated_units(source, name, channel)
+            .and_then(|()| unit_conversion(source, name, channel))
         {
-            Ok(factor) => factor,
+            Ok(conversion) => conversion,
             Err(refusal) if is_in_files(source, name) && !is_useless(&channel.signal) => {
                 return Err(refusal);
             }
@@ -73,7 +75,7 @@ fn plan<'a>(
         let plan = ChannelPlan {
             name,
             channel,
-            factor,
+            conversion,
         };
         if plans.insert(&channel.signal, plan).is_some() {
             return Err(duplicate_signal(name, channel));
@@ -94,21 +96,32 @@ fn plan<'a>(
     Ok((plans.into_values().collect(), problems))
 }
 
-/// Checks that every unit that a file states for a channel is the channel map's.
-fn stated_unit(
+/// Checks that every unit that a file states for the columns of a channel is the channel map's.
+fn stated_units(
     source: &(impl ColumnSource + ?Sized),
     name: &str,
     channel: &Channel,
 ) -> Result<(), Refusal> {
+    let Some(formula) = &channel.formula else {
+        return stated_unit(source, name, &channel.unit);
+    };
+    let mut operands = formula.operands().iter();
+    operands.try_for_each(|operand| stated_unit(source, &operand.column, &operand.unit))
+}
+
+fn stated_unit(
+    source: &(impl ColumnSource + ?Sized),
+    name: &str,
+    mapped: &str,
+) -> Result<(), Refusal> {
     let stated = (0..source.files()).filter_map(|file| source.unit(file, name));
-    let differs = |unit: &&str| !unit.is_empty() && !same_unit(unit, &channel.unit);
+    let differs = |unit: &&str| !unit.is_empty() && !same_unit(unit, mapped);
     match stated.map(str::trim).find(differs) {
         None => Ok(()),
         Some(stated) => {
             let reason = format!(
-                "the file states `{stated}` for channel `{name}`, the channel map `{}`: correct \
-                 the channel map, or the file",
-                channel.unit
+                "the file states `{stated}` for channel `{name}`, the channel map `{mapped}`: correct \
+                 the channel map, or the file"
             );
             Err(Refusal::of_channel(name, reason))
         }
@@ -128,22 +141,43 @@ fn is_in_files(source: &(impl ColumnSource + ?Sized), name: &str) -> bool {
     (0..source.files()).any(|file| source.has(file, name))
 }
 
-/// Factor from a channel's unit into its signal's.
-fn unit_factor(
+/// Refusal of a channel that is in no file. Of a formula it names the columns that no file has.
+fn not_in_files(source: &(impl ColumnSource + ?Sized), name: &str, channel: &Channel) -> Refusal {
+    let signal = &channel.signal;
+    let reason = match &channel.formula {
+        None => format!("channel `{name}` (signal `{signal}`) is not in the file"),
+        Some(formula) => {
+            let columns = formula.operands().iter().map(|operand| &operand.column);
+            let lacking = columns.filter(|column| !is_in_files(source, column));
+            let lacking: Vec<String> = lacking.map(|column| format!("`{column}`")).collect();
+            if lacking.is_empty() {
+                format!(
+                    "the columns of channel `{name}` (signal `{signal}`) are in different files; a \
+                     formula takes the values of one row"
+                )
+            } else {
+                format!(
+                    "channel `{name}` (signal `{signal}`) is computed from {}, not in the file",
+                    lacking.join(", ")
+                )
+            }
+        }
+    };
+    Refusal::of_channel(name, reason)
+}
+
+/// Conversion of a channel's unit into its signal's.
+fn unit_conversion(
     source: &(impl ColumnSource + ?Sized),
     name: &str,
     channel: &Channel,
-) -> Result<f64, Refusal> {
+) -> Result<Conversion, Refusal> {
     if !is_in_files(source, name) {
-        let reason = format!(
-            "channel `{name}` (signal `{}`) is not in the file",
-            channel.signal
-        );
-        return Err(Refusal::of_channel(name, reason));
+        return Err(not_in_files(source, name, channel));
     }
     let target = Unit::of_signal(&channel.signal);
     let unit = Unit::parse(&channel.unit).ok();
-    unit.and_then(|u| u.factor_to(target)).ok_or_else(|| {
+    unit.and_then(|u| u.conversion_to(target)).ok_or_else(|| {
         let reason = format!(
             "signal `{}` is in {}, which `{}` does not convert to",
             channel.signal, target.name, channel.unit

@@ -44,7 +44,7 @@ impl<'a> ChannelReader<'a> {
         let ChannelPlan {
             name,
             channel,
-            factor,
+            conversion,
         } = *plan;
         let (step_s, samples) = (stretch.clock.step_s, stretch.clock.samples);
         ChannelReader {
@@ -52,7 +52,7 @@ impl<'a> ChannelReader<'a> {
             channel,
             stretch,
             output: Output {
-                conditioner: Conditioner::new(channel, factor, step_s, samples, settings),
+                conditioner: Conditioner::new(channel, conversion, step_s, samples, settings),
                 block_means: BlockAverager::of(&channel.signal, step_s, &settings.checks),
                 signature_samples: SignatureSamples::of(&stretch.clock),
             },

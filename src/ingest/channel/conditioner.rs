@@ -19,6 +19,7 @@ use crate::flight::{Channel, Mark};
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Settings;
 use crate::numerics::order_statistics::{upper_median_in_place, upper_median_of_counts};
+use crate::units::Conversion;
 
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
 const FLAG_UNIT: &str = "0/1";
@@ -92,8 +93,8 @@ pub struct Conditioner {
     step_s: f64,
     /// Samples of the stretch.
     samples: usize,
-    /// Factor from the recorder's numbers to the signal's unit.
-    factor: f64,
+    /// Conversion of the recorder's numbers to the signal's unit.
+    conversion: Conversion,
     is_flag: bool,
     unwrapper: Option<Unwrapper>,
     /// Converted values from sample `first` on.
@@ -168,12 +169,12 @@ impl Characters {
 }
 
 impl Conditioner {
-    /// Conditioner of a channel whose values times `factor` are in the signal's unit, over
-    /// `samples` samples.
+    /// Conditioner of a channel over `samples` samples; `conversion` is that of its unit to the
+    /// signal's.
     #[must_use]
     pub fn new(
         channel: &Channel,
-        factor: f64,
+        conversion: Conversion,
         step_s: f64,
         samples: usize,
         settings: &Settings,
@@ -182,7 +183,10 @@ impl Conditioner {
             settings: settings.clone(),
             step_s,
             samples,
-            factor: factor * channel.sign * channel.scale,
+            conversion: Conversion {
+                factor: conversion.factor * channel.sign * channel.scale,
+                ..conversion
+            },
             is_flag: channel.unit == FLAG_UNIT,
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
@@ -239,8 +243,8 @@ impl Conditioner {
 
     /// Recorded values of which those beyond any measurement are NaN; `None` where none is.
     fn without_beyond(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
-        let factor = self.factor;
-        let is_beyond = |value: f64| value.is_finite() && (value * factor).abs() > LARGEST;
+        let conversion = self.conversion;
+        let is_beyond = |value: f64| value.is_finite() && conversion.of(value).abs() > LARGEST;
         let first = recorded.iter().position(|value| is_beyond(*value))?;
         let first = self.pushed() + first;
         self.statistics.first_beyond.get_or_insert(first);
@@ -257,10 +261,10 @@ impl Conditioner {
 
     /// Appends recorded values, unwrapped and in the signal's unit.
     fn convert(&mut self, recorded: &[f64]) {
-        let factor = self.factor;
+        let conversion = self.conversion;
         let converted = |value: f64| {
             if value.is_finite() {
-                value * factor
+                conversion.of(value)
             } else {
                 f64::NAN
             }
@@ -271,7 +275,7 @@ impl Conditioner {
         };
         for part in recorded.chunks(UNWRAPPED_AT_ONCE) {
             if let Some(offset) = unwrapper.common_offset(part) {
-                let moved = part.iter().map(|v| (v + offset) * factor);
+                let moved = part.iter().map(|v| conversion.of(v + offset));
                 self.values.extend(moved);
             } else {
                 let unwrapped = part.iter().map(|v| unwrapper.unwrap_value(*v));
@@ -462,17 +466,20 @@ fn cut<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
 mod tests {
     use super::*;
 
+    /// Conversion of a unit to itself.
+    const SAME: Conversion = Conversion {
+        factor: 1.0,
+        offset: 0.0,
+    };
+
     /// As they are put together from pieces of some length.
     fn unwrapped_in(piece: usize, wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
         let channel = Channel {
-            signal: "x_deg".into(),
-            unit: "deg".into(),
-            sign: 1.0,
-            scale: 1.0,
             wraps_at,
+            ..Channel::plain("x_deg", "deg")
         };
         let mut conditioner =
-            Conditioner::new(&channel, 1.0, 0.025, values.len(), &Settings::default());
+            Conditioner::new(&channel, SAME, 0.025, values.len(), &Settings::default());
         values
             .chunks(piece)
             .for_each(|piece| conditioner.push(piece));

@@ -3,8 +3,8 @@
 //!
 //! Files that hold the same channels are one stream: parts of a flight, copies, overlapping pieces.
 //! Files that hold other channels are streams of their own, with clocks and rates of their own. The
-//! stream with the most channels is the main stream and gives the record its clock. The channels of
-//! the other streams are interpolated to that clock.
+//! stream with the most values per second is the main stream and gives the record its clock. The
+//! channels of the other streams are interpolated to that clock.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,10 +94,16 @@ impl Stream {
         self.files.first().map_or(f64::INFINITY, |f| f.step_s)
     }
 
-    /// Order of streams: the most channels first, then the highest rate.
+    /// Order of streams: the most values per second first, then the most channels. Many slow engine
+    /// channels are not the clock of a few rates.
     fn by_size(a: &Stream, b: &Stream) -> Ordering {
-        let columns = b.columns.len().cmp(&a.columns.len());
-        columns.then(a.step_s().total_cmp(&b.step_s()))
+        let values_per_s = b.values_per_s().total_cmp(&a.values_per_s());
+        values_per_s.then(b.columns.len().cmp(&a.columns.len()))
+    }
+
+    fn values_per_s(&self) -> f64 {
+        let per_s = self.columns.len() as f64 / self.step_s();
+        if per_s.is_finite() { per_s } else { 0.0 }
     }
 
     fn rows(&self) -> usize {
@@ -151,8 +157,14 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
     /// Scans each file and groups the files by their channels.
     fn streams(&self) -> Result<Vec<Stream>, Refusal> {
         let mut streams: Vec<Stream> = Vec::new();
-        for file in 0..self.times.source.files() {
-            let columns = self.columns(file);
+        let files = 0..self.times.source.files();
+        let columns: Vec<BTreeSet<String>> = files.map(|file| self.columns(file)).collect();
+        let any_mapped = columns.iter().any(|columns| !columns.is_empty());
+        for (file, columns) in columns.into_iter().enumerate() {
+            // A file without a mapped column has a clock that no channel needs.
+            if any_mapped && columns.is_empty() {
+                continue;
+            }
             let scanned = self.scan(file)?;
             match streams.iter_mut().find(|s| s.shares_half(&columns)) {
                 Some(stream) => {

@@ -48,14 +48,7 @@ impl Counted {
 
     fn survey(&self) -> Result<Survey, Problem> {
         let channel = |(name, signal, unit): (&str, &str, &str)| {
-            let channel = Channel {
-                signal: signal.to_owned(),
-                unit: unit.to_owned(),
-                sign: 1.0,
-                scale: 1.0,
-                wraps_at: None,
-            };
-            (name.to_owned(), channel)
+            (name.to_owned(), Channel::plain(signal, unit))
         };
         let channels = [
             ("time", signal::TIME, "s"),

@@ -462,13 +462,7 @@ fn recorded(exact: &Record, errors: &[f64; PARAMETERS], seed: u64) -> Record {
 }
 
 fn channels() -> (BTreeMap<String, Channel>, Vec<String>) {
-    let channel = |name: &str| Channel {
-        signal: name.to_owned(),
-        unit: crate::units::Unit::of_signal(name).name.to_owned(),
-        sign: 1.0,
-        scale: 1.0,
-        wraps_at: None,
-    };
+    let channel = |name: &str| Channel::plain(name, crate::units::Unit::of_signal(name).name);
     let channels = SIGNALS
         .iter()
         .map(|name| ((*name).to_owned(), channel(name)))

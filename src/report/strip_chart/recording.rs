@@ -19,8 +19,9 @@ pub fn draw_channels(inspection: &Inspection, id: &str, channels: &[&Channel]) -
     let converted = channels.iter().filter_map(|channel| {
         let values = inspection.grid.columns.get(&channel.column)?;
         let unit = Unit::parse(&channel.unit).ok()?;
-        let factor = channel.sign * unit.factor_to(Unit::of_signal(&channel.signal))?;
-        let values = values.iter().map(|v| v * factor).collect();
+        let conversion = unit.conversion_to(Unit::of_signal(&channel.signal))?;
+        let converted = |value: &f64| conversion.of(channel.sign * value);
+        let values = values.iter().map(converted).collect();
         Some((channel.signal.clone(), values))
     });
     let record = record(inspection, converted.collect());

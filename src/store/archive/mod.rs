@@ -1,8 +1,9 @@
 //! The archive: Parquet files of flights in a folder, under a glob, or in a hive-partitioned tree;
 //! or objects of an object store under the same names.
 //!
-//! Only the columns of the channel map are read, one at a time, page by page, into numbers. A fault
-//! of a file is a problem of its flight, never a panic.
+//! Only the columns of the channel map are read, one at a time, page by page, into numbers. A tall
+//! file (time, name, value) is first written with one column a name. A fault of a file is a problem
+//! of its flight, never a panic.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -23,12 +24,15 @@ use parquet::file::metadata::PageIndexPolicy;
 use parquet::file::reader::ChunkReader;
 
 use crate::error::{Error, Problem, ProblemStage};
-use crate::flight::channel::RawColumn;
+use crate::flight::channel::{RawColumn, columns};
 use crate::flight::{Channel, RawFlight};
 use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
+use super::atomic::Draft;
+use super::import::tall::Tall;
 use super::object;
+use super::recorder::UNIT;
 use file_rules::{flight_id, is_hidden, unreadable};
 
 /// Files of one flight, in the order of their names.
@@ -46,9 +50,6 @@ const BATCH_ROWS: usize = 16_384;
 /// Most numbers of a file, rows times mapped columns: more than ten hours of sixty channels at 200
 /// Hz. A damaged file of a few kilobytes can claim any number of rows.
 const LARGEST_FILE: u64 = 500_000_000;
-
-/// Key of the field metadata that states a column's unit.
-pub(super) const UNIT: &str = "unit";
 
 /// Finds the flights of an archive, sorted by flight. An archive is a folder (searched for
 /// `*.parquet` with its sub-folders), a glob or a single file. The files of one folder `flight=007`
@@ -264,6 +265,8 @@ struct OpenFile {
     path: PathBuf,
     /// Set for an object.
     object: Option<object::Reader>,
+    /// Set for a tall file: a part of its content with one column a name.
+    wide: Option<Draft>,
     metadata: ArrowReaderMetadata,
     columns: BTreeMap<String, OpenColumn>,
     rows: usize,
@@ -277,25 +280,40 @@ struct OpenColumn {
     clock_factor: Option<f64>,
 }
 
-/// Opens the files of a flight.
+/// Opens the files of a flight. A tall file is written with one column a name beside `scratch`, into
+/// files that go with the flight.
 ///
 /// # Errors
-/// A file that is no readable Parquet, or a mapped column that is not numbers.
-pub fn open(files: &FlightFiles, channels: &BTreeMap<String, Channel>) -> Result<Opened, Problem> {
-    let refused = |path: &Path, reason: String| Problem {
-        stage: ProblemStage::Ingest,
+/// A fault of the disk. Inside, a problem of the flight: a file that is no readable Parquet, or a
+/// mapped column that is not numbers.
+pub fn open(
+    files: &FlightFiles,
+    channels: &BTreeMap<String, Channel>,
+    scratch: &Path,
+) -> Result<Result<Opened, Problem>, Error> {
+    let columns = columns(channels);
+    let mut opened = Vec::with_capacity(files.files.len());
+    for path in &files.files {
+        let file = guarded(|| match open_file(path, &columns, scratch) {
+            Err(Error::Archive { what, .. }) => Err(what),
+            opened => Ok(opened),
+        });
+        match file {
+            Ok(parts) => opened.extend(parts?),
+            Err(reason) => {
+                return Ok(Err(Problem {
+                    stage: ProblemStage::Ingest,
+                    flight_id: files.flight_id.clone(),
+                    place: path.display().to_string(),
+                    reason,
+                }));
+            }
+        }
+    }
+    Ok(Ok(Opened {
         flight_id: files.flight_id.clone(),
-        place: path.display().to_string(),
-        reason,
-    };
-    let opened = files
-        .files
-        .iter()
-        .map(|path| guarded(|| open_file(path, channels)).map_err(|e| refused(path, e)));
-    Ok(Opened {
-        flight_id: files.flight_id.clone(),
-        files: opened.collect::<Result<_, _>>()?,
-    })
+        files: opened,
+    }))
 }
 
 /// Runs the Parquet reader and treats its panic as a fault of the file. The panic is not printed:
@@ -318,21 +336,67 @@ pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> Result<T, 
     })
 }
 
-fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFile, String> {
+/// Opens one file, which is several if it is tall and its names have several clocks.
+///
+/// # Errors
+/// [`Error::Archive`] for a fault of the file, another one for a fault of the disk.
+fn open_file(
+    path: &Path,
+    channels: &BTreeMap<String, Channel>,
+    scratch: &Path,
+) -> Result<Vec<OpenFile>, Error> {
+    let refused = |what: String| Error::Archive {
+        place: path.to_owned(),
+        what,
+    };
     let object = object::is_object(path)
         .then(|| object::Reader::open(path))
         .transpose()
-        .map_err(|e| e.to_string())?;
-    let metadata = if let Some(object) = &object {
+        .map_err(|e| refused(e.to_string()))?;
+    let metadata = footer(path, object.as_ref()).map_err(refused)?;
+    let is_channel = |name: &str| channels.contains_key(name);
+    let tall = Tall::of(path, object.clone(), &metadata);
+    let Some(tall) = tall.filter(|tall| tall.is_unmapped(is_channel)) else {
+        let opened = open_columns(path, channels, metadata).map_err(refused)?;
+        return Ok(vec![OpenFile { object, ..opened }]);
+    };
+    check_size(&metadata, 1).map_err(refused)?;
+    let wide = tall.widened(scratch, is_channel).map_err(|e| {
+        // A fault of the network is the reason for what the reader says.
+        match object::failed(path) {
+            Some(failed) if matches!(e, Error::Archive { .. }) => refused(failed),
+            _ => e,
+        }
+    })?;
+    let open_part = |wide: Draft| {
+        let metadata = footer(wide.draft(), None).map_err(refused)?;
+        let opened = open_columns(path, channels, metadata).map_err(refused)?;
+        Ok(OpenFile {
+            wide: Some(wide),
+            ..opened
+        })
+    };
+    wide.into_iter().map(open_part).collect()
+}
+
+/// Footer of a file or object.
+fn footer(path: &Path, object: Option<&object::Reader>) -> Result<ArrowReaderMetadata, String> {
+    if let Some(object) = object {
         // The page index of an object avoids fetching other pages.
         let options =
             ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
-        ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e))?
-    } else {
-        let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
-        ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default())
-            .map_err(|e| unreadable(&e))?
-    };
+        return ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e));
+    }
+    let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
+    ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))
+}
+
+/// The mapped columns of a file with one column a channel.
+fn open_columns(
+    path: &Path,
+    channels: &BTreeMap<String, Channel>,
+    metadata: ArrowReaderMetadata,
+) -> Result<OpenFile, String> {
     let mut columns = BTreeMap::new();
     for (at, field) in metadata.schema().fields().iter().enumerate() {
         let Some(channel) = channels.get(field.name()) else {
@@ -349,6 +413,22 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
             return Err(format!("two columns are named `{}`", field.name()));
         }
     }
+    let rows = check_size(&metadata, columns.len())?;
+    Ok(OpenFile {
+        path: path.to_owned(),
+        object: None,
+        wide: None,
+        metadata,
+        columns,
+        rows,
+    })
+}
+
+/// Number of rows of a file.
+///
+/// # Errors
+/// In words, for a file that claims more than any recorder writes.
+fn check_size(metadata: &ArrowReaderMetadata, columns: usize) -> Result<usize, String> {
     let claimed = |rows: i64| u64::try_from(rows).unwrap_or(u64::MAX);
     let in_groups = metadata
         .metadata()
@@ -357,20 +437,12 @@ fn open_file(path: &Path, channels: &BTreeMap<String, Channel>) -> Result<OpenFi
         .map(|g| claimed(g.num_rows()));
     let all = claimed(metadata.metadata().file_metadata().num_rows());
     let most = in_groups.fold(0, u64::saturating_add).max(all);
-    if most.saturating_mul(columns.len() as u64) > LARGEST_FILE {
+    if most.saturating_mul(columns as u64) > LARGEST_FILE {
         return Err(format!(
-            "claims {most} rows of {} mapped columns, more than any recorder writes",
-            columns.len()
+            "claims {most} rows of {columns} mapped columns, more than any recorder writes"
         ));
     }
-    let rows = usize::try_from(all).unwrap_or_default();
-    Ok(OpenFile {
-        path: path.to_owned(),
-        object,
-        metadata,
-        columns,
-        rows,
-    })
+    Ok(usize::try_from(all).unwrap_or_default())
 }
 
 impl ColumnSource for Opened {
@@ -434,7 +506,8 @@ impl OpenFile {
             let read = self.read_from(object.of_stretches(stretches), column, rows, sink);
             return read.map_err(|e| object::failed(&self.path).unwrap_or(e));
         }
-        let opened = File::open(&self.path).map_err(|e| format!("cannot open the file: {e}"))?;
+        let path = self.wide.as_ref().map_or(self.path.as_path(), Draft::draft);
+        let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
         self.read_from(opened, column, rows, sink)
     }
 
@@ -517,13 +590,20 @@ pub fn read(
     files: &FlightFiles,
     channels: &BTreeMap<String, Channel>,
 ) -> Result<Vec<RawFlight>, Problem> {
-    let opened = open(files, channels)?;
+    let scratch = std::env::temp_dir().join("archive");
+    let opened = open(files, channels, &scratch).map_err(|e| Problem {
+        stage: ProblemStage::Ingest,
+        flight_id: files.flight_id.clone(),
+        place: scratch.display().to_string(),
+        reason: e.to_string(),
+    })??;
+    let columns = columns(channels);
     let one = |file: usize| {
         let mut flight = RawFlight {
             flight_id: files.flight_id.clone(),
             columns: BTreeMap::new(),
         };
-        for name in channels.keys().filter(|name| opened.has(file, name)) {
+        for name in columns.keys().filter(|name| opened.has(file, name)) {
             let unit = opened.unit(file, name).map(str::to_owned);
             let mut values = Vec::with_capacity(opened.rows(file));
             let read = opened.read(file, name, 0..opened.rows(file), &mut |v| {
@@ -557,8 +637,12 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
     } else {
         "a number (float, integer or boolean)"
     };
+    let of_signal = match signal {
+        "" => String::new(),
+        signal => format!(" (signal `{signal}`)"),
+    };
     Err(format!(
-        "column `{}` (signal `{signal}`) is of type {found}; expected {number}",
+        "column `{}`{of_signal} is of type {found}; expected {number}",
         field.name()
     ))
 }

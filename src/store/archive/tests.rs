@@ -48,19 +48,8 @@ fn simple(times: &[f64]) -> Vec<u8> {
 }
 
 fn channels() -> BTreeMap<String, Channel> {
-    let channel = |name: &str, signal: &str, unit: &str| {
-        let (signal, unit) = (signal.to_owned(), unit.to_owned());
-        (
-            name.to_owned(),
-            Channel {
-                signal,
-                unit,
-                sign: 1.0,
-                scale: 1.0,
-                wraps_at: None,
-            },
-        )
-    };
+    let channel =
+        |name: &str, signal: &str, unit: &str| (name.to_owned(), Channel::plain(signal, unit));
     [
         channel("time", "time_s", "s"),
         channel("q", "q_deg_s", "deg/s"),
@@ -298,7 +287,10 @@ fn rows_are_read_from_the_middle_of_row_groups_and_pages() {
         .unwrap();
     writer.close().unwrap();
     let (_folder, text) = archive(&[("f.parquet", &bytes)]);
-    let opened = open(&find(&text).unwrap()[0], &channels()).unwrap();
+    let scratch = std::env::temp_dir().join("archive");
+    let opened = open(&find(&text).unwrap()[0], &channels(), &scratch)
+        .unwrap()
+        .unwrap();
     assert_eq!((opened.files(), opened.rows(0)), (1, 5000));
     let mut read = Vec::new();
     opened

@@ -32,6 +32,8 @@ pub struct Contents {
     pub rows: usize,
     pub columns: Vec<ImportedColumn>,
     pub notes: Vec<String>,
+    /// Folder of the files, where the source became several.
+    pub folder: Option<PathBuf>,
 }
 
 /// Error of a file that is no recording.

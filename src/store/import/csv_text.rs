@@ -93,6 +93,7 @@ pub fn import(source: &Path, file: &Path) -> Result<Contents> {
         rows,
         columns,
         notes,
+        folder: None,
     })
 }
 

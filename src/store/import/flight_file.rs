@@ -22,6 +22,17 @@ pub fn write(
     columns: &[ImportedColumn],
     batches: impl FnOnce(&mut Sink) -> Result<()>,
 ) -> Result<usize> {
+    let (draft, rows) = write_draft(path, columns, batches)?;
+    draft.place()?;
+    Ok(rows)
+}
+
+/// Writes a draft beside a path from batches. Returns it with the number of rows.
+pub fn write_draft(
+    path: &Path,
+    columns: &[ImportedColumn],
+    batches: impl FnOnce(&mut Sink) -> Result<()>,
+) -> Result<(Draft, usize)> {
     let heads = columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref()));
     let schema = schema(heads);
     let properties = properties().map_err(|e| Error::store(path, &e))?;
@@ -39,6 +50,5 @@ pub fn write(
         })?;
         writer.close().map_err(|e| Error::store(path, &e))?;
     }
-    draft.place()?;
-    Ok(rows)
+    Ok((draft, rows))
 }

@@ -56,6 +56,7 @@ pub fn import(source: &Path, file: &Path) -> Result<Contents> {
         rows,
         columns: heads,
         notes,
+        folder: None,
     })
 }
 

@@ -8,7 +8,7 @@ mod contents;
 mod csv_text;
 mod flight_file;
 mod matlab;
-mod tall;
+pub(super) mod tall;
 
 use std::fs::File;
 use std::io::Read;
@@ -83,7 +83,7 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
     Ok(Imported {
         source: source.to_owned(),
         fingerprint: digest.blake3,
-        file,
+        file: contents.folder.unwrap_or(file),
         rows: contents.rows,
         columns: contents.columns,
         notes: contents.notes,

@@ -1,0 +1,131 @@
+//! The channel map as checked: columns and formulas as channels.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::source::Source;
+use super::written::ChannelLine;
+use crate::error::{Error, Result, did_you_mean};
+use crate::flight::formula::Operand;
+use crate::flight::{Channel, Formula, signal};
+use crate::units::Unit;
+
+/// Channels of a map: the lines that give a signal. Formulas are parsed and checked for units.
+///
+/// # Errors
+/// [`Error::Config`] with the line of the first mistake.
+pub fn channels(
+    lines: &BTreeMap<String, ChannelLine>,
+    source: &Source,
+) -> Result<BTreeMap<String, Channel>> {
+    let map = ChannelMap { lines, source };
+    let mut channels = BTreeMap::new();
+    for (name, line) in lines {
+        if let Some(channel) = map.channel(name, line)? {
+            channels.insert(name.clone(), channel);
+        }
+    }
+    map.find_unused(&channels)?;
+    Ok(channels)
+}
+
+struct ChannelMap<'a> {
+    lines: &'a BTreeMap<String, ChannelLine>,
+    source: &'a Source,
+}
+
+impl ChannelMap<'_> {
+    fn error(&self, name: &str, what: &str) -> Error {
+        let what = format!("channel `{name}`: {what}");
+        self.source.error_under("channels", name, what)
+    }
+
+    /// Channel of a line; `None` for a column that only formulas use.
+    fn channel(&self, name: &str, line: &ChannelLine) -> Result<Option<Channel>> {
+        if let Some(text) = &line.formula {
+            return self.computed(name, line, text).map(Some);
+        }
+        let Some(unit) = &line.unit else {
+            return Err(self.error(name, "it has no `unit`"));
+        };
+        Unit::parse(unit).map_err(|what| self.error(name, &what))?;
+        Ok(line.signal.as_ref().map(|signal| Channel {
+            sign: line.sign.unwrap_or(1.0),
+            scale: line.scale.unwrap_or(1.0),
+            wraps_at: line.wraps_at,
+            ..Channel::plain(signal, unit)
+        }))
+    }
+
+    /// Channel of a formula, in its signal's unit.
+    fn computed(&self, name: &str, line: &ChannelLine, text: &str) -> Result<Channel> {
+        let Some(signal) = &line.signal else {
+            return Err(self.error(name, "a formula needs a `signal`"));
+        };
+        let further = [
+            ("unit", line.unit.is_some()),
+            ("sign", line.sign.is_some()),
+            ("scale", line.scale.is_some()),
+            ("wraps_at", line.wraps_at.is_some()),
+        ];
+        if let Some((key, _)) = further.iter().find(|(_, is_given)| *is_given) {
+            let what = format!(
+                "a formula has no `{key}`: its units follow from its columns, factors stand in it"
+            );
+            return Err(self.error(name, &what));
+        }
+        if signal == signal::TIME {
+            return Err(self.error(name, "the clock is a column, not a formula"));
+        }
+        let target = Unit::of_signal(signal);
+        let formula = Formula::parse(text, target, |column| self.operand(column));
+        let formula =
+            formula.map_err(|what| self.error(name, &format!("formula `{text}`: {what}")))?;
+        Ok(Channel {
+            formula: Some(formula),
+            ..Channel::plain(signal, target.name)
+        })
+    }
+
+    /// Column of a formula with its unit.
+    fn operand(&self, column: &str) -> std::result::Result<Operand, String> {
+        let Some(line) = self.lines.get(column) else {
+            let names = self.lines.keys().map(String::as_str);
+            let near = did_you_mean(column, names);
+            return Err(format!(
+                "no column `{column}`{near}; each column of a formula has a line with its unit under \
+                 `channels`"
+            ));
+        };
+        if line.formula.is_some() {
+            return Err(format!("`{column}` is a formula itself: write it out"));
+        }
+        if line.wraps_at.is_some() {
+            return Err(format!("`{column}` wraps around: a formula cannot have it"));
+        }
+        let (sign, scale) = (line.sign.unwrap_or(1.0), line.scale.unwrap_or(1.0));
+        if ![1.0, -1.0].contains(&sign) || !(scale.is_finite() && scale > 0.0) {
+            return Err(format!(
+                "`{column}`: sign is 1 or -1, and scale is greater than zero"
+            ));
+        }
+        let unit = line.unit.clone();
+        Ok(Operand {
+            column: column.to_owned(),
+            unit: unit.ok_or_else(|| format!("`{column}` has no unit"))?,
+            factor: sign * scale,
+        })
+    }
+
+    /// Refuses a column without a signal that no formula uses.
+    fn find_unused(&self, channels: &BTreeMap<String, Channel>) -> Result<()> {
+        let formulas = channels.values().filter_map(|c| c.formula.as_ref());
+        let operands = formulas.flat_map(Formula::operands);
+        let used: BTreeSet<&str> = operands.map(|operand| operand.column.as_str()).collect();
+        let mut lines = self.lines.iter();
+        let unused =
+            lines.find(|(name, line)| line.signal.is_none() && !used.contains(name.as_str()));
+        unused.map_or(Ok(()), |(name, _)| {
+            Err(self.error(name, "it has no `signal`, and no formula uses it"))
+        })
+    }
+}
