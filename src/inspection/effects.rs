@@ -19,7 +19,30 @@ pub struct Effect {
     pub significance: f64,
 }
 
-/// Effects of all regressors; `None` where they are not told apart.
+/// Least share of a regressor that the ones before it leave unexplained. Below it the regressor is
+/// another one's copy or mirror image, such as the second of two ailerons.
+const OWN_SHARE: f64 = 1e-4;
+
+/// Columns of a matrix that are no linear combination of those before them.
+fn independent(x: &DMatrix<f64>) -> Vec<usize> {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    let mut kept = Vec::new();
+    for (j, column) in x.column_iter().enumerate() {
+        let mut rest = column.clone_owned();
+        for direction in &basis {
+            rest -= direction * direction.dot(&rest);
+        }
+        let share = rest.norm();
+        if share > OWN_SHARE * column.norm() {
+            basis.push(rest / share);
+            kept.push(j);
+        }
+    }
+    kept
+}
+
+/// Effects of all regressors; `None` where there are too few samples. A regressor that others explain
+/// has none.
 #[must_use]
 pub fn effects(regression: &Regression) -> Option<Vec<Effect>> {
     let columns = regression.regressors.len() + 1;
@@ -40,12 +63,17 @@ pub fn effects(regression: &Regression) -> Option<Vec<Effect>> {
         .map(|c| c.norm().max(f64::MIN_POSITIVE))
         .collect();
     let x = DMatrix::from_fn(rows.len(), columns, |i, j| x[(i, j)] / scale[j]);
+    let kept = independent(&x);
+    let x = x.select_columns(&kept);
     let inverse = (x.transpose() * &x).cholesky()?.inverse();
     let slopes = &inverse * (x.transpose() * &y);
     let variance = (&y - &x * &slopes).norm_squared() / degrees as f64;
-    let effect = |j: usize| Effect {
-        slope: slopes[j] / scale[j],
-        significance: slopes[j] / (variance * inverse[(j, j)]).sqrt(),
+    let effect = |j: usize| {
+        let place = kept.iter().position(|own| *own == j);
+        place.map_or_else(Effect::default, |k| Effect {
+            slope: slopes[k] / scale[j],
+            significance: slopes[k] / (variance * inverse[(k, k)]).sqrt(),
+        })
     };
     Some((1..columns).map(effect).collect())
 }
@@ -72,5 +100,15 @@ mod tests {
         .unwrap();
         assert!((found[0].slope + 3.0).abs() < 0.02 && found[0].significance < -100.0);
         assert!((found[1].slope - 0.5).abs() < 0.02 && found[1].significance > 50.0);
+        // The mirror image of an input takes nothing from the others.
+        let mirror: Vec<f64> = a.iter().map(|v| -v).collect();
+        let with_mirror = effects(&Regression {
+            response: &response,
+            regressors: vec![&a, &mirror, &b],
+        })
+        .unwrap();
+        assert_eq!(with_mirror[1], Effect::default());
+        assert!((with_mirror[0].slope - found[0].slope).abs() < 1e-9);
+        assert!((with_mirror[2].slope - found[1].slope).abs() < 1e-9);
     }
 }
