@@ -7,6 +7,9 @@ use crate::config::doubts;
 use crate::maneuver::Status;
 use crate::store::archive;
 
+/// Least width of the names of classes.
+const SHORT_NAME: usize = 10;
+
 /// Validates the configuration and prints what a run would use.
 pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     let config = options.load()?;
@@ -32,12 +35,14 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
             format!("{} given", config.events.len())
         }
     );
-    out!("classes    estimated  held  inactive");
+    let longest = config.classes.iter().map(|c| c.name.chars().count()).max();
+    let width = longest.unwrap_or_default().max(SHORT_NAME);
+    out!("{:<width$} estimated  held  inactive", "classes");
     for class in &config.classes {
         let count = |status| class.statuses.values().filter(|s| **s == status).count();
         let [free, held, inactive] = [Status::Estimated, Status::Held, Status::Inactive].map(count);
         out!(
-            "  {:<10} {free:>7} {held:>5} {inactive:>9}  {}",
+            "  {:<width$} {free:>7} {held:>5} {inactive:>9}  {}",
             class.name,
             class.title
         );

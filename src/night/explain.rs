@@ -211,18 +211,24 @@ fn write_fit(text: &mut String, estimated: &Estimated) {
     );
 }
 
+/// Least width of the names of derivatives.
+const SHORT_NAME: usize = 10;
+
 fn write_derivatives(text: &mut String, estimated: &Estimated) {
     write_heading(text, "Derivatives");
+    let named = estimated.estimates.iter().chain(&estimated.combined);
+    let longest = named.map(|e| e.derivative.chars().count()).max();
+    let width = longest.unwrap_or_default().max(SHORT_NAME);
     let _ = writeln!(
         text,
-        "  {:<10} {:<9} {:>12} {:>12} {:>12} {:>12} {:>9}  unit",
+        "  {:<width$} {:<9} {:>12} {:>12} {:>12} {:>12} {:>9}  unit",
         "", "", "value", "bound", "corrected", "tunnel", "inflation"
     );
     let is_inactive = |e: &&EstimateRow| e.status == Status::Inactive;
     let estimates = estimated.estimates.iter();
     let active = estimates.clone().filter(|e| !is_inactive(e));
     for row in active.chain(&estimated.combined) {
-        write_derivative(text, row);
+        write_derivative(text, row, width);
     }
     let inactive: Vec<String> = estimates
         .filter(is_inactive)
@@ -231,7 +237,7 @@ fn write_derivatives(text: &mut String, estimated: &Estimated) {
     write_line(text, "inactive", &joined_or(&inactive, " ", "none"));
 }
 
-fn write_derivative(text: &mut String, e: &EstimateRow) {
+fn write_derivative(text: &mut String, e: &EstimateRow, width: usize) {
     let because = e
         .held_because
         .as_deref()
@@ -241,7 +247,7 @@ fn write_derivative(text: &mut String, e: &EstimateRow) {
     let inflation = format_number(e.variance_inflation);
     let _ = writeln!(
         text,
-        "  {:<10} {:<9} {value:>12} {bound:>12} {corrected:>12} {tunnel:>12} {inflation:>9}  {}{because}",
+        "  {:<width$} {:<9} {value:>12} {bound:>12} {corrected:>12} {tunnel:>12} {inflation:>9}  {}{because}",
         e.derivative,
         e.status.name(),
         e.unit
