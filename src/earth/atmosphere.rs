@@ -3,15 +3,19 @@
 
 use crate::units::M_PER_FT;
 
-/// Density and speed of sound.
+/// Density, speed of sound, pressure and temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
     pub density_slug_ft3: f64,
     pub sound_ft_s: f64,
+    pub pressure_psf: f64,
+    pub kelvin: f64,
 }
 
 /// kg/m³ in a slug/ft³.
 const KG_M3_PER_SLUG_FT3: f64 = 515.378_818_393_2;
+/// Pascals in a pound-force per square foot.
+const PA_PER_PSF: f64 = 47.880_258_980_336;
 /// Gas constant of air, J/(kg K).
 const GAS: f64 = 287.052_87;
 /// Standard gravity, m/s².
@@ -57,6 +61,8 @@ pub fn air(altitude_ft: f64) -> Air {
     Air {
         density_slug_ft3: pressure / (GAS * temperature) / KG_M3_PER_SLUG_FT3,
         sound_ft_s: (HEAT_RATIO * GAS * temperature).sqrt() / M_PER_FT,
+        pressure_psf: pressure / PA_PER_PSF,
+        kelvin: temperature,
     }
 }
 
@@ -113,6 +119,14 @@ mod tests {
             );
             assert_relative_eq!(air.sound_ft_s * M_PER_FT, sound, max_relative = 3e-5);
         }
+    }
+
+    #[test]
+    fn pressure_and_temperature_at_sea_level_are_the_defined_ones() {
+        let air = air(0.0);
+        // 101,325 Pa are 2116.22 lbf/ft2.
+        assert_relative_eq!(air.pressure_psf, 2116.22, max_relative = 3e-6);
+        assert_relative_eq!(air.kelvin, 288.15);
     }
 
     #[test]

@@ -28,6 +28,8 @@ pub struct Cards {
     #[serde(default)]
     pub instruments: Instruments,
     #[serde(default)]
+    pub recorder: RecorderCard,
+    #[serde(default)]
     pub wind_tunnel: TunnelErrors,
     /// Programs by maneuver class.
     pub programs: BTreeMap<String, Program>,
@@ -36,6 +38,36 @@ pub struct Cards {
     /// Settings of `harvest lab validate`.
     #[serde(default)]
     pub study: StudySettings,
+}
+
+/// Recorder of the flights. Default: every channel of the channel map at the rate of the recorder, one
+/// column a channel.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecorderCard {
+    pub form: Form,
+    /// Formula, of the simulator's signals, of each column that only formulas of the channel map use.
+    pub columns: BTreeMap<String, String>,
+    pub slow: SlowColumns,
+}
+
+/// Form of the files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Form {
+    /// One column a channel.
+    #[default]
+    Wide,
+    /// One row a value: time, name, value.
+    Tall,
+}
+
+/// Columns that are recorded at a lower rate.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SlowColumns {
+    pub rate_hz: f64,
+    pub columns: Vec<String>,
 }
 
 /// Settings of the study of the bounds.

@@ -6,9 +6,9 @@
 
 mod study_condition;
 mod cards;
+mod recording;
 mod simulated_campaign;
 mod flights;
-mod recording;
 mod tunnel;
 mod truth;
 
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::pipeline::Progress;
-use crate::store::{atomic, files, recorder};
+use crate::store::{atomic, files};
 
 pub use flights::FlownFlight;
 pub use simulated_campaign::SimulatedCampaign;
@@ -59,8 +59,8 @@ fn write_flight(campaign: &SimulatedCampaign, out: &Path, flight: &FlownFlight) 
     let path = out
         .join("flights")
         .join(format!("{}.parquet", flight.flight_id));
-    let columns = recording::columns(&campaign.config.channels, &flight.records);
-    let bytes = recorder::bytes(&columns).map_err(|what| Error::store(&path, &what))?;
+    let recorded = campaign.recorder.bytes(&flight.records);
+    let bytes = recorded.map_err(|what| Error::store(&path, &what))?;
     atomic::place(&path, &bytes)?;
     Ok(())
 }

@@ -4,10 +4,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::cards::Cards;
+use super::recording::Recorder;
 use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
-use crate::lab::simulator::{Card, FlightCondition, Program, Simulator};
+use crate::lab::simulator::{
+    AIR_TEMPERATURE, Card, FlightCondition, Program, STATIC_PRESSURE, Simulator,
+};
 use crate::store::files::{self, TunnelRow};
 
 /// Test cards with their pipeline and simulator, checked.
@@ -19,6 +22,7 @@ pub struct SimulatedCampaign {
     /// True derivatives as written.
     pub truth: Vec<TunnelRow>,
     pub simulator: Simulator,
+    pub recorder: Recorder,
 }
 
 impl SimulatedCampaign {
@@ -48,17 +52,23 @@ impl SimulatedCampaign {
             cards.aircraft.clone(),
         )
         .map_err(|message| source.error("aircraft", message))?;
+        let names = signals(&cards, &simulator);
+        check_channels(&config, &names, &source)?;
+        check_instruments(&cards, &names, &source)?;
+        let rate_hz = simulator.settings().rate_hz;
+        let names: Vec<&str> = names.into_iter().collect();
+        let recorder = Recorder::new(&cards.recorder, &config.channels, (&names, rate_hz))
+            .map_err(|(name, what)| source.error_under("recorder", &name, what))?;
         let campaign = SimulatedCampaign {
             cards,
             config,
             truth,
             simulator,
+            recorder,
         };
         campaign.check_programs(&source)?;
         campaign.check_flights(&source)?;
         campaign.check_conditions(&source)?;
-        campaign.check_channels(&source)?;
-        campaign.check_instruments(&source)?;
         Ok(campaign)
     }
 
@@ -81,21 +91,6 @@ impl SimulatedCampaign {
             seed: self.cards.seed,
             program: self.cards.programs.get(class)?.clone(),
         })
-    }
-
-    /// Signals of the simulator.
-    fn signals(&self) -> BTreeSet<&str> {
-        let settings = self.simulator.settings();
-        let flags = self.cards.programs.values().flat_map(|p| p.flags.keys());
-        let sticks = settings.laws.values().flat_map(|law| law.gearing.keys());
-        let names = flags
-            .chain(sticks)
-            .chain(settings.surfaces.keys())
-            .map(String::as_str);
-        names
-            .chain(signal::REQUIRED.iter().copied())
-            .chain([signal::PSI, "time_s"])
-            .collect()
     }
 
     fn check_programs(&self, source: &Source) -> Result<()> {
@@ -177,30 +172,44 @@ impl SimulatedCampaign {
         }
         Ok(())
     }
+}
 
-    fn check_channels(&self, source: &Source) -> Result<()> {
-        let signals = self.signals();
-        for (column, channel) in &self.config.channels {
-            if !signals.contains(channel.signal.as_str()) {
-                let message = format!(
-                    "channel `{column}`: the simulator has no signal `{}`",
-                    channel.signal
-                );
-                return Err(source.error("pipeline", message));
-            }
-        }
-        Ok(())
-    }
+/// Signals of the simulator.
+fn signals<'a>(cards: &'a Cards, simulator: &'a Simulator) -> BTreeSet<&'a str> {
+    let settings = simulator.settings();
+    let flags = cards.programs.values().flat_map(|p| p.flags.keys());
+    let sticks = settings.laws.values().flat_map(|law| law.gearing.keys());
+    let names = flags
+        .chain(sticks)
+        .chain(settings.surfaces.keys())
+        .map(String::as_str);
+    names
+        .chain(signal::REQUIRED.iter().copied())
+        .chain([signal::PSI, signal::TIME, STATIC_PRESSURE, AIR_TEMPERATURE])
+        .collect()
+}
 
-    fn check_instruments(&self, source: &Source) -> Result<()> {
-        let signals = self.signals();
-        for name in self.cards.instruments.0.keys() {
-            if !signals.contains(name.as_str()) {
-                let near = did_you_mean(name, signals.iter().copied());
-                let message = format!("instruments: there is no signal `{name}`{near}");
-                return Err(source.error_under("instruments", name, message));
-            }
+fn check_channels(config: &Config, signals: &BTreeSet<&str>, source: &Source) -> Result<()> {
+    let recorded = config.channels.iter();
+    for (column, channel) in recorded.filter(|(_, channel)| channel.formula.is_none()) {
+        if !signals.contains(channel.signal.as_str()) {
+            let message = format!(
+                "channel `{column}`: the simulator has no signal `{}`",
+                channel.signal
+            );
+            return Err(source.error("pipeline", message));
         }
-        Ok(())
     }
+    Ok(())
+}
+
+fn check_instruments(cards: &Cards, signals: &BTreeSet<&str>, source: &Source) -> Result<()> {
+    for name in cards.instruments.0.keys() {
+        if !signals.contains(name.as_str()) {
+            let near = did_you_mean(name, signals.iter().copied());
+            let message = format!("instruments: there is no signal `{name}`{near}");
+            return Err(source.error_under("instruments", name, message));
+        }
+    }
+    Ok(())
 }

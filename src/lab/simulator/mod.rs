@@ -35,6 +35,7 @@ pub use card::{Card, DerivativeLookup, FlightCondition, Program};
 pub use discrete_gusts::DiscreteGusts;
 pub use flown::{FlownManeuver, TrueDerivative};
 pub use instruments::{Instrument, Instruments};
+pub use sensors::{AIR_TEMPERATURE, STATIC_PRESSURE};
 pub use settings::Settings;
 pub use turbulence::{Turbulence, TurbulenceModel};
 

@@ -8,8 +8,13 @@ use nalgebra::Vector3;
 use super::body::BodyState;
 use super::plant::{PlantInputs, PlantOutputs};
 use crate::aircraft::{Aircraft, Flow, Position};
+use crate::earth;
 use crate::flight::signal;
 use crate::units::{DEG, G0_FT_S2};
+
+/// Static pressure and temperature of the air: signals that air-data computers record.
+pub const STATIC_PRESSURE: &str = "static_psf";
+pub const AIR_TEMPERATURE: &str = "air_kelvin";
 
 /// Signals of the motion, air data, engines and mass properties; surfaces and pilot controls are not
 /// among them.
@@ -41,6 +46,7 @@ pub fn readings(
         inputs.thrust_lbf / loading.mass_slug / G0_FT_S2
     };
     let angles = state.euler();
+    let outside = earth::air(state.position.z);
     vec![
         (
             signal::ALPHA_VANE,
@@ -74,5 +80,7 @@ pub fn readings(
         (signal::IY, loading.iy_slug_ft2),
         (signal::IZ, loading.iz_slug_ft2),
         (signal::IXZ, loading.ixz_slug_ft2),
+        (STATIC_PRESSURE, outside.pressure_psf),
+        (AIR_TEMPERATURE, outside.kelvin),
     ]
 }
