@@ -17,6 +17,7 @@ mod init;
 mod joint_estimation;
 mod lab;
 mod memory;
+mod navion;
 mod nights;
 #[cfg(feature = "s3")]
 mod object_store;

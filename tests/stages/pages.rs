@@ -11,7 +11,14 @@ fn root() -> &'static Path {
 
 /// Markdown files of the repository; generated folders are left out.
 fn pages() -> Vec<PathBuf> {
-    let folders = ["docs", "data/demo", "data/simulation", "pipelines"].map(|f| root().join(f));
+    let folders = [
+        "docs",
+        "data/demo",
+        "data/navion",
+        "data/simulation",
+        "pipelines",
+    ]
+    .map(|f| root().join(f));
     let is_page = |path: &PathBuf| path.extension().is_some_and(|e| e == "md");
     let mut pages: Vec<PathBuf> = folders
         .iter()
