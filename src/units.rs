@@ -407,7 +407,7 @@ impl Unit {
 
     /// Conversion from the product of the base units of its dimensions to values in this unit.
     #[must_use]
-    pub fn from_base(self) -> Conversion {
+    pub fn of_base(self) -> Conversion {
         Conversion {
             factor: 1.0 / self.to_base().factor,
             offset: -self.offset,
@@ -546,7 +546,7 @@ mod tests {
         for unit in [celsius, fahrenheit] {
             assert_eq!(unit.factor_to(unit), Some(1.0));
             let there = unit.to_base().of(15.0);
-            assert_relative_eq!(unit.from_base().of(there), 15.0, max_relative = 1e-12);
+            assert_relative_eq!(unit.of_base().of(there), 15.0, max_relative = 1e-12);
         }
         let celsius = fahrenheit.conversion_to(celsius).expect("a temperature");
         assert_relative_eq!(celsius.of(59.0), 15.0, max_relative = 1e-12);

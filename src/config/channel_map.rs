@@ -103,7 +103,7 @@ impl ChannelMap<'_> {
             return Err(format!("`{column}` wraps around: a formula cannot have it"));
         }
         let (sign, scale) = (line.sign.unwrap_or(1.0), line.scale.unwrap_or(1.0));
-        if ![1.0, -1.0].contains(&sign) || !(scale.is_finite() && scale > 0.0) {
+        if !([1.0, -1.0].contains(&sign) && scale.is_finite() && scale > 0.0) {
             return Err(format!(
                 "`{column}`: sign is 1 or -1, and scale is greater than zero"
             ));

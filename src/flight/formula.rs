@@ -40,7 +40,7 @@ pub struct Formula {
     root: Node,
     /// Conversion of the result to the target's unit.
     #[serde(skip)]
-    from_base: Conversion,
+    of_base: Conversion,
 }
 
 /// Part of a formula.
@@ -95,7 +95,7 @@ impl Formula {
             operands: parser.operands,
             to_base: parser.to_base,
             root,
-            from_base: target.from_base(),
+            of_base: target.of_base(),
         })
     }
 
@@ -116,7 +116,7 @@ impl Formula {
         {
             *own = to_base.of(value * operand.factor);
         }
-        self.from_base.of(self.root.value(&base))
+        self.of_base.of(self.root.value(&base))
     }
 }
 

@@ -155,7 +155,7 @@ mod tests {
         let rows = 1..ROWS + 3;
         source
             .read(0, "thrust", rows.clone(), &mut |part| {
-                values.extend_from_slice(part)
+                values.extend_from_slice(part);
             })
             .unwrap();
         assert_eq!(values.len(), rows.len());

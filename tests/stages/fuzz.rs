@@ -4,14 +4,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use harvest::config::{Config, Overrides};
 use harvest::error::Error;
 use serde_yaml::Value;
 
 use crate::support::{
-    Campaign, Outcome, Random, copy_tree, files, flight, from_environment, pitch_steps,
+    Campaign, Outcome, Random, copy_tree, files, flight, from_environment, pitch_steps, values,
 };
 
 /// Memory that a run on small flights gets, kB of address space; what it takes is far less.
@@ -112,12 +114,42 @@ fn spoiled(whole: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
+/// The record with one row a value.
+fn tall(record: &RecordBatch) -> RecordBatch {
+    let schema = record.schema();
+    let names = schema.fields().iter().map(|field| field.name().as_str());
+    let columns: Vec<(&str, Vec<f64>)> = names
+        .filter(|name| *name != "time")
+        .map(|name| (name, values(record, name)))
+        .collect();
+    let rows = |k: usize| columns.iter().map(move |(name, v)| (k, *name, v[k]));
+    let rows: Vec<(usize, &str, f64)> = (0..record.num_rows()).flat_map(rows).collect();
+    let time = values(record, "time");
+    let times = rows.iter().map(|r| Some(time[r.0]));
+    let times: ArrayRef = Arc::new(times.collect::<Float64Array>());
+    let names: ArrayRef = Arc::new(rows.iter().map(|r| Some(r.1)).collect::<StringArray>());
+    let numbers = rows.iter().map(|r| Some(r.2));
+    let numbers: ArrayRef = Arc::new(numbers.collect::<Float64Array>());
+    RecordBatch::try_from_iter([("time", times), ("name", names), ("value", numbers)]).unwrap()
+}
+
 #[cfg(unix)]
 #[test]
 fn whatever_bytes_a_flight_has_the_others_are_read() {
+    others_are_read_beside_spoiled(&flight(1, 12));
+}
+
+#[cfg(unix)]
+#[test]
+fn whatever_bytes_a_tall_flight_has_the_others_are_read() {
+    others_are_read_beside_spoiled(&tall(&flight(1, 12)));
+}
+
+#[cfg(unix)]
+fn others_are_read_beside_spoiled(record: &RecordBatch) {
     let (wanted, per_run) = (from_environment("HARVEST_FUZZ", 60), 60);
     let small = Campaign::new();
-    small.add("small", &flight(1, 12));
+    small.add("small", record);
     let whole = fs::read(small.flight("small")).unwrap();
     let mut random = Random::new(u64::try_from(from_environment("HARVEST_FUZZ_SEED", 1)).unwrap());
     for _ in 0..wanted.div_ceil(per_run) {
@@ -130,11 +162,16 @@ fn whatever_bytes_a_flight_has_the_others_are_read() {
             .unwrap();
         }
         let outcome = bounded(&campaign);
+        let kept = std::env::temp_dir().join("harvest-fuzz");
         if outcome.code != Some(2) {
-            let kept = std::env::temp_dir().join("harvest-fuzz");
             copy_tree(&campaign.path("flights"), &kept);
-            panic!("{outcome:?}; the files are in {}", kept.display());
         }
+        let place = kept.display();
+        assert_eq!(
+            outcome.code,
+            Some(2),
+            "{outcome:?}; the files are in {place}"
+        );
         assert_eq!(outcome.stderr, "");
         let told = |table: &str, id: &str| {
             campaign

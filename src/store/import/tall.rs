@@ -308,7 +308,9 @@ impl Tall {
         let mut now = f64::NAN;
         let mut count = |at_once: &mut Vec<usize>| {
             if at_once.iter().any(|place| Some(*place) == main) {
-                at_once.iter().for_each(|place| shared[*place] += 1);
+                for place in at_once.iter() {
+                    shared[*place] += 1;
+                }
             }
             at_once.clear();
         };
