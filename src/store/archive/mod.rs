@@ -6,8 +6,8 @@
 //! of its flight, never a panic.
 
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::fs::{self, File};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::ops::Range;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
@@ -33,7 +33,8 @@ use super::atomic::Draft;
 use super::import::tall::Tall;
 use super::object;
 use super::recorder::UNIT;
-use file_rules::{flight_id, is_hidden, unreadable};
+use file_rules::{flight_id, unreadable};
+use walk::Walk;
 
 /// Files of one flight, in the order of their names.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -123,85 +124,6 @@ fn add_below(archive: &str, at: usize, files: &mut BTreeSet<PathBuf>) -> Result<
     let is_wanted = |path: &PathBuf| path.is_dir() || pattern.matches_path_with(path, options);
     files.extend(found.into_iter().map(plain).filter(is_wanted));
     Ok(())
-}
-
-/// Search of folders, each entered once whatever links lead to it: folders themselves first, then
-/// links in the order in which they are found.
-#[derive(Debug, Default)]
-struct Walk {
-    /// Folders entered, without links.
-    entered: BTreeSet<PathBuf>,
-    /// Links to folders, not followed yet.
-    links: VecDeque<PathBuf>,
-    /// Files of every name are added, not only flights.
-    takes_all: bool,
-}
-
-impl Walk {
-    /// Search for Parquet files.
-    fn of_flights() -> Walk {
-        Walk::default()
-    }
-
-    /// Search for files of every extension.
-    fn of_files() -> Walk {
-        Walk {
-            takes_all: true,
-            ..Walk::default()
-        }
-    }
-
-    /// Adds the files below a folder, except names with a leading dot or underscore. A folder
-    /// below it that cannot be read, or that a link leads to again, is added itself.
-    fn add(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-        if self.has_entered(folder) {
-            files.insert(folder.to_owned());
-            return Ok(());
-        }
-        self.enter(folder, files)?;
-        while let Some(link) = self.links.pop_front() {
-            if self.has_entered(&link) || self.enter(&link, files).is_err() {
-                files.insert(link);
-            }
-        }
-        Ok(())
-    }
-
-    fn has_entered(&self, folder: &Path) -> bool {
-        fs::canonicalize(folder).is_ok_and(|folder| self.entered.contains(&folder))
-    }
-
-    fn enter(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-        let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
-        self.entered
-            .insert(fs::canonicalize(folder).map_err(unreadable)?);
-        let entries = fs::read_dir(folder).map_err(unreadable)?;
-        let paths = entries.map(|entry| entry.map(|entry| entry.path()));
-        let mut paths: Vec<PathBuf> = paths.collect::<Result<_, _>>().map_err(unreadable)?;
-        paths.sort();
-        for path in paths.into_iter().filter(|path| !has_hidden_name(path)) {
-            if !path.is_dir() {
-                if self.takes_all || has_extension_of_flights(&path) {
-                    files.insert(path);
-                }
-            } else if path.is_symlink() {
-                self.links.push_back(path);
-            } else if self.has_entered(&path) || self.enter(&path, files).is_err() {
-                files.insert(path);
-            }
-        }
-        Ok(())
-    }
-}
-
-fn has_hidden_name(path: &Path) -> bool {
-    let name = path.file_name();
-    name.is_some_and(|name| is_hidden(&name.to_string_lossy()))
-}
-
-fn has_extension_of_flights(path: &Path) -> bool {
-    let extension = path.extension();
-    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
 }
 
 fn flights(files: BTreeSet<PathBuf>) -> Vec<FlightFiles> {
@@ -664,5 +586,6 @@ fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
 
 mod file_rules;
 mod remote;
+mod walk;
 #[cfg(test)]
 mod tests;

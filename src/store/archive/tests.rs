@@ -1,5 +1,6 @@
 //! Archives good and bad: what is found, what is read, and what is said about files that cannot be.
 
+use std::fs;
 use std::sync::Arc;
 
 use arrow::array::{
