@@ -4,7 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::CoefficientPosterior;
+use super::posterior::Gaussian;
 use super::term::Term;
+use super::unknowns::{SparseRow, between, sum};
 use crate::aero::{Axis, Coefficient, Condition};
 
 /// Half of the step in Mach number over which slopes are taken. Tables are linear between their points.
@@ -71,14 +73,11 @@ impl Model {
 impl CoefficientPosterior {
     fn at(&self, coefficient: Coefficient, condition: &Condition) -> LocalPosterior {
         let mut values = Vec::new();
-        let mut rows = Vec::new();
         let mut tunnel = Vec::new();
+        let mut rows: Vec<SparseRow> = Vec::new();
         for (term, start) in self.terms.iter().zip(&self.unknowns.starts) {
-            let weights = [
-                Some(value_shares(term, condition)),
-                mach_shares(term, condition),
-            ];
-            for (shares, is_mach_slope) in weights.into_iter().zip([false, true]) {
+            let value = Some(term.prior.grid.shares(condition));
+            for (shares, is_mach_slope) in [(value, false), (mach_shares(term, condition), true)] {
                 let Some(shares) = shares else { continue };
                 values.push(LocalValue {
                     coefficient,
@@ -92,31 +91,24 @@ impl CoefficientPosterior {
                 });
                 let known = shares.iter().map(|(node, w)| w * term.prior.mean[*node]);
                 tunnel.push(known.sum::<f64>());
-                rows.push((*start, shares));
+                let of_unknowns = shares.iter().map(|(node, w)| (start + node, *w));
+                rows.push(of_unknowns.collect());
             }
         }
-        let n = self.unknowns.differences;
-        let mut weights = DMatrix::zeros(rows.len(), n);
-        for (i, (start, shares)) in rows.iter().enumerate() {
-            for (node, weight) in shares {
-                weights[(i, start + node)] += weight;
-            }
-        }
-        let covariance = self.gaussian.covariance.view((0, 0), (n, n));
+        let Gaussian { mean, covariance } = &self.gaussian;
+        let both = tunnel.iter().zip(&rows);
         LocalPosterior {
+            mean: DVector::from_iterator(rows.len(), both.map(|(t, row)| t + sum(row, mean))),
+            covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+                between(&rows[i], &rows[j], covariance)
+            }),
             values,
-            mean: DVector::from_vec(tunnel) + &weights * self.gaussian.mean.rows(0, n),
-            covariance: &weights * covariance * weights.transpose(),
         }
     }
 }
 
-fn value_shares(term: &Term, condition: &Condition) -> Vec<(usize, f64)> {
-    term.prior.grid.shares(condition)
-}
-
 /// Weights of the grid's points in the slope along Mach number; `None` for a table without Mach.
-fn mach_shares(term: &Term, condition: &Condition) -> Option<Vec<(usize, f64)>> {
+fn mach_shares(term: &Term, condition: &Condition) -> Option<SparseRow> {
     let at = |mach: f64| {
         let condition = Condition { mach, ..*condition };
         term.prior.grid.shares(&condition)
