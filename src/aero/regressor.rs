@@ -5,7 +5,6 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::derivative_unit::DerivativeUnit;
-use crate::flight::signal;
 use crate::units::{Quantity, Unit};
 
 /// Factor of a derivative.
@@ -86,6 +85,24 @@ impl Regressor {
         }
     }
 
+    /// Slope along one of its parts, from the values of all.
+    pub fn slope(&self, along: &Regressor, of: &impl Fn(&Regressor) -> f64) -> f64 {
+        match self {
+            Regressor::Magnitude(inner) => {
+                let value = inner.value(of);
+                let sign = if value == 0.0 { 0.0 } else { value.signum() };
+                sign * inner.slope(along, of)
+            }
+            Regressor::Product(both) => {
+                let [first, second] = &**both;
+                first.slope(along, of) * second.value(of)
+                    + first.value(of) * second.slope(along, of)
+            }
+            part if part == along => 1.0,
+            _ => 0.0,
+        }
+    }
+
     /// Factor of proportion to the first part that has one, from the factors and the measured values of
     /// the parts; `None` where no part has one.
     pub fn factor(
@@ -109,7 +126,8 @@ impl Regressor {
     }
 
     /// Unit of the derivative of a coefficient; `None` where there is none.
-    pub(super) fn unit(&self) -> Option<DerivativeUnit> {
+    #[must_use]
+    pub fn unit(&self) -> Option<DerivativeUnit> {
         let mut powers: Powers = [0; 3];
         for part in self.leaves() {
             let own = part.powers()?;
@@ -145,7 +163,8 @@ impl Regressor {
     }
 
     /// Regressors that are neither products nor magnitudes.
-    fn leaves(&self) -> Vec<&Regressor> {
+    #[must_use]
+    pub fn leaves(&self) -> Vec<&Regressor> {
         match self {
             Regressor::Magnitude(of) => of.leaves(),
             Regressor::Product(both) => both.iter().flat_map(Regressor::leaves).collect(),
@@ -190,9 +209,9 @@ impl fmt::Display for Regressor {
             Regressor::Constant => f.write_str("constant"),
             Regressor::Alpha => f.write_str("alpha"),
             Regressor::Beta => f.write_str("beta"),
-            Regressor::RollRate => f.write_str(signal::P),
-            Regressor::PitchRate => f.write_str(signal::Q),
-            Regressor::YawRate => f.write_str(signal::R),
+            Regressor::RollRate => f.write_str("p"),
+            Regressor::PitchRate => f.write_str("q"),
+            Regressor::YawRate => f.write_str("r"),
             Regressor::Surface(signal) | Regressor::Vane(signal) => f.write_str(signal),
             Regressor::Magnitude(of) => write!(f, "abs({of})"),
             Regressor::Product(both) => write!(f, "{} * {}", both[0], both[1]),
@@ -252,6 +271,7 @@ mod tests {
             let regressor = Regressor::parse(written).unwrap();
             assert_eq!(regressor.factor(&states, &measured), factor, "{written}");
             assert_relative_eq!(regressor.value(&measured), value);
+            assert_eq!(Regressor::parse(&regressor.to_string()), Ok(regressor));
         }
     }
 }

@@ -25,6 +25,7 @@ mod published;
 mod rows;
 mod campaign_model;
 mod with_held;
+mod lift_and_drag;
 mod draws;
 mod local;
 #[cfg(test)]
@@ -39,6 +40,7 @@ use term::Basis;
 pub use campaign_model::{Failure, MOST_POINTS, Model};
 pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
+pub use lift_and_drag::Flown;
 pub use local::{LocalKind, LocalPosterior, LocalValue};
 pub use settings::Settings;
 

@@ -90,7 +90,8 @@ fn publish_model(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &rows.covariance)?;
     table::publish(shelf, &rows.scales)?;
     table::publish(shelf, &rows.contributions)?;
-    table::publish(shelf, &rows.self_check)
+    table::publish(shelf, &rows.self_check)?;
+    table::publish(shelf, &campaign.lift_and_drag)
 }
 
 fn publish_qualities(shelf: &Shelf, campaign: &Campaign) -> Result<()> {

@@ -16,7 +16,7 @@ use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow,
-    EstimateRow, EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow,
+    EstimateRow, EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, LiftAndDragRow,
     ManeuverComparisonRow, OutlierRow, TrendRow, VerdictRow,
 };
 
@@ -100,6 +100,8 @@ pub struct Campaign {
     pub outliers: Vec<OutlierRow>,
     /// Posterior of every derivative.
     pub model: Model,
+    /// Lift and drag of each maneuver.
+    pub lift_and_drag: Vec<LiftAndDragRow>,
     /// Modes of the aircraft and their levels; empty without `qualities.yaml`.
     pub qualities: Qualities,
     pub comparison: Vec<ComparisonRow>,

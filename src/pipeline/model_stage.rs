@@ -8,9 +8,10 @@ use crate::aero::Combined;
 use crate::config::Config;
 use crate::error::ProblemStage;
 use crate::estimate::HeldValues;
-use crate::model::{self, Evidence, Failure, MOST_POINTS, Model};
+use crate::maneuver::Means;
+use crate::model::{self, Evidence, Failure, Flown, MOST_POINTS, Model};
 use crate::output_error::Outcome;
-use crate::tables::EstimateRow;
+use crate::tables::{EstimateRow, LiftAndDragRow};
 
 /// Version of the posterior.
 pub const MODEL_VERSION: u32 = 2;
@@ -40,13 +41,45 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
         let problem = problem(ProblemStage::Model, "", &place, &reason(*failure));
         campaign.problems.push(problem);
     }
-    if config.estimate.held_values == HeldValues::Posterior {
-        let sums = &config.buildup.combined;
-        let estimates = with_held(&campaign.estimates, &found, &evidence, sums);
-        let combined = with_held(&campaign.combined, &found, &evidence, sums);
-        (campaign.estimates, campaign.combined) = (estimates, combined);
-    }
+    let sums = &config.buildup.combined;
+    let read_held = |rows: &[EstimateRow]| match config.estimate.held_values {
+        HeldValues::Posterior => with_held(rows, &found, &evidence, sums),
+        HeldValues::Tunnel => rows.to_vec(),
+    };
+    let (estimates, combined) = (
+        read_held(&campaign.estimates),
+        read_held(&campaign.combined),
+    );
+    let means = campaign.maneuvers.iter().zip(&campaign.means);
+    let means = means.filter_map(|(m, means)| Some((m.maneuver_id.as_str(), means.as_ref()?)));
+    let lift_and_drag = lift_and_drag(config, &found, &evidence, &means.collect(), &estimates);
+    (campaign.estimates, campaign.combined) = (estimates, combined);
+    campaign.lift_and_drag = lift_and_drag;
     campaign.model = found;
+}
+
+/// Lift and drag of the maneuvers, from their estimates as they are published.
+fn lift_and_drag(
+    config: &Config,
+    model: &Model,
+    evidence: &[Evidence],
+    means: &BTreeMap<&str, &Means>,
+    estimates: &[EstimateRow],
+) -> Vec<LiftAndDragRow> {
+    let estimates = by_maneuver(estimates);
+    let by_posterior = config.estimate.held_values == HeldValues::Posterior;
+    let of_maneuver = |evidence: &Evidence| {
+        let id = evidence.maneuver.maneuver_id.as_str();
+        let flown = Flown {
+            evidence,
+            estimates: estimates.get(id)?,
+            means: means.get(id)?,
+            aircraft: &config.aircraft,
+            buildup: &config.buildup,
+        };
+        Some(model.lift_and_drag(&flown, by_posterior))
+    };
+    evidence.iter().filter_map(of_maneuver).flatten().collect()
 }
 
 /// Rows of the maneuvers with what they hold read from the posterior of the other flights.

@@ -34,7 +34,8 @@ pub use flights::{
 pub use history::{History, HistoryOutput};
 pub use page::page;
 pub use posterior::{
-    ContributionRow, CovarianceRow, Knowledge, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
+    ContributionRow, CovarianceRow, Knowledge, LeftOutKind, LiftAndDragRow, PosteriorRow, ScaleRow,
+    SelfCheckRow,
 };
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use published::{PublishedTrend, PublishedVerdict};

@@ -6,8 +6,8 @@ use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
     ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, LevelRow,
-    ManeuverComparisonRow, OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow,
-    SelfCheckRow, StartRow, TrendRow, VerdictRow,
+    LiftAndDragRow, ManeuverComparisonRow, OutlierRow, PosteriorRow, PredictedRow, QualityRow,
+    RootRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -85,6 +85,7 @@ pub fn page() -> String {
     table::<ScaleRow>(&mut page);
     table::<ContributionRow>(&mut page);
     table::<SelfCheckRow>(&mut page);
+    table::<LiftAndDragRow>(&mut page);
     table::<QualityRow>(&mut page);
     table::<LevelRow>(&mut page);
     table::<RootRow>(&mut page);

@@ -110,6 +110,38 @@ table! {
     }
 }
 
+table! {
+    /// Lift and drag of each maneuver whose normal and axial force are estimated, from the rows of
+    /// `estimates`: C_L = C_N cos α − C_A sin α, C_D = C_N sin α + C_A cos α.
+    ///
+    /// Row `total` has the coefficients in the mean flight condition. The other rows have their slopes along
+    /// a regressor, at that condition; along α the axes turn as well.
+    pub struct LiftAndDragRow in "lift_and_drag" per "maneuver and regressor" {
+        /// Maneuver.
+        pub maneuver_id: String,
+        /// Class of the maneuver.
+        pub class: String,
+        /// Mean angle of attack.
+        pub alpha_deg: f64 ["deg"],
+        /// Mean Mach number.
+        pub mach: f64 ["1"],
+        /// Regressor as in `model.yaml`, or `total`.
+        pub regressor: String,
+        /// Unit of lift and drag.
+        pub unit: String,
+        /// C_L or its slope, in the column `unit`.
+        pub lift: f64,
+        /// Standard deviation of `lift`, with the uncertainty of what the maneuver holds, in the column `unit`.
+        pub lift_bound: f64,
+        /// C_D or its slope, in the column `unit`.
+        pub drag: f64,
+        /// Standard deviation of `drag`, in the column `unit`.
+        pub drag_bound: f64,
+        /// Correlation of the errors of `lift` and `drag`.
+        pub correlation: Option<f64> ["1"],
+    }
+}
+
 words! {
     /// Part of the campaign that is left out.
     pub enum LeftOutKind {

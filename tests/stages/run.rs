@@ -128,6 +128,11 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "left_out item coefficient estimates inside_95_pct log_density",
     ),
     (
+        "model",
+        "lift_and_drag",
+        "maneuver_id class alpha_deg mach regressor unit lift lift_bound drag drag_bound correlation",
+    ),
+    (
         "qualities",
         "qualities",
         "airframe axis quantity unit alpha_deg mach qbar_psf mass_slug path_deg value standard_deviation lower_95 \

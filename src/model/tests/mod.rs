@@ -2,6 +2,7 @@
 
 mod fixture;
 mod held;
+mod lift_and_drag;
 mod limits;
 mod parts;
 mod simulated;

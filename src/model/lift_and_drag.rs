@@ -1,0 +1,281 @@
+//! Lift and drag from a maneuver's normal and axial force.
+//!
+//! ```text
+//! C_L = C_N cos α − C_A sin α        C_D = C_N sin α + C_A cos α
+//! ```
+//!
+//! at the maneuver's mean flight condition, and their slopes along each regressor. Along α the axes turn
+//! as well: ∂C_L/∂α has −C_D, ∂C_D/∂α has C_L, per rad. All are weighted sums of the derivatives. With p
+//! those that were estimated, of covariance Σ, and h those that were held, in error by f of covariance C,
+//! the errors are G f + e and −f, so a sum has the variance
+//!
+//! ```text
+//! w_p' Σ w_p − 2 w_p' G C w_h + w_h' C w_h
+//! ```
+//!
+//! What the maneuver holds counts with the tunnel's uncertainty, or with the posterior's of the other
+//! flights.
+
+use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
+
+use super::campaign_model::Model;
+use super::evidence::Evidence;
+use crate::aero::{Axis, Buildup, Coefficient, Derivative, DerivativeUnit, Regressor};
+use crate::aircraft::Aircraft;
+use crate::flight::signal;
+use crate::maneuver::{Means, Status};
+use crate::tables::{EstimateRow, LiftAndDragRow};
+use crate::units::RAD;
+
+/// Regressor of the row with the coefficients themselves.
+const TOTAL: &str = "total";
+
+/// Maneuver as it was flown, with its build-up.
+#[derive(Clone, Copy, Debug)]
+pub struct Flown<'a> {
+    pub evidence: &'a Evidence<'a>,
+    /// Rows of the estimates as they are published.
+    pub estimates: &'a [EstimateRow],
+    pub means: &'a Means,
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+}
+
+/// Weights of all normal and axial derivatives in lift and drag.
+#[derive(Clone, Debug)]
+struct Weights {
+    lift: RowDVector<f64>,
+    drag: RowDVector<f64>,
+}
+
+/// Errors of the derivatives that a maneuver holds.
+struct HeldErrors {
+    names: Vec<String>,
+    /// G.
+    gains: DMatrix<f64>,
+    /// Covariance that the maneuver's corrected one assumes.
+    assumed: DMatrix<f64>,
+    /// C.
+    covariance: DMatrix<f64>,
+}
+
+impl Model {
+    /// Lift and drag of a longitudinal maneuver whose normal and axial force are estimated, and their
+    /// slopes along the regressors; empty for others. Derivatives that are held are the posterior's of
+    /// the other flights, or the tunnel's.
+    #[must_use]
+    pub fn lift_and_drag(&self, flown: &Flown, held_by_posterior: bool) -> Vec<LiftAndDragRow> {
+        let derivatives = flown.derivatives();
+        let is_estimated = |c: Coefficient| {
+            let mut own = derivatives.iter().filter(|d| d.coefficient == c);
+            own.any(|d| d.regressor == Regressor::Constant && flown.is_estimated(d))
+        };
+        if !is_estimated(Coefficient::CN) || !is_estimated(Coefficient::CA) {
+            return vec![];
+        }
+        let mut held = HeldErrors::of(flown.evidence);
+        if held_by_posterior {
+            held.take_posterior(self, &flown.evidence.maneuver.maneuver_id);
+        }
+        let total = flown.total(&derivatives);
+        let mut rows = vec![flown.row(TOTAL, DerivativeUnit::Number, &derivatives, &total, &held)];
+        for regressor in leaves(&derivatives) {
+            let slope = flown.slope(&derivatives, regressor, &total);
+            let has_estimate = derivatives.iter().enumerate().any(|(i, d)| {
+                let weight = slope.lift[i].abs() + slope.drag[i].abs();
+                weight > 0.0 && d.regressor != Regressor::Constant && flown.is_estimated(d)
+            });
+            if has_estimate {
+                let unit = regressor.unit().unwrap_or(DerivativeUnit::Number);
+                rows.push(flown.row(&regressor.to_string(), unit, &derivatives, &slope, &held));
+            }
+        }
+        rows
+    }
+}
+
+impl Flown<'_> {
+    fn derivatives(&self) -> Vec<&Derivative> {
+        let longitudinal = self.buildup.derivatives_of(Axis::Longitudinal);
+        longitudinal
+            .filter(|d| !d.coefficient.is_moment())
+            .collect()
+    }
+
+    fn estimate(&self, derivative: &Derivative) -> Option<&EstimateRow> {
+        let mut rows = self.estimates.iter();
+        rows.find(|row| row.derivative == derivative.name)
+    }
+
+    fn is_estimated(&self, derivative: &Derivative) -> bool {
+        let row = self.estimate(derivative);
+        row.is_some_and(|row| row.status == Status::Estimated && row.value.is_some())
+    }
+
+    /// Value of a derivative; one that is inactive acts with the tunnel's.
+    fn value(&self, derivative: &Derivative) -> f64 {
+        let row = self.estimate(derivative);
+        row.and_then(|row| row.value.or(row.wind_tunnel))
+            .unwrap_or(0.0)
+    }
+
+    /// Part of a regressor in the mean flight condition. The mean rates of a maneuver are small.
+    fn mean(&self, part: &Regressor) -> f64 {
+        let maneuver = self.evidence.maneuver;
+        match part {
+            Regressor::Constant => 1.0,
+            Regressor::Alpha => maneuver.alpha_deg,
+            Regressor::Surface(name) if name == signal::VELOCITY => maneuver.velocity_ft_s,
+            Regressor::Surface(name) if name == signal::MACH => maneuver.mach,
+            Regressor::Surface(name) | Regressor::Vane(name) => {
+                self.means.surfaces_deg.get(name).copied().unwrap_or(0.0)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Factor to a coefficient: one, for a vane 1/q̄S.
+    fn per_pressure(&self, derivative: &Derivative) -> f64 {
+        match derivative.regressor {
+            Regressor::Vane(_) => {
+                1.0 / (self.evidence.maneuver.qbar_psf * self.aircraft.wing_area_ft2)
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// Weights of the derivatives in lift and drag, from each one's weight in its own coefficient.
+    fn turned(&self, derivatives: &[&Derivative], own: impl Fn(&Derivative) -> f64) -> Weights {
+        let (sin, cos) = (RAD * self.evidence.maneuver.alpha_deg).sin_cos();
+        let weight = |by_normal: f64, by_axial: f64| {
+            let weights = derivatives.iter().map(|d| match d.coefficient {
+                Coefficient::CN => by_normal * own(d),
+                _ => by_axial * own(d),
+            });
+            RowDVector::from_iterator(derivatives.len(), weights)
+        };
+        Weights {
+            lift: weight(cos, -sin),
+            drag: weight(sin, cos),
+        }
+    }
+
+    fn total(&self, derivatives: &[&Derivative]) -> Weights {
+        self.turned(derivatives, |d| {
+            d.regressor.value(&|part| self.mean(part)) * self.per_pressure(d)
+        })
+    }
+
+    fn slope(&self, derivatives: &[&Derivative], along: &Regressor, total: &Weights) -> Weights {
+        let mut slope = self.turned(derivatives, |d| {
+            d.regressor.slope(along, &|part| self.mean(part)) * self.per_pressure(d)
+        });
+        if *along == Regressor::Alpha {
+            slope.lift -= RAD * &total.drag;
+            slope.drag += RAD * &total.lift;
+        }
+        slope
+    }
+
+    fn row(
+        &self,
+        regressor: &str,
+        unit: DerivativeUnit,
+        derivatives: &[&Derivative],
+        weights: &Weights,
+        held: &HeldErrors,
+    ) -> LiftAndDragRow {
+        let values = derivatives.iter().map(|d| self.value(d));
+        let values = DVector::from_iterator(derivatives.len(), values);
+        let covariance = self.covariance(derivatives, weights, held);
+        let bound = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+        let correlation = covariance[(0, 1)] / (bound(0) * bound(1));
+        let maneuver = self.evidence.maneuver;
+        LiftAndDragRow {
+            maneuver_id: maneuver.maneuver_id.clone(),
+            class: maneuver.class.clone(),
+            alpha_deg: maneuver.alpha_deg,
+            mach: maneuver.mach,
+            regressor: regressor.to_owned(),
+            unit: unit.name().to_owned(),
+            lift: (&weights.lift * &values)[0],
+            lift_bound: bound(0),
+            drag: (&weights.drag * &values)[0],
+            drag_bound: bound(1),
+            correlation: Some(correlation).filter(|c| c.is_finite()),
+        }
+    }
+
+    /// Covariance of lift and drag.
+    fn covariance(
+        &self,
+        derivatives: &[&Derivative],
+        weights: &Weights,
+        held: &HeldErrors,
+    ) -> Matrix2<f64> {
+        let place = |name: &String| derivatives.iter().position(|d| d.name == *name);
+        let of = |names: &[String]| {
+            DMatrix::from_fn(2, names.len(), |i, j| {
+                let row = if i == 0 { &weights.lift } else { &weights.drag };
+                place(&names[j]).map_or(0.0, |d| row[d])
+            })
+        };
+        let covariance = self.evidence.covariance;
+        let (estimated, held_weights) = (of(&covariance.names), of(&held.names));
+        let n = covariance.names.len();
+        let corrected = DMatrix::from_row_slice(n, n, &covariance.corrected);
+        let change = &held.gains * (&held.covariance - &held.assumed) * held.gains.transpose();
+        let own = &estimated * (corrected + change) * estimated.transpose();
+        let cross = &estimated * &held.gains * &held.covariance * held_weights.transpose();
+        let alone = &held_weights * &held.covariance * held_weights.transpose();
+        let sum = own - &cross - cross.transpose() + alone;
+        sum.fixed_view::<2, 2>(0, 0).into_owned()
+    }
+}
+
+impl HeldErrors {
+    /// Errors with the tunnel's uncertainty.
+    fn of(evidence: &Evidence) -> HeldErrors {
+        let effects: Vec<_> = evidence.held_effects().collect();
+        let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
+        let variances = DVector::from_iterator(effects.len(), deviations);
+        let assumed = DMatrix::from_diagonal(&variances);
+        let n = evidence.covariance.names.len();
+        let gain = |i: usize, j: usize| effects[j].1.change[i] / effects[j].1.deviation;
+        HeldErrors {
+            names: effects.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            gains: DMatrix::from_fn(n, effects.len(), gain),
+            covariance: assumed.clone(),
+            assumed,
+        }
+    }
+
+    /// Takes the covariance that the other flights give.
+    fn take_posterior(&mut self, model: &Model, maneuver_id: &str) {
+        for (_, coefficient) in &model.coefficients {
+            let Some(known) = coefficient.held.get(maneuver_id) else {
+                continue;
+            };
+            let place = |name: &String| self.names.iter().position(|n| n == name);
+            let places: Vec<Option<usize>> = known.derivatives.iter().map(place).collect();
+            for (i, row) in places.iter().enumerate() {
+                for (j, column) in places.iter().enumerate() {
+                    if let (Some(row), Some(column)) = (row, column) {
+                        self.covariance[(*row, *column)] = known.covariance[(i, j)];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Regressors of the derivatives that are neither constant nor composed, each once.
+fn leaves<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
+    let mut leaves: Vec<&Regressor> = Vec::new();
+    for leaf in derivatives.iter().flat_map(|d| d.regressor.leaves()) {
+        if *leaf != Regressor::Constant && !leaves.contains(&leaf) {
+            leaves.push(leaf);
+        }
+    }
+    leaves
+}
