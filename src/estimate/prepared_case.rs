@@ -6,7 +6,7 @@ use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::maneuver::Maneuver;
 use crate::output_error::surface_noise::noisy_surfaces;
-use crate::output_error::{Case, Model};
+use crate::output_error::{Case, Model, pressure_noise};
 
 /// Everything of a maneuver's estimation that does not depend on the parameters.
 pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
@@ -53,6 +53,7 @@ impl<'a> Task<'a> {
         let mut free = model.free.clone();
         free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
         case.noisy_surfaces = noisy_surfaces(self.context.aircraft, &window, &free, &model.held);
+        case.pressure_variance = pressure_noise::relative_variance(self.record, range);
         Ok(PreparedCase {
             model,
             surfaces,

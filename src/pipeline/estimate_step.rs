@@ -95,7 +95,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 18;
+    const VERSION: u32 = 19;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

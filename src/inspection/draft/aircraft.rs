@@ -97,7 +97,7 @@ fn unused(draft: &Draft) -> String {
         return String::new();
     }
     let mut text =
-        "\n# Columns that no signal takes. To use one, give it a line above.\n".to_owned();
+        "\n# Columns that no signal takes. To use one, give it a line above, or compute a channel from several by a formula\n# (docs/recorder.md).\n".to_owned();
     for column in unused {
         let unit = column
             .unit

@@ -1,5 +1,5 @@
-//! Effect of the measured surfaces' noise on the estimates. The equations take surfaces as exact, so
-//! their noise moves the computed aircraft. Through a moment it is integrated to slow errors, which
+//! Effect of the measured surfaces' noise, and of a slow dynamic pressure's, on the estimates. The
+//! equations take both as exact, so their noise moves the computed aircraft. Through a moment it is integrated to slow errors, which
 //! derivatives follow and residuals hardly show beside the sensors' own noise.
 //!
 //! An error of one surface sample changes the gradient Σ Sᵀ W v through the outputs at once and
@@ -24,8 +24,8 @@ use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::chunking::CHUNK;
 use crate::output_error::case::surface_noise::DerivativeValue;
 
-/// Covariance of the gradient from the noise of the surfaces, along the measured motion, given the
-/// outputs' series.
+/// Covariance of the gradient from the noise of the surfaces and the dynamic pressure, along the
+/// measured motion, given the outputs' series.
 #[must_use]
 pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
@@ -35,7 +35,8 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
 ) -> DMatrix<f64> {
     let n = case.parameters();
     let width = n.next_multiple_of(VECTOR);
-    if case.noisy_surfaces.is_empty() || n == 0 {
+    let is_exact = case.noisy_surfaces.is_empty() && case.pressure_variance == 0.0;
+    if is_exact || n == 0 {
         return DMatrix::zeros(n, n);
     }
     let mut covariance = AlignedBuffer::zeros(width * width);
@@ -196,10 +197,16 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         at
     }
 
-    /// Covariance of the coefficients' errors at a sample; each surface's noise acts on all of them.
+    /// Covariance of the coefficients' errors at a sample; the noise of each surface and of the dynamic
+    /// pressure acts on all of them.
     #[inline(always)]
     fn coefficient_noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
+        if self.case.pressure_variance > 0.0 {
+            let build_up = self.case.build_up_at(self.parameters, 2 * k);
+            let effects = build_up.coefficients(&self.case.states[k]);
+            add_product(&mut covariance, self.case.pressure_variance, &effects);
+        }
         for surface in &self.case.noisy_surfaces {
             let mut effects = [0.0; COEFFICIENTS];
             for effect in &surface.effects {
@@ -210,13 +217,23 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
                 let factor = effect.factors.get(k).copied().unwrap_or(1.0);
                 effects[effect.coefficient] += value * factor;
             }
-            for (c, row) in covariance.iter_mut().enumerate() {
-                for (d, v) in row.iter_mut().enumerate() {
-                    *v += surface.variance * effects[c] * effects[d];
-                }
-            }
+            add_product(&mut covariance, surface.variance, &effects);
         }
         covariance
+    }
+}
+
+/// Adds the covariance of effects of one noise.
+#[inline(always)]
+fn add_product(
+    covariance: &mut [[f64; COEFFICIENTS]; COEFFICIENTS],
+    variance: f64,
+    effects: &[f64; COEFFICIENTS],
+) {
+    for (row, c) in covariance.iter_mut().zip(effects) {
+        for (v, d) in row.iter_mut().zip(effects) {
+            *v += variance * c * d;
+        }
     }
 }
 
@@ -280,10 +297,41 @@ mod tests {
         Window::cut(record, 0..SAMPLES, SURFACES, MassProperties::Recorded).unwrap()
     }
 
-    /// Compares the scatter of the gradient over draws of the surfaces' noise with its covariance;
-    /// the last derivative is held.
-    fn assert_gradient_scatters_as_computed<const NX: usize, E: Equations<NX>>() {
-        let (sd_deg, draws, mut noise) = (0.02, 150, Noise(77));
+    /// Record with noise on every nth value of its dynamic pressure, and lines between them.
+    fn slow_pressure(share: f64, every: usize, noise: &mut Noise) -> Record {
+        let mut record = record();
+        let series = record.signals.get_mut(crate::flight::signal::QBAR).unwrap();
+        let nodes: Vec<f64> = (0..=SAMPLES / every + 1)
+            .map(|_| share * noise.gaussian())
+            .collect();
+        for (k, value) in series.values.iter_mut().enumerate() {
+            let part = (k % every) as f64 / every as f64;
+            let (before, after) = (nodes[k / every], nodes[k / every + 1]);
+            *value *= 1.0 + before + part * (after - before);
+        }
+        record
+    }
+
+    /// Source of noise for a comparison.
+    #[derive(Clone, Copy)]
+    enum Source {
+        Surfaces { sd_deg: f64 },
+        Pressure { share: f64, every: usize },
+    }
+
+    impl Source {
+        fn record(self, noise: &mut Noise) -> Record {
+            match self {
+                Source::Surfaces { sd_deg } => noisy(sd_deg, noise),
+                Source::Pressure { share, every } => slow_pressure(share, every, noise),
+            }
+        }
+    }
+
+    /// Compares the scatter of the gradient over draws of the noise with its covariance; the last
+    /// derivative is held.
+    fn assert_gradient_scatters_as_computed<const NX: usize, E: Equations<NX>>(source: Source) {
+        let (draws, mut noise) = (150, Noise(77));
         let truth = truth(E::AXIS);
         let ((held, value), free) = truth.split_last().unwrap();
         let model = Model {
@@ -309,7 +357,7 @@ mod tests {
         for _ in 0..draws {
             let other = Case::<NX, E>::new(
                 &aircraft(),
-                &window(&noisy(sd_deg, &mut noise)),
+                &window(&source.record(&mut noise)),
                 nothing_measured(),
                 &model,
             );
@@ -333,15 +381,27 @@ mod tests {
             .iter()
             .filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name))
             .collect();
-        let once = window(&noisy(sd_deg, &mut noise));
-        case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
+        match source {
+            Source::Surfaces { .. } => {
+                let once = window(&source.record(&mut noise));
+                case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
+            }
+            Source::Pressure { share, every } => {
+                case.pressure_variance = every as f64 * share * share;
+            }
+        }
         let series = case.series(&response, &TABLE);
         let computed = gradient_covariance(&case, &parameters, &series, &TABLE);
         for (j, name) in case.names.iter().enumerate() {
             // 150 draws give a standard deviation to 6 %; the noise's size is an estimate to 5 %.
             let ratio = (scatter[j] / computed[(j, j)]).sqrt();
+            // A slow pressure's noise is white over longer times than it lasts only.
+            let range = match source {
+                Source::Surfaces { .. } => 0.75..1.25,
+                Source::Pressure { .. } => 0.6..1.4,
+            };
             assert!(
-                (0.75..1.25).contains(&ratio),
+                range.contains(&ratio),
                 "{name}: scatter is {ratio:.2} of the computed one"
             );
         }
@@ -349,8 +409,19 @@ mod tests {
 
     #[test]
     fn the_gradient_scatters_with_the_noise_of_the_surfaces() {
-        assert_gradient_scatters_as_computed::<3, Longitudinal>();
-        assert_gradient_scatters_as_computed::<4, Lateral>();
+        let source = Source::Surfaces { sd_deg: 0.02 };
+        assert_gradient_scatters_as_computed::<3, Longitudinal>(source);
+        assert_gradient_scatters_as_computed::<4, Lateral>(source);
+    }
+
+    #[test]
+    fn the_gradient_scatters_with_the_noise_of_a_slow_dynamic_pressure() {
+        let source = Source::Pressure {
+            share: 0.001,
+            every: 10,
+        };
+        assert_gradient_scatters_as_computed::<3, Longitudinal>(source);
+        assert_gradient_scatters_as_computed::<4, Lateral>(source);
     }
 
     #[test]

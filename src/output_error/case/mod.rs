@@ -10,6 +10,7 @@ pub(crate) mod build_up;
 pub(crate) mod chunking;
 pub(crate) mod layout;
 pub(crate) mod regressors;
+pub mod pressure_noise;
 pub mod surface_noise;
 
 use std::marker::PhantomData;
@@ -98,6 +99,9 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(crate) implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
     /// Surfaces whose noise the corrected bounds count; empty by default.
     pub noisy_surfaces: Vec<NoisySurface>,
+    /// Relative variance of the dynamic pressure's noise that the corrected bounds count; zero by
+    /// default.
+    pub pressure_variance: f64,
     pub measurements: Measurements,
     /// Names of the parameters in order; initial states are named `initial alpha` and so on.
     pub names: Vec<String>,
@@ -151,6 +155,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             implied: motion.implied,
             implied_without_accelerations: motion.without_accelerations,
             noisy_surfaces: vec![],
+            pressure_variance: 0.0,
             measurements,
             names: model.parameter_names(&free, &E::STATES),
             equations: PhantomData,

@@ -1,0 +1,79 @@
+//! Noise of a dynamic pressure that is recorded more slowly than the other signals.
+//!
+//! Between two recorded values it is on the line through them, so the error of one lasts over the
+//! samples on either side. Every coefficient acts in proportion to the dynamic pressure.
+
+use std::ops::Range;
+
+use super::surface_noise::white_variance;
+use crate::flight::{Mark, Record, signal};
+
+/// Variance, relative to the dynamic pressure squared, of white noise with the effect of a slow
+/// dynamic pressure's on slow motion. Zero where it is recorded at full rate.
+///
+/// On lines through values at every nth sample, each value counts n samples in all. Its variance σ²
+/// adds n² σ² to a sum over them, and white noise of variance n σ² does the same.
+#[must_use]
+pub fn relative_variance(record: &Record, range: Range<usize>) -> f64 {
+    let Some(series) = record.signals.get(signal::QBAR) else {
+        return 0.0;
+    };
+    let values = series.values.get(range.clone()).unwrap_or_default();
+    let marks = series.marks.get(range).unwrap_or_default();
+    let recorded = values.iter().zip(marks);
+    let recorded = recorded.filter(|(_, mark)| **mark == Mark::Measured);
+    let recorded: Vec<f64> = recorded.map(|(value, _)| *value).collect();
+    let is_slow = marks.contains(&Mark::Between) && 2 * recorded.len() <= values.len();
+    if !is_slow || recorded.is_empty() {
+        return 0.0;
+    }
+    let mean = recorded.iter().sum::<f64>() / recorded.len() as f64;
+    let samples_per_value = values.len() as f64 / recorded.len() as f64;
+    let relative = white_variance(&recorded) / (mean * mean);
+    if relative.is_finite() {
+        samples_per_value * relative
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::flight::record::Series;
+    use crate::output_error::tests::Noise;
+
+    /// Record with a dynamic pressure of 40 with noise of 0.2 at every nth sample.
+    fn record(every: usize) -> Record {
+        let mut noise = Noise(3);
+        let values = (0..400 * every).map(|_| 40.0 + 0.2 * noise.gaussian());
+        let mark = |k: usize| {
+            if k.is_multiple_of(every) {
+                Mark::Measured
+            } else {
+                Mark::Between
+            }
+        };
+        let series = Series {
+            values: values.collect(),
+            marks: (0..400 * every).map(mark).collect(),
+        };
+        Record {
+            flight_id: String::new(),
+            start_s: 0.0,
+            step_s: 0.02,
+            samples: 400 * every,
+            signals: [(signal::QBAR.to_owned(), series)].into(),
+        }
+    }
+
+    #[test]
+    fn the_variance_grows_with_the_samples_of_a_value_and_is_none_at_full_rate() {
+        let slow = relative_variance(&record(25), 0..400 * 25);
+        assert_relative_eq!(slow, 25.0 * 0.005 * 0.005, max_relative = 0.2);
+        assert_eq!(relative_variance(&record(1), 0..400), 0.0);
+        assert_eq!(relative_variance(&record(25), 0..0), 0.0);
+    }
+}
