@@ -49,6 +49,7 @@ pub mod lineage;
 
 // Physics: how the aircraft moves and what its sensors read.
 pub mod dynamics;
+mod rigid_body;
 
 // Method: how derivatives follow from motion.
 pub mod output_error;

@@ -18,8 +18,8 @@ use crate::aero::{Coefficient, Condition, Derivative, Regressor, WindTunnel, win
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
-use crate::lab::simulator::air_data::AirData;
 use crate::model::CorrelatedDerivatives;
+use crate::rigid_body::AirData;
 use crate::store::files::TunnelRow;
 use crate::store::tunnel;
 use crate::tables::PosteriorRow;

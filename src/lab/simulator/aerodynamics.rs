@@ -5,10 +5,10 @@
 
 use nalgebra::Vector3;
 
-use super::air_data::AirData;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
+use crate::rigid_body::AirData;
 use crate::units::DEG;
 
 /// Signals that the air data give.

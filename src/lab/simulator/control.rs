@@ -6,12 +6,11 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::air_data::AirData;
-use super::body::{BodyState, Euler};
 use super::law::ControlLaw;
 use super::plant::Plant;
 use super::settings::Settings;
 use super::trim::Trim;
+use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::units::DEG;
 
 /// Step of the central differences, deg or ft/s.

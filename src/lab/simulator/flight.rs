@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::actuators::SurfaceState;
-use super::body::BodyState;
 use super::card::{Card, DerivativeLookup, FlightCondition};
 use super::control::Feedback;
 use super::flown::{FlownManeuver, TrueDerivative};
@@ -17,6 +16,7 @@ use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
+use crate::rigid_body::BodyState;
 use crate::units::DEG;
 
 /// Limit of |α| and |β|, deg: the build-up has no meaning beyond it.

@@ -2,7 +2,7 @@
 //! build-up with known derivatives.
 //!
 //! The record is that of perfect instruments; [`FlownManeuver::recorded`] adds the errors of real
-//! ones. The equations of motion ([`body`]) are independent of the estimator's
+//! ones. The equations of motion ([`crate::rigid_body`]) are independent of the estimator's
 //! ([`crate::dynamics`]), so that each checks the other.
 
 mod gust;
@@ -15,11 +15,8 @@ pub mod card;
 pub mod flown;
 pub mod actuators;
 pub mod engine;
-pub mod loading;
 pub mod law;
 pub mod settings;
-pub mod air_data;
-pub mod body;
 pub mod aerodynamics;
 pub mod plant;
 pub mod sensors;

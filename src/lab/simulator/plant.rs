@@ -5,12 +5,10 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 
 use super::aerodynamics::Aerodynamics;
-use super::air_data::AirData;
-use super::body::{self, BodyState, Loads, StateRate};
 use super::gust::Gust;
-use super::loading::Loading;
 use crate::aircraft::Aircraft;
 use crate::earth::gravity_ft_s2;
+use crate::rigid_body::{AirData, BodyState, Loading, Loads, StateRate, body};
 use crate::units::DEG;
 
 /// Inputs of the plant at one instant.

@@ -1,16 +1,10 @@
-//! Sensors: readings of perfect instruments at their positions.
-//!
-//! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r); a vane measures the local
-//! flow, which turns about the c.g. with the aircraft's rates relative to the air.
+//! Sensors: every recorded signal of the motion, as perfect instruments at their positions read it.
 
-use nalgebra::Vector3;
-
-use super::body::BodyState;
 use super::plant::{PlantInputs, PlantOutputs};
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::Aircraft;
 use crate::earth;
 use crate::flight::signal;
-use crate::units::{DEG, G0_FT_S2};
+use crate::rigid_body::{BodyState, Instant};
 
 /// Static pressure and temperature of the air: signals that air-data computers record.
 pub const STATIC_PRESSURE: &str = "static_psf";
@@ -25,49 +19,35 @@ pub fn readings(
     inputs: &PlantInputs,
     outputs: &PlantOutputs,
 ) -> Vec<(&'static str, f64)> {
-    let (air, loading, sensors) = (&outputs.air, &outputs.loading, &aircraft.sensors);
-    let w = state.rates;
-    let relative = w - inputs.gust.rates;
-    let flow = Flow {
-        alpha: air.alpha,
-        beta: air.beta,
-        velocity: air.velocity_ft_s,
-        rates: relative.into(),
-    };
-    let cg = loading.cg();
-    let acceleration_g = |position: Position, axis: usize| {
-        let arm = Vector3::from(position.arm(cg));
-        let rotation = outputs.rate.rates.cross(&arm) + w.cross(&w.cross(&arm));
-        (outputs.specific_force + rotation)[axis] / G0_FT_S2
-    };
-    let thrust = if sensors.thrust_in_ax {
-        0.0
-    } else {
-        inputs.thrust_lbf / loading.mass_slug / G0_FT_S2
-    };
-    let angles = state.euler();
+    let (air, loading) = (&outputs.air, &outputs.loading);
+    let read = Instant {
+        state: *state,
+        rate: outputs.rate,
+        air: *air,
+        loading: *loading,
+        specific_force: outputs.specific_force,
+        relative_rates: state.rates - inputs.gust.rates,
+        thrust_lbf: inputs.thrust_lbf,
+    }
+    .readings(aircraft);
+    let [p, q, r] = read.rates_deg_s;
+    let [phi, theta, psi] = read.euler_deg;
     let outside = earth::air(state.position.z);
     vec![
-        (
-            signal::ALPHA_VANE,
-            DEG * sensors.alpha_reading(&flow, cg).angle,
-        ),
-        (
-            signal::BETA_VANE,
-            DEG * sensors.beta_reading(&flow, cg).angle,
-        ),
+        (signal::ALPHA_VANE, read.alpha_vane_deg),
+        (signal::BETA_VANE, read.beta_vane_deg),
         (signal::VELOCITY, air.velocity_ft_s),
         (signal::MACH, air.mach),
         (signal::ALTITUDE, state.position.z),
-        (signal::P, DEG * w.x),
-        (signal::Q, DEG * w.y),
-        (signal::R, DEG * w.z),
-        (signal::THETA, DEG * angles.theta),
-        (signal::PHI, DEG * angles.phi),
-        (signal::PSI, DEG * angles.psi),
-        (signal::AN, -acceleration_g(sensors.an, 2)),
-        (signal::AX, acceleration_g(sensors.ax, 0) - thrust),
-        (signal::AY, acceleration_g(sensors.ay, 1)),
+        (signal::P, p),
+        (signal::Q, q),
+        (signal::R, r),
+        (signal::THETA, theta),
+        (signal::PHI, phi),
+        (signal::PSI, psi),
+        (signal::AN, read.an_g),
+        (signal::AX, read.ax_g),
+        (signal::AY, read.ay_g),
         (signal::QBAR, air.qbar_psf),
         (signal::THRUST, inputs.thrust_lbf),
         (signal::RPM_LEFT, 0.5 * inputs.rpm),

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::actuators::Actuator;
 use super::engine::Engine;
 use super::law::ControlLaw;
-use super::loading::Loading;
 use crate::error::did_you_mean;
+use crate::rigid_body::Loading;
 
 /// Simulated aircraft and rates of the simulation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

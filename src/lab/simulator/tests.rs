@@ -6,8 +6,6 @@ use std::path::Path;
 use approx::assert_abs_diff_eq;
 use nalgebra::{SVector, Vector3};
 
-use super::air_data::AirData;
-use super::body::{BodyState, Euler};
 use super::gust::Gust;
 use super::plant::{PlantInputs, PlantOutputs};
 use super::trim::{self, Trim, TrimPoint};
@@ -22,6 +20,7 @@ use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
 use crate::maneuver::Maneuver;
 use crate::numerics::random::RandomStream;
+use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::surfaces::{self, Basis};
 use crate::tables::Outcome;
 use crate::units::DEG;

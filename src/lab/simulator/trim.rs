@@ -7,13 +7,12 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::air_data::AirData;
-use super::body::{BodyState, Euler};
 use super::card::Card;
 use super::gust::Gust;
 use super::plant::{Plant, PlantInputs};
 use super::settings::Settings;
 use crate::earth::air;
+use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::units::DEG;
 
 /// Starting values of the iteration; the trim does not depend on them.

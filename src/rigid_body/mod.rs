@@ -1,0 +1,15 @@
+//! Rigid body in flight: Newton's and Euler's equations in vector form with their mass properties, air
+//! data, and the readings of its sensors.
+//!
+//! The proof of match and the simulator of the laboratory fly with it. It is written independently of
+//! the estimator's equations ([`crate::dynamics`]), so that each checks the other.
+
+pub mod air_data;
+pub mod loading;
+pub mod body;
+pub mod readings;
+
+pub use air_data::AirData;
+pub use body::{BodyState, Euler, Loads, StateRate};
+pub use loading::Loading;
+pub use readings::{Instant, Readings};
