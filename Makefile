@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities match match-study compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -48,6 +48,9 @@ model: build ## fuse tunnel and flights to the posterior of every derivative
 
 qualities: build ## judge the flying qualities of the posterior, with the probability of each level
 	$(call harvest,qualities) $(running)
+
+match: build ## fly every maneuver again by a simulator, and judge the match by tolerances
+	$(call harvest,match) $(running)
 
 compare: build ## compare the trends with the wind-tunnel database
 	$(call harvest,compare) $(running)
@@ -137,6 +140,9 @@ object-store: ## archive and store in an object store: the tests on an S3-compat
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
 	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --release --locked --test stages -- fuzz:: --nocapture
+
+match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
+	cargo test --release --locked --lib -- --ignored proof_of_match::
 
 bench: ## run the benchmarks
 	cargo bench --locked

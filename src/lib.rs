@@ -66,6 +66,7 @@ pub mod estimate;
 mod trend;
 mod model;
 mod qualities;
+mod proof_of_match;
 mod compare;
 mod export;
 mod pdf;

@@ -100,6 +100,8 @@ enum Command {
     Model(RunOptions),
     /// Judge the flying qualities of the posterior, with the probability of each level
     Qualities(RunOptions),
+    /// Fly every maneuver again by a simulator, and judge the match by tolerances
+    Match(RunOptions),
     /// Compare the trends with the wind-tunnel database
     Compare(RunOptions),
     /// Write the report
@@ -191,6 +193,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Trend(options) => (Stage::Trend, options),
         Command::Model(options) => (Stage::Model, options),
         Command::Qualities(options) => (Stage::Qualities, options),
+        Command::Match(options) => (Stage::Match, options),
         Command::Compare(options) => (Stage::Compare, options),
         Command::Status(options) => return night_commands::status(&options),
         Command::Explain(options) => return night_commands::explain(&options),

@@ -9,6 +9,7 @@ use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
+use crate::proof_of_match;
 use crate::qualities::Specification;
 use crate::{compare, estimate, export, ingest, model, segment, trend};
 
@@ -44,6 +45,10 @@ pub struct Config {
     pub model: model::Settings,
     /// Specification of flying qualities, where the pipeline has one.
     pub qualities: Option<Specification>,
+    /// Models and tolerances of the proof of match, where the pipeline has them.
+    pub proof_of_match: Option<proof_of_match::Specification>,
+    /// Derivatives of the proof's model `database`; empty without one.
+    pub match_database: WindTunnel,
     pub compare: compare::Settings,
     pub export: export::Settings,
     pub report: ReportSettings,

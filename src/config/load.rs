@@ -7,7 +7,7 @@ use super::checked::Config;
 use super::instruments::{self, Instrument};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{channel_map, check, moved, places, qualities, questions, ranges};
+use super::{channel_map, check, moved, places, proof_of_match, qualities, questions, ranges};
 use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
@@ -74,6 +74,8 @@ impl Config {
             None => classes.iter_mut().map(Class::hold_nothing).sum(),
         };
         name_surfaces(&mut classes, &buildup, &pipeline.segment);
+        let proof = files.proof_of_match()?;
+        let match_database = proof_of_match::database(proof.as_ref(), &buildup, &pipeline.tunnel)?;
         let config = Config {
             tunnel,
             held_at_nothing,
@@ -99,6 +101,8 @@ impl Config {
             trend: pipeline.trend,
             model: pipeline.model,
             qualities: files.qualities()?,
+            match_database,
+            proof_of_match: proof,
             compare: against(pipeline.compare, overrides.against),
             export: pipeline.export,
             report: pipeline.report,
@@ -108,6 +112,7 @@ impl Config {
         };
         check::whole(&config, &files)?;
         qualities::check(&config, &files)?;
+        proof_of_match::check(&config, &files)?;
         check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
         files.all().try_for_each(ranges::are_finite)?;
         ranges::of_pipeline(&files.pipeline)?;

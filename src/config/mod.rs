@@ -2,8 +2,8 @@
 //!
 //! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages),
 //! `aircraft.yaml` (geometry, sensors, channel map, errors of instruments), `model.yaml` (the
-//! build-up), `maneuvers/*.yaml` (one class per file) and, where flying qualities are judged,
-//! `qualities.yaml`.
+//! build-up), `maneuvers/*.yaml` (one class per file) and, where flying qualities and the match of a simulator
+//! are judged, `qualities.yaml` and `match.yaml`.
 
 mod absences;
 mod channel_map;
@@ -15,6 +15,7 @@ mod load;
 mod moved;
 mod nesting;
 mod places;
+mod proof_of_match;
 mod qualities;
 mod questions;
 mod ranges;

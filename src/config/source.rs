@@ -9,6 +9,7 @@ use super::written::{AircraftFile, ClassFile, ModelFile};
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
+use crate::proof_of_match;
 use crate::qualities::Specification;
 use crate::store::files;
 
@@ -28,6 +29,8 @@ pub(super) struct Files {
     pub classes: Vec<Source>,
     /// Flying qualities, where the pipeline has a specification.
     pub qualities: Option<Source>,
+    /// Proof of match, where the pipeline has tolerances.
+    pub proof_of_match: Option<Source>,
 }
 
 impl Source {
@@ -38,6 +41,12 @@ impl Source {
             Some(line) => Err(Error::config(&source.path, Some(line), nesting::REASON)),
             None => Ok(source),
         }
+    }
+
+    /// The file, where there is one.
+    fn optional(path: PathBuf) -> Result<Option<Source>> {
+        let is_file = files::is_file(&path);
+        is_file.then(|| Source::read(path)).transpose()
     }
 
     #[cfg(test)]
@@ -143,6 +152,7 @@ impl Files {
             .into_iter()
             .chain(&self.classes)
             .chain(&self.qualities)
+            .chain(&self.proof_of_match)
     }
 
     pub fn read(folder: &Path) -> Result<Files> {
@@ -159,10 +169,9 @@ impl Files {
                 "no maneuver class: each is a file `<class>.yaml` here",
             ));
         }
-        let qualities = folder.join("qualities.yaml");
-        let has_qualities = files::is_file(&qualities);
         Ok(Files {
-            qualities: has_qualities.then(|| Source::read(qualities)).transpose()?,
+            qualities: Source::optional(folder.join("qualities.yaml"))?,
+            proof_of_match: Source::optional(folder.join("match.yaml"))?,
             pipeline: Source::read(folder.join("pipeline.yaml"))?,
             aircraft: Source::read(folder.join("aircraft.yaml"))?,
             model: Source::read(folder.join("model.yaml"))?,
@@ -185,6 +194,10 @@ impl Files {
 
     pub fn qualities(&self) -> Result<Option<Specification>> {
         self.qualities.as_ref().map(Source::parse).transpose()
+    }
+
+    pub fn proof_of_match(&self) -> Result<Option<proof_of_match::Specification>> {
+        self.proof_of_match.as_ref().map(Source::parse).transpose()
     }
 
     pub fn classes(&self) -> Result<Vec<Class>> {

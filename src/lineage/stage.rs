@@ -17,6 +17,8 @@ words! {
         Model = "model",
         /// Posterior to the modes of the aircraft and their levels.
         Qualities = "qualities",
+        /// Maneuvers flown again by simulators.
+        Match = "match",
         /// Trends against the tunnel and earlier campaigns.
         Compare = "compare",
         /// The report.

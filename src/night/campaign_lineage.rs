@@ -59,9 +59,14 @@ fn tables(conductor: &Conductor) -> BTreeMap<Stage, BTreeMap<String, String>> {
         fingerprint(&config.events),
     );
     let tunnel = ("wind-tunnel table".to_owned(), fingerprint(&config.tunnel));
+    let database = (
+        "database of the proof of match".to_owned(),
+        fingerprint(&config.match_database),
+    );
     [
         (Stage::Segment, [events].into()),
         (Stage::Estimate, [tunnel].into()),
+        (Stage::Match, [database].into()),
         (Stage::Compare, earlier.collect()),
     ]
     .into()
@@ -111,6 +116,10 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
         (
             Stage::Qualities,
             named([("qualities", value(&config.qualities))]),
+        ),
+        (
+            Stage::Match,
+            named([("match", value(&config.proof_of_match))]),
         ),
         (Stage::Compare, named([("compare", value(&config.compare))])),
         (

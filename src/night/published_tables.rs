@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::lineage::{Lineage, Stage};
 use crate::pipeline::Campaign;
 use crate::store::table::{self, Shelf};
-use crate::tables::{EstimateRow, FitRow, JointRow, PredictedRow};
+use crate::tables::{EstimateRow, FitRow, JointRow, MatchRow, MatchVerdictRow, PredictedRow};
 
 /// Writes the tables of all stages as far as `until` into a folder.
 ///
@@ -35,6 +35,9 @@ pub fn publish_tables(
     }
     if until >= Stage::Qualities {
         publish_qualities(&shelf(Stage::Qualities), campaign)?;
+    }
+    if until >= Stage::Match {
+        publish_match(&shelf(Stage::Match), campaign)?;
     }
     if until >= Stage::Compare {
         publish_compare(&shelf(Stage::Compare), campaign)?;
@@ -99,6 +102,15 @@ fn publish_qualities(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &found.qualities)?;
     table::publish(shelf, &found.levels)?;
     table::publish(shelf, &found.roots)
+}
+
+fn publish_match(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+    let matched = &campaign.matched;
+    let rows: Vec<MatchRow> = matched.iter().flat_map(|m| &m.rows).cloned().collect();
+    let verdicts = matched.iter().flat_map(|m| &m.verdicts);
+    let verdicts: Vec<MatchVerdictRow> = verdicts.cloned().collect();
+    table::publish(shelf, &rows)?;
+    table::publish(shelf, &verdicts)
 }
 
 fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {

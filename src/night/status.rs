@@ -90,6 +90,7 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         Stage::Trend,
         Stage::Model,
         Stage::Qualities,
+        Stage::Match,
         Stage::Compare,
         Stage::Report,
     ];

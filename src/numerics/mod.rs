@@ -8,6 +8,7 @@ pub(crate) mod harmonics;
 pub(crate) mod matrix;
 pub mod mean;
 pub mod minimise;
+pub mod normal;
 pub mod order_statistics;
 pub mod random;
 pub mod root;

@@ -11,6 +11,7 @@ use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, Means, Unknown};
 use crate::model::Model;
 use crate::output_error::Outcome;
+use crate::proof_of_match::Matched;
 use crate::qualities::Qualities;
 use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
@@ -104,6 +105,8 @@ pub struct Campaign {
     pub lift_and_drag: Vec<LiftAndDragRow>,
     /// Modes of the aircraft and their levels; empty without `qualities.yaml`.
     pub qualities: Qualities,
+    /// Each maneuver flown again, in the order of the maneuvers; empty without `match.yaml`.
+    pub matched: Vec<Matched>,
     pub comparison: Vec<ComparisonRow>,
     pub maneuver_comparison: Vec<ManeuverComparisonRow>,
     /// Readings of the tunnel beyond its tables.

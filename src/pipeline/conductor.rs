@@ -9,6 +9,7 @@ use super::flight_contents::{FlightContents, source_file};
 use super::group_steps::{self, JointStep, PredictStep};
 use super::ingest_step::{self, IngestStep};
 use super::lift_check;
+use super::match_step::{self, MatchStep};
 use super::model_stage::{self, MODEL_VERSION};
 use super::progress::Progress;
 use super::qualities_stage::{self, QUALITIES_VERSION};
@@ -26,7 +27,7 @@ use crate::store::{Contents, Store};
 
 /// Name and version of each method whose artefacts the store keeps.
 #[must_use]
-pub fn step_versions() -> [(&'static str, u32); 6] {
+pub fn step_versions() -> [(&'static str, u32); 7] {
     [
         version_of::<IngestStep>(),
         version_of::<SegmentStep>(),
@@ -34,6 +35,7 @@ pub fn step_versions() -> [(&'static str, u32); 6] {
         version_of::<EstimateStep>(),
         version_of::<JointStep>(),
         version_of::<PredictStep>(),
+        version_of::<MatchStep>(),
     ]
 }
 
@@ -199,6 +201,9 @@ impl<'a> Conductor<'a> {
         }
         if until >= Stage::Qualities {
             qualities_stage::judge_qualities(config, &mut campaign);
+        }
+        if until >= Stage::Match {
+            match_step::fly_again(runner, &mut campaign)?;
         }
         if until >= Stage::Compare {
             trend_stage::compare(config, &self.earlier, &mut campaign);

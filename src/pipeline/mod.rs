@@ -1,6 +1,6 @@
 //! The pipeline: the stages of a campaign, brought up to date in order.
 //!
-//! Ingest, segment, surfaces, estimate, joint estimate and prediction are steps ([`step::Step`]): artefacts
+//! Ingest, segment, surfaces, estimate, joint estimate, prediction and proof of match are steps ([`step::Step`]): artefacts
 //! of the store, each a function of a key. [`step_runner::StepRunner`] loads an artefact or makes
 //! it, so what is up to date is not done again and a killed run goes on where it was. Trends,
 //! posterior, flying qualities, comparison and report are small and made anew each time. [`Conductor`] brings the stages in
@@ -17,6 +17,7 @@ mod group_steps;
 mod ingest_step;
 mod ingested;
 mod lift_check;
+mod match_step;
 mod memory_shares;
 mod problems;
 mod progress;

@@ -121,7 +121,7 @@ fn reason(failure: Failure) -> String {
 }
 
 /// Rows of each maneuver, which stand together.
-fn by_maneuver(rows: &[EstimateRow]) -> BTreeMap<&str, &[EstimateRow]> {
+pub fn by_maneuver(rows: &[EstimateRow]) -> BTreeMap<&str, &[EstimateRow]> {
     rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id)
         .map(|own| (own[0].maneuver_id.as_str(), own))
         .collect()

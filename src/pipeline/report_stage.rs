@@ -75,6 +75,8 @@ pub fn make_report(
         trends: &campaign.trends,
         specification: config.qualities.as_ref(),
         qualities: &campaign.qualities,
+        tolerances: config.proof_of_match.as_ref(),
+        matched: &campaign.matched,
         comparison: &campaign.comparison,
         flights: &campaign.flight_rows,
         channels: &campaign.channels,

@@ -25,10 +25,12 @@ use rayon::prelude::*;
 use crate::maneuver::{Maneuver, Means};
 use crate::tables::{LevelRow, QualityRow, RootRow};
 use analysis::Analysis;
-use trim::FlownConditions;
 
 pub use basis::Basis;
+pub use linear::{Controls, Flight, LinearModel};
+pub use quantities::Differentiation;
 pub use specification::{Range, Specification};
+pub use trim::FlownConditions;
 
 /// States that the feedback of a specification may use.
 pub const FEEDBACK_STATES: [&str; 7] = [

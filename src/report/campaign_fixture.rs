@@ -9,12 +9,14 @@ use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, Status};
 use crate::output_error::identifiability::Limits;
+use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, Airframe, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
     CorrelationRow, DeviationBasis, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow,
-    History, HistoryOutput, InstrumentRow, Level, LevelRow, Outcome, PosteriorRow, QualityRow,
-    Quantity, RootRow, TrendRow, TunnelDifference, TunnelVerdict,
+    History, HistoryOutput, InstrumentRow, Level, LevelRow, MatchRow, MatchVerdict,
+    MatchVerdictRow, MatchedQuantity, ModelSource, Outcome, PosteriorRow, QualityRow, Quantity,
+    RootRow, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -29,6 +31,8 @@ pub struct Campaign {
     pub trends: Vec<TrendRow>,
     pub specification: Option<Specification>,
     pub qualities: Qualities,
+    pub tolerances: Option<proof_of_match::Specification>,
+    pub matched: Vec<Matched>,
     pub posterior: Vec<PosteriorRow>,
     pub comparison: Vec<ComparisonRow>,
     pub flights: Vec<FlightRow>,
@@ -62,6 +66,8 @@ impl Campaign {
             trends: &self.trends,
             specification: self.specification.as_ref(),
             qualities: &self.qualities,
+            tolerances: self.tolerances.as_ref(),
+            matched: &self.matched,
             comparison: &self.comparison,
             flights: &self.flights,
             channels: &self.channels,
@@ -132,6 +138,7 @@ pub fn campaign() -> Campaign {
         )],
     };
     judge(&mut campaign);
+    fly_again(&mut campaign);
     campaign.fits[0].outcome = Outcome::NotConverged;
     campaign.estimates[5].value = Some(1e6);
     campaign.checks.push(CheckRow {
@@ -238,6 +245,108 @@ fn judge(campaign: &mut Campaign) {
                 imaginary,
             });
         }
+    }
+}
+
+/// Proof of match of four maneuvers: two inside, one outside, one not flown.
+fn fly_again(campaign: &mut Campaign) {
+    let text = include_str!("../../pipelines/harv/match.yaml");
+    campaign.tolerances = serde_yaml::from_str(text).ok();
+    for (i, margin) in [Some(0.4), Some(0.2), Some(-0.5), None]
+        .into_iter()
+        .enumerate()
+    {
+        let Some(maneuver) = campaign.maneuvers.get(i) else {
+            continue;
+        };
+        let verdict = match margin {
+            Some(margin) if margin >= 0.0 => MatchVerdict::Inside,
+            Some(_) => MatchVerdict::Outside,
+            None => MatchVerdict::NotFlown,
+        };
+        let models = [(ModelSource::Posterior, 0.0), (ModelSource::Tunnel, -0.1)];
+        let verdicts = models.map(|(model, less)| MatchVerdictRow {
+            maneuver_id: maneuver.maneuver_id.clone(),
+            flight_id: maneuver.flight_id.clone(),
+            class: maneuver.class.clone(),
+            alpha_deg: maneuver.alpha_deg,
+            model,
+            verdict,
+            margin: margin.map(|m: f64| m + less),
+            decided_by: margin.map_or("", |_| "2.c.10 an_g").to_owned(),
+            repeat_pct: margin.map(|margin| 50.0 + 100.0 * margin),
+            closed_loop: margin.map(|_| usize::from(i == 1)),
+            reason: margin.map_or("no signal", |_| "").to_owned(),
+        });
+        let mut matched = Matched {
+            verdicts: verdicts.to_vec(),
+            ..Matched::default()
+        };
+        if margin.is_some() {
+            for (quantity, within) in [
+                (MatchedQuantity::PitchAttitude, 1.5),
+                (MatchedQuantity::NormalAcceleration, 0.1),
+            ] {
+                matched
+                    .rows
+                    .push(match_row(maneuver, quantity, (within, margin, verdict)));
+            }
+            matched.history = Some(flown_again(maneuver));
+        }
+        campaign.matched.push(matched);
+    }
+}
+
+fn match_row(
+    maneuver: &Maneuver,
+    quantity: MatchedQuantity,
+    (within, margin, verdict): (f64, Option<f64>, MatchVerdict),
+) -> MatchRow {
+    MatchRow {
+        maneuver_id: maneuver.maneuver_id.clone(),
+        flight_id: maneuver.flight_id.clone(),
+        class: maneuver.class.clone(),
+        alpha_deg: maneuver.alpha_deg,
+        model: ModelSource::Posterior,
+        test: "2.c.10".into(),
+        subject: "short-period dynamics".into(),
+        requirement: 1,
+        quantity,
+        unit: quantity.unit().into(),
+        tolerance: Some(within),
+        tolerance_pct: None,
+        flight_value: None,
+        model_value: None,
+        samples: 50,
+        inside_pct: 100.0,
+        largest_excess: margin.map(|margin| -margin * within),
+        largest_excess_s: Some(12.0),
+        margin,
+        verdict,
+        repeat_pct: Some(90.0),
+    }
+}
+
+/// Pitch attitude and normal acceleration, measured and simulated.
+fn flown_again(maneuver: &Maneuver) -> History {
+    let times: Vec<f64> = (0..50).map(|k| 0.2 * f64::from(k)).collect();
+    let output = |quantity: MatchedQuantity, size: f64| HistoryOutput {
+        label: quantity.name().into(),
+        unit: quantity.unit().into(),
+        measured: times.iter().map(|t| size * t.sin()).collect(),
+        computed: times.iter().map(|t| size * (t + 0.1).sin()).collect(),
+        marked: vec![false; times.len()],
+    };
+    History {
+        maneuver_id: maneuver.maneuver_id.clone(),
+        class: maneuver.class.clone(),
+        alpha_deg: maneuver.alpha_deg,
+        outputs: vec![
+            output(MatchedQuantity::PitchAttitude, 5.0),
+            output(MatchedQuantity::NormalAcceleration, 0.5),
+        ],
+        controls: vec![],
+        time_s: times.clone(),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::error::Problem;
 use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
 use crate::output_error::identifiability::Limits;
+use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
@@ -44,6 +45,9 @@ pub struct Contents<'a> {
     /// Specification of flying qualities, and what it finds; empty without one.
     pub specification: Option<&'a Specification>,
     pub qualities: &'a Qualities,
+    /// Tolerances of the proof of match, and each maneuver flown again; empty without them.
+    pub tolerances: Option<&'a proof_of_match::Specification>,
+    pub matched: &'a [Matched],
     pub comparison: &'a [ComparisonRow],
     pub flights: &'a [FlightRow],
     pub channels: &'a [ChannelRow],

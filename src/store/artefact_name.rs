@@ -24,10 +24,12 @@ pub enum Kind {
     Joint,
     /// Prediction of a maneuver from others.
     Predict,
+    /// Maneuver flown again by simulators.
+    Match,
 }
 
 impl Kind {
-    pub const ALL: [Kind; 8] = [
+    pub const ALL: [Kind; 9] = [
         Kind::Ingest,
         Kind::Records,
         Kind::Segment,
@@ -36,6 +38,7 @@ impl Kind {
         Kind::History,
         Kind::Joint,
         Kind::Predict,
+        Kind::Match,
     ];
 
     /// Name of the kind's folder, and of the method that makes the artefacts.
@@ -50,6 +53,7 @@ impl Kind {
             Kind::History => "history",
             Kind::Joint => "joint",
             Kind::Predict => "predict",
+            Kind::Match => "match",
         }
     }
 

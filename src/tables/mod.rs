@@ -13,6 +13,7 @@ mod history;
 mod page;
 mod posterior;
 mod predictions;
+mod proof_of_match;
 mod published;
 mod qualities;
 mod trends;
@@ -38,6 +39,7 @@ pub use posterior::{
     SelfCheckRow,
 };
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
+pub use proof_of_match::{MatchRow, MatchVerdict, MatchVerdictRow, MatchedQuantity, ModelSource};
 pub use published::{PublishedTrend, PublishedVerdict};
 pub use qualities::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
 pub use trends::{OutlierRow, TrendRow};

@@ -6,8 +6,8 @@ use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
     ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, LevelRow,
-    LiftAndDragRow, ManeuverComparisonRow, OutlierRow, PosteriorRow, PredictedRow, QualityRow,
-    RootRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
+    LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, OutlierRow, PosteriorRow,
+    PredictedRow, QualityRow, RootRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -89,6 +89,8 @@ pub fn page() -> String {
     table::<QualityRow>(&mut page);
     table::<LevelRow>(&mut page);
     table::<RootRow>(&mut page);
+    table::<MatchRow>(&mut page);
+    table::<MatchVerdictRow>(&mut page);
     table::<ComparisonRow>(&mut page);
     table::<ManeuverComparisonRow>(&mut page);
     table::<VerdictRow>(&mut page);

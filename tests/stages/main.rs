@@ -23,6 +23,7 @@ mod nights;
 mod object_store;
 mod pages;
 mod paper;
+mod proof_of_match;
 mod qualities;
 mod python;
 mod report;

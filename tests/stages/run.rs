@@ -149,6 +149,17 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
         "airframe axis alpha_deg real imaginary",
     ),
     (
+        "match",
+        "match",
+        "maneuver_id flight_id class alpha_deg model test subject requirement quantity unit tolerance tolerance_pct flight_value \
+         model_value samples inside_pct largest_excess largest_excess_s margin verdict repeat_pct",
+    ),
+    (
+        "match",
+        "match_verdicts",
+        "maneuver_id flight_id class alpha_deg model verdict margin decided_by repeat_pct closed_loop reason",
+    ),
+    (
         "compare",
         "comparison",
         "derivative unit alpha_deg mach flight standard_error flight_share_pct wind_tunnel difference uncertainty difference_pct z verdict",
@@ -193,13 +204,14 @@ const WITHOUT_ROWS: [&str; 7] = [
     "unknown",
 ];
 
-const STAGES: [&str; 8] = [
+const STAGES: [&str; 9] = [
     "ingest",
     "segment",
     "estimate",
     "trend",
     "model",
     "qualities",
+    "match",
     "compare",
     "report",
 ];

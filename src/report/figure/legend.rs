@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::style::{EXCLUDED_COLOUR, INK, MEASURED_COLOUR};
+use super::style::{EXCLUDED_COLOUR, INK, MEASURED_COLOUR, TOLERANCE_AREA, TOLERANCE_LIMIT};
 
 /// One entry of a legend.
 #[derive(Clone, Debug, Serialize)]
@@ -50,4 +50,17 @@ pub fn time_history(has_excluded_samples: bool) -> Vec<LegendView> {
         legend.push(LegendView::new(key(12, &dot), "left out of the cost"));
     }
     legend
+}
+
+/// Legend of a maneuver that was flown again.
+#[must_use]
+pub fn flown_again() -> Vec<LegendView> {
+    let tube = format!(
+        r#"<rect x="0" y="1" width="24" height="10" fill="{TOLERANCE_AREA}" stroke="{TOLERANCE_LIMIT}"/>"#
+    );
+    vec![
+        LegendView::new(key(24, &line(MEASURED_COLOUR, "", 4.0)), "measured"),
+        LegendView::new(key(24, &line(INK, "", 1.4)), "flown again"),
+        LegendView::new(key(24, &tube), "tolerance"),
+    ]
 }

@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use super::scale::Scale;
-use super::style::{EXCLUDED_COLOUR, FAINT, INK};
+use super::style::{EXCLUDED_COLOUR, FAINT, INK, TOLERANCE_AREA, TOLERANCE_LIMIT};
 use super::svg_writer::{Anchor, PathStyle, SvgWriter, TextStyle, coordinate, polyline, rectangle};
 use crate::report::notation::Digits;
 
@@ -18,6 +18,8 @@ pub struct Strip {
     pub height: f64,
     pub scale: Scale,
     pub lines: Vec<StripLine>,
+    /// Tolerance drawn as an area behind the lines: time, lower and upper limit.
+    pub tube: Vec<(f64, f64, f64)>,
     /// Samples drawn as dots: those excluded from the cost.
     pub dots: Vec<(f64, f64)>,
     pub flagged: FlaggedSpans,
@@ -60,6 +62,7 @@ impl Strip {
             height,
             scale,
             lines,
+            tube: vec![],
             dots: vec![],
             flagged: FlaggedSpans::default(),
             attributes: vec![],
@@ -275,6 +278,7 @@ impl StripColumn {
                 .collect();
             svg.open_group(&attributes, "");
         }
+        self.tube(svg, strip, top);
         for line in &strip.lines {
             let style = PathStyle {
                 dash: line.dash,
@@ -294,6 +298,21 @@ impl StripColumn {
         if !strip.attributes.is_empty() {
             svg.close_group();
         }
+    }
+
+    /// Area and limits of a tolerance.
+    fn tube(&self, svg: &mut SvgWriter, strip: &Strip, top: f64) {
+        if strip.tube.is_empty() {
+            return;
+        }
+        let place = |time_s: f64, value: f64| (self.x(time_s), strip.y(top, value));
+        let upper = strip.tube.iter().map(|(t, _, upper)| place(*t, *upper));
+        let lower = strip.tube.iter().map(|(t, lower, _)| place(*t, *lower));
+        let around = upper.clone().chain(lower.clone().rev());
+        let area = format!("{}z", polyline(around));
+        svg.path(&area, PathStyle::filled(TOLERANCE_AREA));
+        let limits = [polyline(upper), polyline(lower)].concat();
+        svg.path(&limits, PathStyle::line(TOLERANCE_LIMIT, 0.6));
     }
 
     fn line(&self, line: &StripLine, strip: &Strip, top: f64) -> String {

@@ -6,16 +6,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::class_markers::ClassMarkers;
-use super::history_strips;
+use super::{history_strips, match_strips};
 use crate::error::Problem;
 use crate::maneuver::{Maneuver, Status};
+use crate::proof_of_match::Matched;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{self, LegendView};
 use crate::report::notation::{
     self, Digits, NOTHING, angle, count, fixed, number, outcome_in_words,
 };
 use crate::report::table_view::TableView;
-use crate::tables::{AgreementRow, EstimateRow, FitRow, History};
+use crate::tables::{AgreementRow, EstimateRow, FitRow, History, MatchVerdict};
 
 /// Page of one maneuver.
 #[derive(Clone, Debug, Serialize)]
@@ -32,6 +33,10 @@ pub struct ManeuverPage {
     /// Time history; empty if no response was computed.
     pub svg: String,
     pub legend: Vec<LegendView>,
+    /// The maneuver flown again; empty where it was not.
+    pub match_svg: String,
+    pub match_legend: Vec<LegendView>,
+    pub match_caption: String,
     pub estimates: TableView,
     pub problems: Vec<String>,
 }
@@ -62,6 +67,7 @@ pub fn pages(contents: &Contents, markers: &ClassMarkers) -> Vec<ManeuverPage> {
         estimates: group_by(contents.estimates, |e| &e.maneuver_id),
         predictions: group_by(contents.predictions, |p| &p.maneuver_id),
         problems: group_by(contents.problems, |p| &p.place),
+        matched: group_by(contents.matched, Matched::maneuver_id),
     };
     let maneuvers: Vec<(usize, &Maneuver)> = with_page(contents).collect();
     maneuvers
@@ -78,15 +84,19 @@ struct RowsByManeuver<'a> {
     estimates: BTreeMap<&'a str, Vec<&'a EstimateRow>>,
     predictions: BTreeMap<&'a str, Vec<&'a AgreementRow>>,
     problems: BTreeMap<&'a str, Vec<&'a Problem>>,
+    matched: BTreeMap<&'a str, Vec<&'a Matched>>,
 }
 
 impl RowsByManeuver<'_> {
     fn page(&self, maneuver: &Maneuver, number: usize) -> ManeuverPage {
         let id = maneuver.maneuver_id.as_str();
         let history = self.histories.get(id).and_then(|h| h.first());
+        let matched = self.matched.get(id).and_then(|m| m.first()).copied();
+        let flown_again = matched.and_then(|m| Some((m, m.history.as_ref()?)));
         let mut facts = flight_condition(maneuver);
         facts.extend(fit_facts(self.fits.get(id).copied()));
         facts.extend(self.predictions.get(id).map(|rows| prediction_fact(rows)));
+        facts.extend(matched.into_iter().flat_map(match_facts));
         ManeuverPage {
             anchor: format!("m{number}"),
             maneuver_id: id.to_owned(),
@@ -100,6 +110,12 @@ impl RowsByManeuver<'_> {
             legend: history.map_or_else(Vec::new, |h| {
                 legend::time_history(h.outputs.iter().any(|o| o.marked.contains(&true)))
             }),
+            match_svg: flown_again.map_or_else(String::new, |(matched, history)| {
+                let rows = matched.first_rows().collect::<Vec<_>>();
+                match_strips::draw(history, &rows, format!("p{number}"))
+            }),
+            match_legend: flown_again.map_or_else(Vec::new, |_| legend::flown_again()),
+            match_caption: flown_again.map_or_else(String::new, |(m, _)| match_caption(m)),
             estimates: estimates(self.estimates.get(id).map_or(&[], Vec::as_slice)),
             problems: self
                 .problems
@@ -110,6 +126,39 @@ impl RowsByManeuver<'_> {
                 .collect(),
         }
     }
+}
+
+/// Verdict of each model.
+fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String)> {
+    matched.verdicts.iter().map(|row| {
+        let name = format!("Match, {}", row.model);
+        let value = match row.verdict {
+            MatchVerdict::NotFlown => format!("not flown again: {}", row.reason),
+            verdict => format!(
+                "{verdict} the tolerances, margin {}, decided by {}; a repeat flight passes with {} %",
+                number(row.margin, 2),
+                row.decided_by,
+                number(row.repeat_pct, 3)
+            ),
+        };
+        fact(&name, value)
+    })
+}
+
+/// Model and loop of the drawn simulation.
+fn match_caption(matched: &Matched) -> String {
+    let first = matched.verdicts.first();
+    let model = first.map_or("", |row| row.model.name());
+    let closed = first.is_some_and(|row| row.closed_loop == Some(1));
+    let note = if closed {
+        " Feedback moved the surfaces: they are those recorded."
+    } else {
+        ""
+    };
+    format!(
+        "Flown again with the derivatives of the {model}, free-running from the matched start with the \
+         recorded surfaces.{note}"
+    )
 }
 
 fn fact(name: &str, value: String) -> (String, String) {

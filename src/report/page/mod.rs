@@ -14,6 +14,9 @@ mod history_strips;
 mod identifiability_tables;
 mod maneuver_page;
 mod maneuver_table;
+mod match_charts;
+mod match_section;
+mod match_strips;
 mod prediction_table;
 mod qualities_section;
 mod quality_charts;
@@ -36,6 +39,7 @@ use correlation_triangle::CorrelationTriangle;
 use derivative_page::DerivativeGroup;
 use derivative_results::DerivativeResults;
 use maneuver_page::ManeuverPage;
+use match_section::MatchSection;
 use qualities_section::QualitiesSection;
 use summary::Summary;
 use verdict_table::VerdictGroup;
@@ -55,6 +59,7 @@ pub struct Page<'a> {
     classes: Vec<ClassOutcomes>,
     verdicts: Vec<VerdictGroup>,
     qualities: Option<QualitiesSection>,
+    proof_of_match: Option<MatchSection>,
     derivative_groups: Vec<DerivativeGroup>,
     never_estimated: Vec<&'a str>,
     inputs: Vec<ClassFigure>,
@@ -92,6 +97,7 @@ impl<'a> Page<'a> {
             classes,
             verdicts: verdict_table::by_axis(&derivatives, &anchors),
             qualities: qualities_section::section(contents),
+            proof_of_match: match_section::section(contents, &markers),
             derivative_groups: derivative_page::groups(&derivatives, &anchors, &markers),
             never_estimated: never_estimated(contents, &derivatives),
             inputs: class_figures::inputs(contents, &markers),

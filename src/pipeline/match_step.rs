@@ -1,0 +1,192 @@
+//! Proof of match of the campaign: one artefact a maneuver, flown again by each model.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::campaign::Campaign;
+use super::estimate_step::LazyRecord;
+use super::ingested::Flight;
+use super::model_stage::by_maneuver;
+use super::step::{Made, Step};
+use super::step_runner::StepRunner;
+use crate::aero::{Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::config::Config;
+use crate::error::Result;
+use crate::maneuver::{Maneuver, Means};
+use crate::model::Model;
+use crate::proof_of_match::{self, Basis, Flown, Matched, OwnEstimates, Specification};
+use crate::store::{ArtefactName, Fingerprint, Kind};
+use crate::surfaces::DelayCorrection;
+use crate::tables::{EstimateRow, ModelSource, Outcome};
+
+/// Everything that decides a maneuver's proof of match.
+#[derive(Serialize)]
+pub struct MatchKey<'a> {
+    /// Fingerprint of the flight's ingest.
+    ingest: &'a str,
+    maneuver: &'a Maneuver,
+    aircraft: &'a Aircraft,
+    model: &'a Buildup,
+    specification: &'a Specification,
+    /// Fingerprint of all models' derivatives, and of the posterior with its covariance.
+    derivatives: &'a str,
+    /// The maneuver's own estimates and means, from which its Dutch roll follows.
+    own: Option<(&'a Means, OwnEstimates)>,
+    delays: &'a [DelayCorrection],
+}
+
+/// Proof of match of one maneuver.
+pub struct MatchStep<'a> {
+    basis: &'a Basis<'a>,
+    posterior: &'a Model,
+    derivatives: &'a str,
+    record: &'a LazyRecord<'a>,
+    delays: &'a [DelayCorrection],
+    maneuver: &'a Maneuver,
+    own: Option<(&'a Means, OwnEstimates)>,
+}
+
+impl<'a> Step for MatchStep<'a> {
+    type Key = MatchKey<'a>;
+    type Artefact = Matched;
+
+    const KIND: Kind = Kind::Match;
+    const VERSION: u32 = 1;
+
+    fn item(&self) -> &str {
+        &self.maneuver.maneuver_id
+    }
+
+    fn key(&self) -> MatchKey<'a> {
+        MatchKey {
+            ingest: &self.record.flight.fingerprint,
+            maneuver: self.maneuver,
+            aircraft: self.basis.aircraft,
+            model: self.basis.buildup,
+            specification: self.basis.specification,
+            derivatives: self.derivatives,
+            own: self.own.clone(),
+            delays: self.delays,
+        }
+    }
+
+    fn make(&self, _: &ArtefactName) -> Result<Made<Matched>> {
+        if self.maneuver.is_rejected() {
+            let reason = format!("rejected: {}", self.maneuver.quality.reason);
+            let matched = proof_of_match::not_flown(self.basis, self.maneuver, &reason);
+            return Ok(Made::Settled(matched));
+        }
+        let record = self.record.part(self.maneuver)?;
+        let condition = self.maneuver.condition(self.basis.tunnel);
+        let local = self.posterior.at(self.maneuver.axis, &condition);
+        let flown = Flown {
+            record: &record,
+            maneuver: self.maneuver,
+            local: Some(&local),
+            own: self.own.as_ref().map(|(means, own)| (*means, own)),
+        };
+        let mut matched = proof_of_match::fly_again(self.basis, &flown);
+        matched.history = matched.history.map(|h| crate::report::thinned(&h));
+        Ok(Made::Settled(matched))
+    }
+}
+
+/// Flies every maneuver again, where the pipeline has tolerances.
+///
+/// # Errors
+/// A fault that stops the run.
+pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
+    let Some(specification) = &runner.config.proof_of_match else {
+        return Ok(());
+    };
+    let tunnel = runner.config.tunnel.clamped();
+    let models = models(runner.config, campaign, specification);
+    let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
+    let derivatives = Fingerprint::of("models", 1)
+        .with(&models)
+        .with(&tunnel)
+        .with(&campaign.model.rows.posterior)
+        .with(&campaign.model.rows.covariance)
+        .finish();
+    let basis = Basis {
+        aircraft: &runner.config.aircraft,
+        buildup: &runner.config.buildup,
+        models: &models,
+        posterior: &posterior,
+        tunnel: &tunnel,
+        specification,
+    };
+    let estimates = by_maneuver(&campaign.estimates);
+    let of_flight = |flight: &Flight| {
+        let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
+        let own = campaign.maneuvers.iter().enumerate();
+        let own = own.filter(|(_, m)| m.flight_id == flight.id());
+        let steps: Vec<MatchStep> = own
+            .map(|(i, maneuver)| MatchStep {
+                basis: &basis,
+                posterior: &campaign.model,
+                derivatives: &derivatives,
+                record: &record,
+                delays: &campaign.delays,
+                maneuver,
+                own: own_estimates(campaign, &estimates, i),
+            })
+            .collect();
+        runner.bring_all(&steps)
+    };
+    let brought: Result<Vec<Vec<_>>> =
+        runner.with_progress("match", campaign.maneuvers.len(), || {
+            campaign.flights.par_iter().map(of_flight).collect()
+        });
+    let brought = brought?.into_iter().flatten().flatten();
+    campaign.matched = brought.map(|brought| brought.artefact).collect();
+    Ok(())
+}
+
+/// Means and estimates of a maneuver that converged.
+fn own_estimates<'a>(
+    campaign: &'a Campaign,
+    estimates: &BTreeMap<&str, &[EstimateRow]>,
+    index: usize,
+) -> Option<(&'a Means, OwnEstimates)> {
+    let maneuver = campaign.maneuvers.get(index)?;
+    let fit = campaign.fits.get(index)?;
+    let covariance = campaign.covariances.get(index)?.as_ref()?;
+    let means = campaign.means.get(index)?.as_ref()?;
+    let rows = estimates.get(maneuver.maneuver_id.as_str())?;
+    let value = |row: &EstimateRow| Some((row.derivative.clone(), row.value?));
+    let own = OwnEstimates {
+        values: rows.iter().filter_map(value).collect(),
+        estimated: covariance.names.clone(),
+        covariance: covariance.corrected.clone(),
+    };
+    (fit.outcome == Outcome::Converged).then_some((means, own))
+}
+
+/// Derivatives of each model that the specification names.
+fn models(
+    config: &Config,
+    campaign: &Campaign,
+    specification: &Specification,
+) -> Vec<(ModelSource, WindTunnel)> {
+    let tunnel = &config.tunnel;
+    let groups: Vec<&str> = config
+        .trend
+        .groups
+        .iter()
+        .map(|g| g.name.as_str())
+        .collect();
+    let database = |model: ModelSource| match model {
+        ModelSource::Posterior => {
+            proof_of_match::of_posterior(&campaign.model.rows.posterior, tunnel)
+        }
+        ModelSource::Trend => proof_of_match::of_trends(&campaign.trends, &groups, tunnel),
+        ModelSource::Tunnel => tunnel.clamped(),
+        ModelSource::Database => config.match_database.clamped(),
+    };
+    let models = specification.models.iter();
+    models.map(|model| (*model, database(*model))).collect()
+}

@@ -1,0 +1,233 @@
+//! Aerodynamic coefficients of a simulation: those of the trim, and their change with everything that
+//! moves from it.
+//!
+//! C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim), with the derivatives at the present angle of attack.
+//! A derivative is the local slope, as it is estimated; the level of a coefficient is matched at the
+//! trim, so constants of the database do not enter.
+
+use nalgebra::Vector3;
+
+use super::derivative_table::{DerivativeTable, Place};
+use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
+use crate::aircraft::Aircraft;
+use crate::flight::signal;
+
+/// Number of coefficients: CN, Cm, CA, CY, Cl, Cn.
+pub const COEFFICIENTS: usize = 6;
+
+/// Signals that the simulation has itself; all others of the build-up are recorded.
+const OWN_SIGNALS: [&str; 2] = [signal::VELOCITY, signal::MACH];
+
+/// Recorded signals of a build-up, each once: surfaces and vanes.
+#[must_use]
+pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
+    let all = buildup
+        .derivatives
+        .iter()
+        .flat_map(|d| d.regressor.signals());
+    let mut signals: Vec<&str> = all.filter(|name| !OWN_SIGNALS.contains(name)).collect();
+    signals.sort_unstable();
+    signals.dedup();
+    signals
+}
+
+/// Flow at the c.g. and rotation, in deg, rad/s, ft/s, lbf/ft².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flow {
+    pub alpha_deg: f64,
+    pub beta_deg: f64,
+    pub velocity: f64,
+    pub mach: f64,
+    pub rates: [f64; 3],
+    pub qbar: f64,
+}
+
+/// Factor of a derivative, with the constants that it needs.
+#[derive(Clone, Debug, PartialEq)]
+enum Factor {
+    Constant,
+    Alpha,
+    Beta,
+    Velocity,
+    Mach,
+    /// Rate of an axis times half this length over the airspeed.
+    Rate {
+        axis: usize,
+        half_length: f64,
+    },
+    /// Recorded signal with this place.
+    Recorded(usize),
+    /// Recorded deflection over dynamic pressure times this area or volume.
+    Vane {
+        place: usize,
+        size: f64,
+    },
+    Magnitude(Box<Factor>),
+    Product(Box<[Factor; 2]>),
+}
+
+/// Terms of the build-up with the derivatives of one model.
+#[derive(Clone, Debug)]
+pub struct Aerodynamics<'a> {
+    aircraft: &'a Aircraft,
+    /// Coefficient and factor of each derivative, in the order of the build-up.
+    terms: Vec<(usize, Factor)>,
+    pub table: DerivativeTable,
+}
+
+/// Balance from which a simulation starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trim {
+    pub coefficients: [f64; COEFFICIENTS],
+    /// Factors of the derivatives at the trim.
+    pub factors: Vec<f64>,
+    pub alpha_deg: f64,
+}
+
+impl<'a> Aerodynamics<'a> {
+    #[must_use]
+    pub fn new(
+        aircraft: &'a Aircraft,
+        buildup: &Buildup,
+        table: DerivativeTable,
+    ) -> Aerodynamics<'a> {
+        let derivatives = buildup.derivatives.iter();
+        let recorded = recorded_signals(buildup);
+        let term = |d: &Derivative| {
+            let factors = Factors {
+                aircraft,
+                recorded: &recorded,
+                coefficient: d.coefficient,
+            };
+            (index(d.coefficient), factors.of(&d.regressor))
+        };
+        Aerodynamics {
+            aircraft,
+            terms: derivatives.map(term).collect(),
+            table,
+        }
+    }
+
+    /// Factors of all derivatives in a flow, with the recorded signals.
+    pub fn factors<'b>(
+        &'b self,
+        flow: &'b Flow,
+        recorded: &'b [f64],
+    ) -> impl Iterator<Item = f64> + 'b {
+        let terms = self.terms.iter();
+        terms.map(|(_, factor)| factor.value(flow, recorded))
+    }
+
+    /// Change of the coefficients from the trim.
+    #[must_use]
+    pub fn change(&self, flow: &Flow, recorded: &[f64], trim: &Trim) -> [f64; COEFFICIENTS] {
+        let mut change = [0.0; COEFFICIENTS];
+        let (place, trimmed) = (self.place(flow.alpha_deg), self.place(trim.alpha_deg));
+        let terms = self.terms.iter().zip(&trim.factors).enumerate();
+        for (i, ((coefficient, factor), at_trim)) in terms {
+            change[*coefficient] += match factor {
+                Factor::Constant => 0.0,
+                Factor::Alpha => self.table.integral(place, i) - self.table.integral(trimmed, i),
+                _ => self.table.value(place, i) * (factor.value(flow, recorded) - at_trim),
+            };
+        }
+        change
+    }
+
+    fn place(&self, alpha_deg: f64) -> Place {
+        self.table.place(alpha_deg)
+    }
+
+    /// Force, lbf, and moment about the c.g., ft lbf, in body axes.
+    #[must_use]
+    pub fn loads(
+        &self,
+        coefficients: &[f64; COEFFICIENTS],
+        qbar: f64,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let [normal, pitching, axial, side, rolling, yawing] = *coefficients;
+        let area = qbar * self.aircraft.wing_area_ft2;
+        let (span, chord) = (self.aircraft.span_ft, self.aircraft.chord_ft);
+        (
+            Vector3::new(-axial, side, -normal) * area,
+            Vector3::new(span * rolling, chord * pitching, span * yawing) * area,
+        )
+    }
+}
+
+/// Place of a coefficient among those of both axes.
+fn index(coefficient: Coefficient) -> usize {
+    let first = match coefficient.axis() {
+        Axis::Longitudinal => 0,
+        Axis::Lateral => 3,
+    };
+    first + coefficient.index()
+}
+
+/// Aircraft, recorded signals and coefficient from which factors follow.
+struct Factors<'a> {
+    aircraft: &'a Aircraft,
+    recorded: &'a [&'a str],
+    coefficient: Coefficient,
+}
+
+impl Factors<'_> {
+    fn of(&self, regressor: &Regressor) -> Factor {
+        let rate = |axis: usize, length: f64| Factor::Rate {
+            axis,
+            half_length: 0.5 * length,
+        };
+        match regressor {
+            Regressor::Constant => Factor::Constant,
+            Regressor::Alpha => Factor::Alpha,
+            Regressor::Beta => Factor::Beta,
+            Regressor::RollRate => rate(0, self.aircraft.span_ft),
+            Regressor::PitchRate => rate(1, self.aircraft.chord_ft),
+            Regressor::YawRate => rate(2, self.aircraft.span_ft),
+            Regressor::Surface(name) if name == signal::VELOCITY => Factor::Velocity,
+            Regressor::Surface(name) if name == signal::MACH => Factor::Mach,
+            Regressor::Surface(name) => Factor::Recorded(self.place(name)),
+            Regressor::Vane(name) => Factor::Vane {
+                place: self.place(name),
+                size: self.size(),
+            },
+            Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.of(of))),
+            Regressor::Product(both) => {
+                Factor::Product(Box::new([self.of(&both[0]), self.of(&both[1])]))
+            }
+        }
+    }
+
+    fn place(&self, name: &str) -> usize {
+        let place = self.recorded.iter().position(|own| *own == name);
+        place.unwrap_or(usize::MAX)
+    }
+
+    /// Area, or volume of a moment, by which a vane's force is divided.
+    fn size(&self) -> f64 {
+        let length = match self.coefficient {
+            Coefficient::Cm => self.aircraft.chord_ft,
+            Coefficient::Cl | Coefficient::Cn => self.aircraft.span_ft,
+            Coefficient::CN | Coefficient::CA | Coefficient::CY => 1.0,
+        };
+        self.aircraft.wing_area_ft2 * length
+    }
+}
+
+impl Factor {
+    fn value(&self, flow: &Flow, recorded: &[f64]) -> f64 {
+        let at = |place: &usize| recorded.get(*place).copied().unwrap_or(0.0);
+        match self {
+            Factor::Constant => 1.0,
+            Factor::Alpha => flow.alpha_deg,
+            Factor::Beta => flow.beta_deg,
+            Factor::Velocity => flow.velocity,
+            Factor::Mach => flow.mach,
+            Factor::Rate { axis, half_length } => flow.rates[*axis] * half_length / flow.velocity,
+            Factor::Recorded(place) => at(place),
+            Factor::Vane { place, size } => at(place) / (flow.qbar * size),
+            Factor::Magnitude(of) => of.value(flow, recorded).abs(),
+            Factor::Product(both) => both[0].value(flow, recorded) * both[1].value(flow, recorded),
+        }
+    }
+}

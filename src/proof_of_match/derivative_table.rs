@@ -1,0 +1,142 @@
+//! Derivatives of a model over angle of attack in the flight condition of one maneuver, tabulated
+//! closely for the inner loop.
+
+use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
+
+/// Spacing of the table, deg. It is linear between, as most databases are.
+const STEP_DEG: f64 = 1.0;
+
+/// Reach of the table either way from the maneuver's mean, deg. Beyond, derivatives are constant.
+const REACH_DEG: f64 = 20.0;
+
+/// Derivatives over angle of attack. A derivative along α is tabulated as its integral from the
+/// table's start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DerivativeTable {
+    first_deg: f64,
+    nodes: usize,
+    /// Node by node, each derivative in the order of the build-up.
+    values: Vec<f64>,
+    derivatives: usize,
+}
+
+/// Place of an angle of attack in a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    row: usize,
+    /// Fraction of the interval; below 0 or above 1 beyond the table.
+    fraction: f64,
+}
+
+impl DerivativeTable {
+    /// Tabulates a model at a maneuver's condition. A derivative that the model lacks is the
+    /// fallback's, or zero.
+    #[must_use]
+    pub fn new(
+        buildup: &Buildup,
+        model: &WindTunnel,
+        fallback: &WindTunnel,
+        condition: &Condition,
+    ) -> DerivativeTable {
+        let first_deg = ((condition.alpha_deg - REACH_DEG) / STEP_DEG).floor() * STEP_DEG;
+        let nodes = node_count();
+        let derivatives = buildup.derivatives.len();
+        let mut values = vec![0.0; nodes * derivatives];
+        for (i, derivative) in buildup.derivatives.iter().enumerate() {
+            let source = if model.has(&derivative.name) {
+                model
+            } else {
+                fallback
+            };
+            let at = |node: usize| {
+                let alpha_deg = first_deg + STEP_DEG * node as f64;
+                let condition = Condition {
+                    alpha_deg,
+                    ..*condition
+                };
+                source
+                    .at(&derivative.name, &condition)
+                    .map_or(0.0, |v| v.value)
+            };
+            let mut column: Vec<f64> = (0..nodes).map(at).collect();
+            if derivative.regressor == Regressor::Alpha {
+                column = integral(&column);
+            }
+            for (node, value) in column.into_iter().enumerate() {
+                values[node * derivatives + i] = value;
+            }
+        }
+        DerivativeTable {
+            first_deg,
+            nodes,
+            values,
+            derivatives,
+        }
+    }
+
+    /// Raises one derivative by a constant.
+    pub fn raise(&mut self, derivative: usize, regressor: &Regressor, by: f64) {
+        for (node, row) in self.values.chunks_mut(self.derivatives).enumerate() {
+            let distance = if *regressor == Regressor::Alpha {
+                STEP_DEG * node as f64
+            } else {
+                1.0
+            };
+            row[derivative] += by * distance;
+        }
+    }
+
+    #[must_use]
+    pub fn place(&self, alpha_deg: f64) -> Place {
+        let steps = (alpha_deg - self.first_deg) / STEP_DEG;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative; what is no number becomes 0"
+        )]
+        let row = (steps.max(0.0) as usize).min(self.nodes - 2);
+        Place {
+            row,
+            fraction: steps - row as f64,
+        }
+    }
+
+    /// Derivative at a place, constant beyond the table.
+    #[must_use]
+    pub fn value(&self, place: Place, derivative: usize) -> f64 {
+        self.between(place.row, place.fraction.clamp(0.0, 1.0), derivative)
+    }
+
+    /// Integral of a derivative along α, to which the derivative is constant beyond the table.
+    #[must_use]
+    pub fn integral(&self, place: Place, derivative: usize) -> f64 {
+        self.between(place.row, place.fraction, derivative)
+    }
+
+    fn between(&self, row: usize, fraction: f64, derivative: usize) -> f64 {
+        let at = row * self.derivatives + derivative;
+        let (low, high) = (self.values[at], self.values[at + self.derivatives]);
+        low + fraction * (high - low)
+    }
+}
+
+fn node_count() -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small positive constant"
+    )]
+    let intervals = (2.0 * REACH_DEG / STEP_DEG) as usize + 1;
+    intervals + 1
+}
+
+/// Integral of a column by the trapezoidal rule.
+fn integral(slopes: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut integral = vec![0.0];
+    for pair in slopes.windows(2) {
+        sum += 0.5 * STEP_DEG * (pair[0] + pair[1]);
+        integral.push(sum);
+    }
+    integral
+}

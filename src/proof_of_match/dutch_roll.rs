@@ -1,0 +1,215 @@
+//! Dutch roll of a maneuver: of the flight by its own estimates, of a simulator by its model.
+//!
+//! Period, time to half and damping ratio follow from the same linear equations at the maneuver's
+//! condition ([`crate::qualities`]), so that only the derivatives differ. A maneuver has no free decay
+//! of several cycles from which they could be read.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::derivative_table::DerivativeTable;
+use super::deviations::independent;
+use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::maneuver::{Maneuver, Means};
+use crate::model::{LocalKind, LocalPosterior, LocalValue};
+use crate::numerics::random::RandomStream;
+use crate::qualities::{Controls, Differentiation, Flight, FlownConditions, LinearModel};
+use crate::tables::{MatchedQuantity, Quantity};
+
+/// Estimates of a maneuver.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct OwnEstimates {
+    /// Name and value of each derivative, estimated or held.
+    pub values: Vec<(String, f64)>,
+    /// Names of the estimated ones, and their corrected covariance row by row.
+    pub estimated: Vec<String>,
+    pub covariance: Vec<f64>,
+}
+
+/// Dutch roll of an oscillation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DutchRoll {
+    pub period_s: f64,
+    /// Time to half amplitude, or to double where it grows.
+    pub half_s: f64,
+    pub damping: f64,
+}
+
+impl DutchRoll {
+    /// Value of a quantity; `None` for a time history.
+    #[must_use]
+    pub fn value(&self, quantity: MatchedQuantity) -> Option<f64> {
+        match quantity {
+            MatchedQuantity::DutchRollPeriod => Some(self.period_s),
+            MatchedQuantity::DutchRollHalving => Some(self.half_s),
+            MatchedQuantity::DutchRollDamping => Some(self.damping),
+            _ => None,
+        }
+    }
+}
+
+/// Lateral equations at a maneuver's condition, with the maneuver's own estimates.
+#[derive(Clone, Debug)]
+pub struct LateralModes {
+    linear: LinearModel,
+    /// Derivatives of the equations, by their place in the build-up.
+    derivatives: Vec<usize>,
+    /// The maneuver's own values.
+    own: DVector<f64>,
+    /// Derivatives that the maneuver estimates; it holds the others.
+    estimated: Vec<bool>,
+    /// Independent errors of the estimates.
+    errors: Vec<DVector<f64>>,
+    alpha_deg: f64,
+    pub flight: DutchRoll,
+}
+
+impl LateralModes {
+    /// Equations of a maneuver; `None` where a derivative has no value or there is no oscillation.
+    #[must_use]
+    pub fn new(
+        (aircraft, buildup, tunnel): (&Aircraft, &Buildup, &WindTunnel),
+        (maneuver, means): (&Maneuver, &Means),
+        estimates: &OwnEstimates,
+    ) -> Option<LateralModes> {
+        let conditions = FlownConditions::new(&[(maneuver, means)], tunnel);
+        let trim = conditions.trim(maneuver.alpha_deg, aircraft)?;
+        let nothing = BTreeMap::new();
+        let flight = Flight {
+            aircraft,
+            buildup,
+            trim: &trim,
+            controls: Controls {
+                feedback: &nothing_by_surface(),
+                pitch: &nothing,
+            },
+        };
+        let derivatives = of_motion(buildup);
+        let own = |i: &usize| estimates.value(&buildup.derivatives[*i].name);
+        let own: Option<Vec<f64>> = derivatives.iter().map(own).collect();
+        let own = DVector::from_vec(own?);
+        let values = derivatives.iter().map(|i| LocalValue {
+            coefficient: buildup.derivatives[*i].coefficient,
+            derivative: buildup.derivatives[*i].name.clone(),
+            kind: LocalKind::Derivative,
+            is_mach_slope: false,
+        });
+        let linear = flight.lateral(&LocalPosterior {
+            values: values.collect(),
+            mean: own.clone(),
+            covariance: DMatrix::zeros(0, 0),
+        });
+        let names = derivatives
+            .iter()
+            .map(|i| buildup.derivatives[*i].name.as_str());
+        let names: Vec<&str> = names.collect();
+        Some(LateralModes {
+            flight: dutch_roll(&linear, &own)?,
+            estimated: names
+                .iter()
+                .map(|name| estimates.place(name).is_some())
+                .collect(),
+            errors: independent(&estimates.covariance_of(&names)),
+            alpha_deg: maneuver.alpha_deg,
+            linear,
+            derivatives,
+            own,
+        })
+    }
+
+    /// Dutch roll of a model.
+    #[must_use]
+    pub fn of_model(&self, table: &DerivativeTable) -> Option<DutchRoll> {
+        dutch_roll(&self.linear, &self.values(table))
+    }
+
+    fn values(&self, table: &DerivativeTable) -> DVector<f64> {
+        let place = table.place(self.alpha_deg);
+        let values = self.derivatives.iter().map(|i| table.value(place, *i));
+        DVector::from_iterator(self.own.len(), values)
+    }
+
+    /// Dutch roll that a repeat flight's estimates have: those of an aircraft that deviates from a
+    /// model, with errors of their own. What the maneuver holds stays.
+    #[must_use]
+    pub fn of_repeat(
+        &self,
+        mean: &DerivativeTable,
+        deviation: impl Fn(usize) -> f64,
+        stream: &mut RandomStream,
+    ) -> Option<DutchRoll> {
+        let mut values = self.values(mean);
+        for (value, derivative) in values.iter_mut().zip(&self.derivatives) {
+            *value += deviation(*derivative);
+        }
+        for error in &self.errors {
+            values.axpy(stream.normal(), error, 1.0);
+        }
+        for ((value, own), is_estimated) in values.iter_mut().zip(&self.own).zip(&self.estimated) {
+            if !is_estimated {
+                *value = *own;
+            }
+        }
+        dutch_roll(&self.linear, &values)
+    }
+}
+
+impl OwnEstimates {
+    fn value(&self, name: &str) -> Option<f64> {
+        let own = self.values.iter().find(|(own, _)| own == name);
+        own.map(|(_, value)| *value)
+    }
+
+    fn place(&self, name: &str) -> Option<usize> {
+        self.estimated.iter().position(|own| own == name)
+    }
+
+    /// Covariance of some derivatives; zero for those that are held.
+    fn covariance_of(&self, names: &[&str]) -> DMatrix<f64> {
+        let places: Vec<Option<usize>> = names.iter().map(|name| self.place(name)).collect();
+        let count = self.estimated.len();
+        let entry = |i: usize, j: usize| {
+            let at = places[i]? * count + places[j]?;
+            self.covariance.get(at).copied()
+        };
+        DMatrix::from_fn(names.len(), names.len(), |i, j| entry(i, j).unwrap_or(0.0))
+    }
+}
+
+/// Lateral derivatives of the motion; surfaces are fixed.
+fn of_motion(buildup: &Buildup) -> Vec<usize> {
+    let is_of_motion = |d: &Derivative| {
+        let is_motion = d.regressor.surface().is_none() && d.regressor != Regressor::Constant;
+        is_motion && d.coefficient.axis() == Axis::Lateral
+    };
+    let derivatives = buildup.derivatives.iter().enumerate();
+    derivatives
+        .filter(|(_, d)| is_of_motion(d))
+        .map(|(i, _)| i)
+        .collect()
+}
+
+fn nothing_by_surface() -> BTreeMap<String, BTreeMap<String, f64>> {
+    BTreeMap::new()
+}
+
+/// Dutch roll of the equations at values of their derivatives; `None` where it does not oscillate.
+fn dutch_roll(linear: &LinearModel, values: &DVector<f64>) -> Option<DutchRoll> {
+    let found = linear.quantities(Axis::Lateral, values, Differentiation::ValuesAlone)?;
+    let value = |quantity: Quantity| {
+        let own = found.quantities.iter().find(|(q, _)| *q == quantity);
+        own.map(|(_, dual)| dual.value)
+    };
+    let frequency = value(Quantity::DutchRollFrequency)?;
+    let damping = value(Quantity::DutchRollDamping)?;
+    let damped = frequency * (1.0 - damping * damping).sqrt();
+    let found = DutchRoll {
+        period_s: 2.0 * std::f64::consts::PI / damped,
+        half_s: std::f64::consts::LN_2 / (damping * frequency).abs(),
+        damping,
+    };
+    let is_finite = found.period_s.is_finite() && found.half_s.is_finite();
+    is_finite.then_some(found)
+}

@@ -1,0 +1,149 @@
+//! Free run: the rigid body flies from a start with the recorded surfaces, thrust and mass, and nothing
+//! else of the record.
+
+use super::aerodynamics::{Aerodynamics, COEFFICIENTS, Flow, Trim};
+use super::outputs::{Outputs, outputs};
+use super::recording::Recording;
+use crate::aircraft::Aircraft;
+use crate::numerics::runge_kutta::{self, POINT};
+use crate::rigid_body::{AirData, BodyState, Euler, Instant, Loads, body};
+use crate::units::DEG;
+use nalgebra::Vector3;
+
+/// Angle of attack beyond which the aircraft has departed, deg: no build-up has a meaning there.
+const DEPARTURE_DEG: f64 = 90.0;
+
+/// Number of states at the start.
+pub const STATES: usize = 8;
+
+/// State and balance from which a simulation starts. Heading and place over the ground decide nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// α, β, airspeed, p, q, r, pitch attitude, bank; rad, ft/s, rad/s.
+    pub state: [f64; STATES],
+    pub altitude_ft: f64,
+    /// Dynamic pressure as measured over that of the standard atmosphere: the density of the day.
+    pub density_ratio: f64,
+    pub trim: Trim,
+}
+
+impl Start {
+    /// The start with one of its states, or after them trim coefficients, changed.
+    #[must_use]
+    pub fn moved(&self, parameter: usize, by: f64) -> Start {
+        let mut start = self.clone();
+        match start.state.get_mut(parameter) {
+            Some(state) => *state += by,
+            None => {
+                if let Some(own) = start.trim.coefficients.get_mut(parameter - STATES) {
+                    *own += by;
+                }
+            }
+        }
+        start
+    }
+
+    fn body(&self) -> BodyState {
+        let [alpha, beta, velocity, p, q, r, theta, phi] = self.state;
+        BodyState {
+            velocity: AirData::velocity(velocity, alpha, beta),
+            rates: Vector3::new(p, q, r),
+            attitude: Euler {
+                phi,
+                theta,
+                psi: 0.0,
+            }
+            .attitude(),
+            position: Vector3::new(0.0, 0.0, self.altitude_ft),
+        }
+    }
+}
+
+/// Outputs of a free run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FreeRun {
+    /// At the samples of the run, up to a departure.
+    pub outputs: Vec<Outputs>,
+    pub has_departed: bool,
+}
+
+/// A maneuver with the aircraft that flies it again.
+#[derive(Clone, Debug)]
+pub struct Simulation<'a> {
+    pub aircraft: &'a Aircraft,
+    pub recording: &'a Recording,
+    pub aerodynamics: Aerodynamics<'a>,
+}
+
+impl Simulation<'_> {
+    /// Flies the first `samples` samples, every `stride`-th of which is a step.
+    #[must_use]
+    pub fn fly(&self, start: &Start, samples: usize, stride: usize) -> FreeRun {
+        let step_s = stride as f64 * self.recording.step_s;
+        let mut state = start.body();
+        let mut run = FreeRun {
+            outputs: Vec::with_capacity(samples.div_ceil(stride)),
+            has_departed: false,
+        };
+        for sample in (0..samples).step_by(stride) {
+            let instant = self.instant(&state, 2 * sample, start);
+            let alpha_deg = instant.air.alpha * DEG;
+            if !(state.is_finite() && alpha_deg.abs() < DEPARTURE_DEG) {
+                run.has_departed = true;
+                break;
+            }
+            let readings = instant.readings(self.aircraft);
+            run.outputs
+                .push(outputs(&readings, instant.air.velocity_ft_s));
+            if sample + stride < samples {
+                let rate = |stage: usize, at: &BodyState| {
+                    self.instant(at, 2 * sample + stride * POINT[stage], start)
+                        .rate
+                };
+                state = runge_kutta::step(&state, step_s, rate, BodyState::plus).normalised();
+            }
+        }
+        run
+    }
+
+    /// Motion at a state and a point of the recording.
+    #[must_use]
+    pub fn instant(&self, state: &BodyState, point: usize, start: &Start) -> Instant {
+        let inputs = self.recording.inputs(point);
+        let mut air = AirData::new(&state.velocity, state.position.z);
+        air.qbar_psf *= start.density_ratio;
+        let flow = flow(&air, state.rates.into());
+        let recorded = self.recording.signals(point);
+        let change = self.aerodynamics.change(&flow, recorded, &start.trim);
+        let level = start.trim.coefficients;
+        let coefficients: [f64; COEFFICIENTS] = std::array::from_fn(|i| level[i] + change[i]);
+        let (force, moment) = self.aerodynamics.loads(&coefficients, air.qbar_psf);
+        let force = force + Vector3::new(inputs.thrust_lbf, 0.0, 0.0);
+        let loads = Loads {
+            force,
+            moment,
+            engine_momentum: inputs.engine_momentum,
+            gravity_ft_s2: inputs.gravity_ft_s2,
+        };
+        Instant {
+            state: *state,
+            rate: body::state_rate(state, &inputs.loading, &loads),
+            air,
+            loading: inputs.loading,
+            specific_force: force / inputs.loading.mass_slug,
+            relative_rates: state.rates,
+            thrust_lbf: inputs.thrust_lbf,
+        }
+    }
+}
+
+fn flow(air: &AirData, rates: [f64; 3]) -> Flow {
+    Flow {
+        alpha_deg: DEG * air.alpha,
+        beta_deg: DEG * air.beta,
+        velocity: air.velocity_ft_s,
+        mach: air.mach,
+        rates,
+        qbar: air.qbar_psf,
+    }
+}

@@ -1,0 +1,331 @@
+//! One maneuver, flown again by each model and judged.
+
+use serde::{Deserialize, Serialize};
+
+use super::aerodynamics::Aerodynamics;
+use super::derivative_table::DerivativeTable;
+use super::dutch_roll::{LateralModes, OwnEstimates};
+use super::free_run::{FreeRun, Simulation};
+use super::judgement::{self, Finding, Simulated};
+use super::outputs::place;
+use super::recording::Recording;
+use super::repeat_flight::{self, Effects, Probabilities};
+use super::specification::{Specification, Test};
+use super::start::{self, MatchedStart};
+use crate::aero::{Axis, Buildup, WindTunnel};
+use crate::aircraft::Aircraft;
+use crate::flight::Record;
+use crate::maneuver::{Maneuver, Means};
+use crate::model::LocalPosterior;
+use crate::tables::{History, HistoryOutput, MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
+
+/// Time after the last input at which open-loop surfaces rest, s: that of an actuator.
+const SETTLED_S: f64 = 0.5;
+
+/// Movement by which a surface counts as moved by feedback, deg: beyond noise and resolution.
+const MOVED_DEG: f64 = 0.5;
+
+/// Aircraft, models and tolerances of the proof.
+#[derive(Clone, Debug)]
+pub struct Basis<'a> {
+    pub aircraft: &'a Aircraft,
+    pub buildup: &'a Buildup,
+    /// Models in the order of the specification.
+    pub models: &'a [(ModelSource, WindTunnel)],
+    /// Posterior as a database, about which repeat flights are drawn.
+    pub posterior: &'a WindTunnel,
+    /// Tunnel, constant beyond its ends, for derivatives that a model lacks.
+    pub tunnel: &'a WindTunnel,
+    pub specification: &'a Specification,
+}
+
+/// A maneuver as found.
+#[derive(Clone, Copy, Debug)]
+pub struct Flown<'a> {
+    pub record: &'a Record,
+    pub maneuver: &'a Maneuver,
+    /// Posterior of the maneuver's axis at its condition; without one there are no probabilities.
+    pub local: Option<&'a LocalPosterior>,
+    /// Means of its record and its own estimates, from which its Dutch roll follows.
+    pub own: Option<(&'a Means, &'a OwnEstimates)>,
+}
+
+/// Rows of one maneuver, and its time history flown by the first model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Matched {
+    pub rows: Vec<MatchRow>,
+    pub verdicts: Vec<MatchVerdictRow>,
+    /// Judged quantities measured and computed; `None` where the maneuver was not flown again.
+    pub history: Option<History>,
+}
+
+impl Matched {
+    /// Maneuver; empty without a model.
+    #[must_use]
+    pub fn maneuver_id(&self) -> &str {
+        let first = self.verdicts.first();
+        first.map_or("", |row| row.maneuver_id.as_str())
+    }
+
+    /// Rows of the first model.
+    pub fn first_rows(&self) -> impl Iterator<Item = &MatchRow> {
+        let model = self.verdicts.first().map(|row| row.model);
+        self.rows.iter().filter(move |row| Some(row.model) == model)
+    }
+}
+
+/// Flies a maneuver again with each model.
+#[must_use]
+pub fn fly_again(basis: &Basis, flown: &Flown) -> Matched {
+    let Flown {
+        record,
+        maneuver,
+        local,
+        own,
+    } = *flown;
+    let specification = basis.specification;
+    let tests: Vec<&Test> = specification
+        .tests
+        .iter()
+        .filter(|test| test.judges(maneuver.axis, &maneuver.class))
+        .collect();
+    if tests.is_empty() {
+        return not_flown(basis, maneuver, "no test judges its class");
+    }
+    let aircraft = (basis.aircraft, basis.buildup);
+    match Recording::new(record, maneuver, aircraft, specification.trim_s) {
+        Ok(recording) => Flight {
+            basis,
+            maneuver,
+            local,
+            modes: dutch_roll(basis, maneuver, own),
+            tests,
+            recording,
+        }
+        .matched(),
+        Err(reason) => not_flown(basis, maneuver, &reason),
+    }
+}
+
+/// Dutch roll of a lateral maneuver by its own estimates.
+fn dutch_roll(
+    basis: &Basis,
+    maneuver: &Maneuver,
+    own: Option<(&Means, &OwnEstimates)>,
+) -> Option<LateralModes> {
+    let (means, estimates) = own.filter(|_| maneuver.axis == Axis::Lateral)?;
+    let model = (basis.aircraft, basis.buildup, basis.tunnel);
+    LateralModes::new(model, (maneuver, means), estimates)
+}
+
+/// Rows of a maneuver that is not flown again.
+#[must_use]
+pub fn not_flown(basis: &Basis, maneuver: &Maneuver, reason: &str) -> Matched {
+    let row = |model: &ModelSource| MatchVerdictRow {
+        reason: reason.to_owned(),
+        ..verdict_row(maneuver, *model)
+    };
+    Matched {
+        verdicts: basis.specification.models.iter().map(row).collect(),
+        ..Matched::default()
+    }
+}
+
+/// Verdict without a flight.
+fn verdict_row(maneuver: &Maneuver, model: ModelSource) -> MatchVerdictRow {
+    MatchVerdictRow {
+        maneuver_id: maneuver.maneuver_id.clone(),
+        flight_id: maneuver.flight_id.clone(),
+        class: maneuver.class.clone(),
+        alpha_deg: maneuver.alpha_deg,
+        model,
+        verdict: MatchVerdict::NotFlown,
+        margin: None,
+        decided_by: String::new(),
+        repeat_pct: None,
+        closed_loop: None,
+        reason: String::new(),
+    }
+}
+
+/// A simulation with its matched start.
+struct Trimmed<'a> {
+    simulation: Simulation<'a>,
+    start: MatchedStart,
+}
+
+/// A maneuver that can be flown again.
+struct Flight<'a> {
+    basis: &'a Basis<'a>,
+    maneuver: &'a Maneuver,
+    local: Option<&'a LocalPosterior>,
+    modes: Option<LateralModes>,
+    tests: Vec<&'a Test>,
+    recording: Recording,
+}
+
+impl Flight<'_> {
+    fn matched(&self) -> Matched {
+        let posterior = self.trimmed(self.basis.posterior);
+        let effects = self.effects(&posterior);
+        let mut matched = Matched::default();
+        for (model, database) in self.basis.models {
+            let own = (*model != ModelSource::Posterior).then(|| self.trimmed(database));
+            let simulated = self.simulated(own.as_ref().unwrap_or(&posterior));
+            self.judge(*model, &simulated, effects.as_ref(), &mut matched);
+        }
+        matched
+    }
+
+    /// The maneuver with a model's derivatives, trimmed.
+    fn trimmed(&self, database: &WindTunnel) -> Trimmed<'_> {
+        let basis = self.basis;
+        let condition = self.maneuver.condition(basis.tunnel);
+        let table = DerivativeTable::new(basis.buildup, database, basis.tunnel, &condition);
+        let simulation = Simulation {
+            aircraft: basis.aircraft,
+            recording: &self.recording,
+            aerodynamics: Aerodynamics::new(basis.aircraft, basis.buildup, table),
+        };
+        let start = start::matched(&simulation);
+        Trimmed { simulation, start }
+    }
+
+    /// Effects of the posterior's deviations and of the errors of its start.
+    fn effects(&self, posterior: &Trimmed) -> Option<Effects> {
+        let model = (self.basis.buildup, self.maneuver.axis);
+        let Trimmed { simulation, start } = posterior;
+        repeat_flight::effects(simulation, start, self.local?, model)
+    }
+
+    /// Free run and Dutch roll of a trimmed model.
+    fn simulated(&self, trimmed: &Trimmed) -> Simulated {
+        let Trimmed { simulation, start } = trimmed;
+        let modes = self.modes.as_ref();
+        Simulated {
+            run: simulation.fly(&start.start, self.recording.samples, 1),
+            flight: modes.map(|modes| modes.flight),
+            model: modes.and_then(|modes| modes.of_model(&simulation.aerodynamics.table)),
+        }
+    }
+
+    /// Adds the rows of a model.
+    fn judge(
+        &self,
+        model: ModelSource,
+        simulated: &Simulated,
+        effects: Option<&Effects>,
+        matched: &mut Matched,
+    ) {
+        let specification = self.basis.specification;
+        let counts = (specification.draws, specification.inside_pct);
+        let judged = judgement::judged(&self.tests, self.modes.is_some());
+        let findings = judgement::judge(&self.recording, simulated, &judged, counts.1);
+        let flown = (&self.recording, self.modes.as_ref());
+        let repeat = effects.map(|e| e.probabilities(flown, simulated, &judged, counts));
+        let repeat = repeat.as_ref();
+        matched
+            .verdicts
+            .push(self.verdict(model, &findings, repeat));
+        let rows = findings.iter().enumerate().map(|(i, finding)| MatchRow {
+            repeat_pct: repeat.map(|r| 100.0 * r.tolerances[i]),
+            ..self.row(model, finding)
+        });
+        matched.rows.extend(rows);
+        matched
+            .history
+            .get_or_insert_with(|| self.history(&simulated.run, &findings));
+    }
+
+    fn row(&self, model: ModelSource, finding: &Finding) -> MatchRow {
+        let maneuver = self.maneuver;
+        let tolerance = finding.tolerance;
+        MatchRow {
+            maneuver_id: maneuver.maneuver_id.clone(),
+            flight_id: maneuver.flight_id.clone(),
+            class: maneuver.class.clone(),
+            alpha_deg: maneuver.alpha_deg,
+            model,
+            test: finding.test.clone(),
+            subject: finding.subject.clone(),
+            requirement: finding.requirement,
+            quantity: tolerance.quantity,
+            unit: tolerance.quantity.unit().to_owned(),
+            tolerance: tolerance.within,
+            tolerance_pct: tolerance.within_pct,
+            flight_value: finding.flight_value,
+            model_value: finding.model_value,
+            samples: finding.samples,
+            inside_pct: finding.inside_pct,
+            largest_excess: finding.largest_excess.map(|(excess, _)| excess),
+            largest_excess_s: finding.largest_excess.map(|(_, time_s)| time_s),
+            margin: finite(finding.margin),
+            verdict: finding.verdict(),
+            repeat_pct: None,
+        }
+    }
+
+    fn verdict(
+        &self,
+        model: ModelSource,
+        findings: &[Finding],
+        repeat: Option<&Probabilities>,
+    ) -> MatchVerdictRow {
+        let decisive = judgement::decisive(findings);
+        let margin = decisive.map_or(f64::NEG_INFINITY, |finding| finding.margin);
+        let decided_by = decisive.map_or_else(String::new, |finding| {
+            format!("{} {}", finding.test, finding.tolerance.quantity.name())
+        });
+        MatchVerdictRow {
+            verdict: judgement::verdict(margin),
+            margin: finite(margin),
+            decided_by,
+            repeat_pct: repeat.map(|r| 100.0 * r.whole),
+            closed_loop: self.closed_loop(),
+            ..verdict_row(self.maneuver, model)
+        }
+    }
+
+    /// One where a surface moves after the last input; `None` where the maneuver ends before that.
+    fn closed_loop(&self) -> Option<usize> {
+        let settled_s = self.maneuver.recognised.last_input_s? + SETTLED_S;
+        let has_moved = self.recording.movement_after(settled_s) > MOVED_DEG;
+        (settled_s < self.maneuver.end_s).then_some(usize::from(has_moved))
+    }
+
+    /// Judged quantities measured and computed, each once.
+    fn history(&self, run: &FreeRun, findings: &[Finding]) -> History {
+        let recording = &self.recording;
+        let times = (0..recording.samples).map(|k| recording.start_s + k as f64 * recording.step_s);
+        let mut quantities = Vec::new();
+        for finding in findings {
+            if !quantities.contains(&finding.tolerance.quantity) {
+                quantities.push(finding.tolerance.quantity);
+            }
+        }
+        let output = |quantity: &crate::tables::MatchedQuantity| {
+            let output = place(*quantity)?;
+            let computed = |k: usize| run.outputs.get(k).map_or(f64::NAN, |o| o[output]);
+            let samples = 0..recording.samples;
+            Some(HistoryOutput {
+                label: quantity.name().to_owned(),
+                unit: quantity.unit().to_owned(),
+                measured: recording.measured.iter().map(|m| m[output]).collect(),
+                computed: samples.map(computed).collect(),
+                marked: recording.repaired.iter().map(|r| r[output]).collect(),
+            })
+        };
+        History {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            class: self.maneuver.class.clone(),
+            alpha_deg: self.maneuver.alpha_deg,
+            time_s: times.collect(),
+            outputs: quantities.iter().filter_map(output).collect(),
+            controls: vec![],
+        }
+    }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}

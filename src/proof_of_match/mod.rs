@@ -1,0 +1,28 @@
+//! Proof of match: does the simulator still match the aircraft? Each maneuver is flown again by a body
+//! with six degrees of freedom, and judged by the tolerances of a standard.
+//!
+//! [`recording`] is the maneuver as recorded: inputs and outputs. [`derivative_table`] and
+//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, and [`start`] its initial
+//! state and trim. [`specification`] has the tolerances, which are the analyst's data; [`judgement`]
+//! compares, and [`dutch_roll`] adds the modes of the flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes.
+
+mod specification;
+mod outputs;
+mod derivative_table;
+mod aerodynamics;
+mod recording;
+mod free_run;
+mod start;
+mod deviations;
+mod dutch_roll;
+mod judgement;
+mod repeat_flight;
+mod maneuver;
+mod models;
+#[cfg(test)]
+mod tests;
+
+pub use dutch_roll::OwnEstimates;
+pub use maneuver::{Basis, Flown, Matched, fly_again, not_flown};
+pub use models::{of_posterior, of_trends};
+pub use specification::{Specification, Test, Tolerance};

@@ -1,0 +1,43 @@
+//! Results of the campaign as databases of derivatives.
+
+use crate::aero::WindTunnel;
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::tables::{PosteriorRow, TrendRow};
+
+/// Posterior as a database, read as the tunnel's but constant beyond its ends.
+#[must_use]
+pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
+    let mut database = WindTunnel::new(tunnel.clamped().settings().clone());
+    for row in rows {
+        let point = point(row.alpha_deg, row.mach, row.value);
+        database.insert_at(&row.derivative, row.third, point);
+    }
+    database
+}
+
+/// Trends as a database: of each derivative its first group in the table, which is flight's value.
+#[must_use]
+pub fn of_trends(rows: &[TrendRow], groups: &[&str], tunnel: &WindTunnel) -> WindTunnel {
+    let mut database = WindTunnel::new(tunnel.clamped().settings().clone());
+    let mut seen: std::collections::BTreeMap<&str, &str> = std::collections::BTreeMap::new();
+    for row in rows
+        .iter()
+        .filter(|row| groups.contains(&row.group.as_str()))
+    {
+        let first = seen.entry(&row.derivative).or_insert(&row.group);
+        if *first == row.group {
+            database.insert(&row.derivative, point(row.alpha_deg, None, row.value));
+        }
+    }
+    database
+}
+
+fn point(alpha_deg: f64, mach: Option<f64>, value: f64) -> TunnelPoint {
+    TunnelPoint {
+        alpha_deg,
+        mach,
+        value,
+        uncertainty: None,
+        source: None,
+    }
+}

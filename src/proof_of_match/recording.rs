@@ -1,0 +1,210 @@
+//! Maneuver as recorded: the inputs of its simulation, and the signals to match.
+
+use super::aerodynamics::recorded_signals;
+use super::outputs::{COUNT, MATCHED, Outputs};
+use crate::aero::Buildup;
+use crate::aircraft::Aircraft;
+use crate::dynamics::Motion;
+use crate::dynamics::motion::{MassProperties, Window};
+use crate::flight::Record;
+use crate::maneuver::Maneuver;
+use crate::numerics::order_statistics::median;
+use crate::rigid_body::Loading;
+
+/// Fewest samples of a maneuver that can be flown again.
+const FEWEST_SAMPLES: usize = 20;
+
+/// Least time over which the trim is matched, s: half a second at 40 Hz gives a rate's slope to a
+/// tenth of a degree per second squared.
+const LEAST_TRIM_S: f64 = 0.5;
+
+/// Standard deviations below which a recorder's noise is not taken, in the order of the outputs:
+/// finer than any resolution.
+const LEAST_NOISE: Outputs = [
+    1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4,
+];
+
+/// Inputs of the simulation at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inputs {
+    pub loading: Loading,
+    pub thrust_lbf: f64,
+    pub engine_momentum: f64,
+    pub gravity_ft_s2: f64,
+}
+
+/// Maneuver as recorded.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    pub step_s: f64,
+    pub start_s: f64,
+    pub samples: usize,
+    /// Samples over which initial state and trim are matched.
+    pub trim_samples: usize,
+    /// Inputs at samples and halfway between them.
+    inputs: Vec<Inputs>,
+    /// Recorded signals of the build-up at the same points.
+    signals: Vec<f64>,
+    /// Number of the signals.
+    width: usize,
+    /// Measured motion at the samples of the trim.
+    pub motions: Vec<Motion>,
+    pub altitude_ft: f64,
+    /// Recorded outputs at the samples.
+    pub measured: Vec<Outputs>,
+    /// Samples of each output that ingest repaired.
+    pub repaired: Vec<[bool; COUNT]>,
+    /// White noise of each output, standard deviation.
+    pub noise: Outputs,
+}
+
+impl Recording {
+    /// Cuts a maneuver out of its record.
+    ///
+    /// # Errors
+    /// A sentence that names the signal that is missing, or the length that is too short.
+    pub fn new(
+        record: &Record,
+        maneuver: &Maneuver,
+        (aircraft, buildup): (&Aircraft, &Buildup),
+        longest_trim_s: f64,
+    ) -> Result<Recording, String> {
+        let first = record.sample_at(maneuver.start_s);
+        let range = first..record.sample_at(maneuver.end_s) + 1;
+        let samples = range.len();
+        if samples < FEWEST_SAMPLES {
+            return Err(format!("it has {samples} samples only"));
+        }
+        let signals = recorded_signals(buildup);
+        let mass = MassProperties::Recorded;
+        let window = Window::cut(record, range.clone(), signals.iter().copied(), mass)?;
+        let motions: Vec<Motion> = window.motion(aircraft).points().collect();
+        let measured = measured(record, range.clone());
+        let trim_samples = trim_samples(record, maneuver, samples, longest_trim_s);
+        Ok(Recording {
+            step_s: record.step_s,
+            start_s: record.time_s(first),
+            samples,
+            trim_samples,
+            inputs: motions.iter().map(inputs).collect(),
+            signals: by_point(&window, &signals),
+            width: signals.len(),
+            motions: motions
+                .iter()
+                .step_by(2)
+                .take(trim_samples)
+                .copied()
+                .collect(),
+            altitude_ft: window
+                .signal(crate::flight::signal::ALTITUDE)
+                .first()
+                .copied()
+                .unwrap_or(0.0),
+            noise: noise(&measured),
+            repaired: repaired(record, range),
+            measured,
+        })
+    }
+
+    /// Inputs at a point: sample k is point 2k.
+    #[must_use]
+    pub fn inputs(&self, point: usize) -> &Inputs {
+        &self.inputs[point]
+    }
+
+    /// Recorded signals of the build-up at a point, in the order of [`recorded_signals`].
+    #[must_use]
+    pub fn signals(&self, point: usize) -> &[f64] {
+        &self.signals[point * self.width..][..self.width]
+    }
+
+    /// Largest range over which a surface moves from a time on, deg.
+    #[must_use]
+    pub fn movement_after(&self, time_s: f64) -> f64 {
+        let from = ((time_s - self.start_s) / self.step_s).max(0.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative"
+        )]
+        let first = (from.ceil() as usize).min(self.samples);
+        let range = |place: usize| {
+            let values = (first..self.samples).map(|k| self.signals(2 * k)[place]);
+            let ends = values.fold((f64::MAX, f64::MIN), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+            (ends.1 - ends.0).max(0.0)
+        };
+        (0..self.width).map(range).fold(0.0, f64::max)
+    }
+}
+
+fn inputs(motion: &Motion) -> Inputs {
+    Inputs {
+        loading: Loading {
+            mass_slug: motion.mass,
+            x_cg_ft: motion.cg.x_ft,
+            y_cg_ft: motion.cg.y_ft,
+            z_cg_ft: motion.cg.z_ft,
+            ix_slug_ft2: motion.ix,
+            iy_slug_ft2: motion.iy,
+            iz_slug_ft2: motion.iz,
+            ixz_slug_ft2: motion.ixz,
+        },
+        thrust_lbf: motion.thrust,
+        engine_momentum: motion.engine_momentum,
+        gravity_ft_s2: motion.gravity,
+    }
+}
+
+/// Values of some signals, point by point.
+fn by_point(window: &Window, names: &[&str]) -> Vec<f64> {
+    let signals: Vec<&[f64]> = names.iter().map(|name| window.signal(name)).collect();
+    let at = |point: usize| {
+        let signals = signals.iter();
+        signals.map(move |signal| signal.get(point).copied().unwrap_or(0.0))
+    };
+    (0..window.len()).flat_map(at).collect()
+}
+
+fn measured(record: &Record, range: std::ops::Range<usize>) -> Vec<Outputs> {
+    let signals = MATCHED.map(|quantity| record.values(quantity.name()).unwrap_or_default());
+    let at = |k: usize| signals.map(|values| values.get(k).copied().unwrap_or(f64::NAN));
+    range.map(at).collect()
+}
+
+fn repaired(record: &Record, range: std::ops::Range<usize>) -> Vec<[bool; COUNT]> {
+    let marks = MATCHED.map(|quantity| record.signals.get(quantity.name()).map(|s| &s.marks));
+    let at =
+        |k: usize| marks.map(|marks| marks.and_then(|m| m.get(k)).is_some_and(|m| m.is_fault()));
+    range.map(at).collect()
+}
+
+/// Samples from the start to the first input, at most as long as the settings allow.
+fn trim_samples(record: &Record, maneuver: &Maneuver, samples: usize, longest_s: f64) -> usize {
+    let until_input = maneuver
+        .recognised
+        .first_input_s
+        .map(|t| t - maneuver.start_s);
+    let time_s = until_input.map_or(longest_s, |t| t.min(longest_s));
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive time over a positive step"
+    )]
+    let count = (time_s.max(LEAST_TRIM_S) / record.step_s).round() as usize + 1;
+    count.clamp(FEWEST_SAMPLES.min(samples), samples)
+}
+
+/// White noise of each output from its third differences, whose variance is 20 times that of the
+/// noise. The median leaves out steps of the accelerations.
+fn noise(measured: &[Outputs]) -> Outputs {
+    const MEDIAN_TO_DEVIATION: f64 = 0.674_489_750_196_082;
+    std::array::from_fn(|i| {
+        let third = measured
+            .windows(4)
+            .map(|w| (w[3][i] - 3.0 * w[2][i] + 3.0 * w[1][i] - w[0][i]).abs());
+        let spread = median(third).unwrap_or(0.0) / MEDIAN_TO_DEVIATION / 20_f64.sqrt();
+        spread.max(LEAST_NOISE[i])
+    })
+}

@@ -1,0 +1,225 @@
+//! Start of a free run: initial state and trim, matched over the first samples of a maneuver.
+//!
+//! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free. The
+//! initial state and the six coefficients at trim are those with which the simulation fits all outputs
+//! best, weighted by their noise, up to the first input. What moves the coefficients from there is the
+//! model's alone.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::aerodynamics::{COEFFICIENTS, Flow, Trim};
+use super::free_run::{STATES, Simulation, Start};
+use super::outputs::{COUNT, Outputs};
+use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
+use crate::earth::air;
+use crate::numerics::symmetric;
+use crate::units::DEG;
+
+/// Number of parameters of a start.
+pub const PARAMETERS: usize = STATES + COEFFICIENTS;
+
+/// Iterations of Gauss and Newton with the slopes of the first: a second of flight is nearly linear in
+/// its start.
+const ITERATIONS: usize = 3;
+
+/// Steps of the differences, in the order of the parameters.
+const STEPS: [f64; PARAMETERS] = [
+    1e-4, 1e-4, 1e-1, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4,
+];
+
+/// Matched start with the covariance of its parameters.
+#[derive(Clone, Debug)]
+pub struct MatchedStart {
+    pub start: Start,
+    /// `None` where the samples do not determine all parameters.
+    pub covariance: Option<DMatrix<f64>>,
+}
+
+/// Matches initial state and trim of a simulation.
+#[must_use]
+pub fn matched(simulation: &Simulation) -> MatchedStart {
+    let mut start = as_measured(simulation);
+    let Some(slopes) = Slopes::of(simulation, &start) else {
+        return MatchedStart {
+            start,
+            covariance: None,
+        };
+    };
+    for _ in 0..ITERATIONS {
+        let Some(step) = slopes.step(simulation, &start) else {
+            break;
+        };
+        for (parameter, by) in step.iter().enumerate() {
+            start = start.moved(parameter, *by);
+        }
+    }
+    MatchedStart {
+        start,
+        covariance: Some(slopes.covariance),
+    }
+}
+
+/// Slopes of the outputs along the parameters of a start, each over its noise.
+struct Slopes {
+    /// Row by row: samples, and outputs that ingest has not repaired.
+    rows: Vec<(usize, usize, DVector<f64>)>,
+    covariance: DMatrix<f64>,
+}
+
+impl Slopes {
+    /// Slopes by differences; `None` where the samples do not determine all parameters.
+    fn of(simulation: &Simulation, start: &Start) -> Option<Slopes> {
+        let recording = simulation.recording;
+        let computed = trim_run(simulation, start)?;
+        let moved: Option<Vec<Vec<Outputs>>> = (0..PARAMETERS)
+            .map(|parameter| trim_run(simulation, &start.moved(parameter, STEPS[parameter])))
+            .collect();
+        let moved = moved?;
+        let mut information = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        let mut rows = Vec::with_capacity(recording.trim_samples * COUNT);
+        for sample in 0..recording.trim_samples {
+            for output in (0..COUNT).filter(|output| !recording.repaired[sample][*output]) {
+                let slopes = DVector::from_fn(PARAMETERS, |parameter, _| {
+                    let change = moved[parameter][sample][output] - computed[sample][output];
+                    change / (STEPS[parameter] * recording.noise[output])
+                });
+                information.ger(1.0, &slopes, &slopes, 1.0);
+                rows.push((sample, output, slopes));
+            }
+        }
+        let covariance = symmetric::inverse(&information)?;
+        Some(Slopes { rows, covariance })
+    }
+
+    /// Step of Gauss and Newton; `None` where it is not finite.
+    fn step(&self, simulation: &Simulation, start: &Start) -> Option<DVector<f64>> {
+        let recording = simulation.recording;
+        let computed = trim_run(simulation, start)?;
+        let mut gradient = DVector::zeros(PARAMETERS);
+        for (sample, output, slopes) in &self.rows {
+            let residual = recording.measured[*sample][*output] - computed[*sample][*output];
+            gradient.axpy(residual / recording.noise[*output], slopes, 1.0);
+        }
+        let step = &self.covariance * gradient;
+        step.iter().all(|s| s.is_finite()).then_some(step)
+    }
+}
+
+/// Outputs over the trim; `None` where the simulated aircraft departs.
+fn trim_run(simulation: &Simulation, start: &Start) -> Option<Vec<Outputs>> {
+    let samples = simulation.recording.trim_samples;
+    let run = simulation.fly(start, samples, 1);
+    (!run.has_departed).then_some(run.outputs)
+}
+
+/// State on straight lines through the measured one, and coefficients that the measured motion
+/// implies.
+fn as_measured(simulation: &Simulation) -> Start {
+    let recording = simulation.recording;
+    let motions = &recording.motions;
+    let states: Vec<[f64; STATES]> = motions.iter().map(state).collect();
+    let mut trim = Trim {
+        coefficients: [0.0; COEFFICIENTS],
+        factors: mean_factors(simulation),
+        alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),
+    };
+    let implied: Vec<[f64; COEFFICIENTS]> = motions
+        .iter()
+        .enumerate()
+        .map(|(sample, motion)| {
+            let recorded = recording.signals(2 * sample);
+            let change = simulation.aerodynamics.change(
+                &flow(motion, recording.altitude_ft),
+                recorded,
+                &trim,
+            );
+            let implied = implied(simulation, motion);
+            std::array::from_fn(|i| implied[i] - change[i])
+        })
+        .collect();
+    trim.coefficients = std::array::from_fn(|i| mean(implied.iter().map(|c| c[i])));
+    let ratio = |m: &Motion| {
+        let standard = air(recording.altitude_ft).density_slug_ft3;
+        m.qbar / (0.5 * standard * m.velocity * m.velocity)
+    };
+    Start {
+        state: std::array::from_fn(|i| at_start(states.iter().map(|s| s[i]))),
+        altitude_ft: recording.altitude_ft,
+        density_ratio: mean(motions.iter().map(ratio)),
+        trim,
+    }
+}
+
+fn state(motion: &Motion) -> [f64; STATES] {
+    let [p, q, r] = motion.rates;
+    [
+        motion.alpha,
+        motion.beta,
+        motion.velocity,
+        p,
+        q,
+        r,
+        motion.theta,
+        motion.phi,
+    ]
+}
+
+/// Flow of a measured motion, with the Mach number of the standard atmosphere.
+fn flow(motion: &Motion, altitude_ft: f64) -> Flow {
+    Flow {
+        mach: motion.velocity / air(altitude_ft).sound_ft_s,
+        alpha_deg: DEG * motion.alpha,
+        beta_deg: DEG * motion.beta,
+        velocity: motion.velocity,
+        rates: motion.rates,
+        qbar: motion.qbar,
+    }
+}
+
+/// Means of the derivatives' factors over the trim.
+fn mean_factors(simulation: &Simulation) -> Vec<f64> {
+    let recording = simulation.recording;
+    let share = 1.0 / recording.motions.len().max(1) as f64;
+    let mut sums: Vec<f64> = vec![];
+    for (sample, motion) in recording.motions.iter().enumerate() {
+        let flow = flow(motion, recording.altitude_ft);
+        let recorded = recording.signals(2 * sample);
+        let factors = simulation.aerodynamics.factors(&flow, recorded);
+        if sums.is_empty() {
+            sums = factors.map(|factor| share * factor).collect();
+        } else {
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                *sum += share * factor;
+            }
+        }
+    }
+    sums
+}
+
+/// Coefficients of both axes that a measured motion implies.
+fn implied(simulation: &Simulation, motion: &Motion) -> [f64; COEFFICIENTS] {
+    let aircraft = simulation.aircraft;
+    let inputs = Longitudinal::rate_inputs(aircraft, motion);
+    let [normal, pitching, axial] = Longitudinal::implied_coefficients(aircraft, motion, &inputs);
+    let inputs = Lateral::rate_inputs(aircraft, motion);
+    let [side, rolling, yawing] = Lateral::implied_coefficients(aircraft, motion, &inputs);
+    [normal, pitching, axial, side, rolling, yawing]
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}
+
+/// Value at the first sample of the straight line of least squares.
+fn at_start(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+    let last = values.len().saturating_sub(1) as f64;
+    let level = mean(values.clone());
+    let (mut up, mut norm) = (0.0, 0.0);
+    for (k, value) in values.enumerate() {
+        let place = k as f64 - 0.5 * last;
+        up += place * value;
+        norm += place * place;
+    }
+    level - 0.5 * last * up / f64::max(norm, f64::MIN_POSITIVE)
+}

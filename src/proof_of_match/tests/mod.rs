@@ -1,0 +1,8 @@
+//! Free runs, judgement and probabilities, on maneuvers of the laboratory's simulator.
+
+mod dutch_roll;
+mod fixture;
+mod free_run;
+mod judgement;
+mod repeat_flight;
+mod wrong_models;

@@ -1,0 +1,326 @@
+//! Section of the proof of match: how many maneuvers each simulator reproduces within the tolerances.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::class_markers::ClassMarkers;
+use super::maneuver_page;
+use super::match_charts;
+use super::quality_charts::QualityChart;
+use crate::report::contents::Contents;
+use crate::report::notation::{NOTHING, angle, count, fixed, number};
+use crate::report::table_view::TableView;
+use crate::tables::{MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
+
+/// The section.
+#[derive(Clone, Debug, Serialize)]
+pub struct MatchSection {
+    pub note: String,
+    /// The board's answer, a sentence or two for each model.
+    pub answers: Vec<String>,
+    pub charts: Vec<QualityChart>,
+    pub tables: Vec<TableView>,
+}
+
+/// The section; `None` without tolerances or maneuvers.
+#[must_use]
+pub fn section(contents: &Contents, markers: &ClassMarkers) -> Option<MatchSection> {
+    let specification = contents.tolerances?;
+    if contents.matched.is_empty() {
+        return None;
+    }
+    let models = &specification.models;
+    Some(MatchSection {
+        note: format!(
+            "{}. Each maneuver is flown again by a body with six degrees of freedom: initial state and \
+             trim are matched over its first second at most, then it runs free to the end with the \
+             recorded surfaces and thrust. Where feedback moved the surfaces, the recorded surfaces \
+             contain it, and the control law is not judged. {} % of the samples must be inside.",
+            specification.standard,
+            fixed(specification.inside_pct, 0)
+        ),
+        answers: models.iter().map(|m| answer(contents, *m)).collect(),
+        charts: models
+            .iter()
+            .filter_map(|m| match_charts::chart(contents, *m))
+            .collect(),
+        tables: vec![
+            class_table(contents, models),
+            maneuver_table(contents, models, markers),
+        ],
+    })
+}
+
+/// Verdicts of one model.
+fn of_model<'a>(
+    contents: &Contents<'a>,
+    model: ModelSource,
+) -> impl Iterator<Item = &'a MatchVerdictRow> {
+    let all = contents.matched.iter().flat_map(|m| &m.verdicts);
+    all.filter(move |row| row.model == model)
+}
+
+fn is_flown(row: &&MatchVerdictRow) -> bool {
+    row.verdict != MatchVerdict::NotFlown
+}
+
+/// Words of a model.
+fn words(model: ModelSource) -> &'static str {
+    match model {
+        ModelSource::Posterior => "the posterior",
+        ModelSource::Trend => "the trends",
+        ModelSource::Tunnel => "the wind tunnel",
+        ModelSource::Database => "the given database",
+    }
+}
+
+/// Number of maneuvers that a model reproduces, and the farthest from it.
+fn answer(contents: &Contents, model: ModelSource) -> String {
+    let flown: Vec<&MatchVerdictRow> = of_model(contents, model).filter(is_flown).collect();
+    let inside = flown
+        .iter()
+        .filter(|row| row.verdict == MatchVerdict::Inside);
+    let closed = flown
+        .iter()
+        .filter(|row| row.closed_loop == Some(1))
+        .count();
+    let mut text = format!(
+        "With {} as its derivatives a simulator matches {} of {} within every tolerance",
+        words(model),
+        inside.count(),
+        count(flown.len(), "maneuver"),
+    );
+    let worst = flown
+        .iter()
+        .min_by(|a, b| size(a.margin).total_cmp(&size(b.margin)))
+        .filter(|row| row.verdict == MatchVerdict::Outside);
+    if let Some(worst) = worst {
+        text.push_str(&format!(
+            "; the farthest outside is {} ({} at {}, {})",
+            worst.maneuver_id,
+            worst.class,
+            angle(worst.alpha_deg),
+            worst.decided_by
+        ));
+    }
+    text.push('.');
+    let repeats = flown.iter().map(|row| row.repeat_pct);
+    if let Some(expected) = repeats.map(|pct| Some(0.01 * pct?)).sum::<Option<f64>>() {
+        text.push_str(&format!(
+            " Flown once more, {} of them are expected to match.",
+            fixed(expected, 1)
+        ));
+    }
+    if closed > 0 {
+        text.push_str(&format!(
+            " {} flown closed-loop, judged with the recorded surfaces.",
+            if closed == 1 {
+                "1 was".to_owned()
+            } else {
+                format!("{closed} were")
+            }
+        ));
+    }
+    text
+}
+
+/// Margin for comparison; that of a departure is the smallest.
+fn size(margin: Option<f64>) -> f64 {
+    margin.unwrap_or(f64::NEG_INFINITY)
+}
+
+/// Number of maneuvers inside by class and model.
+fn class_table(contents: &Contents, models: &[ModelSource]) -> TableView {
+    let heads: Vec<String> = models
+        .iter()
+        .flat_map(|m| {
+            [
+                format!("{}: inside", m.name()),
+                format!("{}: median margin", m.name()),
+            ]
+        })
+        .collect();
+    let heads: Vec<&str> = ["class", "flown again", "closed loop"]
+        .into_iter()
+        .chain(heads.iter().map(String::as_str))
+        .collect();
+    let line = |class: &str| {
+        let rows = |model: ModelSource| {
+            let rows = of_model(contents, model).filter(is_flown);
+            rows.filter(|row| row.class == class).collect::<Vec<_>>()
+        };
+        let first = models.first().map(|m| rows(*m)).unwrap_or_default();
+        let closed = first
+            .iter()
+            .filter(|row| row.closed_loop == Some(1))
+            .count();
+        let cells = models.iter().flat_map(|model| {
+            let rows = rows(*model);
+            let inside = rows
+                .iter()
+                .filter(|row| row.verdict == MatchVerdict::Inside);
+            let margins = rows.iter().map(|row| size(row.margin));
+            let median = crate::numerics::order_statistics::median(margins);
+            let median = median.filter(|m| m.is_finite());
+            [inside.count().to_string(), number(median, 2)]
+        });
+        [
+            class.to_owned(),
+            first.len().to_string(),
+            closed.to_string(),
+        ]
+        .into_iter()
+        .chain(cells)
+        .collect()
+    };
+    let classes = contents.classes.iter().map(|c| c.name.as_str());
+    let is_found = |class: &&str| contents.maneuvers.iter().any(|m| m.class == *class);
+    TableView::new(
+        "By class",
+        "Margin: one less the largest difference over its tolerance; 0 is on the limit, negative outside.",
+        &heads,
+        classes.filter(is_found).map(line).collect(),
+    )
+}
+
+/// Margin of each maneuver by model, and what decides it for the first.
+fn maneuver_table(
+    contents: &Contents,
+    models: &[ModelSource],
+    markers: &ClassMarkers,
+) -> TableView {
+    let anchors = maneuver_page::anchors(contents);
+    let margins: Vec<String> = models
+        .iter()
+        .map(|m| format!("margin, {}", m.name()))
+        .collect();
+    let heads: Vec<&str> = ["maneuver", "class", "α, deg"]
+        .into_iter()
+        .chain(margins.iter().map(String::as_str))
+        .chain([
+            "verdict",
+            "decided by",
+            "repeat, %",
+            "inside, %",
+            "largest excess",
+            "loop",
+        ])
+        .collect();
+    let decisive = decisive_rows(contents);
+    let mut rows = Vec::new();
+    let (mut links, mut classes) = (Vec::new(), Vec::new());
+    for matched in contents.matched {
+        let Some(first) = matched.verdicts.first() else {
+            continue;
+        };
+        let id = first.maneuver_id.as_str();
+        rows.push(maneuver_row(
+            first,
+            &matched.verdicts,
+            decisive.get(id).copied(),
+        ));
+        links.push(anchors.get(id).cloned().unwrap_or_default());
+        classes.push(markers.token(&first.class));
+    }
+    let mut table = TableView::new(
+        "By maneuver",
+        "Verdict, deciding tolerance, probability that a repeat flight passes, share inside and largest \
+         excess are those of the first model. The \
+         page of a maneuver draws it.",
+        &heads,
+        rows,
+    );
+    table.links = links;
+    table.classes = classes;
+    table
+}
+
+fn maneuver_row(
+    first: &MatchVerdictRow,
+    verdicts: &[MatchVerdictRow],
+    decisive: Option<&MatchRow>,
+) -> Vec<String> {
+    let margins = verdicts.iter().map(|row| number(row.margin, 2));
+    let verdict = if first.verdict == MatchVerdict::NotFlown {
+        format!("not flown: {}", first.reason)
+    } else {
+        first.verdict.to_string()
+    };
+    let nothing = || NOTHING.to_owned();
+    let excess = decisive.and_then(|row| {
+        Some(format!(
+            "{} {}",
+            number(Some(row.largest_excess?), 2),
+            row.unit
+        ))
+    });
+    let loop_ = match first.closed_loop {
+        Some(1) => "closed",
+        Some(_) => "open",
+        None => NOTHING,
+    };
+    [
+        first.maneuver_id.clone(),
+        first.class.clone(),
+        fixed(first.alpha_deg, 1),
+    ]
+    .into_iter()
+    .chain(margins)
+    .chain([
+        verdict,
+        first.decided_by.clone(),
+        first.repeat_pct.map_or_else(nothing, |pct| fixed(pct, 0)),
+        decisive.map_or_else(nothing, |row| fixed(row.inside_pct, 1)),
+        excess.unwrap_or_else(nothing),
+        loop_.to_owned(),
+    ])
+    .collect()
+}
+
+/// Row that decides each maneuver's verdict, of the first model.
+fn decisive_rows<'a>(contents: &Contents<'a>) -> BTreeMap<&'a str, &'a MatchRow> {
+    let decisive = |matched: &'a crate::proof_of_match::Matched| {
+        let verdict = matched.verdicts.first()?;
+        let mut rows = matched.rows.iter().filter(|row| row.model == verdict.model);
+        let row =
+            rows.find(|row| format!("{} {}", row.test, row.quantity.name()) == verdict.decided_by);
+        Some((verdict.maneuver_id.as_str(), row?))
+    };
+    contents.matched.iter().filter_map(decisive).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::campaign_fixture::campaign;
+
+    #[test]
+    fn the_answer_counts_the_maneuvers_inside_and_names_the_farthest() {
+        let campaign = campaign();
+        let contents = campaign.contents();
+        let markers = ClassMarkers::new(&contents);
+        let section = section(&contents, &markers).expect("a section");
+        assert_eq!(
+            section.answers[0],
+            "With the posterior as its derivatives a simulator matches 2 of 3 maneuvers within every \
+             tolerance; the farthest outside is 1-OLON-30 (OLON at 30°, 2.c.10 an_g). Flown once more, 1.6 of them are expected to match. 1 was flown \
+             closed-loop, judged with the recorded surfaces."
+        );
+        assert!(section.answers[1].starts_with("With the wind tunnel"));
+        assert_eq!(section.charts.len(), 2);
+        assert_eq!(section.charts[0].svg.matches("inside").count(), 2);
+        let rows = &section.tables[1].rows;
+        assert_eq!(rows.len(), 4);
+        assert_eq!(rows[0][..5], ["1-OLON-10", "OLON", "10.0", "0.40", "0.30"]);
+        assert!(rows[3][5].starts_with("not flown: no"), "{:?}", rows[3]);
+    }
+
+    #[test]
+    fn without_tolerances_there_is_no_section() {
+        let mut campaign = campaign();
+        campaign.tolerances = None;
+        let contents = campaign.contents();
+        assert!(section(&contents, &ClassMarkers::new(&contents)).is_none());
+    }
+}
