@@ -12,7 +12,8 @@ pub const IMPORT_HELP: &str = "\
 Formats, known by their content:
   text      one row a sample: any delimiter, decimal commas, units in brackets or in a row of their own, comments above
   MATLAB    version 5 (-v6, -v7): vectors, matrices and structs; of v7.3 (HDF5) the message says how to convert it
-  Parquet   tall: columns time, name, value and perhaps unit. A Parquet file with one column a channel needs no import
+  Parquet   tall: columns time, name, value and perhaps unit; runs and init also read it as it is. A Parquet file with one \
+column a channel needs no import
 
 Numbers keep every bit; what is no number becomes a missing value. import.json beside the files names each source with its \
 fingerprint, the columns with their units, and what was left out.
