@@ -30,11 +30,11 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
             let what = format!("test {} has a list without tolerances", test.test);
             return Err(source.error(&test.test, what));
         }
-        let tolerances = test
+        let mut tolerances = test
             .all_of
             .iter()
             .flat_map(|requirement| &requirement.one_of);
-        for tolerance in tolerances.filter(|tolerance| !has_width(tolerance)) {
+        if let Some(tolerance) = tolerances.find(|own| !has_width(own)) {
             let name = tolerance.quantity.name();
             let what = format!("`{name}`: give `within` or `within_pct`, greater than zero");
             return Err(source.error(name, what));

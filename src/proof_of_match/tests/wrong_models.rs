@@ -49,6 +49,10 @@ struct IndependentFlight {
 impl IndependentFlight {
     /// From the first sample of the maneuver, where the aircraft is in balance: the coefficient's
     /// constant takes up what the wrong derivative changes there.
+    #[expect(
+        clippy::default_trait_access,
+        reason = "the type of a gust is the simulator's own"
+    )]
     fn new(flown: &FlownManeuver, wrong: &str, factor: f64) -> IndependentFlight {
         let campaign = shipped();
         let (record, aircraft) = (&flown.record, &campaign.config.aircraft);

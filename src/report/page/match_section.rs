@@ -52,17 +52,12 @@ pub fn section(contents: &Contents, markers: &ClassMarkers) -> Option<MatchSecti
     })
 }
 
-/// Verdicts of one model.
-fn of_model<'a>(
-    contents: &Contents<'a>,
-    model: ModelSource,
-) -> impl Iterator<Item = &'a MatchVerdictRow> {
+/// Verdicts of the maneuvers that one model flew again.
+fn flown_by<'a>(contents: &Contents<'a>, model: ModelSource) -> Vec<&'a MatchVerdictRow> {
     let all = contents.matched.iter().flat_map(|m| &m.verdicts);
-    all.filter(move |row| row.model == model)
-}
-
-fn is_flown(row: &&MatchVerdictRow) -> bool {
-    row.verdict != MatchVerdict::NotFlown
+    let is_flown =
+        |row: &&MatchVerdictRow| row.model == model && row.verdict != MatchVerdict::NotFlown;
+    all.filter(is_flown).collect()
 }
 
 /// Words of a model.
@@ -75,54 +70,63 @@ fn words(model: ModelSource) -> &'static str {
     }
 }
 
-/// Number of maneuvers that a model reproduces, and the farthest from it.
+/// Number of maneuvers that a model reproduces now and if flown once more, and the farthest from it.
 fn answer(contents: &Contents, model: ModelSource) -> String {
-    let flown: Vec<&MatchVerdictRow> = of_model(contents, model).filter(is_flown).collect();
+    let flown = flown_by(contents, model);
     let inside = flown
         .iter()
         .filter(|row| row.verdict == MatchVerdict::Inside);
-    let closed = flown
+    let sentences = [
+        Some(format!(
+            "With {} as its derivatives a simulator matches {} of {} within every tolerance{}.",
+            words(model),
+            inside.count(),
+            count(flown.len(), "maneuver"),
+            farthest(&flown).unwrap_or_default(),
+        )),
+        repeats(&flown),
+        closed_loop(&flown),
+    ];
+    let sentences: Vec<String> = sentences.into_iter().flatten().collect();
+    sentences.join(" ")
+}
+
+/// The maneuver farthest outside; `None` where all are inside.
+fn farthest(flown: &[&MatchVerdictRow]) -> Option<String> {
+    let outside = flown
         .iter()
-        .filter(|row| row.closed_loop == Some(1))
-        .count();
-    let mut text = format!(
-        "With {} as its derivatives a simulator matches {} of {} within every tolerance",
-        words(model),
-        inside.count(),
-        count(flown.len(), "maneuver"),
-    );
-    let worst = flown
-        .iter()
-        .min_by(|a, b| size(a.margin).total_cmp(&size(b.margin)))
         .filter(|row| row.verdict == MatchVerdict::Outside);
-    if let Some(worst) = worst {
-        text.push_str(&format!(
-            "; the farthest outside is {} ({} at {}, {})",
-            worst.maneuver_id,
-            worst.class,
-            angle(worst.alpha_deg),
-            worst.decided_by
-        ));
-    }
-    text.push('.');
-    let repeats = flown.iter().map(|row| row.repeat_pct);
-    if let Some(expected) = repeats.map(|pct| Some(0.01 * pct?)).sum::<Option<f64>>() {
-        text.push_str(&format!(
-            " Flown once more, {} of them are expected to match.",
-            fixed(expected, 1)
-        ));
-    }
-    if closed > 0 {
-        text.push_str(&format!(
-            " {} flown closed-loop, judged with the recorded surfaces.",
-            if closed == 1 {
-                "1 was".to_owned()
-            } else {
-                format!("{closed} were")
-            }
-        ));
-    }
-    text
+    let worst = outside.min_by(|a, b| size(a.margin).total_cmp(&size(b.margin)))?;
+    Some(format!(
+        "; the farthest outside is {} ({} at {}, {})",
+        worst.maneuver_id,
+        worst.class,
+        angle(worst.alpha_deg),
+        worst.decided_by
+    ))
+}
+
+/// Expected number of repeat flights that match; `None` without probabilities.
+fn repeats(flown: &[&MatchVerdictRow]) -> Option<String> {
+    let probabilities = flown.iter().map(|row| Some(0.01 * row.repeat_pct?));
+    let expected = probabilities.sum::<Option<f64>>()?;
+    Some(format!(
+        "Flown once more, {} of them are expected to match.",
+        fixed(expected, 1)
+    ))
+}
+
+/// Number of maneuvers flown closed-loop; `None` where there is none.
+fn closed_loop(flown: &[&MatchVerdictRow]) -> Option<String> {
+    let closed = flown.iter().filter(|row| row.closed_loop == Some(1));
+    let verb = match closed.count() {
+        0 => return None,
+        1 => "1 was".to_owned(),
+        closed => format!("{closed} were"),
+    };
+    Some(format!(
+        "{verb} flown closed-loop, judged with the recorded surfaces."
+    ))
 }
 
 /// Margin for comparison; that of a departure is the smallest.
@@ -147,8 +151,9 @@ fn class_table(contents: &Contents, models: &[ModelSource]) -> TableView {
         .collect();
     let line = |class: &str| {
         let rows = |model: ModelSource| {
-            let rows = of_model(contents, model).filter(is_flown);
-            rows.filter(|row| row.class == class).collect::<Vec<_>>()
+            let mut rows = flown_by(contents, model);
+            rows.retain(|row| row.class == class);
+            rows
         };
         let first = models.first().map(|m| rows(*m)).unwrap_or_default();
         let closed = first
