@@ -6,6 +6,7 @@ use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, Posterior};
 use super::observation::Observation;
+use super::open_scales::OpenScales;
 use super::others::Others;
 use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
 use super::prior::Scale;
@@ -28,6 +29,7 @@ pub struct CoefficientPosterior {
     pub terms: Vec<Term>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
+    /// With the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
     /// Weight of each maneuver that takes part, by its place in the evidence.
     pub weights: BTreeMap<usize, f64>,
@@ -63,7 +65,15 @@ impl CoefficientPosterior {
             gaussian: &found,
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let whole = data.posterior(terms, scales, &weights, found, evidence)?;
+        let sums = information(&data.flights, &weights, data.unknowns.count);
+        let differences = of_differences(&sums, &data.unknowns)?;
+        let mut whole = data.posterior(terms, scales, &weights, found, evidence)?;
+        let open = OpenScales {
+            terms: &whole.terms,
+            unknowns: &whole.unknowns,
+            information: &differences,
+        };
+        open.add_to(&whole.scales, &mut whole.gaussian);
         Some(CoefficientPosterior { held, ..whole })
     }
 }

@@ -5,7 +5,8 @@
 //! the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver is evidence
 //! with its whole corrected covariance, the exact effect of what it held, and the calibration errors
 //! that it shares with its flight ([`observation`]). Sizes and lengths of the differences are the most
-//! probable ones ([`scales`]); a maneuver that the others contradict weighs less ([`posterior`]).
+//! probable ones ([`scales`]), and what the data leave open of them is in the covariance
+//! ([`open_scales`]). A maneuver that the others contradict weighs less ([`posterior`]).
 
 mod settings;
 mod evidence;
@@ -17,6 +18,7 @@ mod unknowns;
 mod flight_data;
 mod scales;
 mod posterior;
+mod open_scales;
 mod self_check;
 mod others;
 mod held_values;

@@ -18,7 +18,7 @@ use crate::numerics::triangular::{cholesky, solve_lower};
 
 /// Share of a term's largest variance below which the search leaves directions out: they change a
 /// difference by a thousandth of its deviation.
-const LEAST_VARIANCE: f64 = 1e-6;
+pub const LEAST_VARIANCE: f64 = 1e-6;
 
 /// Steps of the search.
 const STEPS: usize = 60;
@@ -40,8 +40,7 @@ pub fn most_probable(
     information: &Information,
     start: &[Scale],
 ) -> Vec<Scale> {
-    let logarithms = start.iter().flat_map(|s| [s.size.ln(), s.length_deg.ln()]);
-    let start = DVector::from_iterator(2 * start.len(), logarithms);
+    let start = logarithms_of(start);
     let negative = |logarithms: &DVector<f64>| {
         negative_log_posterior(
             terms,
@@ -54,7 +53,16 @@ pub fn most_probable(
     scales_of(&minimum(start, STEPS, TOLERANCE, negative))
 }
 
-fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
+/// Logarithms of size and length, term by term.
+#[must_use]
+pub fn logarithms_of(scales: &[Scale]) -> DVector<f64> {
+    let logarithms = scales.iter().flat_map(|s| [s.size.ln(), s.length_deg.ln()]);
+    DVector::from_iterator(2 * scales.len(), logarithms)
+}
+
+/// Scales of logarithms of size and length.
+#[must_use]
+pub fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
     let pairs = logarithms.as_slice().chunks_exact(2);
     pairs
         .map(|pair| Scale {
