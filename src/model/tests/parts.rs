@@ -8,10 +8,12 @@ use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
+use crate::model::open_scales::OpenScales;
 use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
 use crate::model::prior::Scale;
-use crate::model::scales::negative_log_posterior;
+use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{Basis, Term};
+use crate::model::unknowns::root_of_differences;
 use crate::model::{Evidence, Settings};
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::EXACT;
@@ -187,6 +189,61 @@ fn the_likelihood_of_the_scales_is_that_of_the_data() {
         of_data(&scales()) - of_data(&others),
         max_relative = 1e-8
     );
+}
+
+/// Second derivatives of a function, by differences of its values.
+fn second_derivatives(at: &DVector<f64>, f: impl Fn(&DVector<f64>) -> f64) -> DMatrix<f64> {
+    const H: f64 = 0.02;
+    let step = |i: usize, h: f64| DVector::from_fn(at.len(), |k, _| if k == i { h } else { 0.0 });
+    DMatrix::from_fn(at.len(), at.len(), |i, j| {
+        let value = |a: f64, b: f64| f(&(at + step(i, a * H) + step(j, b * H)));
+        (value(1.0, 1.0) - value(1.0, -1.0) - value(-1.0, 1.0) + value(-1.0, -1.0)) / (4.0 * H * H)
+    })
+}
+
+#[test]
+fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
+    let flown = campaign();
+    let (terms, data) = data(&flown, &Settings::default());
+    let weights = vec![1.0; flown.len()];
+    let sums = information(&data.flights, &weights, data.unknowns.count);
+    let own = of_differences(&sums, &data.unknowns).unwrap();
+    let scales = most_probable(&terms, &data.unknowns, &own, &scales());
+    let mean = |at: &DVector<f64>| {
+        let root = root_of_differences(&terms, &scales_of(at), EXACT);
+        gaussian(&root, &own).unwrap().mean
+    };
+    let at = logarithms_of(&scales);
+    let curvature = second_derivatives(&at, |at| {
+        let scales = scales_of(at);
+        negative_log_posterior(&terms, &data.unknowns, &own, &scales, EXACT)
+            .unwrap()
+            .0
+    });
+    let root = Cholesky::new(curvature).unwrap().inverse();
+    let root = Cholesky::new(root).unwrap().l();
+    let (centre, mut stream) = (mean(&at), RandomStream::new(7, "scales"));
+    let mut squares = DVector::zeros(centre.len());
+    for _ in 0..1000 {
+        let deviates = DVector::from_fn(at.len(), |_, _| stream.normal());
+        let off = mean(&(&at + &root * deviates)) - &centre;
+        squares += off.component_mul(&off) / 1000.0;
+    }
+    let mut whole = gaussian(&data.unknowns.root(&terms, &scales, EXACT), &sums).unwrap();
+    let before = whole.covariance.diagonal();
+    let open = OpenScales {
+        terms: &terms,
+        unknowns: &data.unknowns,
+        information: &own,
+    };
+    open.add_to(&scales, &mut whole);
+    let added = whole.covariance.diagonal() - before;
+    // A quadrature of three points a direction beside a thousand draws.
+    let share = added.rows(0, squares.len()).sum() / squares.sum();
+    assert!((0.75..1.3).contains(&share), "{share}");
+    let n = squares.len();
+    let (a, b) = (added.rows(0, n).into_owned(), &squares);
+    assert!(a.dot(b) > 0.95 * a.norm() * b.norm());
 }
 
 #[test]
