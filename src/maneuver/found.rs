@@ -70,6 +70,7 @@ impl Maneuver {
 
     /// Longitudinal maneuver of class `A` in flight `f`, for tests.
     #[cfg(test)]
+    #[must_use]
     pub fn example(id: &str, alpha_deg: f64) -> Maneuver {
         Maneuver {
             maneuver_id: id.into(),

@@ -161,8 +161,8 @@ impl Flown {
     fn mean(group: &[Flown]) -> Option<Flown> {
         Some(Flown {
             alpha_deg: finite_mean(group.iter().map(|own| own.alpha_deg))?,
-            quantities: mean_of(group.iter().map(|own| &own.quantities)),
-            surfaces_deg: mean_of(group.iter().map(|own| &own.surfaces_deg)),
+            quantities: mean_of(&group.iter().map(|own| &own.quantities)),
+            surfaces_deg: mean_of(&group.iter().map(|own| &own.surfaces_deg)),
         })
     }
 
@@ -209,7 +209,7 @@ impl Flown {
 
 /// Mean of each value over those that have it.
 fn mean_of<'a, K: Ord + Clone + 'a>(
-    group: impl Iterator<Item = &'a BTreeMap<K, f64>> + Clone,
+    group: &(impl Iterator<Item = &'a BTreeMap<K, f64>> + Clone),
 ) -> BTreeMap<K, f64> {
     let names: BTreeSet<&K> = group.clone().flat_map(BTreeMap::keys).collect();
     let mean = |name: &K| finite_mean(group.clone().filter_map(|own| own.get(name).copied()));
