@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::derivative_unit::DerivativeUnit;
 use super::regressor::Regressor;
+use crate::aircraft::Aircraft;
 use crate::flight::signal;
 use crate::schema::words;
 
@@ -71,6 +72,16 @@ impl Coefficient {
             .iter()
             .position(|c| *c == self)
             .unwrap_or(0)
+    }
+
+    /// Reference length of a moment, ft; one of a force.
+    #[must_use]
+    pub fn reference_length(self, aircraft: &Aircraft) -> f64 {
+        match self {
+            Coefficient::CN | Coefficient::CA | Coefficient::CY => 1.0,
+            Coefficient::Cm => aircraft.chord_ft,
+            Coefficient::Cl | Coefficient::Cn => aircraft.span_ft,
+        }
     }
 
     #[must_use]
@@ -148,6 +159,16 @@ pub struct Derivative {
 }
 
 impl Derivative {
+    /// Coefficient per unit of the derivative times its regressor, at a dynamic pressure in lbf/ft²: one;
+    /// of a vane, whose derivative is a force or moment, one over q̄S and the reference length.
+    #[must_use]
+    pub fn coefficient_factor(&self, aircraft: &Aircraft, qbar: f64) -> f64 {
+        if !matches!(self.regressor, Regressor::Vane(_)) {
+            return 1.0;
+        }
+        1.0 / (qbar * aircraft.wing_area_ft2 * self.coefficient.reference_length(aircraft))
+    }
+
     #[must_use]
     pub fn unit(&self) -> DerivativeUnit {
         match self.regressor {

@@ -11,6 +11,7 @@ use super::task::Task;
 use crate::aero::{Condition, Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
+use crate::numerics::trapezoid::running_integral;
 use crate::output_error::{Case, Model};
 use crate::units::DEG;
 
@@ -145,12 +146,7 @@ impl AlphaRange {
 
     /// Integral over α from the mean.
     fn integral(&self, quantity: &[f64]) -> Vec<f64> {
-        let mut sum = 0.0;
-        let mut integral = vec![0.0];
-        for pair in quantity.windows(2) {
-            sum += 0.5 * self.step * (pair[0] + pair[1]);
-            integral.push(sum);
-        }
+        let integral = running_integral(quantity, self.step);
         let at_mean = read(&integral, self.place(self.mean));
         integral.iter().map(|value| value - at_mean).collect()
     }

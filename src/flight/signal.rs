@@ -52,3 +52,6 @@ pub const REQUIRED: &[&str] = &[
     ALPHA_VANE, BETA_VANE, VELOCITY, MACH, ALTITUDE, P, Q, R, THETA, PHI, AN, AX, AY, QBAR, THRUST,
     RPM_LEFT, RPM_RIGHT, MASS, X_CG, Y_CG, Z_CG, IX, IY, IZ, IXZ,
 ];
+
+/// Signals of the flow that regressors may be; a simulation computes them.
+pub const OF_THE_FLOW: [&str; 2] = [VELOCITY, MACH];

@@ -23,7 +23,7 @@ use super::evidence::Evidence;
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
-use crate::maneuver::{Means, Status};
+use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 use crate::units::RAD;
 
@@ -134,19 +134,15 @@ impl Flown<'_> {
         }
     }
 
-    /// Factor to a coefficient: one, for a vane 1/q̄S.
-    fn per_pressure(&self, derivative: &Derivative) -> f64 {
-        match derivative.regressor {
-            Regressor::Vane(_) => {
-                1.0 / (self.evidence.maneuver.qbar_psf * self.aircraft.wing_area_ft2)
-            }
-            _ => 1.0,
-        }
-    }
-
-    /// Weights of the derivatives in lift and drag, from each one's weight in its own coefficient.
+    /// Weights of the derivatives in lift and drag, from each one's regressor or its slope.
     fn turned(&self, derivatives: &[&Derivative], own: impl Fn(&Derivative) -> f64) -> Weights {
-        let (sin, cos) = (RAD * self.evidence.maneuver.alpha_deg).sin_cos();
+        let Maneuver {
+            alpha_deg,
+            qbar_psf,
+            ..
+        } = *self.evidence.maneuver;
+        let (sin, cos) = (RAD * alpha_deg).sin_cos();
+        let own = |d: &Derivative| own(d) * d.coefficient_factor(self.aircraft, qbar_psf);
         let weight = |by_normal: f64, by_axial: f64| {
             let weights = derivatives.iter().map(|d| match d.coefficient {
                 Coefficient::CN => by_normal * own(d),
@@ -161,14 +157,12 @@ impl Flown<'_> {
     }
 
     fn total(&self, derivatives: &[&Derivative]) -> Weights {
-        self.turned(derivatives, |d| {
-            d.regressor.value(&|part| self.mean(part)) * self.per_pressure(d)
-        })
+        self.turned(derivatives, |d| d.regressor.value(&|part| self.mean(part)))
     }
 
     fn slope(&self, derivatives: &[&Derivative], along: &Regressor, total: &Weights) -> Weights {
         let mut slope = self.turned(derivatives, |d| {
-            d.regressor.slope(along, &|part| self.mean(part)) * self.per_pressure(d)
+            d.regressor.slope(along, &|part| self.mean(part))
         });
         if *along == Regressor::Alpha {
             slope.lift -= RAD * &total.drag;

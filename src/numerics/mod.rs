@@ -1,5 +1,6 @@
 //! Numerical methods that several rooms share: vectors of the processor, aligned matrices, the
-//! inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, Student's t, χ².
+//! inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, a running integral,
+//! Student's t, χ².
 
 pub mod chi_squared;
 pub(crate) mod digits;
@@ -17,5 +18,6 @@ pub mod runge_kutta;
 pub(crate) mod simd;
 pub mod student;
 pub mod symmetric;
+pub mod trapezoid;
 pub mod triangular;
 pub mod trig;

@@ -103,8 +103,15 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         return Ok(());
     };
     let tunnel = runner.config.tunnel.clamped();
-    let models = models(runner.config, campaign, specification);
     let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
+    let database = |model: &ModelSource| match model {
+        ModelSource::Posterior => posterior.clone(),
+        ModelSource::Trend => of_trends(runner.config, campaign, &tunnel),
+        ModelSource::Tunnel => tunnel.clone(),
+        ModelSource::Database => runner.config.match_database.clamped(),
+    };
+    let models = specification.models.iter();
+    let models: Vec<(ModelSource, WindTunnel)> = models.map(|m| (*m, database(m))).collect();
     let derivatives = Fingerprint::of("models", 1)
         .with(&models)
         .with(&tunnel)
@@ -166,27 +173,9 @@ fn own_estimates<'a>(
     (fit.outcome == Outcome::Converged).then_some((means, own))
 }
 
-/// Derivatives of each model that the specification names.
-fn models(
-    config: &Config,
-    campaign: &Campaign,
-    specification: &Specification,
-) -> Vec<(ModelSource, WindTunnel)> {
-    let tunnel = &config.tunnel;
-    let groups: Vec<&str> = config
-        .trend
-        .groups
-        .iter()
-        .map(|g| g.name.as_str())
-        .collect();
-    let database = |model: ModelSource| match model {
-        ModelSource::Posterior => {
-            proof_of_match::of_posterior(&campaign.model.rows.posterior, tunnel)
-        }
-        ModelSource::Trend => proof_of_match::of_trends(&campaign.trends, &groups, tunnel),
-        ModelSource::Tunnel => tunnel.clamped(),
-        ModelSource::Database => config.match_database.clamped(),
-    };
-    let models = specification.models.iter();
-    models.map(|model| (*model, database(*model))).collect()
+/// Trends of the configured groups as a database.
+fn of_trends(config: &Config, campaign: &Campaign, tunnel: &WindTunnel) -> WindTunnel {
+    let groups = config.trend.groups.iter();
+    let groups: Vec<&str> = groups.map(|group| group.name.as_str()).collect();
+    proof_of_match::of_trends(&campaign.trends, &groups, tunnel)
 }

@@ -15,17 +15,16 @@ use crate::flight::signal;
 /// Number of coefficients: CN, Cm, CA, CY, Cl, Cn.
 pub const COEFFICIENTS: usize = 6;
 
-/// Signals that the simulation has itself; all others of the build-up are recorded.
-const OWN_SIGNALS: [&str; 2] = [signal::VELOCITY, signal::MACH];
-
-/// Recorded signals of a build-up, each once: surfaces and vanes.
+/// Recorded signals of a build-up, each once: surfaces and vanes. The simulation has the flow itself.
 #[must_use]
 pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
     let all = buildup
         .derivatives
         .iter()
         .flat_map(|d| d.regressor.signals());
-    let mut signals: Vec<&str> = all.filter(|name| !OWN_SIGNALS.contains(name)).collect();
+    let mut signals: Vec<&str> = all
+        .filter(|name| !signal::OF_THE_FLOW.contains(name))
+        .collect();
     signals.sort_unstable();
     signals.dedup();
     signals
@@ -189,7 +188,8 @@ impl Factors<'_> {
             Regressor::Surface(name) => Factor::Recorded(self.place(name)),
             Regressor::Vane(name) => Factor::Vane {
                 place: self.place(name),
-                size: self.size(),
+                size: self.aircraft.wing_area_ft2
+                    * self.coefficient.reference_length(self.aircraft),
             },
             Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.of(of))),
             Regressor::Product(both) => {
@@ -201,16 +201,6 @@ impl Factors<'_> {
     fn place(&self, name: &str) -> usize {
         let place = self.recorded.iter().position(|own| *own == name);
         place.unwrap_or(usize::MAX)
-    }
-
-    /// Area, or volume of a moment, by which a vane's force is divided.
-    fn size(&self) -> f64 {
-        let length = match self.coefficient {
-            Coefficient::Cm => self.aircraft.chord_ft,
-            Coefficient::Cl | Coefficient::Cn => self.aircraft.span_ft,
-            Coefficient::CN | Coefficient::CA | Coefficient::CY => 1.0,
-        };
-        self.aircraft.wing_area_ft2 * length
     }
 }
 

@@ -2,6 +2,7 @@
 //! closely for the inner loop.
 
 use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
+use crate::numerics::trapezoid::running_integral;
 
 /// Spacing of the table, deg. It is linear between, as most databases are.
 const STEP_DEG: f64 = 1.0;
@@ -60,7 +61,7 @@ impl DerivativeTable {
             };
             let mut column: Vec<f64> = (0..nodes).map(at).collect();
             if derivative.regressor == Regressor::Alpha {
-                column = integral(&column);
+                column = running_integral(&column, STEP_DEG);
             }
             for (node, value) in column.into_iter().enumerate() {
                 values[node * derivatives + i] = value;
@@ -128,15 +129,4 @@ fn node_count() -> usize {
     )]
     let intervals = (2.0 * REACH_DEG / STEP_DEG) as usize + 1;
     intervals + 1
-}
-
-/// Integral of a column by the trapezoidal rule.
-fn integral(slopes: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let mut integral = vec![0.0];
-    for pair in slopes.windows(2) {
-        sum += 0.5 * STEP_DEG * (pair[0] + pair[1]);
-        integral.push(sum);
-    }
-    integral
 }

@@ -4,10 +4,10 @@ use crate::aero::WindTunnel;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::tables::{PosteriorRow, TrendRow};
 
-/// Posterior as a database, read as the tunnel's but constant beyond its ends.
+/// Posterior as a database, read as the tunnel.
 #[must_use]
 pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
-    let mut database = WindTunnel::new(tunnel.clamped().settings().clone());
+    let mut database = WindTunnel::new(tunnel.settings().clone());
     for row in rows {
         let point = point(row.alpha_deg, row.mach, row.value);
         database.insert_at(&row.derivative, row.third, point);
@@ -18,7 +18,7 @@ pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
 /// Trends as a database: of each derivative its first group in the table, which is flight's value.
 #[must_use]
 pub fn of_trends(rows: &[TrendRow], groups: &[&str], tunnel: &WindTunnel) -> WindTunnel {
-    let mut database = WindTunnel::new(tunnel.clamped().settings().clone());
+    let mut database = WindTunnel::new(tunnel.settings().clone());
     let mut seen: std::collections::BTreeMap<&str, &str> = std::collections::BTreeMap::new();
     for row in rows
         .iter()

@@ -135,7 +135,7 @@ impl Flight<'_> {
             LocalKind::Sum => Effect::constant(1.0),
             LocalKind::Derivative => {
                 let regressor = self.regressor(&derivative.regressor, states);
-                regressor.times(self.per_pressure(derivative))
+                regressor.times(derivative.coefficient_factor(self.aircraft, self.trim.qbar))
             }
         };
         effect.coefficient = value.coefficient.index();
@@ -220,19 +220,6 @@ impl Flight<'_> {
         }
         let gearing = self.controls.pitch.get(surface);
         effect.by_control = factor * gearing.copied().unwrap_or(0.0);
-    }
-
-    /// Factor to a coefficient: one, for a vane 1/q̄S and, of a moment, one over the reference length.
-    fn per_pressure(&self, derivative: &Derivative) -> f64 {
-        if !matches!(derivative.regressor, Regressor::Vane(_)) {
-            return 1.0;
-        }
-        let length = match derivative.coefficient {
-            Coefficient::Cm => self.aircraft.chord_ft,
-            Coefficient::Cl | Coefficient::Cn => self.aircraft.span_ft,
-            Coefficient::CN | Coefficient::CA | Coefficient::CY => 1.0,
-        };
-        1.0 / (self.trim.qbar * self.aircraft.wing_area_ft2 * length)
     }
 }
 

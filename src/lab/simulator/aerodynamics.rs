@@ -11,9 +11,6 @@ use crate::flight::signal;
 use crate::rigid_body::AirData;
 use crate::units::DEG;
 
-/// Signals that the air data give.
-const OWN_SIGNALS: [&str; 2] = [signal::VELOCITY, signal::MACH];
-
 /// The build-up with the tables of the true derivatives.
 #[derive(Clone, Debug)]
 pub struct Aerodynamics {
@@ -37,8 +34,9 @@ impl Aerodynamics {
             if !truth.has(&derivative.name) {
                 return Err(format!("the truth has no value of {}", derivative.name));
             }
-            let is_known =
-                |name: &str| OWN_SIGNALS.contains(&name) || surfaces.iter().any(|s| s == name);
+            let is_known = |name: &str| {
+                signal::OF_THE_FLOW.contains(&name) || surfaces.iter().any(|s| s == name)
+            };
             if let Some(name) = derivative.regressor.signals().find(|name| !is_known(name)) {
                 return Err(format!("{}: `surfaces` has no `{name}`", derivative.name));
             }

@@ -8,7 +8,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::build_up::Term;
 use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
-use crate::aero::{Axis, Derivative, Regressor};
+use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations};
@@ -140,7 +140,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
         if matches!(derivative.regressor, Regressor::Vane(_)) {
             let qbar = self.window.signal(signal::QBAR).iter();
             for (force, qbar) in column.iter_mut().zip(qbar) {
-                *force *= surface_factor(self.aircraft, *qbar, derivative);
+                *force *= derivative.coefficient_factor(self.aircraft, *qbar);
             }
         }
         column
@@ -219,22 +219,4 @@ fn have_same_column(a: &Derivative, b: &Derivative) -> bool {
 
 fn is_vane_moment(derivative: &Derivative) -> bool {
     matches!(derivative.regressor, Regressor::Vane(_)) && derivative.coefficient.is_moment()
-}
-
-/// Regressor per deflection (deg) or per force of a vane (lbf): one for a surface; a vane's force
-/// and moment become coefficients.
-pub(crate) fn surface_factor(aircraft: &Aircraft, qbar: f64, derivative: &Derivative) -> f64 {
-    if !matches!(derivative.regressor, Regressor::Vane(_)) {
-        return 1.0;
-    }
-    let force = qbar * aircraft.wing_area_ft2;
-    let length = match derivative.coefficient.axis() {
-        Axis::Longitudinal => aircraft.chord_ft,
-        Axis::Lateral => aircraft.span_ft,
-    };
-    1.0 / if derivative.coefficient.is_moment() {
-        force * length
-    } else {
-        force
-    }
 }

@@ -2,7 +2,6 @@
 
 use pulp::Arch;
 
-use super::regressors::surface_factor;
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -79,7 +78,7 @@ impl Effect {
     ) -> Effect {
         let factors = match derivative.regressor {
             Regressor::Vane(_) => {
-                let times_qbar = surface_factor(aircraft, 1.0, derivative);
+                let times_qbar = derivative.coefficient_factor(aircraft, 1.0);
                 let qbar = samples_of(window, signal::QBAR);
                 qbar.iter().map(|qbar| times_qbar / qbar).collect()
             }

@@ -12,7 +12,6 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, Motion, OUTPUTS};
 use crate::numerics::runge_kutta::{self, POINT};
-use crate::output_error::case::regressors::surface_factor;
 use crate::output_error::case::{Case, InitialState, Measurements, Model};
 use crate::units::DEG;
 
@@ -240,7 +239,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
             Regressor::PitchRate => m.rates[1] * aircraft.chord_ft / (2.0 * m.velocity),
             Regressor::YawRate => m.rates[2] * aircraft.span_ft / (2.0 * m.velocity),
             Regressor::Surface(name) | Regressor::Vane(name) => {
-                self.window.signal(name)[point] * surface_factor(aircraft, m.qbar, derivative)
+                self.window.signal(name)[point] * derivative.coefficient_factor(aircraft, m.qbar)
             }
             Regressor::Magnitude(_) | Regressor::Product(_) => {
                 part.value(&|own| self.measured(own, derivative, point))
