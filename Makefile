@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate trend model qualities match match-study compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate model trend qualities match match-study compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -40,11 +40,11 @@ segment: build ## find the maneuvers and their classes
 estimate: build ## estimate the derivatives of every maneuver
 	$(call harvest,estimate) $(running)
 
-trend: build ## fit least-squares trends across angle of attack
-	$(call harvest,trend) $(running)
-
 model: build ## fuse tunnel and flights to the posterior of every derivative
 	$(call harvest,model) $(running)
+
+trend: build ## fit least-squares trends across angle of attack
+	$(call harvest,trend) $(running)
 
 qualities: build ## judge the flying qualities of the posterior, with the probability of each level
 	$(call harvest,qualities) $(running)

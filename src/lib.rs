@@ -21,9 +21,10 @@
 //!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air
 //!    [`filter_error`] takes its place. [`estimate::maneuver`] returns
 //!    the rows [`tables::FitRow`] and [`tables::EstimateRow`].
-//! 7. **Trend.** [`trend::trends`] fits the estimates of a derivative across angle of attack
-//!    ([`tables::TrendRow`]). [`compare::comparison`] sets the trend against the
-//!    [`aero::WindTunnel`] ([`tables::ComparisonRow`]).
+//! 7. **Model and trend.** [`model::model`] fuses the [`aero::WindTunnel`] and the estimates to the
+//!    posterior ([`tables::PosteriorRow`]); [`trend::trends`] fits the estimates of a derivative
+//!    across angle of attack ([`tables::TrendRow`]). [`compare::compare_posterior`] sets the posterior
+//!    against the tunnel ([`tables::ComparisonRow`]).
 //! 8. **Report.** [`report::html`] makes the page of all results, [`pdf::pdf`] its PDF, and
 //!    [`night::run`] publishes both with the tables.
 //!
@@ -63,8 +64,8 @@ pub mod ingest;
 pub mod segment;
 mod surfaces;
 pub mod estimate;
-mod trend;
 mod model;
+mod trend;
 mod qualities;
 mod proof_of_match;
 mod compare;

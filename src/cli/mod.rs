@@ -94,10 +94,10 @@ enum Command {
     Segment(StageOptions),
     /// Estimate the derivatives of every maneuver
     Estimate(StageOptions),
-    /// Fit least-squares trends across angle of attack
-    Trend(RunOptions),
     /// Fuse tunnel and flights to the posterior of every derivative
     Model(RunOptions),
+    /// Fit least-squares trends across angle of attack
+    Trend(RunOptions),
     /// Judge the flying qualities of the posterior, with the probability of each level
     Qualities(RunOptions),
     /// Fly every maneuver again by a simulator, and judge the match by tolerances
@@ -190,8 +190,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Ingest(options) => return run_stage(Stage::Ingest, &options),
         Command::Segment(options) => return run_stage(Stage::Segment, &options),
         Command::Estimate(options) => return run_stage(Stage::Estimate, &options),
-        Command::Trend(options) => (Stage::Trend, options),
         Command::Model(options) => (Stage::Model, options),
+        Command::Trend(options) => (Stage::Trend, options),
         Command::Qualities(options) => (Stage::Qualities, options),
         Command::Match(options) => (Stage::Match, options),
         Command::Compare(options) => (Stage::Compare, options),

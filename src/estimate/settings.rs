@@ -141,7 +141,7 @@ settings! {
         pub held_uncertainty_pct: f64 = 20.0,
         /// Values that maneuvers hold, in the tables from the stage `model` on: `posterior` reads them
         /// from the posterior of the other flights, `tunnel` from the wind tunnel, as in the paper.
-        /// Trends and posterior are of estimates with the tunnel's values.
+        /// Trends are of the estimates as published, the posterior of those with the tunnel's values.
         #[serde(skip_serializing)]
         pub held_values: HeldValues = HeldValues::default(),
         /// Delays of the surfaces, estimated from all maneuvers of the campaign.

@@ -155,7 +155,7 @@ fn program_difference(before: &Code, now: &Code) -> Option<Cause> {
     }
     let name = |code: &Code| format!("{} ({})", code.version, code.source);
     Some(Cause {
-        stage: Stage::Trend,
+        stage: Stage::Model,
         origin: Origin::Code,
         subject: "harvest".to_owned(),
         words: format!("the program changed from {} to {}", name(before), name(now)),
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(causes[1].words, "method `joint`: version 2 became 3");
         assert_eq!(
             (causes[1].stage, causes[2].stage),
-            (Stage::Estimate, Stage::Trend)
+            (Stage::Estimate, Stage::Model)
         );
     }
 

@@ -11,10 +11,10 @@ words! {
         Segment = "segment",
         /// Maneuvers to derivatives.
         Estimate = "estimate",
-        /// Derivatives to trends across angle of attack.
-        Trend = "trend",
         /// Tunnel and derivatives to the posterior.
         Model = "model",
+        /// Derivatives to trends across angle of attack.
+        Trend = "trend",
         /// Posterior to the modes of the aircraft and their levels.
         Qualities = "qualities",
         /// Maneuvers flown again by simulators.

@@ -111,8 +111,14 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
                 ("prediction", value(&estimate.prediction)),
             ]),
         ),
+        (
+            Stage::Model,
+            named([
+                ("model", value(&config.model)),
+                ("held_values", value(&estimate.held_values)),
+            ]),
+        ),
         (Stage::Trend, named([("trend", value(&config.trend))])),
-        (Stage::Model, named([("model", value(&config.model))])),
         (
             Stage::Qualities,
             named([("qualities", value(&config.qualities))]),

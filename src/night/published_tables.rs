@@ -27,11 +27,11 @@ pub fn publish_tables(
     if until >= Stage::Estimate {
         publish_estimate(&shelf(Stage::Estimate), campaign)?;
     }
-    if until >= Stage::Trend {
-        publish_trend(&shelf(Stage::Trend), campaign)?;
-    }
     if until >= Stage::Model {
         publish_model(&shelf(Stage::Model), campaign)?;
+    }
+    if until >= Stage::Trend {
+        publish_trend(&shelf(Stage::Trend), campaign)?;
     }
     if until >= Stage::Qualities {
         publish_qualities(&shelf(Stage::Qualities), campaign)?;

@@ -87,8 +87,8 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         }
     }
     let made_anew = [
-        Stage::Trend,
         Stage::Model,
+        Stage::Trend,
         Stage::Qualities,
         Stage::Match,
         Stage::Compare,

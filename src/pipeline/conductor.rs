@@ -47,8 +47,8 @@ fn version_of<S: Step>() -> (&'static str, u32) {
 #[must_use]
 pub fn method_versions() -> BTreeMap<String, u32> {
     let made_anew = [
-        (Stage::Trend.name(), TREND_VERSION),
         (Stage::Model.name(), MODEL_VERSION),
+        (Stage::Trend.name(), TREND_VERSION),
         (Stage::Qualities.name(), QUALITIES_VERSION),
         (Stage::Compare.name(), COMPARE_VERSION),
     ];
@@ -193,11 +193,11 @@ impl<'a> Conductor<'a> {
         if until >= Stage::Estimate && !self.estimate(&mut campaign)? {
             return Ok(campaign);
         }
-        if until >= Stage::Trend {
-            trend_stage::fit_trends(config, &mut campaign);
-        }
         if until >= Stage::Model {
             model_stage::fit_model(config, &mut campaign);
+        }
+        if until >= Stage::Trend {
+            trend_stage::fit_trends(config, &mut campaign);
         }
         if until >= Stage::Qualities {
             qualities_stage::judge_qualities(config, &mut campaign);

@@ -15,7 +15,7 @@ use crate::tables::EstimateRow;
 use crate::trend;
 
 /// Version of the trends.
-pub const TREND_VERSION: u32 = 3;
+pub const TREND_VERSION: u32 = 4;
 
 /// Version of the comparison.
 pub const COMPARE_VERSION: u32 = 2;
@@ -49,7 +49,7 @@ pub fn converged_estimates(config: &Config, campaign: &Campaign) -> Vec<Estimate
         .collect()
 }
 
-/// Fits the trends.
+/// Fits the trends of the estimates as they are published.
 pub fn fit_trends(config: &Config, campaign: &mut Campaign) {
     let estimates = converged_estimates(config, campaign);
     let found = trend::trends(&estimates, &config.trend, |name| {

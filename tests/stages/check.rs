@@ -35,7 +35,7 @@ fn help_teaches_subcommands_examples_and_exit_codes() {
 #[test]
 fn every_subcommand_explains_its_options() {
     for stage in [
-        "run", "ingest", "segment", "estimate", "trend", "model", "compare", "report", "check",
+        "run", "ingest", "segment", "estimate", "model", "trend", "compare", "report", "check",
     ] {
         let outcome = run(harvest().args([stage, "--help"]));
         assert_eq!(outcome.code, Some(0), "{stage}");

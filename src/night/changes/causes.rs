@@ -97,7 +97,7 @@ impl Causes {
         causes.insert(because.to_owned());
     }
 
-    /// Causes of a trend's change: its maneuvers, and the settings and methods as far as `until`.
+    /// Causes of a trend's change: its maneuvers, and the settings and methods from the posterior to `until`.
     /// The group may be a class.
     pub fn of_trend(&self, derivative: &str, group: &str, until: Stage) -> String {
         let is_in_group = |class: &str| class == group || !self.classes.contains(group);
@@ -114,7 +114,7 @@ impl Causes {
         let later = self
             .all
             .iter()
-            .filter(|c| (Stage::Trend..=until).contains(&c.stage));
+            .filter(|c| (Stage::Model..=until).contains(&c.stage));
         let others = gone.chain(settings).chain(later);
         phrase(
             of_maneuvers
