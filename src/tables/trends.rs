@@ -19,7 +19,7 @@ table! {
         /// Value of the polynomial or spline, in the column `unit`.
         pub value: f64,
         /// Standard error of the trend, in the column `unit`: from the residuals as they are, with
-        /// the orders not chosen counted.
+        /// the orders not chosen and the lack of fit at the flown angles of attack counted.
         pub standard_error: f64,
         /// Lower end of the trend's 95 % interval, in the column `unit`: Student's t with the
         /// residuals' degrees of freedom.
@@ -27,7 +27,8 @@ table! {
         /// Upper end of the trend's 95 % interval, in the column `unit`.
         pub upper_95: f64,
         /// Lower end of the 95 % interval for one more maneuver's estimate with the median bound, in
-        /// the column `unit`: the trend's error, the scatter and that bound together.
+        /// the column `unit`: the trend's error, the deviations of maneuvers of one angle of attack from
+        /// each other, and that bound together.
         pub prediction_lower_95: f64,
         /// Upper end of the 95 % interval for one more maneuver's estimate, in the column `unit`.
         pub prediction_upper_95: f64,

@@ -64,7 +64,7 @@ fn stall(a: f64) -> f64 {
 
 /// Studies with the least coverage of the band. A stall within 15° bends more than test points 5°
 /// apart resolve: there the coverage is below the nominal one.
-const STUDIES: [(Study, f64); 7] = [
+const STUDIES: [(Study, f64); 9] = [
     (
         Study {
             maneuvers: 4,
@@ -107,6 +107,24 @@ const STUDIES: [(Study, f64); 7] = [
             points: 12,
             truth: parabola,
             scatter: 0.003,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 4,
+            points: 4,
+            truth: stall,
+            scatter: 0.0,
+        },
+        0.92,
+    ),
+    (
+        Study {
+            maneuvers: 8,
+            points: 4,
+            truth: parabola,
+            scatter: 0.0,
         },
         0.92,
     ),

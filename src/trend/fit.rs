@@ -24,6 +24,11 @@
 //! bounds and τ predict them; few data need that. The interval takes Student's t with n − p degrees
 //! of freedom (Hartung and Knapp 2001). It is never narrower than the bounds alone give.
 //!
+//! A trend of few coefficients may not follow the derivative. Maneuvers of one flown α differ by their
+//! own deviations alone; their mean residuals differ from α to α also by lack of fit, λ (Paule and
+//! Mandel's equation for the means). Lack of fit does not average out: λ² counts in the variance of the
+//! trend at every α. Where no α was flown twice, all that the bounds leave is lack of fit.
+//!
 //! A criterion chooses the order, and its choice is uncertain. The other orders count in the
 //! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance),
 //! each with its own variance and its distance from the chosen trend. A criterion also smooths: it
@@ -60,11 +65,29 @@ pub(super) struct Point {
     pub bound: f64,
     /// Index of its class among those of the trend.
     pub class: usize,
+    /// Index of its flown α among those of the trend.
+    pub flown: usize,
 }
 
 impl Point {
     pub(super) fn key(&self) -> (f64, f64, f64, usize) {
         (self.alpha_deg, self.value, self.bound, self.class)
+    }
+}
+
+/// Counts the flown α of points sorted by α: one spans half a step of the published grid.
+pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_deg: f64) {
+    let mut current: Option<(usize, f64)> = None;
+    for point in points {
+        let (flown, first) = match current {
+            None => (0, point.alpha_deg),
+            Some((flown, first)) if point.alpha_deg - first > 0.5 * step_deg => {
+                (flown + 1, point.alpha_deg)
+            }
+            Some(same) => same,
+        };
+        current = Some((flown, first));
+        point.flown = flown;
     }
 }
 
@@ -76,10 +99,12 @@ pub(super) struct Fit {
     covariance: DMatrix<f64>,
     /// Covariance from the bounds alone, without scatter.
     covariance_of_bounds: DMatrix<f64>,
+    /// λ².
+    lack_of_fit2: f64,
     /// τ² of each point, in the points' order.
     scatter2: Vec<f64>,
-    /// τ² + bound² of each point.
-    variances: Vec<f64>,
+    /// Standard deviation by the median maneuver's bound and the maneuvers' own deviations.
+    deviation_of_one_more: f64,
     degrees_of_freedom: usize,
     criterion: f64,
     /// In the points' order.
@@ -165,7 +190,7 @@ impl Fit {
             return Vec::new();
         };
         let range = (first.alpha_deg, last.alpha_deg);
-        let flown = flown_alphas(points, settings.alpha_step_deg);
+        let flown = flown_alphas(points);
         let most = flown.len().min(points.len().saturating_sub(2));
         let highest = if knots_deg.is_empty() {
             settings.max_order
@@ -244,7 +269,11 @@ impl Fit {
             &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)),
         )?
         .1;
+        let lack = LackOfFit::of(points, &residuals, &variances, p);
+        let bound2 = upper_median(variances.iter().copied()).unwrap_or(0.0);
         Some(Fit {
+            lack_of_fit2: lack.lack2,
+            deviation_of_one_more: (bound2 + lack.own2).sqrt(),
             residuals: standardised(&design, &residuals, &total, &weights, &solution.1),
             basis,
             coefficients: solution.0,
@@ -255,7 +284,6 @@ impl Fit {
                 .zip(&variances)
                 .map(|(all, bound)| all - bound)
                 .collect(),
-            variances: total,
             degrees_of_freedom,
             criterion: misfit + penalty(criterion, n, p + strata.len()),
         })
@@ -268,7 +296,7 @@ impl Fit {
         let variance = variance(&self.covariance).max(variance(&self.covariance_of_bounds));
         (
             (&row * &self.coefficients)[(0, 0)],
-            variance.max(0.0).sqrt(),
+            (variance.max(0.0) + self.lack_of_fit2).sqrt(),
         )
     }
 
@@ -285,9 +313,9 @@ impl Fit {
         upper_median(self.scatter2.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
-    /// τ and bound together of the median maneuver: the standard deviation of one more estimate.
+    /// Standard deviation of one more estimate from the derivative.
     pub(super) fn deviation_of_one_more(&self) -> f64 {
-        upper_median(self.variances.iter().copied()).map_or(0.0, f64::sqrt)
+        self.deviation_of_one_more
     }
 
     /// The half width of the 95% band in standard errors: Student's t with the residuals' degrees
@@ -335,22 +363,12 @@ fn standardised(
     (0..design.nrows()).map(of).collect()
 }
 
-/// Clusters the flown α, deg, ascending: a cluster spans half a step of the published grid. Each is
-/// the mean of its maneuvers, to a tenth.
-fn flown_alphas(points: &[Point], step_deg: f64) -> Vec<f64> {
-    let mut clusters: Vec<Vec<f64>> = Vec::new();
-    for p in points {
-        match clusters.last_mut() {
-            Some(cluster) if p.alpha_deg - cluster[0] <= 0.5 * step_deg => {
-                cluster.push(p.alpha_deg);
-            }
-            _ => clusters.push(vec![p.alpha_deg]),
-        }
-    }
-    let mean = |cluster: &Vec<f64>| cluster.iter().sum::<f64>() / cluster.len() as f64;
-    clusters
-        .iter()
-        .map(|cluster| (10.0 * mean(cluster)).round() / 10.0)
+/// The flown α, deg, ascending: each the mean of its maneuvers, to a tenth.
+fn flown_alphas(points: &[Point]) -> Vec<f64> {
+    let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
+    points
+        .chunk_by(|a, b| a.flown == b.flown)
+        .map(|own| (10.0 * mean(own)).round() / 10.0)
         .collect()
 }
 
@@ -452,6 +470,74 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     }
 }
 
+/// Variance of the residuals beyond the bounds, in two parts.
+struct LackOfFit {
+    /// λ², by which the derivative leaves the curve.
+    lack2: f64,
+    /// Variance of the maneuvers' own deviations, from those of one flown α.
+    own2: f64,
+}
+
+impl LackOfFit {
+    fn of(
+        points: &[Point],
+        residuals: &DVector<f64>,
+        variances: &[f64],
+        coefficients: usize,
+    ) -> LackOfFit {
+        let about = about_their_means(points, residuals, variances);
+        let every: Vec<usize> = (0..points.len()).collect();
+        let own2 = scatter_squared(&about.residuals, variances, &about.freedom, &every);
+        let total: Vec<f64> = variances.iter().map(|bound2| bound2 + own2).collect();
+        let about = about_their_means(points, residuals, &total);
+        let alphas = about.means.len();
+        let freedom = alphas.saturating_sub(coefficients) as f64 / alphas as f64;
+        let every: Vec<usize> = (0..alphas).collect();
+        let means = DVector::from_vec(about.means);
+        let lack2 = scatter_squared(&means, &about.variances, &vec![freedom; alphas], &every);
+        LackOfFit { lack2, own2 }
+    }
+}
+
+/// Residuals of the maneuvers of each flown α about their weighted mean.
+struct AboutMeans {
+    /// Residual of each maneuver.
+    residuals: DVector<f64>,
+    /// One less its share of the mean, of each maneuver.
+    freedom: Vec<f64>,
+    /// Mean residual of each flown α.
+    means: Vec<f64>,
+    /// Variance of each mean.
+    variances: Vec<f64>,
+}
+
+fn about_their_means(points: &[Point], residuals: &DVector<f64>, variances: &[f64]) -> AboutMeans {
+    let mut about = AboutMeans {
+        residuals: residuals.clone(),
+        freedom: Vec::with_capacity(points.len()),
+        means: Vec::new(),
+        variances: Vec::new(),
+    };
+    let mut first = 0;
+    for own in points.chunk_by(|a, b| a.flown == b.flown) {
+        let members = first..first + own.len();
+        first = members.end;
+        let total: f64 = members.clone().map(|i| 1.0 / variances[i]).sum();
+        let mean = members
+            .clone()
+            .map(|i| residuals[i] / variances[i])
+            .sum::<f64>()
+            / total;
+        for i in members {
+            about.residuals[i] -= mean;
+            about.freedom.push(1.0 - 1.0 / (variances[i] * total));
+        }
+        about.means.push(mean);
+        about.variances.push(1.0 / total);
+    }
+    about
+}
+
 /// Solves for τ² of some of the points: the sum of their squared residuals over their variances,
 /// outliers cut, equals its expectation. The sum falls as τ² grows, so bisection finds it.
 fn scatter_squared(
@@ -487,15 +573,18 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn points(of: impl Fn(f64) -> f64, alphas: &[f64]) -> Vec<Point> {
-        alphas
+        let mut points: Vec<Point> = alphas
             .iter()
             .map(|&a| Point {
                 alpha_deg: a,
                 value: of(a),
                 bound: 0.01,
                 class: 0,
+                flown: 0,
             })
-            .collect()
+            .collect();
+        count_flown(points.iter_mut(), 5.0);
+        points
     }
 
     fn constant(points: &[Point]) -> Option<Fit> {
@@ -551,12 +640,14 @@ mod tests {
             (30.0, 0.95, 0.1),
             (40.0, 1.05, 0.15),
         ];
-        let data = data.map(|(alpha_deg, value, bound)| Point {
+        let mut data = data.map(|(alpha_deg, value, bound)| Point {
             alpha_deg,
             value,
             bound,
             class: 0,
+            flown: 0,
         });
+        count_flown(data.iter_mut(), 5.0);
         let fit = constant(&data).expect("a fit");
         let sum = |f: &dyn Fn(&Point) -> f64| data.iter().map(f).sum::<f64>();
         let weight = sum(&|p| p.bound.powi(-2));
@@ -586,6 +677,57 @@ mod tests {
         );
     }
 
+    /// Pairs of maneuvers at 10, 20, … 50 deg, `apart` from each other.
+    fn pairs(of: impl Fn(f64) -> f64, apart: f64) -> Vec<Point> {
+        let alphas: Vec<f64> = (1..=5).flat_map(|i| [10.0 * f64::from(i); 2]).collect();
+        let mut data = points(of, &alphas);
+        for (i, p) in data.iter_mut().enumerate() {
+            p.value += if i % 2 == 0 {
+                0.5 * apart
+            } else {
+                -0.5 * apart
+            };
+            p.bound = 1e-4;
+        }
+        data
+    }
+
+    #[test]
+    fn what_a_curve_misses_is_lack_of_fit_and_what_maneuvers_of_one_alpha_differ_by_is_not() {
+        let missed = constant(&pairs(|a| 0.01 * a, 0.02)).expect("a fit");
+        // The means are ±0.2, ±0.1, 0 from the constant; pairs leave 2·0.01² with five degrees of freedom.
+        let own2 = 10.0 * 0.01_f64.powi(2) / 5.0 / HUBER_VARIANCE;
+        let between2 = 0.1 / 4.0 / HUBER_VARIANCE;
+        assert_relative_eq!(
+            missed.lack_of_fit2,
+            between2 - 0.5 * own2,
+            max_relative = 1e-3
+        );
+        let line = Fit::of(
+            &pairs(|a| 0.01 * a, 0.02),
+            Basis::polynomial((10.0, 50.0), 1),
+            Criterion::Aicc,
+        );
+        assert_relative_eq!(line.expect("a fit").lack_of_fit2, 0.0);
+    }
+
+    #[test]
+    fn lack_of_fit_widens_the_band_of_the_trend_but_not_that_of_one_more_maneuver_twice() {
+        let fit = constant(&pairs(|a| 0.01 * a, 0.02)).expect("a fit");
+        let averaged2 = fit.covariance[(0, 0)];
+        assert_relative_eq!(
+            fit.at(33.0).1.powi(2),
+            averaged2 + fit.lack_of_fit2,
+            max_relative = 1e-12
+        );
+        let own2 = 10.0 * 0.01_f64.powi(2) / 5.0 / HUBER_VARIANCE;
+        assert_relative_eq!(
+            fit.deviation_of_one_more().powi(2),
+            own2,
+            max_relative = 1e-3
+        );
+    }
+
     #[test]
     fn one_outlier_at_the_end_does_not_bend_the_trend() {
         let line = |a: f64| 0.05 + 0.001 * a;
@@ -600,6 +742,7 @@ mod tests {
             value: 5.0,
             bound: 0.01,
             class: 0,
+            flown: 21,
         });
         let wild = Trend::through(&data, &settings, &[]).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {

@@ -51,13 +51,12 @@ impl Mean {
     }
 }
 
-/// Means of at most two maneuvers: one, or one at each of two angles of attack that lie further
-/// apart than half a step of the published grid.
+/// Means of at most two maneuvers: one, or one at each of two flown angles of attack.
 ///
 /// The points are sorted by α.
-pub(super) fn means(points: &[Point], step_deg: f64) -> Vec<Mean> {
+pub(super) fn means(points: &[Point]) -> Vec<Mean> {
     points
-        .chunk_by(|a, b| b.alpha_deg - a.alpha_deg <= 0.5 * step_deg)
+        .chunk_by(|a, b| a.flown == b.flown)
         .map(Mean::of)
         .collect()
 }

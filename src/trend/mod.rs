@@ -23,7 +23,7 @@ use crate::maneuver::Status;
 use crate::numerics::student::NORMAL_95;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
-use fit::{Point, Trend};
+use fit::{Point, Trend, count_flown};
 use means::{Mean, means};
 
 #[cfg(test)]
@@ -140,7 +140,7 @@ fn by_derivative<'a>(
     order
 }
 
-/// The point of an estimate, with class index 0; `None` without a value and a bound.
+/// The point of an estimate, with class and flown α at index 0; `None` without a value and a bound.
 fn point(e: &EstimateRow) -> Option<Point> {
     let bound = e.bound_corrected.or(e.bound)?;
     let p = Point {
@@ -148,6 +148,7 @@ fn point(e: &EstimateRow) -> Option<Point> {
         value: e.value?,
         bound,
         class: 0,
+        flown: 0,
     };
     (p.alpha_deg.is_finite() && p.value.is_finite() && bound.is_finite() && bound > 0.0)
         .then_some(p)
@@ -167,7 +168,7 @@ fn fit_trend(
             members.len()
         ));
     }
-    let placed = placed(members);
+    let placed = placed(members, settings);
     let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
     let fit = Trend::through(&points, settings, knots_deg)
         .ok_or("the least-squares fit has no solution")?;
@@ -208,7 +209,7 @@ fn fit_trend(
 
 /// Estimates with their points, sorted by α: sums do not depend on the order in which the maneuvers
 /// come.
-fn placed<'a>(members: &[&'a EstimateRow]) -> Vec<(Point, &'a EstimateRow)> {
+fn placed<'a>(members: &[&'a EstimateRow], settings: &Settings) -> Vec<(Point, &'a EstimateRow)> {
     let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
     let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
     let of_class = |e: &EstimateRow| {
@@ -226,12 +227,17 @@ fn placed<'a>(members: &[&'a EstimateRow]) -> Vec<(Point, &'a EstimateRow)> {
             .partial_cmp(&b.0.key())
             .unwrap_or(std::cmp::Ordering::Equal)
     });
+    let points = placed.iter_mut().map(|(point, _)| point);
+    count_flown(points, settings.alpha_step_deg);
     placed
 }
 
 /// Rows of the means of maneuvers that are too few for a trend.
 fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<TrendRow> {
-    let points: Vec<Point> = placed(members).iter().map(|(point, _)| *point).collect();
+    let points: Vec<Point> = placed(members, settings)
+        .iter()
+        .map(|(point, _)| *point)
+        .collect();
     let row = |mean: Mean| {
         let common = common_error(members, mean.alpha_deg, settings.alpha_step_deg);
         let standard_error = mean.standard_error.hypot(common);
@@ -255,10 +261,7 @@ fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<
             scatter: mean.scatter,
         }
     };
-    means(&points, settings.alpha_step_deg)
-        .into_iter()
-        .map(row)
-        .collect()
+    means(&points).into_iter().map(row).collect()
 }
 
 /// The maneuvers further than `limit` standard deviations from the trend.
@@ -299,11 +302,23 @@ fn clamp_to_data(points: &[Point], alpha_deg: f64) -> f64 {
 /// Standard error of the trend at an α from held values and the instruments' calibration.
 ///
 /// Errors of held values and of instruments are common to the maneuvers, so they do not average out.
-/// The result is the mean over the maneuvers within a step of α, with weights 1/bound².
+/// The result is the mean over the maneuvers within a step of α, with weights 1/bound²; where none was
+/// flown so near, over the flown α on either side.
 fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
+    let nearest = |side: f64| {
+        let distances = members.iter().map(|e| side * (e.alpha_deg - alpha_deg));
+        distances.filter(|d| *d >= 0.0).min_by(f64::total_cmp)
+    };
+    let reach = match (nearest(-1.0), nearest(1.0)) {
+        (Some(below), Some(above)) if below.min(above) > step_deg => {
+            below.max(above) + 0.5 * step_deg
+        }
+        (Some(only), None) | (None, Some(only)) => only.max(step_deg),
+        _ => step_deg,
+    };
     let near = members
         .iter()
-        .filter(|e| (e.alpha_deg - alpha_deg).abs() <= step_deg);
+        .filter(|e| (e.alpha_deg - alpha_deg).abs() <= reach);
     let (mut sum, mut weights) = (0.0, 0.0);
     for (e, p) in near.filter_map(|e| Some((e, point(e)?))) {
         let weight = p.bound.powi(-2);

@@ -280,6 +280,21 @@ fn the_uncertainty_of_held_values_does_not_average_out() {
 }
 
 #[test]
+fn between_flown_angles_the_uncertainty_of_held_values_counts_as_at_them() {
+    let estimates: Vec<EstimateRow> = [10.0, 10.4, 30.0, 30.4]
+        .iter()
+        .map(|&a| EstimateRow {
+            bound_held: Some(if a < 20.0 { 0.06 } else { 0.1 }),
+            ..estimate("Cm_dpv", "PPSSTV", a, 1.0, 0.1)
+        })
+        .collect();
+    let members: Vec<&EstimateRow> = estimates.iter().collect();
+    assert_relative_eq!(common_error(&members, 10.2, 5.0), 0.06, max_relative = 1e-9);
+    assert_relative_eq!(common_error(&members, 19.0, 5.0), 0.08, max_relative = 1e-2);
+    assert_relative_eq!(common_error(&members, 31.0, 5.0), 0.1, max_relative = 1e-9);
+}
+
+#[test]
 fn the_tunnel_s_breakpoints_inside_the_data_are_published_too() {
     let estimates: Vec<EstimateRow> = [11.0, 14.8, 20.1, 25.0, 29.7]
         .iter()
