@@ -38,58 +38,17 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::basis::Basis;
+use super::lack_of_fit::LackOfFit;
+use super::point::{Point, flown_alphas};
+use super::scatter::{HUBER, floored_variances, strata, total_variances};
 use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
 use crate::numerics::{student, symmetric};
 
-/// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
-/// fit then tolerates a quarter of outliers, and loses 4% of efficiency where there are none.
-const HUBER: f64 = 1.5;
-/// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the
-/// equation for τ².
-const HUBER_VARIANCE: f64 = 0.778_465;
 /// Standard deviations beyond which a residual has no influence on the order of the polynomial.
 const OUTLYING: f64 = 3.0;
-/// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
-const BOUND_FLOOR: f64 = 0.25;
-/// Fewest maneuvers of a class with a scatter of its own; classes with fewer share that of all.
-const OWN_SCATTER: usize = 8;
 /// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
 const MOST_STEPS: usize = 100;
-
-/// One maneuver's estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Point {
-    pub alpha_deg: f64,
-    pub value: f64,
-    pub bound: f64,
-    /// Index of its class among those of the trend.
-    pub class: usize,
-    /// Index of its flown α among those of the trend.
-    pub flown: usize,
-}
-
-impl Point {
-    pub(super) fn key(&self) -> (f64, f64, f64, usize) {
-        (self.alpha_deg, self.value, self.bound, self.class)
-    }
-}
-
-/// Counts the flown α of points sorted by α: one spans half a step of the published grid.
-pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_deg: f64) {
-    let mut current: Option<(usize, f64)> = None;
-    for point in points {
-        let (flown, first) = match current {
-            None => (0, point.alpha_deg),
-            Some((flown, first)) if point.alpha_deg - first > 0.5 * step_deg => {
-                (flown + 1, point.alpha_deg)
-            }
-            Some(same) => same,
-        };
-        current = Some((flown, first));
-        point.flown = flown;
-    }
-}
 
 /// A fitted trend.
 #[derive(Clone, Debug)]
@@ -363,44 +322,6 @@ fn standardised(
     (0..design.nrows()).map(of).collect()
 }
 
-/// The flown α, deg, ascending: each the mean of its maneuvers, to a tenth.
-fn flown_alphas(points: &[Point]) -> Vec<f64> {
-    let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
-    points
-        .chunk_by(|a, b| a.flown == b.flown)
-        .map(|own| (10.0 * mean(own)).round() / 10.0)
-        .collect()
-}
-
-/// Bounds squared, none smaller than the floor.
-fn floored_variances(points: &[Point]) -> Vec<f64> {
-    let floor = BOUND_FLOOR * upper_median(points.iter().map(|p| p.bound)).unwrap_or(0.0);
-    points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
-}
-
-/// The points of each stratum, a set with one τ: every class with a scatter of its own, then all
-/// points where any is left.
-fn strata(points: &[Point]) -> Vec<Vec<usize>> {
-    let classes = points
-        .iter()
-        .map(|p| p.class)
-        .max()
-        .map_or(0, |most| most + 1);
-    let of = |class: usize| {
-        (0..points.len())
-            .filter(|i| points[*i].class == class)
-            .collect::<Vec<usize>>()
-    };
-    let mut strata: Vec<Vec<usize>> = (0..classes)
-        .map(of)
-        .filter(|own| own.len() >= OWN_SCATTER)
-        .collect();
-    if strata.iter().map(Vec::len).sum::<usize>() < points.len() {
-        strata.push((0..points.len()).collect());
-    }
-    strata
-}
-
 /// 1 − h of each point, with h its leverage.
 fn residual_freedom(
     design: &DMatrix<f64>,
@@ -412,23 +333,6 @@ fn residual_freedom(
         (1.0 - weights[i] * (row * inverse * row.transpose())[(0, 0)]).max(0.0)
     };
     (0..design.nrows()).map(of).collect()
-}
-
-/// b² + τ² of each point: τ of its class where that is a stratum, else τ of all.
-fn total_variances(
-    residuals: &DVector<f64>,
-    variances: &[f64],
-    freedom: &[f64],
-    strata: &[Vec<usize>],
-) -> Vec<f64> {
-    let mut total = variances.to_vec();
-    for stratum in strata.iter().rev() {
-        let scatter2 = scatter_squared(residuals, variances, freedom, stratum);
-        for i in stratum {
-            total[*i] = variances[*i] + scatter2;
-        }
-    }
-    total
 }
 
 /// Coefficients and their covariance for given weights.
@@ -470,105 +374,10 @@ fn penalty(criterion: Criterion, n: usize, k: usize) -> f64 {
     }
 }
 
-/// Variance of the residuals beyond the bounds, in two parts.
-struct LackOfFit {
-    /// λ², by which the derivative leaves the curve.
-    lack2: f64,
-    /// Variance of the maneuvers' own deviations, from those of one flown α.
-    own2: f64,
-}
-
-impl LackOfFit {
-    fn of(
-        points: &[Point],
-        residuals: &DVector<f64>,
-        variances: &[f64],
-        coefficients: usize,
-    ) -> LackOfFit {
-        let about = about_their_means(points, residuals, variances);
-        let every: Vec<usize> = (0..points.len()).collect();
-        let own2 = scatter_squared(&about.residuals, variances, &about.freedom, &every);
-        let total: Vec<f64> = variances.iter().map(|bound2| bound2 + own2).collect();
-        let about = about_their_means(points, residuals, &total);
-        let alphas = about.means.len();
-        let freedom = alphas.saturating_sub(coefficients) as f64 / alphas as f64;
-        let every: Vec<usize> = (0..alphas).collect();
-        let means = DVector::from_vec(about.means);
-        let lack2 = scatter_squared(&means, &about.variances, &vec![freedom; alphas], &every);
-        LackOfFit { lack2, own2 }
-    }
-}
-
-/// Residuals of the maneuvers of each flown α about their weighted mean.
-struct AboutMeans {
-    /// Residual of each maneuver.
-    residuals: DVector<f64>,
-    /// One less its share of the mean, of each maneuver.
-    freedom: Vec<f64>,
-    /// Mean residual of each flown α.
-    means: Vec<f64>,
-    /// Variance of each mean.
-    variances: Vec<f64>,
-}
-
-fn about_their_means(points: &[Point], residuals: &DVector<f64>, variances: &[f64]) -> AboutMeans {
-    let mut about = AboutMeans {
-        residuals: residuals.clone(),
-        freedom: Vec::with_capacity(points.len()),
-        means: Vec::new(),
-        variances: Vec::new(),
-    };
-    let mut first = 0;
-    for own in points.chunk_by(|a, b| a.flown == b.flown) {
-        let members = first..first + own.len();
-        first = members.end;
-        let total: f64 = members.clone().map(|i| 1.0 / variances[i]).sum();
-        let mean = members
-            .clone()
-            .map(|i| residuals[i] / variances[i])
-            .sum::<f64>()
-            / total;
-        for i in members {
-            about.residuals[i] -= mean;
-            about.freedom.push(1.0 - 1.0 / (variances[i] * total));
-        }
-        about.means.push(mean);
-        about.variances.push(1.0 / total);
-    }
-    about
-}
-
-/// Solves for τ² of some of the points: the sum of their squared residuals over their variances,
-/// outliers cut, equals its expectation. The sum falls as τ² grows, so bisection finds it.
-fn scatter_squared(
-    residuals: &DVector<f64>,
-    variances: &[f64],
-    freedom: &[f64],
-    stratum: &[usize],
-) -> f64 {
-    let expected = HUBER_VARIANCE * stratum.iter().map(|i| freedom[*i]).sum::<f64>();
-    let cut = |i: &usize, scatter2: f64| {
-        (residuals[*i].powi(2) / (variances[*i] + scatter2)).min(HUBER * HUBER)
-    };
-    let sum = |scatter2: f64| stratum.iter().map(|i| cut(i, scatter2)).sum::<f64>();
-    if sum(0.0) <= expected || expected <= 0.0 {
-        return 0.0;
-    }
-    let square: f64 = stratum.iter().map(|i| residuals[*i].powi(2)).sum();
-    let (mut low, mut high) = (0.0, square / expected);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if sum(middle) > expected {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::point::count_flown;
+    use super::super::scatter::HUBER_VARIANCE;
     use super::*;
     use approx::assert_relative_eq;
 
@@ -594,17 +403,6 @@ mod tests {
 
     fn alphas() -> Vec<f64> {
         (0..48).map(|i| 5.0 + 55.0 * f64::from(i) / 47.0).collect()
-    }
-
-    #[test]
-    fn the_variance_of_cut_normal_residuals_is_that_of_its_integral() {
-        let density = |u: f64| (-0.5 * u * u).exp() / std::f64::consts::TAU.sqrt();
-        let h = 1e-3;
-        let integral: f64 = (-8000..8000)
-            .map(|i| (f64::from(i) + 0.5) * h)
-            .map(|u| (u * u).min(HUBER * HUBER) * density(u) * h)
-            .sum();
-        assert_relative_eq!(integral, HUBER_VARIANCE, max_relative = 1e-5);
     }
 
     #[test]

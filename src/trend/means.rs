@@ -5,7 +5,7 @@
 //! trend; of two maneuvers, ((y₁ − y₂)² − b₁² − b₂²)/2, or zero. The interval is the normal one:
 //! bounds are standard deviations, and no variance is estimated from one or two values alone.
 
-use super::fit::Point;
+use super::point::Point;
 
 /// Mean of the maneuvers of one flown angle of attack.
 #[derive(Clone, Copy, Debug, PartialEq)]

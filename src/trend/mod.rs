@@ -9,7 +9,10 @@ mod basis;
 #[cfg(test)]
 mod coverage;
 mod fit;
+mod lack_of_fit;
 mod means;
+mod point;
+mod scatter;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -23,8 +26,9 @@ use crate::maneuver::Status;
 use crate::numerics::student::NORMAL_95;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
-use fit::{Point, Trend, count_flown};
+use fit::Trend;
 use means::{Mean, means};
+use point::{Point, count_flown};
 
 #[cfg(test)]
 pub use settings::Group;
