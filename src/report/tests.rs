@@ -272,7 +272,7 @@ fn the_same_campaign_is_the_same_bytes() {
 }
 
 #[test]
-fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
+fn every_maneuver_begins_a_page_and_every_derivative_has_a_figure() {
     let campaign = campaign();
     let page = render(&campaign);
     assert_eq!(
@@ -280,7 +280,7 @@ fn every_derivative_and_every_maneuver_begins_a_page_and_has_an_anchor() {
         campaign.maneuvers.len()
     );
     assert_eq!(
-        page.matches("class=\"derivative").count(),
+        page.matches("class=\"derivative\"").count(),
         campaign.order.len()
     );
 }

@@ -67,6 +67,15 @@ pub struct XyChart<'a> {
 }
 
 impl ChartAxis {
+    #[must_use]
+    pub fn linear(label: &str, scale: Scale) -> ChartAxis {
+        ChartAxis {
+            label: label.to_owned(),
+            scale,
+            is_logarithmic: false,
+        }
+    }
+
     /// Share of the axis at a value, kept inside the frame; `None` for a value that has no place.
     fn share(&self, value: f64) -> Option<f64> {
         let placed = if self.is_logarithmic {

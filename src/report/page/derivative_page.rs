@@ -377,11 +377,8 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
         .trend
         .first()
         .map_or_else(String::new, |t| trend_in_words(t));
-    let table = TableView::new("", &note, &heads, rows.iter().map(row).collect());
-    TableView {
-        title: "Flight against wind tunnel".to_owned(),
-        ..table
-    }
+    let rows = rows.iter().map(row).collect();
+    TableView::new("Flight against wind tunnel", &note, &heads, rows)
 }
 
 /// Group, number of maneuvers, order and scatter of a trend.

@@ -36,8 +36,8 @@ pub fn chart(contents: &Contents, model: ModelSource) -> Option<QualityChart> {
         id: &id,
         title: &title,
         description: caption,
-        x: axis("α, deg", Scale::covering(low, high)),
-        y: axis("margin", Scale::covering(LEAST_MARGIN, 1.0)),
+        x: ChartAxis::linear("α, deg", Scale::covering(low, high)),
+        y: ChartAxis::linear("margin", Scale::covering(LEAST_MARGIN, 1.0)),
         boxes: vec![LevelBox {
             label: "inside",
             x: (None, None),
@@ -55,12 +55,4 @@ pub fn chart(contents: &Contents, model: ModelSource) -> Option<QualityChart> {
         svg,
         caption: caption.to_owned(),
     })
-}
-
-fn axis(label: &str, scale: Scale) -> ChartAxis {
-    ChartAxis {
-        label: label.to_owned(),
-        scale,
-        is_logarithmic: false,
-    }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::quality_charts::{self, QualityChart};
+use super::quality_charts::{self, ALL, QualityChart};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
@@ -26,9 +26,6 @@ pub struct AirframeView {
     pub charts: Vec<QualityChart>,
     pub tables: Vec<TableView>,
 }
-
-/// Paragraph of the worst level of all.
-const ALL: &str = "all";
 
 /// Probability from which a level counts as certain, per cent.
 const CERTAIN_PCT: f64 = 95.0;
@@ -276,8 +273,8 @@ mod tests {
         );
         assert_eq!(
             bare.charts.len(),
-            3,
-            "two charts of levels and the lateral roots"
+            4,
+            "probabilities, two charts of levels and the lateral roots"
         );
         let levels = &bare.tables[0];
         assert_eq!(levels.rows[1], ["20°", "1 (60 %)", "1 (60 %)"]);
@@ -300,6 +297,9 @@ mod tests {
             answer < tables && answer.is_some(),
             "the answer stands before any table"
         );
+        let picture = page.find("id=\"chart-levels-bare\"");
+        assert!(answer < picture && picture < tables, "and its picture");
+        assert_eq!(page.matches("id=\"chart-levels-bare\"").count(), 1);
         assert!(page.contains("id=\"chart-short-period-bare\""));
         assert!(page.contains("id=\"chart-roots-lateral-bare\""));
         assert!(!page.contains("NaN"));

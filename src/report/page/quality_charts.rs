@@ -1,5 +1,5 @@
-//! Charts of the flying qualities: control anticipation over damping, frequency over damping of the
-//! Dutch roll, and the roots over angle of attack.
+//! Charts of the flying qualities: probability of the levels, control anticipation over damping, frequency over
+//! damping of the Dutch roll, and the roots over angle of attack.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use crate::report::figure::xy_chart::{
     self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart, decades,
 };
 use crate::report::notation::angle;
-use crate::tables::{Airframe, Level, QualityRow, Quantity, RootRow};
+use crate::tables::{Airframe, Level, LevelRow, QualityRow, Quantity, RootRow};
 
 /// A chart with its caption.
 #[derive(Clone, Debug, Serialize)]
@@ -21,6 +21,9 @@ pub struct QualityChart {
     pub svg: String,
     pub caption: String,
 }
+
+/// Paragraph of the worst level of all.
+pub const ALL: &str = "all";
 
 /// Points of an ellipse's outline.
 const OUTLINE: u32 = 40;
@@ -72,9 +75,88 @@ pub fn charts(
         .iter()
         .filter_map(|pair| pair.draw(&rows, specification, airframe));
     let loci = [Axis::Longitudinal, Axis::Lateral].into_iter();
-    pairs
-        .chain(loci.filter_map(|axis| locus(&roots, axis, airframe)))
-        .collect()
+    let loci = loci.filter_map(|axis| locus(&roots, axis, airframe));
+    let levels = qualities
+        .levels
+        .iter()
+        .filter(|row| row.airframe == airframe && row.paragraph == ALL);
+    let levels = probabilities(&levels.collect::<Vec<_>>(), airframe);
+    levels.into_iter().chain(pairs).chain(loci).collect()
+}
+
+/// Probability over angle of attack that every paragraph is met at a level or better; `None` without
+/// a flown condition.
+fn probabilities(levels: &[&LevelRow], airframe: Airframe) -> Option<QualityChart> {
+    let (low, high) = extent(levels.iter().map(|row| row.alpha_deg))?;
+    let id = format!("levels-{airframe}");
+    let title = "Probability of a level or better";
+    let caption = "Probability that every paragraph is met at Level 1, at Level 2 or better (2), at Level 3 or \
+                   better (3).";
+    let svg = xy_chart::draw(&XyChart {
+        id: &id,
+        title,
+        description: caption,
+        x: ChartAxis::linear("α, deg", Scale::covering(low, high)),
+        y: ChartAxis::linear("probability, %", Scale::covering(0.0, 100.0)),
+        boxes: vec![],
+        series: LEVEL_LINES
+            .iter()
+            .map(|line| line.through(levels))
+            .collect(),
+    });
+    Some(QualityChart {
+        anchor: format!("chart-{id}"),
+        title: title.to_owned(),
+        svg,
+        caption: caption.to_owned(),
+    })
+}
+
+/// Line of a level's probability.
+struct LevelLine {
+    /// Number of the level.
+    label: &'static str,
+    colour: &'static str,
+    /// Fifth of the angles of attack at which the label stands: lines often lie on each other.
+    label_at: usize,
+    share: fn(&LevelRow) -> f64,
+}
+
+const LEVEL_LINES: [LevelLine; 3] = [
+    LevelLine {
+        label: "1",
+        colour: DARK_COLOURS[4],
+        label_at: 1,
+        share: |row| row.level_1_pct,
+    },
+    LevelLine {
+        label: "2",
+        colour: DARK_COLOURS[1],
+        label_at: 4,
+        share: |row| row.level_1_pct + row.level_2_pct,
+    },
+    LevelLine {
+        label: "3",
+        colour: DARK_COLOURS[2],
+        label_at: 2,
+        share: |row| row.level_1_pct + row.level_2_pct + row.level_3_pct,
+    },
+];
+
+impl LevelLine {
+    fn through(&self, levels: &[&LevelRow]) -> ChartSeries {
+        let labelled = self.label_at * levels.len() / 5;
+        let point = |(i, row): (usize, &&LevelRow)| ChartPoint {
+            at: (row.alpha_deg, (self.share)(row)),
+            label: if i == labelled { self.label } else { "" }.to_owned(),
+            outline: vec![],
+        };
+        ChartSeries {
+            colour: self.colour,
+            points: levels.iter().enumerate().map(point).collect(),
+            is_joined: true,
+        }
+    }
 }
 
 /// Chart of two quantities of one mode.
@@ -169,11 +251,7 @@ impl PairChart {
                 .flat_map(|r| r.min.into_iter().chain(r.max))
         };
         let (low, high) = extent(points.iter().map(|p| p.at.0).chain(limits(self.x.0)))?;
-        let x = ChartAxis {
-            label: self.x.1.to_owned(),
-            scale: Scale::covering(low.min(0.0), high),
-            is_logarithmic: false,
-        };
+        let x = ChartAxis::linear(self.x.1, Scale::covering(low.min(0.0), high));
         points.first()?;
         let (low, high) = extent(points.iter().map(|p| p.at.1).chain(limits(self.y.0)))?;
         let y = ChartAxis {
@@ -233,11 +311,6 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         let (low, high) = extent(values)?;
         Some(Scale::covering(low.min(least), high.max(0.0)))
     };
-    let chart_axis = |label: &str, scale| ChartAxis {
-        label: label.to_owned(),
-        scale,
-        is_logarithmic: false,
-    };
     let real = scale(&mut own.iter().map(|r| r.real), f64::INFINITY)?;
     let imaginary = scale(&mut own.iter().map(|r| r.imaginary), 0.0)?;
     let alphas = extent(own.iter().map(|r| r.alpha_deg))?;
@@ -264,8 +337,8 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         id: &id,
         title,
         description: &caption,
-        x: chart_axis("real part, 1/s", real),
-        y: chart_axis("imaginary part, rad/s", imaginary),
+        x: ChartAxis::linear("real part, 1/s", real),
+        y: ChartAxis::linear("imaginary part, rad/s", imaginary),
         boxes: vec![],
         series: vec![ChartSeries {
             colour: DARK_COLOURS[1],
@@ -279,4 +352,22 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         svg,
         caption,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::campaign_fixture::campaign;
+
+    #[test]
+    fn a_level_s_line_is_the_probability_of_that_level_or_a_better_one() {
+        let campaign = campaign();
+        let mut row = campaign.qualities.levels[0].clone();
+        row.level_1_pct = 50.0;
+        row.level_2_pct = 30.0;
+        row.level_3_pct = 15.0;
+        let lines = LEVEL_LINES.iter().map(|line| line.through(&[&row]));
+        let at: Vec<f64> = lines.map(|line| line.points[0].at.1).collect();
+        assert_eq!(at, [50.0, 80.0, 95.0]);
+    }
 }
