@@ -100,7 +100,13 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface());
-    let window = Window::cut(&bench.record, range, surfaces, MassProperties::Recorded)?;
+    let window = Window::cut(
+        &bench.config.aircraft,
+        &bench.record,
+        range,
+        surfaces,
+        MassProperties::Recorded,
+    )?;
     let measurements = Measurements {
         values: vec![[0.0; OUTPUTS]; samples],
         used: vec![[true; OUTPUTS]; samples],

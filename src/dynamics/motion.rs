@@ -14,7 +14,7 @@ use std::sync::Arc;
 use pulp::Arch;
 
 use super::lever::lever;
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Flow, Position, Sensors};
 use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
 use crate::units::{G0_FT_S2, RAD};
@@ -87,11 +87,27 @@ const MASS_PROPERTIES: &[&str] = &[
     signal::IXZ,
 ];
 
+/// Signals that the angles of the flow at the c.g. follow from.
+const FLOW_SIGNALS: [&str; 9] = [
+    signal::ALPHA_VANE,
+    signal::BETA_VANE,
+    signal::VELOCITY,
+    signal::P,
+    signal::Q,
+    signal::R,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
 /// Signals of a window of a record at samples and half-samples.
 #[derive(Clone, Debug)]
 pub struct Window {
     /// Windows that differ in few signals share the others.
     points: BTreeMap<String, Arc<Vec<f64>>>,
+    sensors: Sensors,
+    /// α and β at the c.g. at every point, rad. Inverting the vanes is the dearest part of a motion.
+    flow: Arc<Vec<[f64; 2]>>,
     pub step_s: f64,
     pub samples: usize,
 }
@@ -102,6 +118,7 @@ impl Window {
     /// # Errors
     /// A sentence that names the signal and time where a value is missing, or a size is not positive.
     pub fn cut<'a>(
+        aircraft: &Aircraft,
         record: &Record,
         range: Range<usize>,
         surfaces: impl IntoIterator<Item = &'a str>,
@@ -144,11 +161,41 @@ impl Window {
             );
             points.insert(slope_name(name), Arc::new(with_half_samples(&slope)));
         }
-        Ok(Window {
+        let mut window = Window {
             points,
+            sensors: aircraft.sensors.clone(),
+            flow: Arc::default(),
             step_s: record.step_s,
             samples: range.len(),
-        })
+        };
+        window.flow = Arc::new(window.flow_at_cg());
+        Ok(window)
+    }
+
+    /// α and β at the c.g. at every point, from the vanes.
+    fn flow_at_cg(&self) -> Vec<[f64; 2]> {
+        let signals = FLOW_SIGNALS.map(|name| self.signal(name));
+        let at = |i: usize| {
+            let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = signals.map(|s| s[i]);
+            let read = Flow {
+                alpha: alpha * RAD,
+                beta: beta * RAD,
+                velocity,
+                rates: [p * RAD, q * RAD, r * RAD],
+            };
+            let cg = Position { x_ft, y_ft, z_ft };
+            let flow = self.sensors.flow_at_cg(&read, cg);
+            [flow.alpha, flow.beta]
+        };
+        Arch::new().dispatch(|| (0..self.len()).map(at).collect())
+    }
+
+    /// Replaces the points of a signal, or adds one.
+    fn set(&mut self, name: &str, points: Vec<f64>) {
+        self.points.insert(name.to_owned(), Arc::new(points));
+        if FLOW_SIGNALS.contains(&name) {
+            self.flow = Arc::new(self.flow_at_cg());
+        }
     }
 
     /// Number of points: samples and the halves between them.
@@ -176,9 +223,9 @@ impl Window {
     pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
         let mut window = self.clone();
         for (name, bias) in [(name, bias), (slope_name(name).as_str(), 0.0)] {
-            if let Some(points) = window.points.get_mut(name) {
+            if let Some(points) = self.points.get(name) {
                 let misread = points.iter().map(|value| value + (scale * value + bias));
-                *points = Arc::new(misread.collect());
+                window.set(name, misread.collect());
             }
         }
         window
@@ -189,7 +236,7 @@ impl Window {
     #[must_use]
     pub fn late(&self, name: &str, delay_s: f64) -> Window {
         let mut window = self.clone();
-        if let Some(points) = window.points.get_mut(name) {
+        if let Some(points) = self.points.get(name) {
             // Points lie half a step apart.
             let per_difference = delay_s / self.step_s;
             let last = points.len().saturating_sub(1);
@@ -197,7 +244,7 @@ impl Window {
                 let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
                 value - per_difference * difference
             };
-            *points = Arc::new(points.iter().enumerate().map(value).collect());
+            window.set(name, points.iter().enumerate().map(value).collect());
         }
         window
     }
@@ -206,8 +253,7 @@ impl Window {
     #[must_use]
     pub fn with_samples(&self, name: &str, values: &[f64]) -> Window {
         let mut window = self.clone();
-        let points = Arc::new(with_half_samples(values));
-        window.points.insert(name.to_owned(), points);
+        window.set(name, with_half_samples(values));
         window
     }
 
@@ -215,9 +261,7 @@ impl Window {
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {
         let mut window = self.clone();
-        window
-            .points
-            .insert(name.to_owned(), Arc::new(vec![value; self.len()]));
+        window.set(name, vec![value; self.len()]);
         window
     }
 
@@ -237,8 +281,8 @@ impl Window {
 
     fn signals(&self) -> Signals<'_> {
         Signals {
-            flow: [signal::ALPHA_VANE, signal::BETA_VANE, signal::VELOCITY]
-                .map(|name| self.signal(name)),
+            flow: &self.flow,
+            velocity: self.signal(signal::VELOCITY),
             rates: [signal::P, signal::Q, signal::R].map(|name| self.signal(name)),
             slopes: [signal::P, signal::Q, signal::R].map(|name| self.signal(&slope_name(name))),
             attitude: [signal::THETA, signal::PHI].map(|name| self.signal(name)),
@@ -283,7 +327,8 @@ impl<G: Fn(f64) -> f64> MeasuredMotion<'_, G> {
 
 /// Signals of a window, grouped by use.
 struct Signals<'a> {
-    flow: [&'a [f64]; 3],
+    flow: &'a [[f64; 2]],
+    velocity: &'a [f64],
     rates: [&'a [f64]; 3],
     slopes: [&'a [f64]; 3],
     attitude: [&'a [f64]; 2],
@@ -302,14 +347,7 @@ impl Signals<'_> {
         let accelerations = self.slopes.map(|s| s[i] * RAD);
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
         let cg = Position { x_ft, y_ft, z_ft };
-        let [alpha, beta, velocity] = self.flow.map(|s| s[i]);
-        let read = Flow {
-            alpha: alpha * RAD,
-            beta: beta * RAD,
-            velocity,
-            rates,
-        };
-        let flow = aircraft.sensors.flow_at_cg(&read, cg);
+        let [alpha, beta] = self.flow[i];
         let felt =
             |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
         let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
@@ -325,9 +363,9 @@ impl Signals<'_> {
             thrust * (1.0 / mass)
         };
         Motion {
-            alpha: flow.alpha,
-            beta: flow.beta,
-            velocity: flow.velocity,
+            alpha,
+            beta,
+            velocity: self.velocity[i],
             rates,
             accelerations,
             theta: self.attitude[0][i] * RAD,

@@ -73,6 +73,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .chain(all_free.held.iter().map(|(d, _)| d))
             .flat_map(|d| d.regressor.signals());
         let window = Window::cut(
+            task.context.aircraft,
             task.record,
             range.clone(),
             surfaces,

@@ -35,6 +35,7 @@ impl<'a> Task<'a> {
         let settings = self.context.settings;
         self.check_flagged_share(&surfaces)?;
         let window = Window::cut(
+            self.context.aircraft,
             self.record,
             range.clone(),
             surfaces.iter().copied(),

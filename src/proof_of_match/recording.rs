@@ -77,7 +77,13 @@ impl Recording {
         }
         let signals = recorded_signals(buildup);
         let mass = MassProperties::Recorded;
-        let window = Window::cut(record, range.clone(), signals.iter().copied(), mass)?;
+        let window = Window::cut(
+            aircraft,
+            record,
+            range.clone(),
+            signals.iter().copied(),
+            mass,
+        )?;
         let motions: Vec<Motion> = window.motion(aircraft).points().collect();
         let measured = measured(record, range.clone());
         let trim_samples = trim_samples(record, maneuver, samples, longest_trim_s);

@@ -71,7 +71,14 @@ impl ManeuverData {
         let derivatives = derivatives(record, E::AXIS, basis.buildup);
         let surfaces = surfaces_of(&derivatives);
         let signals = surfaces.iter().map(String::as_str);
-        let window = Window::cut(record, range, signals, MassProperties::Recorded).ok()?;
+        let window = Window::cut(
+            basis.aircraft,
+            record,
+            range,
+            signals,
+            MassProperties::Recorded,
+        )
+        .ok()?;
         let model = Model {
             free: derivatives,
             initial_state: InitialState::Measured,

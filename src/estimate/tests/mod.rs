@@ -88,7 +88,14 @@ impl Bench {
             ..Model::default()
         };
         let surfaces = ["de_deg", "dpv_deg"];
-        let window = Window::cut(&record, 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap();
+        let window = Window::cut(
+            &aircraft(),
+            &record,
+            0..SAMPLES,
+            surfaces,
+            MassProperties::Recorded,
+        )
+        .unwrap();
         let nothing = Measurements {
             values: vec![[0.0; OUTPUTS]; SAMPLES],
             used: vec![[true; OUTPUTS]; SAMPLES],

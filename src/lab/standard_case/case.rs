@@ -159,6 +159,7 @@ impl StandardCase {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.flat_map(|d| d.regressor.signals());
         Window::cut(
+            &self.aircraft,
             &self.record,
             0..self.record.samples,
             surfaces,

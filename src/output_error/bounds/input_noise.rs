@@ -294,7 +294,14 @@ mod tests {
     }
 
     fn window(record: &Record) -> Window {
-        Window::cut(record, 0..SAMPLES, SURFACES, MassProperties::Recorded).unwrap()
+        Window::cut(
+            &aircraft(),
+            record,
+            0..SAMPLES,
+            SURFACES,
+            MassProperties::Recorded,
+        )
+        .unwrap()
     }
 
     /// Record with noise on every nth value of its dynamic pressure, and lines between them.

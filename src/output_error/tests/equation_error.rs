@@ -46,7 +46,14 @@ fn case_of(
     measurements: Measurements,
 ) -> Case<3, Longitudinal> {
     let surfaces = ["de_deg", "dpv_deg"];
-    let window = Window::cut(record, 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap();
+    let window = Window::cut(
+        &aircraft(),
+        record,
+        0..SAMPLES,
+        surfaces,
+        MassProperties::Recorded,
+    )
+    .unwrap();
     let value = |d: &Derivative| held.iter().find(|(name, _)| *name == d.name);
     let model = Model {
         free: truth

@@ -171,7 +171,14 @@ pub(crate) fn record() -> Record {
 
 pub(crate) fn window() -> Window {
     let surfaces = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
-    Window::cut(&record(), 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap()
+    Window::cut(
+        &aircraft(),
+        &record(),
+        0..SAMPLES,
+        surfaces,
+        MassProperties::Recorded,
+    )
+    .unwrap()
 }
 
 pub(crate) fn nothing_measured() -> Measurements {
@@ -530,7 +537,14 @@ fn a_surface_that_never_moves_is_named() {
     };
     record.signals.insert("ghost_deg".into(), still);
     let surfaces = ["dr_deg", "da_deg", "dyv_deg", "ghost_deg"];
-    let window = Window::cut(&record, 0..SAMPLES, surfaces, MassProperties::Recorded).unwrap();
+    let window = Window::cut(
+        &aircraft(),
+        &record,
+        0..SAMPLES,
+        surfaces,
+        MassProperties::Recorded,
+    )
+    .unwrap();
     let case = Case::<4, Lateral>::new(&aircraft(), &window, nothing_measured(), &model);
     let fit = fit(&case, case.starting_values(|_| 0.0), Weights::Table);
     assert_eq!(fit.outcome, Outcome::Unidentifiable);

@@ -64,7 +64,13 @@ impl IndependentFlight {
         let first = record.sample_at(flown.maneuver.start_s);
         let range = first..record.sample_at(flown.maneuver.end_s) + 1;
         let surfaces = names.iter().map(String::as_str);
-        let window = Window::cut(record, range.clone(), surfaces, MassProperties::Recorded);
+        let window = Window::cut(
+            aircraft,
+            record,
+            range.clone(),
+            surfaces,
+            MassProperties::Recorded,
+        );
         let motion = window.unwrap().motion(aircraft).at(0);
         let at = |name: &str, k: usize| record.values(name).unwrap()[k];
 
