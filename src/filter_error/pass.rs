@@ -14,7 +14,7 @@
 )]
 
 use nalgebra::SVector;
-use pulp::{Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::gains::{Gain, Outputs, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
@@ -129,11 +129,13 @@ impl RecordedRows {
     pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
         let mut sum = vec![0.0; self.width];
         let rows = self.rows.slice().chunks_exact(self.width);
-        for (row, u) in rows.zip(values.iter().flatten()) {
-            for (sum, s) in sum.iter_mut().zip(row) {
-                *sum += s * u;
+        Arch::new().dispatch(|| {
+            for (row, u) in rows.zip(values.iter().flatten()) {
+                for (sum, s) in sum.iter_mut().zip(row) {
+                    *sum += s * u;
+                }
             }
-        }
+        });
         sum
     }
 }

@@ -1,7 +1,10 @@
 //! Cholesky's method and triangular systems by blocks: most of the work is products of matrices, which
 //! run several times as fast as the columns of the plain methods.
 
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut};
+use pulp::Arch;
 
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
@@ -39,7 +42,7 @@ fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
 pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     let n = lower.nrows();
     if n <= PLAIN {
-        lower.solve_lower_triangular_mut(&mut right);
+        Arch::new().dispatch(|| solve_plain(lower, &mut right));
         return;
     }
     let half = n / 2;
@@ -50,6 +53,26 @@ pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
         lower.view((half, half), (n - half, n - half)),
         second.as_view_mut(),
     );
+}
+
+/// [`solve_lower`] column by column.
+#[inline(always)]
+fn solve_plain(lower: DMatrixView<f64>, right: &mut DMatrixViewMut<f64>) {
+    for mut column in right.column_iter_mut() {
+        let mut rest = column.as_mut_slice();
+        for (i, lower) in lower.column_iter().enumerate() {
+            let (Some((first, below)), [diagonal, lower @ ..]) =
+                (rest.split_first_mut(), &lower.as_slice()[i..])
+            else {
+                break;
+            };
+            *first /= diagonal;
+            for (value, l) in below.iter_mut().zip(lower) {
+                *value -= *first * l;
+            }
+            rest = below;
+        }
+    }
 }
 
 #[cfg(test)]

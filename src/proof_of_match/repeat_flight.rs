@@ -7,6 +7,7 @@
 //! sensors is white and independent, so its part of the probability is exact for each draw.
 
 use nalgebra::{DMatrix, DVector};
+use pulp::Arch;
 
 use super::derivative_table::DerivativeTable;
 use super::deviations::independent;
@@ -37,12 +38,15 @@ pub struct Effects {
     stride: usize,
     /// Outputs at the mean of the posterior.
     mean: Vec<Outputs>,
-    effects: Vec<Vec<Outputs>>,
+    effects: Vec<Histories>,
     /// Deviations of the derivatives to which the first effects belong, by place in the build-up.
     deviations: Vec<Vec<(usize, f64)>>,
     /// Derivatives at the mean of the posterior.
     table: DerivativeTable,
 }
+
+/// History of each output. A draw sums hundreds of them, sample after sample.
+type Histories = [Vec<f64>; COUNT];
 
 /// Probabilities of one model: of each tolerance in the order of the tests, and of all requirements.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,16 +149,17 @@ fn moved_starts(start: &Start, covariance: &DMatrix<f64>, axis: Axis) -> Vec<Sta
 }
 
 /// Difference of two runs; after a departure the last one stays.
-fn difference(run: &FreeRun, mean: &FreeRun) -> Vec<Outputs> {
-    let mut last = [0.0; COUNT];
-    let mut differences = Vec::with_capacity(mean.outputs.len());
-    for (k, mean) in mean.outputs.iter().enumerate() {
-        if let Some(own) = run.outputs.get(k) {
-            last = std::array::from_fn(|i| own[i] - mean[i]);
-        }
-        differences.push(last);
-    }
-    differences
+fn difference(run: &FreeRun, mean: &FreeRun) -> Histories {
+    std::array::from_fn(|i| {
+        let mut last = 0.0;
+        let at = |(k, mean): (usize, &Outputs)| {
+            if let Some(own) = run.outputs.get(k) {
+                last = own[i] - mean[i];
+            }
+            last
+        };
+        mean.outputs.iter().enumerate().map(at).collect()
+    })
 }
 
 impl Effects {
@@ -195,12 +200,10 @@ impl Effects {
     }
 
     /// Difference of a model's run from the mean of the posterior.
-    fn bias(&self, run: &FreeRun) -> Vec<Outputs> {
+    fn bias(&self, run: &FreeRun) -> Histories {
         let own = run.outputs.iter().step_by(self.stride);
         let pairs = self.mean.iter().zip(own);
-        pairs
-            .map(|(mean, own)| std::array::from_fn(|i| mean[i] - own[i]))
-            .collect()
+        std::array::from_fn(|i| pairs.clone().map(|(mean, own)| mean[i] - own[i]).collect())
     }
 
     /// Drawn deviation of a derivative.
@@ -217,16 +220,18 @@ impl Effects {
     }
 
     /// Drawn differences of one quantity at every `stride`-th sample.
-    fn drawn(&self, bias: &[Outputs], deviates: &[f64], tolerance: &Tolerance) -> Vec<f64> {
+    fn drawn(&self, bias: &Histories, deviates: &[f64], tolerance: &Tolerance) -> Vec<f64> {
         let Some(output) = place(tolerance.quantity) else {
             return vec![];
         };
-        let mut drawn: Vec<f64> = bias.iter().map(|b| b[output]).collect();
-        for (effect, deviate) in self.effects.iter().zip(deviates) {
-            for (sum, effect) in drawn.iter_mut().zip(effect) {
-                *sum += deviate * effect[output];
+        let mut drawn = bias[output].clone();
+        Arch::new().dispatch(|| {
+            for (effect, deviate) in self.effects.iter().zip(deviates) {
+                for (sum, effect) in drawn.iter_mut().zip(&effect[output]) {
+                    *sum += deviate * effect;
+                }
             }
-        }
+        });
         drawn
     }
 }
@@ -237,7 +242,7 @@ struct Repeat<'a> {
     recording: &'a Recording,
     modes: Option<&'a LateralModes>,
     simulated: &'a Simulated,
-    bias: Vec<Outputs>,
+    bias: Histories,
     required_pct: f64,
 }
 
