@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::flight_data::Information;
-use super::posterior::{Gaussian, gaussian};
+use super::posterior::{Gaussian, mean};
 use super::prior::Scale;
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 use super::term::Term;
@@ -77,6 +77,6 @@ impl OpenScales<'_> {
     fn mean(&self, logarithms: &DVector<f64>) -> Option<DVector<f64>> {
         let scales = scales_of(logarithms);
         let root = root_of_differences(self.terms, &scales, LEAST_VARIANCE);
-        Some(gaussian(&root, self.information)?.mean)
+        mean(&root, self.information)
     }
 }

@@ -36,11 +36,7 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
 /// are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
-    let mut inner = root.right(&root.left(&information.matrix));
-    for j in 0..inner.nrows() {
-        inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
-    }
-    let lower = cholesky(inner)?;
+    let lower = inner_root(root, information)?;
     let mut halves = root.transposed();
     solve_lower(lower.as_view(), halves.as_view_mut());
     let covariance = halves.transpose() * halves;
@@ -48,6 +44,26 @@ pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian>
     mean.iter()
         .all(|v| v.is_finite())
         .then_some(Gaussian { mean, covariance })
+}
+
+/// Mean of [`gaussian`] alone.
+#[must_use]
+pub fn mean(root: &BlockRoot, information: &Information) -> Option<DVector<f64>> {
+    let lower = inner_root(root, information)?;
+    let mut seen = root.left_of(&information.vector);
+    lower.solve_lower_triangular_mut(&mut seen);
+    lower.tr_solve_lower_triangular_mut(&mut seen);
+    let mean = root.times(&seen);
+    mean.iter().all(|v| v.is_finite()).then_some(mean)
+}
+
+/// L with L Lᵀ = I + Rᵀ Λ R.
+fn inner_root(root: &BlockRoot, information: &Information) -> Option<DMatrix<f64>> {
+    let mut inner = root.right(&root.left(&information.matrix));
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
+    }
+    cholesky(inner)
 }
 
 /// Normal equations of the differences from the tunnel, with the other unknowns marginalised.
@@ -157,4 +173,27 @@ pub fn prior(unknowns: &Unknowns, terms: &[Term], scales: &[Scale]) -> DMatrix<f
         whole.view_mut((start, start), own.shape()).copy_from(&own);
     }
     whole
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::numerics::root::root;
+
+    #[test]
+    fn the_mean_alone_is_that_of_the_gaussian() {
+        let covariance =
+            DMatrix::from_fn(6, 6, |i, j| (-(i as f64 - j as f64).powi(2) / 4.0).exp());
+        let mut own = BlockRoot::default();
+        own.push(root(&covariance, EXACT));
+        let rows = DMatrix::from_fn(4, 6, |i, j| ((3 * i + 2 * j) % 5) as f64 - 2.0);
+        let data = Information {
+            matrix: rows.transpose() * &rows,
+            vector: DVector::from_fn(6, |i, _| 1.0 - 0.5 * i as f64),
+        };
+        let whole = gaussian(&own, &data).unwrap();
+        assert_relative_eq!(mean(&own, &data).unwrap(), whole.mean, epsilon = 1e-12);
+    }
 }

@@ -89,6 +89,18 @@ impl BlockRoot {
         product
     }
 
+    /// R v.
+    #[must_use]
+    pub fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let count = self.blocks.iter().map(DMatrix::nrows).sum();
+        let mut product = DVector::zeros(count);
+        for (block, rows, columns) in self.places() {
+            let own = block * vector.rows_range(columns);
+            product.rows_range_mut(rows).copy_from(&own);
+        }
+        product
+    }
+
     /// M R.
     #[must_use]
     pub fn right(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
@@ -164,5 +176,8 @@ mod tests {
         );
         let vector = matrix.column(2).into_owned();
         assert_relative_eq!(blocks.left_of(&vector), &whole * &vector, epsilon = 1e-12);
+        let seen = blocks.left_of(&vector);
+        let back = whole.tr_mul(&seen);
+        assert_relative_eq!(blocks.times(&seen), back, epsilon = 1e-12);
     }
 }
