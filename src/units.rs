@@ -43,6 +43,9 @@ pub struct Unit {
     /// End of a signal's name that stands for this unit; signals are kept in units that have one.
     pub suffix: Option<&'static str>,
     pub quantity: Quantity,
+    /// No channel is taken to be recorded in it by mistake: with every unit there is, some factor of one channel
+    /// explains what another channel's usual mistake does.
+    pub is_rare: bool,
     /// Factor from values in this unit to values in the quantity's base unit.
     factor: f64,
     /// Value in this unit of the zero of the base unit, with the opposite sign. It is added before
@@ -60,8 +63,16 @@ const fn unit(
         name,
         suffix,
         quantity,
+        is_rare: false,
         factor,
         offset: 0.0,
+    }
+}
+
+const fn rare(name: &'static str, quantity: Quantity, factor: f64) -> Unit {
+    Unit {
+        is_rare: true,
+        ..unit(name, None, quantity, factor)
     }
 }
 
@@ -124,25 +135,25 @@ const UNITS: &[Unit] = &[
     unit("ft/s", Some("_ft_s"), Quantity::Velocity, 1.0),
     unit("m/s", None, Quantity::Velocity, FT),
     unit("kt", None, Quantity::Velocity, 1852.0 / 3600.0 * FT),
-    unit("km/h", None, Quantity::Velocity, FT / 3.6),
+    rare("km/h", Quantity::Velocity, FT / 3.6),
     unit("ft", Some("_ft"), Quantity::Length, 1.0),
     unit("in", Some("_in"), Quantity::Length, 1.0 / 12.0),
     unit("m", None, Quantity::Length, FT),
-    unit("cm", None, Quantity::Length, 0.01 * FT),
-    unit("mm", None, Quantity::Length, 0.001 * FT),
-    unit("km", None, Quantity::Length, 1000.0 * FT),
+    rare("cm", Quantity::Length, 0.01 * FT),
+    rare("mm", Quantity::Length, 0.001 * FT),
+    rare("km", Quantity::Length, 1000.0 * FT),
     unit("lbf/ft2", Some("_psf"), Quantity::Pressure, 1.0),
     unit("psf", None, Quantity::Pressure, 1.0),
-    unit("psi", None, Quantity::Pressure, 144.0),
+    rare("psi", Quantity::Pressure, 144.0),
     unit("Pa", None, Quantity::Pressure, PSF),
-    unit("hPa", None, Quantity::Pressure, 100.0 * PSF),
-    unit("mbar", None, Quantity::Pressure, 100.0 * PSF),
-    unit("kPa", None, Quantity::Pressure, 1000.0 * PSF),
-    unit("inHg", None, Quantity::Pressure, INCH_OF_MERCURY_PA * PSF),
+    rare("hPa", Quantity::Pressure, 100.0 * PSF),
+    rare("mbar", Quantity::Pressure, 100.0 * PSF),
+    rare("kPa", Quantity::Pressure, 1000.0 * PSF),
+    rare("inHg", Quantity::Pressure, INCH_OF_MERCURY_PA * PSF),
     unit("lbf", Some("_lbf"), Quantity::Force, 1.0),
-    unit("klbf", None, Quantity::Force, 1000.0),
+    rare("klbf", Quantity::Force, 1000.0),
     unit("N", None, Quantity::Force, LBF),
-    unit("kN", None, Quantity::Force, 1000.0 * LBF),
+    rare("kN", Quantity::Force, 1000.0 * LBF),
     unit("slug", Some("_slug"), Quantity::Mass, 1.0),
     unit("lb", None, Quantity::Mass, 1.0 / G0_FT_S2),
     unit("kg", None, Quantity::Mass, SLUG),

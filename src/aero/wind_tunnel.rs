@@ -26,6 +26,30 @@ pub struct TunnelPoint {
     pub source: Option<String>,
 }
 
+impl TunnelPoint {
+    /// Value of a table that depends on α alone, without uncertainty or source.
+    #[must_use]
+    pub fn new(alpha_deg: f64, value: f64) -> TunnelPoint {
+        TunnelPoint {
+            alpha_deg,
+            mach: None,
+            value,
+            uncertainty: None,
+            source: None,
+        }
+    }
+}
+
+/// Each value of a breakpoint's list, or a single `None` for a table without that variable.
+#[must_use]
+pub fn each_or_none(values: &[f64]) -> Vec<Option<f64>> {
+    if values.is_empty() {
+        vec![None]
+    } else {
+        values.iter().copied().map(Some).collect()
+    }
+}
+
 /// A value read from the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TunnelValue {
@@ -408,11 +432,8 @@ mod tests {
             tunnel.insert(
                 "CN_alpha",
                 TunnelPoint {
-                    alpha_deg,
                     mach,
-                    value,
-                    uncertainty: None,
-                    source: None,
+                    ..TunnelPoint::new(alpha_deg, value)
                 },
             );
         }
@@ -484,11 +505,8 @@ mod tests {
         for (altitude, factor) in [(10e3, 1.0), (30e3, 3.0)] {
             for (alpha_deg, mach, value) in points() {
                 let point = TunnelPoint {
-                    alpha_deg,
                     mach,
-                    value: factor * value,
-                    uncertainty: None,
-                    source: None,
+                    ..TunnelPoint::new(alpha_deg, factor * value)
                 };
                 t.insert_at("CN_alpha", Some(altitude), point);
             }
@@ -524,11 +542,8 @@ mod tests {
             cubic.insert(
                 "CN_alpha",
                 TunnelPoint {
-                    alpha_deg,
                     mach,
-                    value,
-                    uncertainty: None,
-                    source: None,
+                    ..TunnelPoint::new(alpha_deg, value)
                 },
             );
         }
@@ -557,11 +572,8 @@ mod tests {
             refusing.insert(
                 "CN_alpha",
                 TunnelPoint {
-                    alpha_deg,
                     mach,
-                    value,
-                    uncertainty: None,
-                    source: None,
+                    ..TunnelPoint::new(alpha_deg, value)
                 },
             );
         }

@@ -299,16 +299,7 @@ mod tests {
 
     fn tunnel() -> WindTunnel {
         let mut tunnel = WindTunnel::default();
-        tunnel.insert(
-            "d",
-            TunnelPoint {
-                alpha_deg: 0.0,
-                mach: None,
-                value: 2.0,
-                uncertainty: None,
-                source: None,
-            },
-        );
+        tunnel.insert("d", TunnelPoint::new(0.0, 2.0));
         tunnel
     }
 

@@ -407,16 +407,7 @@ mod tests {
     fn the_tunnel_is_compared_at_its_own_breakpoints_where_the_posterior_has_some() {
         let mut tunnel = WindTunnel::default();
         for alpha_deg in [12.5, 20.0] {
-            tunnel.insert(
-                "d",
-                TunnelPoint {
-                    alpha_deg,
-                    mach: None,
-                    value: 1.0,
-                    uncertainty: None,
-                    source: None,
-                },
-            );
+            tunnel.insert("d", TunnelPoint::new(alpha_deg, 1.0));
         }
         let at = |alpha_deg: f64| PosteriorRow {
             alpha_deg,
@@ -442,11 +433,8 @@ mod tests {
             tunnel.insert(
                 "d",
                 TunnelPoint {
-                    alpha_deg,
-                    mach: None,
-                    value,
                     uncertainty: Some(0.3),
-                    source: None,
+                    ..TunnelPoint::new(alpha_deg, value)
                 },
             );
         }

@@ -1,6 +1,7 @@
 //! One derivative over the grid of the export.
 
 use crate::aero::Condition;
+use crate::aero::wind_tunnel::each_or_none;
 use crate::tables::{DrawRow, ExportRow};
 
 /// One derivative over the grid of angle of attack, Mach number and third variable.
@@ -30,15 +31,6 @@ pub struct GridCell {
 /// True for breakpoints that are equal but for rounding.
 pub(super) fn is_same_breakpoint(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-6
-}
-
-/// Each value, or a single `None` where there are none.
-pub(super) fn each_or_none(values: &[f64]) -> Vec<Option<f64>> {
-    if values.is_empty() {
-        vec![None]
-    } else {
-        values.iter().copied().map(Some).collect()
-    }
 }
 
 impl DerivativeTable {

@@ -1,8 +1,9 @@
 //! Tables of the export: the posterior, and the tunnel where it has no row.
 
 use super::contents::Contents;
-use super::derivative_table::{DerivativeTable, GridCell, each_or_none, is_same_breakpoint};
+use super::derivative_table::{DerivativeTable, GridCell, is_same_breakpoint};
 use crate::aero::Condition;
+use crate::aero::wind_tunnel::each_or_none;
 use crate::tables::PosteriorRow;
 
 /// Share of the information from which a value counts as flight's, percent.

@@ -1,6 +1,7 @@
 //! Grid of flight conditions. A quantity is known at its points and is linear between them.
 
 use crate::aero::Condition;
+use crate::aero::wind_tunnel::each_or_none;
 
 /// Points over angle of attack, Mach number and third variable. A variable without points does not
 /// matter.
@@ -83,14 +84,6 @@ impl Grid {
             }
         }
         shares
-    }
-}
-
-fn each_or_none(values: &[f64]) -> Vec<Option<f64>> {
-    if values.is_empty() {
-        vec![None]
-    } else {
-        values.iter().copied().map(Some).collect()
     }
 }
 

@@ -109,13 +109,7 @@ mod tests {
         let mut tunnel = WindTunnel::new(Settings::default());
         for alpha_deg in [0.0, 20.0] {
             let mut insert = |name: &str, value| {
-                let point = TunnelPoint {
-                    alpha_deg,
-                    mach: None,
-                    value,
-                    uncertainty: None,
-                    source: None,
-                };
+                let point = TunnelPoint::new(alpha_deg, value);
                 tunnel.insert(name, point);
             };
             if as_sum {

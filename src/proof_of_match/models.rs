@@ -9,7 +9,10 @@ use crate::tables::{PosteriorRow, TrendRow};
 pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
     let mut database = WindTunnel::new(tunnel.settings().clone());
     for row in rows {
-        let point = point(row.alpha_deg, row.mach, row.value);
+        let point = TunnelPoint {
+            mach: row.mach,
+            ..TunnelPoint::new(row.alpha_deg, row.value)
+        };
         database.insert_at(&row.derivative, row.third, point);
     }
     database
@@ -26,18 +29,8 @@ pub fn of_trends(rows: &[TrendRow], groups: &[&str], tunnel: &WindTunnel) -> Win
     {
         let first = seen.entry(&row.derivative).or_insert(&row.group);
         if *first == row.group {
-            database.insert(&row.derivative, point(row.alpha_deg, None, row.value));
+            database.insert(&row.derivative, TunnelPoint::new(row.alpha_deg, row.value));
         }
     }
     database
-}
-
-fn point(alpha_deg: f64, mach: Option<f64>, value: f64) -> TunnelPoint {
-    TunnelPoint {
-        alpha_deg,
-        mach,
-        value,
-        uncertainty: None,
-        source: None,
-    }
 }

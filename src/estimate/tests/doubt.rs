@@ -30,13 +30,7 @@ fn bench_with_opposite_elevator() -> Bench {
     let mut bench = bench_with_instruments();
     let truth = truth(bench.class.axis);
     let (_, value) = truth.iter().find(|(d, _)| d.name == "Cm_de").unwrap();
-    let point = TunnelPoint {
-        alpha_deg: 20.0,
-        mach: None,
-        value: -value,
-        uncertainty: None,
-        source: None,
-    };
+    let point = TunnelPoint::new(20.0, -value);
     bench.tunnel.insert("Cm_de", point);
     bench.class.statuses.insert("Cm_de".into(), Status::Held);
     bench

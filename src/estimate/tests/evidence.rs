@@ -85,11 +85,8 @@ fn tunnel(truth: &[(Derivative, f64)], share: f64) -> WindTunnel {
     for (derivative, value) in truth.iter().filter(|(_, value)| *value != 0.0) {
         let (value, uncertainty) = (1.1 * value, Some(share * value.abs()));
         let point = TunnelPoint {
-            alpha_deg: 20.0,
-            mach: None,
-            value,
             uncertainty,
-            source: None,
+            ..TunnelPoint::new(20.0, value)
         };
         tunnel.insert(&derivative.name, point);
     }

@@ -131,13 +131,7 @@ impl Flown {
                 regressor: Regressor::parse(regressor).unwrap(),
             });
             for alpha_deg in ALPHAS {
-                let point = TunnelPoint {
-                    alpha_deg,
-                    mach: None,
-                    value,
-                    uncertainty: None,
-                    source: None,
-                };
+                let point = TunnelPoint::new(alpha_deg, value);
                 self.config.tunnel.insert(name, point);
             }
         }
@@ -159,11 +153,9 @@ impl Flown {
                 for alpha_deg in [5.0, 20.0, 50.0] {
                     let value = alpha_deg * (1.0 + mach) + 1e-4 * altitude;
                     let point = TunnelPoint {
-                        alpha_deg,
                         mach: Some(mach),
-                        value,
                         uncertainty: Some(0.5),
-                        source: None,
+                        ..TunnelPoint::new(alpha_deg, value)
                     };
                     tunnel.insert_at("CN_alpha", Some(altitude), point);
                 }

@@ -284,20 +284,13 @@ impl Trial<'_> {
     }
 }
 
-/// Units in which no channel is taken to be recorded by mistake: with every unit there is, some factor of
-/// one channel explains what another channel's usual mistake does.
-const UNUSUAL: &[&str] = &[
-    "km/h", "cm", "mm", "km", "psi", "hPa", "mbar", "kPa", "inHg", "klbf", "kN",
-];
-
 /// Factors that could correct a channel, each with the cause that it would have.
 fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     let mut corrections = vec![(-1.0, "its sign is reversed".to_owned())];
     let Ok(mapped) = Unit::parse(&channel.unit) else {
         return corrections;
     };
-    let usual = mapped.alike().filter(|u| !UNUSUAL.contains(&u.name));
-    for other in usual {
+    for other in mapped.alike().filter(|unit| !unit.is_rare) {
         let factor = other.factor_to(mapped);
         let Some(factor) = factor.filter(|f| (f - 1.0).abs() > SAME_UNIT) else {
             continue;

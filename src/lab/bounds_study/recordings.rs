@@ -42,13 +42,7 @@ pub fn true_tables(derivatives: &[TrueDerivative]) -> WindTunnel {
     let mut tables = WindTunnel::default();
     for truth in derivatives {
         for alpha_deg in [-180.0, 180.0] {
-            let point = TunnelPoint {
-                alpha_deg,
-                mach: None,
-                value: truth.value,
-                uncertainty: None,
-                source: None,
-            };
+            let point = TunnelPoint::new(alpha_deg, truth.value);
             tables.insert(&truth.derivative, point);
         }
     }

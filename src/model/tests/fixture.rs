@@ -53,11 +53,8 @@ pub fn tunnel(uncertainty: Option<f64>) -> WindTunnel {
         ];
         for (name, value) in values {
             let point = TunnelPoint {
-                alpha_deg,
-                mach: None,
-                value,
                 uncertainty,
-                source: None,
+                ..TunnelPoint::new(alpha_deg, value)
             };
             tunnel.insert(name, point);
         }

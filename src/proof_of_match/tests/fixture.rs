@@ -63,13 +63,7 @@ pub fn noisy(flown: &FlownManeuver, seed: u64) -> Record {
 pub fn database(flown: &FlownManeuver, value: impl Fn(&TrueDerivative) -> f64) -> WindTunnel {
     let mut database = WindTunnel::new(wind_tunnel::Settings::default());
     for own in &flown.truth {
-        let point = TunnelPoint {
-            alpha_deg: flown.maneuver.alpha_deg,
-            mach: None,
-            value: value(own),
-            uncertainty: None,
-            source: None,
-        };
+        let point = TunnelPoint::new(flown.maneuver.alpha_deg, value(own));
         database.insert(&own.derivative, point);
     }
     database
