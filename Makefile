@@ -126,10 +126,12 @@ doc: ## the documentation of the code, private items included, into target/doc
 docs: ## write docs/tables.md and docs/settings.md from the declarations of tables and settings
 	HARVEST_WRITE_DOCS=1 cargo test --locked --lib --quiet -- the_page_of_
 
+# Of make torture and make fuzz: others each time; the output names it.
+SEED ?= $(shell date +%s)
 KILLS ?= 200
 FLIPS ?= 200
 torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; the bytes must be those of an undisturbed run
-	HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
+	HARVEST_SEED='$(SEED)' HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
 
 cluster: build ## a campaign on a Slurm of this machine's own: plain, with a failing task, with a killed node
 	bash tests/cluster/slurm.sh target/release/harvest
@@ -139,7 +141,7 @@ object-store: ## archive and store in an object store: the tests on an S3-compat
 
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
-	HARVEST_FUZZ='$(FILES)' HARVEST_FUZZ_SEED="$$(date +%s)" cargo test --release --locked --test stages -- fuzz:: --nocapture
+	HARVEST_SEED='$(SEED)' HARVEST_FUZZ='$(FILES)' cargo test --release --locked --test stages -- fuzz:: --nocapture
 
 match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
 	cargo test --release --locked --lib -- --ignored proof_of_match::

@@ -416,13 +416,17 @@ pub fn from_environment(name: &str, default: usize) -> usize {
         .unwrap_or(default)
 }
 
-/// Random numbers that are the same each time (the generator of Steele, Lea and Flood).
+/// Random numbers that are the same each time (the generator of Steele, Lea and Flood), or others for each `HARVEST_SEED`.
 #[derive(Debug)]
 pub struct Random(u64);
 
 impl Random {
     pub fn new(seed: u64) -> Random {
-        Random(seed)
+        let other = u64::try_from(from_environment("HARVEST_SEED", 0)).unwrap();
+        if other > 0 {
+            println!("HARVEST_SEED={other}");
+        }
+        Random(seed ^ other)
     }
 
     pub fn next(&mut self) -> u64 {
