@@ -175,19 +175,23 @@ impl Window {
     /// α and β at the c.g. at every point, from the vanes.
     fn flow_at_cg(&self) -> Vec<[f64; 2]> {
         let signals = FLOW_SIGNALS.map(|name| self.signal(name));
-        let at = |i: usize| {
-            let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = signals.map(|s| s[i]);
-            let read = Flow {
-                alpha: alpha * RAD,
-                beta: beta * RAD,
-                velocity,
-                rates: [p * RAD, q * RAD, r * RAD],
-            };
-            let cg = Position { x_ft, y_ft, z_ft };
-            let flow = self.sensors.flow_at_cg(&read, cg);
-            [flow.alpha, flow.beta]
-        };
-        Arch::new().dispatch(|| (0..self.len()).map(at).collect())
+        let mut angles = Vec::with_capacity(self.len());
+        // A loop: an iterator's closure would not be compiled for the processor at hand.
+        Arch::new().dispatch(|| {
+            for i in 0..self.len() {
+                let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = signals.map(|s| s[i]);
+                let read = Flow {
+                    alpha: alpha * RAD,
+                    beta: beta * RAD,
+                    velocity,
+                    rates: [p * RAD, q * RAD, r * RAD],
+                };
+                let cg = Position { x_ft, y_ft, z_ft };
+                let flow = self.sensors.flow_at_cg(&read, cg);
+                angles.push([flow.alpha, flow.beta]);
+            }
+        });
+        angles
     }
 
     /// Replaces the points of a signal, or adds one.
