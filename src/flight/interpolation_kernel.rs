@@ -42,6 +42,7 @@ impl InterpolationKernel {
 
     /// Interpolates at sample `k` of `samples`: the value, and its slope along the shift, per
     /// sample.
+    #[inline]
     pub fn interpolate(
         &self,
         k: usize,
@@ -49,6 +50,15 @@ impl InterpolationKernel {
         value: impl Fn(usize) -> f64,
     ) -> (f64, f64) {
         let (mut sum, mut slope) = (0.0, 0.0);
+        let inside = k.checked_add_signed(self.first);
+        if let Some(first) = inside.filter(|first| first + WIDTH <= samples) {
+            for i in 0..WIDTH {
+                let v = value(first + i);
+                sum += self.weights[i] * v;
+                slope += self.slopes[i] * v;
+            }
+            return (sum, slope);
+        }
         for (sample, weight, by_shift) in self.weights_at(k, samples) {
             let v = value(sample);
             sum += weight * v;

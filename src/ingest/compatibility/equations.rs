@@ -46,19 +46,16 @@ pub struct MeasuredTerms {
 /// p, q, r (rad/s) and specific force forward, right, down at the sensors (ft/s²).
 pub type Inputs = [f64; INPUTS];
 
-/// Rates of the states with their slopes along states and inputs.
+/// Slopes of the states' rates along states and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateRates {
-    pub rates: State,
+pub struct RateSlopes {
     pub by_state: SMatrix<f64, STATES, STATES>,
     pub by_input: SMatrix<f64, STATES, INPUTS>,
 }
 
-/// Readings of the output instruments, in the units of their signals, with slopes along states and
-/// body rates.
+/// Slopes of the output instruments' readings along states and body rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Readings {
-    pub values: [f64; OUTPUTS],
+pub struct ReadingSlopes {
     pub by_state: SMatrix<f64, OUTPUTS, STATES>,
     pub by_rates: SMatrix<f64, OUTPUTS, 3>,
 }
@@ -134,24 +131,43 @@ fn velocity_at_cg(
 
 /// Computes the rates of the states.
 #[inline(always)]
-pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> StateRates {
+pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> State {
+    let omega = body_rates(input);
+    let (v, _) = velocity_at_cg(x, omega, terms);
+    let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
+    let g = terms.gravity;
+    let gravity = [-g * st, g * ct * sp, g * ct * cp];
+    let turned = (omega + terms.earth).cross(&v);
+    let mut rates = State::zeros();
+    for i in 0..3 {
+        let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
+        rates[i] = input[3 + i] - swing.value + gravity[i] - turned[i];
+    }
+    let w = omega - terms.horizon;
+    let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
+    rates[3] = w.x + st / ct * along;
+    rates[4] = across;
+    rates[5] = along / ct;
+    rates[6] = v.x * st - v.y * sp * ct - v.z * cp * ct;
+    rates
+}
+
+/// Computes the slopes of the states' rates.
+#[inline(always)]
+pub fn rate_slopes(x: &State, input: &Inputs, terms: &MeasuredTerms) -> RateSlopes {
     let omega = body_rates(input);
     let (velocity, velocity_by_rates) = velocity_at_cg(x, omega, terms);
     let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
     let g = terms.gravity;
     let turning = omega + terms.earth;
-    let mut out = StateRates {
-        rates: State::zeros(),
+    let mut out = RateSlopes {
         by_state: SMatrix::zeros(),
         by_input: SMatrix::zeros(),
     };
-    let gravity = Vector3::new(-g * st, g * ct * sp, g * ct * cp);
-    let turned = turning.cross(&velocity);
     let cross = turning.cross_matrix();
     let mut by_rates = velocity.cross_matrix() - cross * velocity_by_rates;
     for i in 0..3 {
         let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
-        out.rates[i] = input[3 + i] - swing.value + gravity[i] - turned[i];
         for j in 0..3 {
             by_rates[(i, j)] -= swing.by_rates[j];
         }
@@ -167,24 +183,21 @@ pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> StateRates {
     out.by_state
         .fixed_view_mut::<3, 1>(0, 4)
         .copy_from(&by_theta);
-    add_attitude_rates(&mut out, omega - terms.horizon, (sp, cp), (st, ct));
-    add_climb_rate(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
+    add_attitude_slopes(&mut out, omega - terms.horizon, (sp, cp), (st, ct));
+    add_climb_slopes(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
     out
 }
 
-/// Adds the rates of φ, θ, ψ for body rates relative to the horizon.
+/// Adds the slopes of the rates of φ, θ, ψ for body rates relative to the horizon.
 #[inline(always)]
-fn add_attitude_rates(
-    out: &mut StateRates,
+fn add_attitude_slopes(
+    out: &mut RateSlopes,
     w: Vector3<f64>,
     (sp, cp): (f64, f64),
     (st, ct): (f64, f64),
 ) {
     let tan = st / ct;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
-    out.rates[3] = w.x + tan * along;
-    out.rates[4] = across;
-    out.rates[5] = along / ct;
     out.by_state[(3, 3)] = tan * across;
     out.by_state[(3, 4)] = along / (ct * ct);
     out.by_state[(4, 3)] = -along;
@@ -205,17 +218,16 @@ fn add_attitude_rates(
         ));
 }
 
-/// Adds the rate of climb.
+/// Adds the slopes of the rate of climb.
 #[inline(always)]
-fn add_climb_rate(
-    out: &mut StateRates,
+fn add_climb_slopes(
+    out: &mut RateSlopes,
     v: Vector3<f64>,
     v_by_rates: Matrix3<f64>,
     (sp, cp): (f64, f64),
     (st, ct): (f64, f64),
 ) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
-    out.rates[6] = up.dot(&v);
     for i in 0..3 {
         out.by_state[(6, i)] = up[i];
         out.by_input[(6, i)] = up.dot(&v_by_rates.column(i));
@@ -227,23 +239,58 @@ fn add_climb_rate(
 /// Computes the readings of the output instruments: α and β vanes, V, θ, φ, ψ, altitude, q̄ and
 /// Mach, in deg, ft/s, ft, lbf/ft².
 #[inline(always)]
-pub fn readings(aircraft: &Aircraft, x: &State, input: &Inputs, terms: &MeasuredTerms) -> Readings {
+pub fn readings(
+    aircraft: &Aircraft,
+    x: &State,
+    input: &Inputs,
+    terms: &MeasuredTerms,
+) -> [f64; OUTPUTS] {
+    let omega = body_rates(input);
+    let (v, _) = velocity_at_cg(x, omega, terms);
+    let speed = v.norm();
+    let flow = flow(v, speed, omega);
+    let air = air(x[6]);
+    [
+        DEG * aircraft.sensors.alpha_reading(&flow, terms.cg).angle,
+        DEG * aircraft.sensors.beta_reading(&flow, terms.cg).angle,
+        speed,
+        DEG * x[4],
+        DEG * x[3],
+        DEG * x[5],
+        x[6],
+        0.5 * air.density_slug_ft3 * speed * speed,
+        speed / air.sound_ft_s,
+    ]
+}
+
+/// Flow of a velocity in body axes.
+#[inline(always)]
+fn flow(v: Vector3<f64>, speed: f64, omega: Vector3<f64>) -> Flow {
+    Flow {
+        alpha: v.z.atan2(v.x),
+        beta: (v.y / speed).clamp(-1.0, 1.0).asin(),
+        velocity: speed,
+        rates: [omega.x, omega.y, omega.z],
+    }
+}
+
+/// Computes the slopes of the readings.
+#[inline(always)]
+pub fn reading_slopes(
+    aircraft: &Aircraft,
+    x: &State,
+    input: &Inputs,
+    terms: &MeasuredTerms,
+) -> ReadingSlopes {
     let omega = body_rates(input);
     let (v, v_by_rates) = velocity_at_cg(x, omega, terms);
     let speed = v.norm();
     let across2 = v.x * v.x + v.z * v.z;
     let unit = v / speed;
-    let beta = (v.y / speed).clamp(-1.0, 1.0).asin();
+    let flow = flow(v, speed, omega);
     let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
-    let beta_by = (Vector3::y() - unit * unit.y) / (speed * beta.cos());
-    let flow = Flow {
-        alpha: v.z.atan2(v.x),
-        beta,
-        velocity: speed,
-        rates: [omega.x, omega.y, omega.z],
-    };
+    let beta_by = (Vector3::y() - unit * unit.y) / (speed * flow.beta.cos());
     let air = AirWithSlopes::at(x[6]);
-    let mut values = [0.0; OUTPUTS];
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let vanes = [
@@ -251,7 +298,6 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Inputs, terms: &Measured
         aircraft.sensors.beta_reading(&flow, terms.cg),
     ];
     for (o, vane) in vanes.iter().enumerate() {
-        values[o] = DEG * vane.angle;
         // A reading depends on the ratio of rates and velocity, so its slope along the velocity
         // follows from those along the rates.
         let rates: Vector3<f64> = vane.by_rates.into();
@@ -264,13 +310,6 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Inputs, terms: &Measured
     for (o, factor) in [2, 7, 8].into_iter().zip(pressures) {
         by_velocity.set_row(o, &(unit * factor).transpose());
     }
-    values[2] = speed;
-    values[3] = DEG * x[4];
-    values[4] = DEG * x[3];
-    values[5] = DEG * x[5];
-    values[6] = x[6];
-    values[7] = 0.5 * air.density * speed * speed;
-    values[8] = speed / air.sound;
     let mut by_state = SMatrix::<f64, OUTPUTS, STATES>::zeros();
     by_state.fixed_columns_mut::<3>(0).copy_from(&by_velocity);
     by_rates += by_velocity * v_by_rates;
@@ -280,11 +319,7 @@ pub fn readings(aircraft: &Aircraft, x: &State, input: &Inputs, terms: &Measured
     by_state[(6, 6)] = 1.0;
     by_state[(7, 6)] = 0.5 * air.density_slope * speed * speed;
     by_state[(8, 6)] = -speed * air.sound_slope / (air.sound * air.sound);
-    Readings {
-        values,
-        by_state,
-        by_rates,
-    }
+    ReadingSlopes { by_state, by_rates }
 }
 
 /// Half the altitude difference over which the slopes of the atmosphere are taken, ft: short against

@@ -20,8 +20,9 @@ const STEPS: usize = 2;
 /// Most halvings of a step that raises the cost; after them the step is dropped.
 const HALVINGS: usize = 5;
 
-/// Relative rise of the cost that is rounding of its sums.
-const COST_ROUNDING: f64 = 1e-9;
+/// Rise of twice the cost that decides nothing: that of a tenth of a standard deviation. A gradient of
+/// interpolated sensitivities is not exact, so its last steps may raise the cost by so much.
+const LEAST_RISE: f64 = 0.01;
 
 /// Largest move of a parameter, as a share of its bound, at which the fit is settled.
 const SETTLED: f64 = 0.05;
@@ -95,7 +96,7 @@ impl JointState<'_> {
                 .map(|window| window.moved(&self.context, &trial, &step, share))
                 .collect();
             if let Some(moved) = moved
-                && self.cost(&moved, &trial) <= cost * (1.0 + COST_ROUNDING)
+                && self.cost(&moved, &trial) <= cost + LEAST_RISE
             {
                 let largest = self.largest_move(&trial, &inverse);
                 self.windows = moved;

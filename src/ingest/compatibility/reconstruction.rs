@@ -1,10 +1,11 @@
-//! Flight-path reconstruction of one window for given errors of its instruments, with exact
+//! Flight-path reconstruction of one window for given errors of its instruments, with
 //! sensitivities.
 //!
 //! An input is corrected before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale).
-//! An output gets its error after them, y(t) = (1 + scale) h(t − delay) + bias. Outputs are passed
-//! on sample by sample as soon as the readings that a delay reaches are computed, so that no more
-//! readings are kept.
+//! States and readings are integrated sample by sample. Their sensitivities change as slowly as the
+//! aircraft moves, so they obey the linearised equations over steps of a tenth of a second, from node
+//! to node. The inputs' slopes enter a step by their means over its samples: then a delay moves an
+//! integral of an input exactly as it moves the input, however noisy that is.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
@@ -12,11 +13,10 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
-use std::ops::Range;
-
+use nalgebra::Matrix3;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::equations::{self, STATES, State};
+use super::equations::{self, RateSlopes, STATES, State};
 use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, Parameters, place};
 use super::window::{Window, input_factor};
 use crate::aircraft::Aircraft;
@@ -29,22 +29,28 @@ use crate::numerics::simd::{load, store};
 pub const LOCAL: usize = STATES + WIND;
 pub const WIND: usize = 3;
 /// Parameters that the states depend on: the local ones, then bias, scale and delay of each input.
-const DRIVING: usize = LOCAL + INPUTS * KINDS;
+pub const DRIVING: usize = LOCAL + INPUTS * KINDS;
 /// Parameters that one output depends on: those of the states, then its own bias, scale and delay.
 pub const ROW: usize = DRIVING + KINDS;
 /// Length of a row: the parameters of an output and the residual, in whole vectors.
 pub const WIDE: usize = (ROW + 1).next_multiple_of(8);
 
+/// Step of the sensitivities, s: a tenth of the period of motions at 1 Hz, faster than which an aircraft
+/// hardly turns.
+const SENSITIVITY_STEP_S: f64 = 0.1;
+
 pub type Local = [f64; LOCAL];
 pub type Row = [f64; WIDE];
 
-/// Receiver of the outputs of a window.
-pub trait Sink {
-    /// `true` where an output is wanted at a sample.
-    fn counts(&self, sample: usize, output: usize) -> bool;
-
-    /// Takes an output with its sensitivities. The row is the sink's to overwrite.
-    fn take<S: Simd>(&mut self, simd: S, sample: usize, output: usize, value: f64, row: &mut Row);
+/// Readings of a window's output instruments without their own errors, with sensitivities.
+#[derive(Debug)]
+pub struct Reconstructed {
+    /// At every sample.
+    pub readings: Vec<[f64; OUTPUTS]>,
+    /// Sensitivities along the driving parameters, at every node.
+    pub rows: Vec<[Row; OUTPUTS]>,
+    /// Samples from a node to the next.
+    pub samples_per_node: usize,
 }
 
 /// One input without its error at one instant, in rad/s or ft/s², with its slopes along bias, scale
@@ -55,251 +61,281 @@ struct CorrectedInput {
     by_error: [f64; KINDS],
 }
 
-/// Reconstructs a window and passes the outputs of some samples to `sink`. `None` where the
-/// integration diverges.
+/// Inputs at one instant.
+type Point = [CorrectedInput; INPUTS];
+
+/// Reconstructs a window. `None` where the integration diverges.
 pub fn reconstruct(
     window: &Window,
     aircraft: &Aircraft,
     local: &Local,
     shared: &Parameters,
-    samples: Range<usize>,
-    sink: &mut impl Sink,
-) -> Option<()> {
-    let points = corrected_inputs(window, shared);
-    let own = |o: usize| std::array::from_fn(|kind| shared[(INPUTS + o) * KINDS + kind]);
-    let errors: [[f64; KINDS]; OUTPUTS] = std::array::from_fn(own);
-    let kernels = errors.map(|e| InterpolationKernel::at(-e[Kind::Delay as usize] / window.step_s));
+) -> Option<Reconstructed> {
     Arch::new().dispatch(Reconstruction {
         window,
         aircraft,
         local,
-        points: &points,
-        errors,
-        kernels,
-        samples,
-        sink,
+        points: &corrected_inputs(window, shared),
+        half_step: half_step(window.step_s),
     })
 }
 
+/// Samples from a node to the middle of its step.
+fn half_step(step_s: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small positive number"
+    )]
+    let half = (0.5 * SENSITIVITY_STEP_S / step_s).round().max(1.0) as usize;
+    half
+}
+
 /// Integration of a window, compiled for the processor at hand.
-struct Reconstruction<'a, K: Sink> {
+struct Reconstruction<'a> {
     window: &'a Window,
     aircraft: &'a Aircraft,
     local: &'a Local,
-    points: &'a [[CorrectedInput; INPUTS]],
-    errors: [[f64; KINDS]; OUTPUTS],
-    kernels: [InterpolationKernel; OUTPUTS],
-    samples: Range<usize>,
-    sink: &'a mut K,
+    /// Inputs at samples and at the halves between them.
+    points: &'a [Point],
+    half_step: usize,
 }
 
 /// Sensitivities of the states, a row for each state.
 type Sensitivities = [Row; STATES];
-/// Readings without instrument error: their sensitivities, and the reading itself in the place of
-/// the output's own bias.
-type ReadingRows = [Row; OUTPUTS];
 
 /// Magnitude of a state (ft, ft/s, rad) from which the integration has diverged.
 const DIVERGED: f64 = 1e7;
 
-/// States and sensitivities at the present sample.
-struct StateWithSensitivities {
-    x: State,
-    s: Sensitivities,
-    /// Workspace of a step: the sensitivities at a stage and at the next one, and those at the end
-    /// of the step summed so far.
-    stages: [Sensitivities; 2],
-    end: Sensitivities,
-}
-
-impl<K: Sink> WithSimd for Reconstruction<'_, K> {
-    type Output = Option<()>;
+impl WithSimd for Reconstruction<'_> {
+    type Output = Option<Reconstructed>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) -> Option<()> {
-        const ZERO: Sensitivities = [[0.0; WIDE]; STATES];
-        let count = self.window.samples;
-        let mut states = StateWithSensitivities {
-            x: State::from_column_slice(&self.local[..STATES]),
-            s: ZERO,
-            stages: [ZERO; 2],
-            end: ZERO,
-        };
-        for i in 0..STATES {
-            states.s[i][i] = 1.0;
+    fn with_simd<S: Simd>(self, simd: S) -> Option<Reconstructed> {
+        let states = self.states()?;
+        let mut readings = Vec::with_capacity(states.len());
+        // A loop: an iterator's closure would not be compiled for the processor at hand.
+        for (k, x) in states.iter().enumerate() {
+            readings.push(self.readings(k, x));
         }
-        let ahead = self.longest_offset(|kernel| kernel.last_offset().max(0));
-        let behind = self.longest_offset(|kernel| kernel.first_offset().min(0));
-        let mut kept = vec![[[0.0; WIDE]; OUTPUTS]; (ahead + behind + 1).next_power_of_two()];
-        for k in 0..count + ahead {
-            if k < count {
-                let place = k & (kept.len() - 1);
-                self.read_outputs(simd, k, &states, &mut kept[place]);
-            }
-            if let Some(sample) = k.checked_sub(ahead)
-                && self.samples.contains(&sample)
-            {
-                self.pass_outputs(simd, sample, &kept);
-            }
-            if k + 1 < count {
-                self.advance(simd, k, &mut states);
-                if !states.x.iter().all(|x| x.is_finite() && x.abs() < DIVERGED) {
-                    return None;
-                }
-            }
-        }
-        Some(())
+        Some(Reconstructed {
+            readings,
+            rows: self.rows(simd, &states),
+            samples_per_node: 2 * self.half_step,
+        })
     }
 }
 
-impl<K: Sink> Reconstruction<'_, K> {
-    /// Largest magnitude of an offset among the outputs' kernels.
-    fn longest_offset(&self, offset: impl Fn(&InterpolationKernel) -> isize) -> usize {
-        let offsets = self
-            .kernels
-            .iter()
-            .map(|kernel| offset(kernel).unsigned_abs());
-        offsets.max().unwrap_or(0)
+impl Reconstruction<'_> {
+    /// States at every sample; `None` where they diverge.
+    #[inline(always)]
+    fn states(&self) -> Option<Vec<State>> {
+        let mut states = Vec::with_capacity(self.window.samples);
+        let mut x = State::from_column_slice(&self.local[..STATES]);
+        for k in 0..self.window.samples {
+            if !x.iter().all(|x| x.is_finite() && x.abs() < DIVERGED) {
+                return None;
+            }
+            states.push(x);
+            if k + 1 < self.window.samples {
+                x = self.next_state(k, &x);
+            }
+        }
+        Some(states)
     }
 
-    /// One Runge-Kutta step of the states and of their sensitivities.
+    /// State one sample later, by a Runge-Kutta step.
     #[inline(always)]
-    fn advance<S: Simd>(&self, simd: S, k: usize, states: &mut StateWithSensitivities) {
+    fn next_state(&self, k: usize, x: &State) -> State {
         let h = self.window.step_s;
-        let (ahead_s, part_s) = (reaches_s(h), weights_s(h));
-        let StateWithSensitivities { x, s, stages, end } = states;
-        let (mut at, mut x_end) = (*x, *x);
-        *end = *s;
+        let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
+        let (mut at, mut end) = (*x, *x);
         for stage in 0..STAGES {
             let sample = if POINT[stage] == 2 { k + 1 } else { k };
-            let [even, odd] = &mut *stages;
-            let (here, next) = if stage % 2 == 0 {
-                (&*even, odd)
-            } else {
-                (&*odd, even)
-            };
-            let slopes = if stage == 0 { &*s } else { here };
-            let point = &self.points[2 * k + POINT[stage]];
-            let mut rates =
-                equations::rates(&at, &point.map(|p| p.value), &self.window.terms[sample]);
-            let to_body = &self.window.terms[sample].to_body;
+            let input = self.points[2 * k + POINT[stage]].map(|input| input.value);
+            let terms = &self.window.terms[sample];
+            let mut rates = equations::rates(&at, &input, terms);
             for i in 0..WIND {
                 for j in 0..WIND {
-                    rates.rates[i] -= to_body[(i, j)] * self.local[STATES + j];
+                    rates[i] -= terms.to_body[(i, j)] * self.local[STATES + j];
                 }
             }
-            let error_rows = error_rows(point);
-            let (part, ahead) = (
-                simd.splat_f64s(part_s[stage]),
-                simd.splat_f64s(ahead_s[stage]),
-            );
-            for i in 0..STATES {
-                let (s, end, next) = (&s[i], &mut end[i], &mut next[i]);
-                for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
-                    let mut slope = Sum::<S>::zero(simd, lane);
-                    for &j in equations::RATES_BY_STATE[i] {
-                        slope.add(simd, rates.by_state[(i, j)], &slopes[j]);
-                    }
-                    for &input in equations::RATES_BY_INPUT[i] {
-                        slope.add(simd, rates.by_input[(i, input)], &error_rows[input]);
-                    }
-                    if i < WIND {
-                        for j in 0..WIND {
-                            slope.add(simd, -to_body[(i, j)], &WIND_ROWS[j]);
-                        }
-                    }
-                    slope.each(|lane, slope| {
-                        let so_far = load::<S>(end, lane);
-                        store::<S>(end, lane, simd.mul_add_f64s(part, slope, so_far));
-                        store::<S>(
-                            next,
-                            lane,
-                            simd.mul_add_f64s(ahead, slope, load::<S>(s, lane)),
-                        );
-                    });
-                }
-            }
-            x_end += rates.rates * part_s[stage];
-            at = *x + rates.rates * ahead_s[stage];
+            end += rates * weights_s[stage];
+            at = x + rates * reaches_s[stage];
         }
-        (states.x, states.s) = (x_end, states.end);
+        end
     }
 
-    /// Computes the readings at a sample, without instrument errors.
+    /// Readings at a sample, without instrument errors.
     #[inline(always)]
-    fn read_outputs<S: Simd>(
+    fn readings(&self, k: usize, x: &State) -> [f64; OUTPUTS] {
+        equations::readings(self.aircraft, x, &self.inputs(k), &self.window.terms[k])
+    }
+
+    #[inline(always)]
+    fn inputs(&self, k: usize) -> equations::Inputs {
+        self.points[2 * k].map(|input| input.value)
+    }
+
+    /// Sensitivities of the readings at every node.
+    #[inline(always)]
+    fn rows<S: Simd>(&self, simd: S, states: &[State]) -> Vec<[Row; OUTPUTS]> {
+        let step = 2 * self.half_step;
+        let mut s = [[0.0; WIDE]; STATES];
+        for i in 0..STATES {
+            s[i][i] = 1.0;
+        }
+        let mut rows = Vec::with_capacity(states.len() / step + 1);
+        let mut start = self.linearised(0, states);
+        for k in (0..states.len()).step_by(step) {
+            rows.push(self.reading_rows(simd, k, &states[k], &s));
+            if k + step < states.len() {
+                let middle = self.linearised(k + self.half_step, states);
+                let end = self.linearised(k + step, states);
+                s = self.advanced(simd, k, &s, [&start, &middle, &end]);
+                start = end;
+            }
+        }
+        rows
+    }
+
+    /// Slopes of the equations at a sample.
+    #[inline(always)]
+    fn linearised(&self, k: usize, states: &[State]) -> Linearised {
+        let terms = &self.window.terms[k];
+        Linearised {
+            slopes: equations::rate_slopes(&states[k], &self.inputs(k), terms),
+            by_wind: -terms.to_body,
+        }
+    }
+
+    /// Sensitivities one node later, by a Runge-Kutta step of the linearised equations from sample `k`.
+    #[inline(always)]
+    fn advanced<S: Simd>(
         &self,
         simd: S,
         k: usize,
-        states: &StateWithSensitivities,
-        cells: &mut ReadingRows,
-    ) {
-        let point = &self.points[2 * k];
-        let at = equations::readings(
-            self.aircraft,
-            &states.x,
-            &point.map(|p| p.value),
-            &self.window.terms[k],
-        );
-        let error_rows = error_rows(point);
-        for o in 0..OUTPUTS {
-            for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
-                let mut slope = Sum::<S>::zero(simd, lane);
-                for &i in equations::READINGS_BY_STATE[o] {
-                    slope.add(simd, at.by_state[(o, i)], &states.s[i]);
+        s: &Sensitivities,
+        linearised: [&Linearised; 3],
+    ) -> Sensitivities {
+        let step = 2 * self.half_step;
+        let h = step as f64 * self.window.step_s;
+        let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
+        let by_error = mean_slopes(&self.points[2 * k..=2 * (k + step)]);
+        let forcing = linearised.map(|at| at.forcing(&by_error));
+        let (mut at, mut end) = (*s, *s);
+        for stage in 0..STAGES {
+            let (reach, weight) = (
+                simd.splat_f64s(reaches_s[stage]),
+                simd.splat_f64s(weights_s[stage]),
+            );
+            let by_state = &linearised[POINT[stage]].slopes.by_state;
+            let mut next = at;
+            for i in 0..STATES {
+                for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
+                    let mut slope = Sum::<S>::of(&forcing[POINT[stage]][i], lane);
+                    for &j in equations::RATES_BY_STATE[i] {
+                        slope.add(simd, by_state[(i, j)], &at[j]);
+                    }
+                    slope.each(|lane, slope| {
+                        let so_far = load::<S>(&end[i], lane);
+                        let start = load::<S>(&s[i], lane);
+                        store::<S>(&mut end[i], lane, simd.mul_add_f64s(weight, slope, so_far));
+                        store::<S>(&mut next[i], lane, simd.mul_add_f64s(reach, slope, start));
+                    });
                 }
-                for &rate in equations::READINGS_BY_RATES[o] {
-                    slope.add(simd, at.by_rates[(o, rate)], &error_rows[rate]);
-                }
-                slope.each(|lane, slope| store::<S>(&mut cells[o], lane, slope));
             }
-            cells[o][DRIVING] = at.values[o];
+            at = next;
         }
+        end
     }
 
-    /// Passes the outputs at a sample, with their errors, to the sink.
+    /// Sensitivities of the readings at a sample.
     #[inline(always)]
-    fn pass_outputs<S: Simd>(&mut self, simd: S, k: usize, kept: &[ReadingRows]) {
+    fn reading_rows<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        x: &State,
+        s: &Sensitivities,
+    ) -> [Row; OUTPUTS] {
+        let terms = &self.window.terms[k];
+        let at = equations::reading_slopes(self.aircraft, x, &self.inputs(k), terms);
+        let by_error = self.points[2 * k].map(|input| input.by_error);
+        let mut rows = [[0.0; WIDE]; OUTPUTS];
         for o in 0..OUTPUTS {
-            if !self.sink.counts(k, o) {
-                continue;
-            }
-            let [bias, scale, _] = self.errors[o];
-            let (mut value, mut by_shift, gain) = (0.0, 0.0, 1.0 + scale);
-            let mut weighted = [(0.0, &kept[0][o]); 4];
-            for (entry, (sample, weight, slope)) in weighted
-                .iter_mut()
-                .zip(self.kernels[o].weights_at(k, self.window.samples))
-            {
-                let cell = &kept[sample & (kept.len() - 1)][o];
-                value += weight * cell[DRIVING];
-                by_shift += slope * cell[DRIVING];
-                *entry = (gain * weight, cell);
-            }
-            let mut row = [0.0; WIDE];
-            for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
-                let mut slope = Sum::<S>::zero(simd, lane);
-                for (weight, cell) in weighted {
-                    slope.add(simd, weight, cell);
+            for &rate in equations::READINGS_BY_RATES[o] {
+                let errors = &mut rows[o][error_columns(rate)];
+                for (slope, by_error) in errors.iter_mut().zip(by_error[rate]) {
+                    *slope = at.by_rates[(o, rate)] * by_error;
                 }
-                slope.each(|lane, slope| store::<S>(&mut row, lane, slope));
             }
-            row[DRIVING] = 1.0;
-            row[DRIVING + 1] = value;
-            row[DRIVING + 2] = -gain * by_shift / self.window.step_s;
-            self.sink.take(simd, k, o, gain * value + bias, &mut row);
+            for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
+                let mut slope = Sum::<S>::of(&rows[o], lane);
+                for &i in equations::READINGS_BY_STATE[o] {
+                    slope.add(simd, at.by_state[(o, i)], &s[i]);
+                }
+                slope.each(|lane, slope| store::<S>(&mut rows[o], lane, slope));
+            }
         }
+        rows
     }
 }
 
-/// Unit sensitivities to the wind's change north, east and down, as rows.
-const WIND_ROWS: [Row; WIND] = {
-    let mut rows = [[0.0; WIDE]; WIND];
-    rows[0][STATES] = 1.0;
-    rows[1][STATES + 1] = 1.0;
-    rows[2][STATES + 2] = 1.0;
-    rows
-};
+/// Slopes of the equations at one instant along states, inputs and the wind's change.
+struct Linearised {
+    slopes: RateSlopes,
+    by_wind: Matrix3<f64>,
+}
+
+impl Linearised {
+    /// Slopes of the states' rates along the wind's change and the inputs' errors, as rows.
+    #[inline(always)]
+    fn forcing(&self, by_error: &[[f64; KINDS]; INPUTS]) -> Sensitivities {
+        let mut rows = [[0.0; WIDE]; STATES];
+        for i in 0..STATES {
+            for &input in equations::RATES_BY_INPUT[i] {
+                let errors = &mut rows[i][error_columns(input)];
+                for (slope, by_error) in errors.iter_mut().zip(by_error[input]) {
+                    *slope = self.slopes.by_input[(i, input)] * by_error;
+                }
+            }
+        }
+        for i in 0..WIND {
+            for j in 0..WIND {
+                rows[i][STATES + j] = self.by_wind[(i, j)];
+            }
+        }
+        rows
+    }
+}
+
+/// Columns of an input's errors in a row.
+#[inline(always)]
+fn error_columns(input: usize) -> std::ops::Range<usize> {
+    LOCAL + input * KINDS..LOCAL + (input + 1) * KINDS
+}
+
+/// Means of the inputs' slopes over points that begin and end at samples, by Simpson's rule from
+/// sample to sample.
+#[inline(always)]
+fn mean_slopes(points: &[Point]) -> [[f64; KINDS]; INPUTS] {
+    let per_weight = 1.0 / (3 * (points.len() - 1)) as f64;
+    let mut means = [[0.0; KINDS]; INPUTS];
+    for (n, point) in points.iter().enumerate() {
+        let weight = match n {
+            _ if n % 2 == 1 => 4.0,
+            _ if n == 0 || n + 1 == points.len() => 1.0,
+            _ => 2.0,
+        };
+        for input in 0..INPUTS {
+            for kind in 0..KINDS {
+                means[input][kind] += per_weight * weight * point[input].by_error[kind];
+            }
+        }
+    }
+    means
+}
 
 /// Vectors of a row that are summed side by side: independent sums hide the latency of each.
 const SIDE_BY_SIDE: usize = 4;
@@ -311,11 +347,12 @@ struct Sum<S: Simd> {
 }
 
 impl<S: Simd> Sum<S> {
+    /// Sum that begins with a row.
     #[inline(always)]
-    fn zero(simd: S, first: usize) -> Self {
+    fn of(row: &Row, first: usize) -> Self {
         Sum {
             first,
-            lanes: [simd.splat_f64s(0.0); SIDE_BY_SIDE],
+            lanes: std::array::from_fn(|n| load::<S>(row, first + n * S::F64_LANES)),
         }
     }
 
@@ -340,18 +377,8 @@ impl<S: Simd> Sum<S> {
     }
 }
 
-/// Slopes of each input along its own errors, as rows.
-#[inline(always)]
-fn error_rows(point: &[CorrectedInput; INPUTS]) -> [Row; INPUTS] {
-    let mut rows = [[0.0; WIDE]; INPUTS];
-    for (input, corrected) in point.iter().enumerate() {
-        rows[input][LOCAL + input * KINDS..][..KINDS].copy_from_slice(&corrected.by_error);
-    }
-    rows
-}
-
 /// Corrected inputs at samples and at the halves between them.
-fn corrected_inputs(window: &Window, shared: &Parameters) -> Vec<[CorrectedInput; INPUTS]> {
+fn corrected_inputs(window: &Window, shared: &Parameters) -> Vec<Point> {
     let mut points = vec![[CorrectedInput::default(); INPUTS]; 2 * window.samples - 1];
     for i in 0..INPUTS {
         let parameter = |kind| shared[place(i, kind)];

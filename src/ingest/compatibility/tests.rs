@@ -3,14 +3,16 @@
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};
-use pulp::Simd;
 
-use super::equations::{self, Inputs, MeasuredTerms, STATES, State, rates, readings};
+use super::equations::{
+    self, Inputs, MeasuredTerms, STATES, State, rate_slopes, rates, reading_slopes, readings,
+};
 use super::parameters::{
     INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, place,
 };
-use super::reconstruction::{LOCAL, Local, ROW, Row, Sink, WIDE, reconstruct, shared_place};
+use super::reconstruction::{DRIVING, LOCAL, Local, ROW, reconstruct, shared_place};
 use super::window::{self, Window, choose_windows, input_factor};
+use super::window_sums::output_sums;
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
@@ -77,14 +79,14 @@ fn state() -> State {
 
 #[test]
 fn slopes_of_the_rates_are_those_of_finite_differences() {
-    let at = rates(&state(), &INPUT, &measured_terms());
+    let at = rate_slopes(&state(), &INPUT, &measured_terms());
     for j in 0..STATES {
         let h = 1e-5 * state()[j].abs().max(1.0);
         let (mut up, mut down) = (state(), state());
         up[j] += h;
         down[j] -= h;
-        let numeric = (rates(&up, &INPUT, &measured_terms()).rates
-            - rates(&down, &INPUT, &measured_terms()).rates)
+        let numeric = (rates(&up, &INPUT, &measured_terms())
+            - rates(&down, &INPUT, &measured_terms()))
             / (2.0 * h);
         (0..STATES)
             .for_each(|i| assert_abs_diff_eq!(at.by_state[(i, j)], numeric[i], epsilon = 1e-6));
@@ -93,8 +95,8 @@ fn slopes_of_the_rates_are_those_of_finite_differences() {
         let (mut up, mut down) = (INPUT, INPUT);
         up[j] += 1e-5;
         down[j] -= 1e-5;
-        let numeric = (rates(&state(), &up, &measured_terms()).rates
-            - rates(&state(), &down, &measured_terms()).rates)
+        let numeric = (rates(&state(), &up, &measured_terms())
+            - rates(&state(), &down, &measured_terms()))
             / 2e-5;
         (0..STATES)
             .for_each(|i| assert_abs_diff_eq!(at.by_input[(i, j)], numeric[i], epsilon = 1e-6));
@@ -104,13 +106,13 @@ fn slopes_of_the_rates_are_those_of_finite_differences() {
 #[test]
 fn slopes_of_the_readings_are_those_of_finite_differences() {
     let read = |x: &State, u: &Inputs| readings(&aircraft(), x, u, &measured_terms());
-    let at = read(&state(), &INPUT);
+    let at = reading_slopes(&aircraft(), &state(), &INPUT, &measured_terms());
     for j in 0..STATES {
         let h = 1e-5 * state()[j].abs().max(1.0);
         let (mut up, mut down) = (state(), state());
         up[j] += h;
         down[j] -= h;
-        let (up, down) = (read(&up, &INPUT).values, read(&down, &INPUT).values);
+        let (up, down) = (read(&up, &INPUT), read(&down, &INPUT));
         (0..OUTPUTS).for_each(|o| {
             assert_abs_diff_eq!(
                 at.by_state[(o, j)],
@@ -123,7 +125,7 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
         let (mut up, mut down) = (INPUT, INPUT);
         up[j] += 1e-6;
         down[j] -= 1e-6;
-        let (up, down) = (read(&state(), &up).values, read(&state(), &down).values);
+        let (up, down) = (read(&state(), &up), read(&state(), &down));
         (0..OUTPUTS).for_each(|o| {
             assert_abs_diff_eq!(
                 at.by_rates[(o, j)],
@@ -137,8 +139,8 @@ fn slopes_of_the_readings_are_those_of_finite_differences() {
 #[test]
 fn the_patterns_name_every_slope_that_is_not_zero() {
     let (at, read) = (
-        rates(&state(), &INPUT, &measured_terms()),
-        readings(&aircraft(), &state(), &INPUT, &measured_terms()),
+        rate_slopes(&state(), &INPUT, &measured_terms()),
+        reading_slopes(&aircraft(), &state(), &INPUT, &measured_terms()),
     );
     let nonzero = |row: &dyn Fn(usize) -> f64, count: usize| {
         (0..count).filter(|j| row(*j) != 0.0).collect::<Vec<_>>()
@@ -185,8 +187,7 @@ fn a_level_turn_on_a_flat_earth_turns_at_g_tan_phi_over_v_and_nothing_else_chang
         &State::from([speed, 0.0, 0.0, phi, 0.0, 0.0, 0.0]),
         &input,
         &terms,
-    )
-    .rates;
+    );
     for (i, expected) in [0.0, 0.0, 0.0, 0.0, 0.0, turn, 0.0].into_iter().enumerate() {
         assert_abs_diff_eq!(at[i], expected, epsilon = 1e-12);
     }
@@ -204,8 +205,7 @@ fn an_aircraft_parked_on_the_turning_earth_stays_where_it_is() {
         &State::zeros(),
         &[6e-5, 0.0, -4e-5, 0.0, 0.0, -terms.gravity],
         &terms,
-    )
-    .rates;
+    );
     // The c.g. goes around the sensors, by a hundred-thousandth of a foot per second.
     assert!(at.norm() < 1e-4, "{at}");
 }
@@ -227,8 +227,8 @@ fn an_accelerometer_off_the_cg_needs_no_differentiated_rate() {
         &[0.0, 0.0, r, 0.0, 7.0 * r_dot, 0.0],
         &terms,
     );
-    assert_abs_diff_eq!(at.rates[1], 7.0 * r_dot, epsilon = 1e-12);
-    assert_abs_diff_eq!(at.rates[6], 0.0, epsilon = 1e-12);
+    assert_abs_diff_eq!(at[1], 7.0 * r_dot, epsilon = 1e-12);
+    assert_abs_diff_eq!(at[6], 0.0, epsilon = 1e-12);
 }
 
 /// A flight in which everything moves, from the equations themselves with a step a tenth of the
@@ -257,7 +257,6 @@ fn flight(seconds: f64) -> Record {
                 columns[i].push(input[i] / input_factor(i));
             }
             for (o, value) in readings(&aircraft, &x, &input, &terms)
-                .values
                 .into_iter()
                 .enumerate()
             {
@@ -266,7 +265,7 @@ fn flight(seconds: f64) -> Record {
         }
         let slope = |t: f64, x: &State| {
             let (terms, input) = at(t, x);
-            rates(x, &input, &terms).rates
+            rates(x, &input, &terms)
         };
         let k1 = slope(t, &x);
         let k2 = slope(t + h / 2.0, &(x + k1 * (h / 2.0)));
@@ -324,7 +323,7 @@ fn pilot_inputs(t: f64, x: &State, terms: &MeasuredTerms) -> Inputs {
     let r = 0.06 * sine(6.7, 0.3) + 0.03 * sine(2.9, 0.0);
     // Forces that make the velocity follow u 450, v 0, w 90 with swings, from the equations without
     // force.
-    let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], terms).rates;
+    let free = rates(x, &[p, q, r, 0.0, 0.0, 0.0], terms);
     let wanted = [
         450.0 + 60.0 * sine(53.0, 0.0),
         12.0 * sine(7.3, 0.0),
@@ -351,77 +350,102 @@ fn windows(record: &Record) -> Vec<Window> {
         .collect()
 }
 
-/// Keeps the outputs of one sample.
-struct Outputs([(f64, Row); OUTPUTS]);
-
-impl Sink for Outputs {
-    fn counts(&self, _: usize, _: usize) -> bool {
-        true
-    }
-
-    fn take<S: Simd>(&mut self, _: S, _: usize, output: usize, value: f64, row: &mut Row) {
-        self.0[output] = (value, *row);
-    }
-}
-
-#[test]
-fn sensitivities_are_those_of_finite_differences() {
+/// A window with parameters at which nothing is zero.
+fn disturbed_window() -> (Window, Local, [f64; PARAMETERS]) {
     let record = flight(12.0);
     let short = Compatibility {
         window_s: 6.0,
         ..settings()
     };
-    let window = Window::of(
-        &record,
-        choose_windows(&record, short.windows, &short).remove(0),
-        &aircraft(),
-        &short,
-    );
+    let range = choose_windows(&record, short.windows, &short).remove(0);
+    let window = Window::of(&record, range, &aircraft(), &short);
     let mut noise = RandomStream::new(3, "errors");
-    let shared: [f64; PARAMETERS] = std::array::from_fn(|_| 0.01 * noise.normal());
+    let shared = std::array::from_fn(|_| 0.01 * noise.normal());
     let mut local = [0.0; LOCAL];
-    local
-        .iter_mut()
-        .zip(window.start.iter())
-        .for_each(|(l, x)| *l = *x);
+    local[..STATES].copy_from_slice(window.start.as_slice());
     local[STATES..].copy_from_slice(&[0.05, -0.1, 0.08]);
-    let (k, h) = (window.samples - 40, 1e-6);
-    let outputs = |local: &Local, shared: &[f64; PARAMETERS]| {
-        let mut outputs = Outputs([(0.0, [0.0; WIDE]); OUTPUTS]);
-        reconstruct(&window, &aircraft(), local, shared, k..k + 1, &mut outputs).unwrap();
-        outputs.0
-    };
-    let at = outputs(&local, &shared);
-    let compare = |column: usize,
-                   compared: &dyn Fn(usize) -> bool,
-                   size: f64,
-                   change: &dyn Fn(f64) -> [(f64, Row); OUTPUTS]| {
-        let (up, down) = (change(h * size), change(-h * size));
-        for o in (0..OUTPUTS).filter(|o| compared(*o)) {
-            let numeric = (up[o].0 - down[o].0) / (2.0 * h * size);
-            let exact = at[o].1[column];
-            let scale = numeric.abs().max(1.0);
-            assert!(
-                (exact - numeric).abs() < 2e-4 * scale,
-                "output {o}, column {column}: {exact} not {numeric}"
-            );
-        }
-    };
-    for j in 0..LOCAL {
-        let size = local[j].abs().max(1.0);
-        compare(j, &|_| true, size, &|d| {
-            let mut moved = local;
-            moved[j] += d;
-            outputs(&moved, &shared)
-        });
+    (window, local, shared)
+}
+
+/// Parameters of an output's row after a change of one of them.
+fn changed(
+    (local, shared): (&Local, &[f64; PARAMETERS]),
+    (column, output): (usize, usize),
+    change: f64,
+) -> (Local, [f64; PARAMETERS]) {
+    let (mut local, mut shared) = (*local, *shared);
+    if column < LOCAL {
+        local[column] += change;
+    } else {
+        shared[shared_place(column, output)] += change;
     }
-    for column in LOCAL..ROW {
+    (local, shared)
+}
+
+/// Largest difference of a sensitivity from a finite difference, as a share of its largest size in the
+/// window, and at least of the instrument's noise: the linearised equations are integrated in steps of
+/// four samples.
+const SENSITIVITY_TOLERANCE: f64 = 0.01;
+
+#[test]
+fn sensitivities_of_the_readings_are_those_of_finite_differences() {
+    let (window, local, shared) = disturbed_window();
+    let aircraft = aircraft();
+    let at = reconstruct(&window, &aircraft, &local, &shared).unwrap();
+    assert_eq!(at.samples_per_node, 4);
+    for column in 0..DRIVING {
+        let h = 1e-6 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
+        let moved = |change| {
+            let (local, shared) = changed((&local, &shared), (column, 0), change);
+            reconstruct(&window, &aircraft, &local, &shared).unwrap()
+        };
+        let (up, down) = (moved(h), moved(-h));
         for o in 0..OUTPUTS {
-            compare(column, &|other| other == o, 1.0, &|d| {
-                let mut moved = shared;
-                moved[shared_place(column, o)] += d;
-                outputs(&local, &moved)
+            let both = at.rows.iter().enumerate().map(|(node, rows)| {
+                let k = node * at.samples_per_node;
+                let numeric = (up.readings[k][o] - down.readings[k][o]) / (2.0 * h);
+                (rows[o][column], numeric)
             });
+            let largest = both
+                .clone()
+                .map(|(_, n)| n.abs())
+                .fold(NOISE[INPUTS + o], f64::max);
+            for (node, (slope, numeric)) in both.enumerate() {
+                assert!(
+                    (slope - numeric).abs() < SENSITIVITY_TOLERANCE * largest,
+                    "output {o}, column {column}, node {node}: {slope} not {numeric}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
+    let (window, local, shared) = disturbed_window();
+    let aircraft = aircraft();
+    let samples = window.margin..window.samples - window.margin;
+    let sums = |local: &Local, shared: &[f64; PARAMETERS]| {
+        let reconstructed = reconstruct(&window, &aircraft, local, shared).unwrap();
+        output_sums(&window, &reconstructed, shared, &samples).0
+    };
+    let at = sums(&local, &shared);
+    for o in 0..OUTPUTS {
+        for column in 0..ROW {
+            let h = 1e-5 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
+            let squares = |change| {
+                let (local, shared) = changed((&local, &shared), (column, o), change);
+                sums(&local, &shared)[o].squared_residuals
+            };
+            let numeric = -(squares(h) - squares(-h)) / (4.0 * h);
+            let gradient = at[o].gradient(column);
+            let least = samples.len() as f64 * NOISE[INPUTS + o].powi(2);
+            let information = at[o].information(column, column).max(least);
+            let size = (information * at[o].squared_residuals).sqrt();
+            assert!(
+                (gradient - numeric).abs() <= SENSITIVITY_TOLERANCE * size,
+                "output {o}, column {column}: {gradient} not {numeric} of {size}"
+            );
         }
     }
 }

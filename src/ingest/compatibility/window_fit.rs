@@ -10,7 +10,7 @@ use super::parameters::{INPUTS, Kind, OUTPUTS, Parameters};
 use super::reconstruction::{LOCAL, Local, WIND, reconstruct};
 use super::settings::Compatibility;
 use super::window::Window;
-use super::window_sums::{OutputSummation, OutputSums, Residuals, WindowSums};
+use super::window_sums::{OutputSums, Residuals, WindowSums, output_sums};
 use crate::aircraft::Aircraft;
 use crate::output_error::coloured;
 
@@ -81,17 +81,9 @@ impl<'a> WindowFit<'a> {
         variances: [f64; OUTPUTS],
         shared: &Parameters,
     ) -> Option<WindowFit<'a>> {
-        let mut summation = OutputSummation::over(window);
-        let compared = context.compared(window);
-        reconstruct(
-            window,
-            context.aircraft,
-            &local,
-            shared,
-            compared,
-            &mut summation,
-        )?;
-        let (output_sums, residuals) = summation.finish();
+        let reconstructed = reconstruct(window, context.aircraft, &local, shared)?;
+        let (output_sums, residuals) =
+            output_sums(window, &reconstructed, shared, &context.compared(window));
         let mut fit = WindowFit {
             window,
             local,
