@@ -5,7 +5,7 @@
 #   make trend ARCHIVE='flights/*.parquet' THREADS=1
 
 PIPELINE ?= harv
-# Of make simulate.
+# Of make simulate and make next.
 CARDS ?= pipelines/$(PIPELINE)/cards.yaml
 OUT ?= data/simulation/campaign
 # Of make show: FLIGHT or MANEUVER, an id as in the table maneuvers.
@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate model trend qualities match match-study compare report export nightly check show shown simulate validate build test same bench lint clean help init import install
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate model trend qualities match match-study compare report export next next-study nightly check show shown simulate validate build test same bench lint clean help init import install
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -60,6 +60,9 @@ report: build ## write the report
 
 export: build ## write the flight-updated derivatives for simulators: DAVE-ML, JSBSim, CSV, Parquet
 	$(call harvest,export) $(if $(WAIT),--wait '$(WAIT)')
+
+next: build ## the cards of the next flight of MINUTES=45 [GOAL=goals.yaml], with a page for the kneeboard
+	$(call harvest,next) --minutes '$(or $(MINUTES),45)' --cards '$(CARDS)' $(if $(GOAL),--goal '$(GOAL)')
 
 nightly: build ## the main job: every stage, to the report
 	$(call harvest,run) $(running)
@@ -146,6 +149,9 @@ fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
 match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
 	cargo test --release --locked --lib -- --ignored proof_of_match::
 
+next-study: ## are the bounds that plans of the next flight predict kept, over ten simulated campaigns
+	cargo test --release --locked --lib -- --ignored --nocapture flight_plan::
+
 bench: ## run the benchmarks
 	cargo bench --locked
 
@@ -168,6 +174,7 @@ help: ## this list
 	@echo 'make show takes FLIGHT= or MANEUVER=, an id as in the table maneuvers'
 	@echo 'make simulate takes [CARDS=$(CARDS)] [OUT=$(OUT)]; then for instance'
 	@echo '  make nightly ARCHIVE=$(OUT)/flights WIND_TUNNEL=$(OUT)/wind_tunnel.csv STORE=data/store/simulated REPORTS=reports/simulated'
+	@echo 'make next takes [MINUTES=45] [CARDS=$(CARDS)] [GOAL=]'
 	@echo
 	@echo 'Every stage first brings its predecessors up to date; what is up to date is not done again.'
 	@echo 'make ends with "Error 2" when harvest ran and rejected something (a flight, a maneuver): the tables and'

@@ -86,5 +86,8 @@ mod cluster;
 // Laboratory: simulator, study of the bounds, timing. The nightly job needs none of it.
 pub mod lab;
 
+// Planning: what to fly next, rehearsed in the laboratory's simulator.
+mod flight_plan;
+
 // Command line.
 pub mod cli;

@@ -179,6 +179,15 @@ impl WindTunnel {
         table.insert(at, entry);
     }
 
+    /// Takes another database's table of a derivative in place of its own; where the other has none, its
+    /// own stays.
+    pub fn take_table(&mut self, derivative: &str, other: &WindTunnel) {
+        let key = key(derivative);
+        if let Some(table) = other.tables.get(&key) {
+            self.tables.insert(key, table.clone());
+        }
+    }
+
     fn table(&self, derivative: &str) -> &[Entry] {
         self.tables
             .get(&key(derivative))

@@ -11,6 +11,7 @@ mod import_command;
 mod init_command;
 mod lab;
 mod manual_command;
+mod next_command;
 mod night_commands;
 mod options;
 mod run_commands;
@@ -63,6 +64,7 @@ Examples:
   harvest estimate --threads 1                   as far as the tables `fits` and `estimates`
   harvest show flight flight_001                 a strip chart of the flight with its maneuvers drawn in
   harvest export                                 the flight-updated derivatives as DAVE-ML, JSBSim section, CSV, Parquet
+  harvest next --minutes 45                      the cards of the next flight, with a page for the kneeboard
   harvest run --quiet --wait 3600 --log nightly.jsonl
                                                  from cron or a timer: waits for another run, prints only errors
   harvest diff                                   the changes since the night before, with their causes
@@ -110,6 +112,9 @@ enum Command {
     /// Parquet
     #[command(after_help = EXPORT_HELP)]
     Export(ExportOptions),
+    /// Plan the next flight: the test cards that teach most in its minutes
+    #[command(after_help = next_command::NEXT_HELP)]
+    Next(next_command::NextOptions),
     /// Write recordings of other formats (CSV, MATLAB, tall Parquet) as Parquet of the archive
     #[command(after_help = import_command::IMPORT_HELP)]
     Import(import_command::ImportOptions),
@@ -204,6 +209,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Merge(options) => return cluster_commands::merge(&options),
         Command::Submit(options) => return cluster_commands::submit(&options),
         Command::Export(options) => return export_command::export(&options),
+        Command::Next(options) => return next_command::next(&options),
         Command::Import(options) => return import_command::import(&options),
         Command::Manual(options) => return manual_command::manual(Cli::command(), &options),
         Command::Init(options) => return init_command::init(&options),

@@ -133,8 +133,8 @@ impl Options {
             .collect()
     }
 
-    /// Loads the configuration with the options of the command line.
-    pub fn load(&self) -> anyhow::Result<Config> {
+    /// Folder of the pipeline.
+    pub fn folder(&self) -> anyhow::Result<PathBuf> {
         let folder = if files::is_folder(&self.pipeline) {
             self.pipeline.clone()
         } else {
@@ -145,6 +145,12 @@ impl Options {
             "there is no pipeline {}: give a folder, or the name of one under pipelines/",
             self.pipeline.display()
         );
+        Ok(folder)
+    }
+
+    /// Loads the configuration with the options of the command line.
+    pub fn load(&self) -> anyhow::Result<Config> {
+        let folder = self.folder()?;
         let overrides = Overrides {
             archive: self.archive.clone(),
             wind_tunnel: self.wind_tunnel.clone(),

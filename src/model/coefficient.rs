@@ -95,22 +95,40 @@ impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
     pub fn new(terms: &[Term], evidence: &[Evidence], basis: &Basis) -> Data {
-        let mut class_places: BTreeMap<&str, usize> = BTreeMap::new();
+        Data::with_planned(terms, evidence, &[], basis).0
+    }
+
+    /// As [`Data::new`], with the observation that each planned maneuver will make. Their classes, and
+    /// the delays that they share with the campaign, are among the unknowns; they are no evidence.
+    #[must_use]
+    pub fn with_planned(
+        terms: &[Term],
+        evidence: &[Evidence],
+        planned: &[Evidence],
+        basis: &Basis,
+    ) -> (Data, Vec<Option<(usize, Observation)>>) {
+        let mut classes: BTreeMap<String, usize> = BTreeMap::new();
+        let mut observe = |own: &Evidence| {
+            let observation = own.about(terms, basis.tunnel)?;
+            let next = classes.len();
+            let class = classes.entry(own.maneuver.class.clone()).or_insert(next);
+            Some((*class, observation))
+        };
         let mut observations: Vec<(usize, Observation)> = vec![];
         let mut places: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
         let mut estimated = BTreeMap::new();
         for (place, own) in evidence.iter().enumerate() {
-            let Some(observation) = own.about(terms, basis.tunnel) else {
+            let Some((class, observation)) = observe(own) else {
                 continue;
             };
-            let next = class_places.len();
-            let class = *class_places.entry(&own.maneuver.class).or_insert(next);
             let of_flight = places.entry(&own.maneuver.flight_id).or_default();
             of_flight.push((place, observations.len()));
             estimated.insert(place, observation.terms.clone());
             observations.push((class, observation));
         }
-        let unknowns = Unknowns::new(terms, &observations, basis.settings.class_error);
+        let planned: Vec<_> = planned.iter().map(observe).collect();
+        let all = observations.iter().chain(planned.iter().flatten());
+        let unknowns = Unknowns::new(terms, all, basis.settings.class_error);
         let mut data = Data {
             unknowns,
             flights: vec![],
@@ -124,7 +142,7 @@ impl Data {
             .iter()
             .map(|own| FlightData::new(&observed(own, &data.observations), terms, &data.unknowns));
         data.flights = flights.collect();
-        data
+        (data, planned)
     }
 
     /// Sets the noise to the maneuvers' own and what lies between the points of the grids.

@@ -30,6 +30,7 @@ mod with_held;
 mod lift_and_drag;
 mod draws;
 mod local;
+mod outlook;
 #[cfg(test)]
 mod tests;
 
@@ -44,6 +45,7 @@ pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
 pub use lift_and_drag::Flown;
 pub use local::{LocalKind, LocalPosterior, LocalValue};
+pub use outlook::{Outlook, PlannedRows, Point};
 pub use settings::Settings;
 
 /// Computes the posterior of every derivative. The order of the evidence within a flight, and of the

@@ -46,9 +46,9 @@ struct ClassError {
 impl Unknowns {
     /// Unknowns of a coefficient's terms and of observations by class.
     #[must_use]
-    pub fn new(
+    pub fn new<'o>(
         terms: &[Term],
-        observations: &[(usize, Observation)],
+        observations: impl Iterator<Item = &'o (usize, Observation)>,
         class_error: f64,
     ) -> Unknowns {
         let mut count = 0;

@@ -22,3 +22,4 @@ pub mod verify;
 pub use run::{RunOutcome, has_rejections, run};
 
 pub(crate) use campaign_lineage::campaign_lineage;
+pub(crate) use table_metadata::shelf_of_stage;

@@ -38,8 +38,9 @@ pub use progress::Progress;
 
 pub(crate) use campaign::{Campaign, Failure, MissingArtefact, StageState};
 pub(crate) use conductor::{Conductor, method_versions};
-pub(crate) use estimate_step::{EstimateStep, LazyRecord, bring_maneuvers};
+pub(crate) use estimate_step::{EstimateStep, LazyRecord, bring_maneuvers, estimate_maneuver};
 pub(crate) use ingested::{Flight, IngestedFlight};
+pub(crate) use model_stage::evidence;
 pub(crate) use problems::problem;
 pub(crate) use report_stage::{PAGE, PRINTED_PAGE, Report, make_report};
 pub(crate) use segment_step::SegmentStep;

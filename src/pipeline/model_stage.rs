@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::campaign::Campaign;
 use super::problems::problem;
-use crate::aero::Combined;
+use crate::aero::{Coefficient, Combined};
 use crate::config::Config;
-use crate::error::ProblemStage;
+use crate::error::{Problem, ProblemStage};
 use crate::estimate::HeldValues;
 use crate::maneuver::Means;
 use crate::model::{self, Evidence, Failure, Flown, MOST_POINTS, Model};
@@ -18,29 +18,9 @@ pub const MODEL_VERSION: u32 = 3;
 
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
-    let estimates = by_maneuver(&campaign.estimates);
-    let combined = by_maneuver(&campaign.combined);
-    let maneuvers = campaign.maneuvers.iter().zip(&campaign.covariances);
-    let evidence = maneuvers.zip(&campaign.fits).filter_map(|(pair, fit)| {
-        let (maneuver, covariance) = pair;
-        let covariance = covariance.as_ref()?;
-        (fit.outcome == Outcome::Converged).then_some(Evidence {
-            maneuver,
-            estimates: estimates.get(maneuver.maneuver_id.as_str())?,
-            combined: combined
-                .get(maneuver.maneuver_id.as_str())
-                .copied()
-                .unwrap_or_default(),
-            covariance,
-        })
-    });
-    let evidence: Vec<Evidence> = evidence.collect();
+    let evidence = evidence(campaign);
     let found = model::model(&evidence, &config.buildup, &config.tunnel, &config.model);
-    for (coefficient, failure) in &found.failed {
-        let place = format!("{coefficient:?}");
-        let problem = problem(ProblemStage::Model, "", &place, &reason(*failure));
-        campaign.problems.push(problem);
-    }
+    let problems: Vec<_> = found.failed.iter().map(failed).collect();
     let sums = &config.buildup.combined;
     let read_held = |rows: &[EstimateRow]| match config.estimate.held_values {
         HeldValues::Posterior => with_held(rows, &found, &evidence, sums),
@@ -53,9 +33,29 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
     let means = campaign.maneuvers.iter().zip(&campaign.means);
     let means = means.filter_map(|(m, means)| Some((m.maneuver_id.as_str(), means.as_ref()?)));
     let lift_and_drag = lift_and_drag(config, &found, &evidence, &means.collect(), &estimates);
+    campaign.problems.extend(problems);
     (campaign.estimates, campaign.combined) = (estimates, combined);
     campaign.lift_and_drag = lift_and_drag;
     campaign.model = found;
+}
+
+/// Results of the maneuvers that converged, as the posterior takes them.
+pub fn evidence(campaign: &Campaign) -> Vec<Evidence<'_>> {
+    let estimates = by_maneuver(&campaign.estimates);
+    let combined = by_maneuver(&campaign.combined);
+    let maneuvers = campaign.maneuvers.iter().zip(&campaign.covariances);
+    let evidence = maneuvers.zip(&campaign.fits).filter_map(|(pair, fit)| {
+        let (maneuver, covariance) = pair;
+        let covariance = covariance.as_ref()?;
+        let id = maneuver.maneuver_id.as_str();
+        (fit.outcome == Outcome::Converged).then_some(Evidence {
+            maneuver,
+            estimates: estimates.get(id)?,
+            combined: combined.get(id).copied().unwrap_or_default(),
+            covariance,
+        })
+    });
+    evidence.collect()
 }
 
 /// Lift and drag of the maneuvers, from their estimates as they are published.
@@ -104,6 +104,12 @@ fn with_held(
         }
     }
     new
+}
+
+/// Problem of a coefficient without posterior.
+fn failed((coefficient, failure): &(Coefficient, Failure)) -> Problem {
+    let place = format!("{coefficient:?}");
+    problem(ProblemStage::Model, "", &place, &reason(*failure))
 }
 
 /// Reason of a posterior's failure, as a problem has it.

@@ -27,7 +27,7 @@ use minijinja::{AutoEscape, Environment};
 
 pub use contents::{ConfiguredClass, Contents};
 pub use history::thinned;
-use notation::well_formed;
+pub use notation::{angle, count, fixed, symbol, unit, well_formed};
 use page::Page;
 pub use page_selection::maneuvers_with_page;
 pub use provenance::{Provenance, SourceFile};

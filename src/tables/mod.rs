@@ -8,6 +8,7 @@ mod bounds_study;
 mod comparison;
 mod estimates;
 mod export;
+mod flight_plan;
 mod flights;
 mod history;
 mod page;
@@ -28,6 +29,7 @@ pub use estimates::{
     Outcome, Participation, StartingValues,
 };
 pub use export::{DrawRow, ExportRow};
+pub use flight_plan::{NextCardRow, NextGoalRow};
 pub use flights::{
     ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict,
     FlightRow, InstrumentRow, InstrumentVerdict,

@@ -6,8 +6,9 @@ use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
     ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, LevelRow,
-    LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, OutlierRow, PosteriorRow,
-    PredictedRow, QualityRow, RootRow, ScaleRow, SelfCheckRow, StartRow, TrendRow, VerdictRow,
+    LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, NextCardRow, NextGoalRow,
+    OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow, SelfCheckRow, StartRow,
+    TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
@@ -99,6 +100,8 @@ pub fn page() -> String {
     table::<ExtrapolationRow>(&mut page);
     table::<ExportRow>(&mut page);
     table::<DrawRow>(&mut page);
+    table::<NextCardRow>(&mut page);
+    table::<NextGoalRow>(&mut page);
     table::<FlightRow>(&mut page);
     table::<ChannelRow>(&mut page);
     table::<CheckRow>(&mut page);

@@ -18,6 +18,7 @@ mod joint_estimation;
 mod lab;
 mod memory;
 mod navion;
+mod next_flight;
 mod nights;
 #[cfg(feature = "s3")]
 mod object_store;

@@ -234,3 +234,21 @@ fn nothing_is_taken_over_from_the_first_aircraft() {
         .collect();
     assert!(shared.is_empty(), "{shared:?}");
 }
+
+#[test]
+fn the_next_flight_is_planned_from_its_cards() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = Path::new("data/navion/flights");
+    let outcome = run(command("next", archive, folder.path()).args(["--minutes", "5"]));
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let planned = table(&folder.path().join("reports/next/next_cards.csv"));
+    assert_eq!(planned.len(), 18);
+    let flown = planned.iter().filter(|row| !row["place"].is_empty());
+    let times: f64 = flown.map(|row| number(row, "times")).sum();
+    // Cards of 36 to 40 s in five minutes less the way.
+    assert!((6.0..=8.0).contains(&times), "{planned:?}");
+    assert!(
+        planned.iter().all(|row| row["refused"].is_empty()),
+        "{planned:?}"
+    );
+}

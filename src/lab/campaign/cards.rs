@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::next_flight::NextFlight;
 use super::study_condition::StudyCondition;
+use super::test_point::TestPoint;
 use crate::lab::simulator::{
     DerivativeLookup, DiscreteGusts, FlightCondition, Instruments, Program, Settings, Turbulence,
 };
@@ -18,8 +20,10 @@ pub struct Cards {
     /// Pipeline with aircraft, channel map and build-up: a folder, or the name of one under
     /// `pipelines/`.
     pub pipeline: PathBuf,
-    /// True derivatives: CSV in the form of a wind-tunnel table.
-    pub truth: PathBuf,
+    /// True derivatives: CSV in the form of a wind-tunnel table. `harvest next` flies the posterior
+    /// and needs none.
+    #[serde(default)]
+    pub truth: Option<PathBuf>,
     pub seed: u64,
     /// Source of the derivatives during a maneuver.
     #[serde(default, rename = "tables")]
@@ -35,6 +39,9 @@ pub struct Cards {
     pub programs: BTreeMap<String, Program>,
     /// Flights by name.
     pub flights: BTreeMap<String, FlightCard>,
+    /// Settings of `harvest next`.
+    #[serde(default)]
+    pub next: NextFlight,
     /// Settings of `harvest lab validate`.
     #[serde(default)]
     pub study: StudySettings,
@@ -139,19 +146,4 @@ impl FlightCard {
             discrete_gusts: self.discrete_gusts,
         }
     }
-}
-
-/// A maneuver class at several angles of attack.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TestPoint {
-    pub class: String,
-    pub alpha_deg: Vec<f64>,
-    /// Scale of all inputs of the program.
-    #[serde(default = "one")]
-    pub scale: f64,
-}
-
-fn one() -> f64 {
-    1.0
 }

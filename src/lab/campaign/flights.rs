@@ -1,7 +1,8 @@
 //! Flights of a simulated campaign: the cards of each, flown one after another.
 
-use super::cards::{FlightCard, TestPoint};
+use super::cards::FlightCard;
 use super::simulated_campaign::SimulatedCampaign;
+use super::test_point::TestPoint;
 use crate::error::Problem;
 use crate::flight::Record;
 use crate::lab::simulator::{Card, FlownManeuver, Instruments};

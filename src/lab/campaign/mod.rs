@@ -5,7 +5,10 @@
 //! seed and its name: the same cards give the same bytes for any number of threads.
 
 mod study_condition;
+mod test_point;
+mod next_flight;
 mod cards;
+mod test_cards;
 mod recording;
 mod simulated_campaign;
 mod flights;
@@ -20,9 +23,15 @@ use crate::error::{Error, Result};
 use crate::pipeline::Progress;
 use crate::store::{atomic, files};
 
+pub use cards::{Cards, FlightCard};
 pub use flights::FlownFlight;
+pub use next_flight::{FlightLimits, NextFlight};
 pub use simulated_campaign::SimulatedCampaign;
 pub use study_condition::{RecordNoise, StudyCondition};
+pub use test_cards::TestCards;
+pub use test_point::TestPoint;
+#[cfg(test)]
+pub use tunnel::rows as tunnel_rows;
 
 /// Flies all cards and writes the campaign into a folder.
 ///

@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::cards::Cards;
 use super::recording::Recorder;
+use super::test_cards::TestCards;
 use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
-use crate::lab::simulator::{
-    AIR_TEMPERATURE, Card, FlightCondition, Program, STATIC_PRESSURE, Simulator,
-};
+use crate::lab::simulator::{AIR_TEMPERATURE, Card, FlightCondition, STATIC_PRESSURE, Simulator};
 use crate::store::files::{self, TunnelRow};
 
 /// Test cards with their pipeline and simulator, checked.
@@ -31,45 +30,44 @@ impl SimulatedCampaign {
     /// # Errors
     /// [`crate::error::Error`] with file, line and the probable meaning of the first mistake.
     pub fn load(file: &Path) -> Result<SimulatedCampaign> {
-        let source = Source::read(file.to_owned())?;
-        let cards: Cards = source.parse()?;
+        let read = TestCards::read(file)?;
+        let (cards, source) = (&read.cards, &read.source);
         let folder = if files::is_folder(&cards.pipeline) {
             cards.pipeline.clone()
         } else {
             PathBuf::from("pipelines").join(&cards.pipeline)
         };
+        let truth = cards.truth.clone().ok_or_else(|| {
+            source.error(
+                "truth",
+                "`truth` must name the file of the true derivatives",
+            )
+        })?;
         let overrides = Overrides {
-            wind_tunnel: Some(cards.truth.clone()),
+            wind_tunnel: Some(truth.clone()),
             ..Overrides::default()
         };
         let config = Config::load(&folder, overrides)?;
-        let truth = config::tunnel_rows(&cards.truth, &config.buildup, config.tunnel.settings())?;
+        let truth = config::tunnel_rows(&truth, &config.buildup, config.tunnel.settings())?;
         let truth = truth.into_iter().map(|(_, row)| row).collect();
-        let simulator = Simulator::new(
-            &config.aircraft,
-            &config.buildup,
-            config.tunnel.clone(),
-            cards.aircraft.clone(),
-        )
-        .map_err(|message| source.error("aircraft", message))?;
-        let names = signals(&cards, &simulator);
-        check_channels(&config, &names, &source)?;
-        check_instruments(&cards, &names, &source)?;
+        let simulator = read.simulator(&config, config.tunnel.clone())?;
+        let names = signals(cards, &simulator);
+        check_channels(&config, &names, source)?;
+        check_instruments(cards, &names, source)?;
         let rate_hz = simulator.settings().rate_hz;
         let names: Vec<&str> = names.into_iter().collect();
         let recorder = Recorder::new(&cards.recorder, &config.channels, (&names, rate_hz))
             .map_err(|(name, what)| source.error_under("recorder", &name, what))?;
-        let campaign = SimulatedCampaign {
-            cards,
+        let names: Vec<&str> = config.classes.iter().map(|c| c.name.as_str()).collect();
+        read.check_programs(&names)?;
+        check_conditions(cards, source)?;
+        Ok(SimulatedCampaign {
+            cards: read.cards,
             config,
             truth,
             simulator,
             recorder,
-        };
-        campaign.check_programs(&source)?;
-        campaign.check_flights(&source)?;
-        campaign.check_conditions(&source)?;
-        Ok(campaign)
+        })
     }
 
     /// Card of one maneuver as the estimator assumes it, for studies: in still air, with frozen
@@ -92,86 +90,22 @@ impl SimulatedCampaign {
             program: self.cards.programs.get(class)?.clone(),
         })
     }
+}
 
-    fn check_programs(&self, source: &Source) -> Result<()> {
-        for (class, program) in &self.cards.programs {
-            if self.config.class(class).is_none() {
-                let near = did_you_mean(class, self.config.classes.iter().map(|c| c.name.as_str()));
-                return Err(source.error_under(
-                    "programs",
-                    class,
-                    format!("unknown class `{class}`{near}"),
-                ));
-            }
-            self.check_program(class, program, source)?;
-        }
-        Ok(())
+/// Checks air and delays of the flights, then those of the study.
+fn check_conditions(cards: &Cards, source: &Source) -> Result<()> {
+    for (flight, card) in &cards.flights {
+        card.condition(cards.derivatives)
+            .check()
+            .map_err(|what| source.error_under("flights", flight, what))?;
     }
-
-    fn check_program(&self, class: &str, program: &Program, source: &Source) -> Result<()> {
-        let error = |name: &str, message: String| {
-            Err(source.error_under("programs", name, format!("{class}: {message}")))
-        };
-        let settings = self.simulator.settings();
-        let Some(law) = settings.laws.get(&program.law) else {
-            let near = did_you_mean(&program.law, settings.laws.keys().map(String::as_str));
-            return error(&program.law, format!("no law `{}`{near}", program.law));
-        };
-        let (from_s, to_s) = program.maneuver_s;
-        if !(0.0 <= from_s && from_s < to_s && to_s <= program.duration_s) {
-            return error(
-                class,
-                "`maneuver_s` must be a start and a later end between 0 and `duration_s`".into(),
-            );
-        }
-        let movable: Vec<&str> = law
-            .gearing
-            .keys()
-            .chain(settings.surfaces.keys())
-            .map(String::as_str)
-            .chain([signal::THRUST])
-            .collect();
-        for input in &program.inputs {
-            if !movable.contains(&input.signal.as_str()) {
-                let near = did_you_mean(&input.signal, movable.iter().copied());
-                return error(
-                    &input.signal,
-                    format!("law `{}` moves no `{}`{near}", program.law, input.signal),
-                );
-            }
-        }
-        Ok(())
+    for condition in &cards.study.conditions {
+        condition
+            .flown()
+            .check()
+            .map_err(|what| source.error_under("study", &condition.name, what))?;
     }
-
-    fn check_flights(&self, source: &Source) -> Result<()> {
-        for (flight, card) in &self.cards.flights {
-            for point in &card.points {
-                if !self.cards.programs.contains_key(&point.class) {
-                    let near =
-                        did_you_mean(&point.class, self.cards.programs.keys().map(String::as_str));
-                    let message = format!("flight {flight}: no program `{}`{near}", point.class);
-                    return Err(source.error_under("flights", &point.class, message));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Checks air and delays of the flights, then those of the study.
-    fn check_conditions(&self, source: &Source) -> Result<()> {
-        for (flight, card) in &self.cards.flights {
-            card.condition(self.cards.derivatives)
-                .check()
-                .map_err(|what| source.error_under("flights", flight, what))?;
-        }
-        for condition in &self.cards.study.conditions {
-            condition
-                .flown()
-                .check()
-                .map_err(|what| source.error_under("study", &condition.name, what))?;
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 /// Signals of the simulator.

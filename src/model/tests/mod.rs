@@ -4,5 +4,6 @@ mod fixture;
 mod held;
 mod lift_and_drag;
 mod limits;
+mod outlook;
 mod parts;
 mod simulated;

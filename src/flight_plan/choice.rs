@@ -1,0 +1,312 @@
+//! Choice of the cards of a flight: what they teach against the minutes they take.
+//!
+//! The state of knowledge is one Gaussian a coefficient. A card observes some of its rows with noise;
+//! its effect on the covariance does not depend on what it will read. With v the variance of an aim and
+//! w the standard deviation that is wanted of it, flying a set of cards is worth
+//!
+//! Σ weight · ½ (ln max(v before, w²) − ln max(v after, w²))
+//!
+//! in nats: what goes beyond a wanted bound is worth nothing.
+//!
+//! Two greedy sets, by worth and by worth per minute, are each improved by exchange: a card is taken
+//! out and the minutes are filled again, as long as the set gains by it. A greedy set alone falls short
+//! of the best one where cards complete each other or the minutes do not come out even.
+
+use nalgebra::{Cholesky, DMatrix, Dyn};
+
+use crate::model::PlannedRows;
+use crate::numerics::triangular::solve_lower;
+
+/// Worth below which a card adds nothing, nats.
+const LEAST_WORTH: f64 = 1e-6;
+
+/// Share of its worth by which an exchange must improve a set: smaller ones take time and change no
+/// decision.
+const LEAST_IMPROVEMENT: f64 = 1e-4;
+
+/// Most rounds of exchanges: the search then ends with the set it has.
+const MOST_ROUNDS: usize = 20;
+
+/// Quantity of which a standard deviation is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// Row of the covariance.
+    pub row: usize,
+    pub weight: f64,
+    /// Wanted standard deviation; zero where each reduction counts.
+    pub wanted: f64,
+    /// Place of the quantity among all that are asked for.
+    pub point: usize,
+}
+
+/// Knowledge of one coefficient, with what the cards observe of it.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    pub covariance: DMatrix<f64>,
+    /// In the order of the cards; `None` for a card that observes nothing of it.
+    pub cards: Vec<Option<PlannedRows>>,
+    pub aims: Vec<Aim>,
+}
+
+/// Price of a card.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Price {
+    /// Time of the card with its trim and recovery.
+    pub minutes: f64,
+    pub alpha_deg: f64,
+}
+
+/// Flight time and what it is spent on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Budget {
+    pub minutes: f64,
+    /// Time to change the angle of attack by one degree. Cards are flown by ascending angle.
+    pub minutes_per_deg: f64,
+    /// Most times that one card is flown.
+    pub repeats: usize,
+}
+
+/// Choice to be made.
+#[derive(Clone, Debug)]
+pub struct CardChoice {
+    pub subjects: Vec<Subject>,
+    pub prices: Vec<Price>,
+    pub budget: Budget,
+}
+
+/// Order in which a set is filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Preference {
+    Worth,
+    WorthPerMinute,
+}
+
+/// A set of cards, and the knowledge after flying it.
+#[derive(Clone, Debug)]
+pub struct CardSet<'a> {
+    choice: &'a CardChoice,
+    covariances: Vec<DMatrix<f64>>,
+    /// Number of times that each card is flown.
+    pub times: Vec<usize>,
+}
+
+impl CardChoice {
+    /// The set that is worth most, as far as exchanges find it.
+    #[must_use]
+    pub fn choose(&self) -> CardSet<'_> {
+        let start = |preference| {
+            let mut set = CardSet::nothing(self);
+            set.fill(preference);
+            set.exchange();
+            CardSet::times(self, &set.times)
+        };
+        let [worth, per_minute] = [Preference::Worth, Preference::WorthPerMinute].map(start);
+        if worth.worth() > per_minute.worth() {
+            worth
+        } else {
+            per_minute
+        }
+    }
+}
+
+impl<'a> CardSet<'a> {
+    /// No card.
+    #[must_use]
+    pub fn nothing(choice: &'a CardChoice) -> CardSet<'a> {
+        let subjects = choice.subjects.iter();
+        CardSet {
+            choice,
+            covariances: subjects.map(|s| s.covariance.clone()).collect(),
+            times: vec![0; choice.prices.len()],
+        }
+    }
+
+    /// Each card so many times.
+    #[must_use]
+    pub fn times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
+        let mut set = CardSet::nothing(choice);
+        for (card, &times) in times.iter().enumerate() {
+            for _ in 0..times {
+                set.fly(card);
+            }
+        }
+        set
+    }
+
+    /// Adds a card. One whose noise is not positive definite changes nothing.
+    pub fn fly(&mut self, card: usize) {
+        for (subject, covariance) in self.choice.subjects.iter().zip(&mut self.covariances) {
+            let Some((rows, sum)) = predicted(subject, covariance, card) else {
+                continue;
+            };
+            let columns = covariance.columns_range(rows.rows.clone()).into_owned();
+            *covariance -= &columns * sum.solve(&columns.transpose());
+        }
+        self.times[card] += 1;
+    }
+
+    /// The set without a card that it has, flown once less.
+    #[must_use]
+    pub fn without(&self, card: usize) -> CardSet<'a> {
+        let mut set = self.clone();
+        for (subject, covariance) in self.choice.subjects.iter().zip(&mut set.covariances) {
+            let Some(rows) = &subject.cards[card] else {
+                continue;
+            };
+            let first = rows.rows.start;
+            let own = covariance.view((first, first), rows.noise.shape());
+            let Some(rest) = Cholesky::new(&rows.noise - own) else {
+                continue;
+            };
+            let columns = covariance.columns_range(rows.rows.clone()).into_owned();
+            *covariance += &columns * rest.solve(&columns.transpose());
+        }
+        set.times[card] -= 1;
+        set
+    }
+
+    /// Worth of the set, nats.
+    #[must_use]
+    pub fn worth(&self) -> f64 {
+        let both = self.choice.subjects.iter().zip(&self.covariances);
+        both.map(|(subject, covariance)| {
+            let aims = subject.aims.iter();
+            aims.map(|aim| {
+                let variance = |of: &DMatrix<f64>| of[(aim.row, aim.row)];
+                aim.worth(variance(&subject.covariance), variance(covariance))
+            })
+            .sum::<f64>()
+        })
+        .sum()
+    }
+
+    /// Worth that a further card adds, nats.
+    #[must_use]
+    pub fn gain(&self, card: usize) -> f64 {
+        let both = self.choice.subjects.iter().zip(&self.covariances);
+        both.map(|(subject, covariance)| {
+            let Some((rows, sum)) = predicted(subject, covariance, card) else {
+                return 0.0;
+            };
+            let mut halves = covariance.rows_range(rows.rows.clone()).into_owned();
+            solve_lower(sum.l_dirty().as_view(), halves.as_view_mut());
+            let aims = subject.aims.iter();
+            aims.map(|aim| {
+                let before = covariance[(aim.row, aim.row)];
+                aim.worth(before, before - halves.column(aim.row).norm_squared())
+            })
+            .sum::<f64>()
+        })
+        .sum()
+    }
+
+    /// Standard deviation of an aim.
+    #[must_use]
+    pub fn deviation(&self, subject: usize, aim: &Aim) -> f64 {
+        self.covariances[subject][(aim.row, aim.row)]
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// Minutes of the set: its cards, and the way from the lowest angle of attack to the highest.
+    #[must_use]
+    pub fn minutes(&self) -> f64 {
+        self.minutes_with(None)
+    }
+
+    fn minutes_with(&self, further: Option<usize>) -> f64 {
+        let (mut minutes, mut lowest, mut highest) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for (card, price) in self.choice.prices.iter().enumerate() {
+            let times = self.times[card] + usize::from(further == Some(card));
+            if times > 0 {
+                minutes += times as f64 * price.minutes;
+                lowest = lowest.min(price.alpha_deg);
+                highest = highest.max(price.alpha_deg);
+            }
+        }
+        minutes + (highest - lowest).max(0.0) * self.choice.budget.minutes_per_deg
+    }
+
+    /// Adds cards as long as one fits and is worth something.
+    fn fill(&mut self, preference: Preference) {
+        while let Some(card) = self.best(preference) {
+            self.fly(card);
+        }
+    }
+
+    fn best(&self, preference: Preference) -> Option<usize> {
+        let minutes = self.minutes();
+        let mut best: Option<(usize, f64)> = None;
+        for card in 0..self.times.len() {
+            let with = self.minutes_with(Some(card));
+            let budget = &self.choice.budget;
+            if self.times[card] >= budget.repeats || with > budget.minutes {
+                continue;
+            }
+            let gain = self.gain(card);
+            let merit = match preference {
+                Preference::Worth => gain,
+                Preference::WorthPerMinute => gain / (with - minutes),
+            };
+            if gain > LEAST_WORTH && best.is_none_or(|(_, other)| merit > other) {
+                best = Some((card, merit));
+            }
+        }
+        best.map(|(card, _)| card)
+    }
+
+    /// Takes out one card after another and fills the minutes again, as long as that is worth more.
+    fn exchange(&mut self) {
+        let mut worth = self.worth();
+        for _ in 0..MOST_ROUNDS {
+            let mut is_better = false;
+            for card in 0..self.times.len() {
+                if self.times[card] == 0 {
+                    continue;
+                }
+                for preference in [Preference::Worth, Preference::WorthPerMinute] {
+                    if self.times[card] == 0 {
+                        break;
+                    }
+                    let mut other = self.without(card);
+                    other.fill(preference);
+                    let of_other = other.worth();
+                    if of_other > worth * (1.0 + LEAST_IMPROVEMENT) {
+                        (*self, worth, is_better) = (other, of_other, true);
+                    }
+                }
+            }
+            if !is_better {
+                break;
+            }
+        }
+    }
+}
+
+impl Aim {
+    /// Worth of a reduction of the variance, nats.
+    #[must_use]
+    pub fn worth(&self, before: f64, after: f64) -> f64 {
+        let counted = |variance: f64| variance.max(self.wanted * self.wanted);
+        let (before, after) = (counted(before), counted(after));
+        if after > 0.0 {
+            0.5 * self.weight * (before / after).ln()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Rows of a card with the covariance of what it will read; `None` where it reads nothing of the
+/// subject.
+fn predicted<'s>(
+    subject: &'s Subject,
+    covariance: &DMatrix<f64>,
+    card: usize,
+) -> Option<(&'s PlannedRows, Cholesky<f64, Dyn>)> {
+    let rows = subject.cards[card].as_ref()?;
+    let first = rows.rows.start;
+    let own = covariance.view((first, first), rows.noise.shape());
+    let sum = Cholesky::new(own + &rows.noise)?;
+    Some((rows, sum))
+}

@@ -1,0 +1,249 @@
+//! The pilot's page: one sheet with the cards in the order of flying and the goals before and after.
+
+use std::collections::BTreeMap;
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment};
+use serde::Serialize;
+
+use super::plan::Plan;
+use crate::config::Config;
+use crate::lab::campaign::{FlightLimits, NextFlight};
+use crate::numerics::order_statistics::median;
+use crate::report::{angle, count, fixed, symbol, unit, well_formed};
+use crate::tables::{NextCardRow, NextGoalRow};
+
+/// Most goals on the sheet: the derivatives that gain most.
+const MOST_GOALS: usize = 14;
+
+/// Most refused cards on the sheet; the table has all.
+const MOST_REFUSED: usize = 4;
+
+/// Values of the template.
+#[derive(Debug, Serialize)]
+struct Page<'a> {
+    title: &'a str,
+    aircraft: &'a str,
+    minutes: String,
+    flown_minutes: String,
+    /// Percentage by which the goals' deviations fall, in their weighted mean.
+    fall_pct: String,
+    cards: Vec<CardLine>,
+    goals: Vec<GoalLine>,
+    further_goals: usize,
+    limits: String,
+    settle_s: String,
+    change_s_per_deg: f64,
+    refused: Vec<RefusedLine>,
+    further_refused: usize,
+}
+
+/// Line of a card.
+#[derive(Debug, Serialize)]
+struct CardLine {
+    place: usize,
+    at: String,
+    class: String,
+    title: String,
+    times: usize,
+    alpha: String,
+    altitude: String,
+    scale: f64,
+    minutes: String,
+    reaches: String,
+    teaches: Vec<Taught>,
+}
+
+/// Goal to which a card adds.
+#[derive(Debug, Serialize)]
+struct Taught {
+    symbol: String,
+    rest: String,
+}
+
+/// Line of a derivative.
+#[derive(Debug, Serialize)]
+struct GoalLine {
+    symbol: String,
+    unit: String,
+    range: String,
+    before: String,
+    after: String,
+    fall_pct: String,
+    reached: String,
+}
+
+/// Line of a card that is refused.
+#[derive(Debug, Serialize)]
+struct RefusedLine {
+    class: String,
+    alpha: String,
+    reason: String,
+}
+
+/// Renders the page.
+///
+/// # Errors
+/// An error of the template, with its line.
+pub fn page(
+    config: &Config,
+    plan: &Plan,
+    minutes: f64,
+    next: &NextFlight,
+) -> Result<String, String> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    let (goals, further_goals) = goal_lines(&plan.goals);
+    let refused = || plan.cards.iter().filter(|row| !row.refused.is_empty());
+    let page = Page {
+        title: &config.title,
+        aircraft: &config.aircraft.name,
+        minutes: fixed(minutes, 0),
+        flown_minutes: fixed(plan.minutes, 1),
+        fall_pct: fixed(100.0 * (1.0 - (-plan.information).exp()), 0),
+        cards: card_lines(config, plan, next),
+        goals,
+        further_goals,
+        limits: limits_in_words(&next.limits),
+        settle_s: fixed(next.settle_s, 0),
+        change_s_per_deg: next.change_s_per_deg,
+        refused: refused().take(MOST_REFUSED).map(refused_line).collect(),
+        further_refused: refused().count().saturating_sub(MOST_REFUSED),
+    };
+    environment
+        .render_named_str(
+            "kneeboard.html",
+            include_str!("kneeboard.html"),
+            Serde(&page),
+        )
+        .map(well_formed)
+        .map_err(|error| format!("the kneeboard's template: {error:#}"))
+}
+
+/// Lines of the cards, each with its start on the flight's clock.
+fn card_lines(config: &Config, plan: &Plan, next: &NextFlight) -> Vec<CardLine> {
+    let mut lines = Vec::new();
+    let (mut at, mut before) = (0.0, None);
+    for row in &plan.cards {
+        let Some(place) = row.place else { continue };
+        let way = before.map_or(0.0, |before: f64| (row.alpha_deg - before).abs());
+        at += way * next.change_s_per_deg / 60.0;
+        let minutes = row.minutes * row.times as f64;
+        lines.push(card_line(config, row, place, at));
+        (at, before) = (at + minutes, Some(row.alpha_deg));
+    }
+    lines
+}
+
+fn card_line(config: &Config, row: &NextCardRow, place: usize, at: f64) -> CardLine {
+    let title = config.class(&row.class).map(|class| class.title.clone());
+    let reach =
+        |value: Option<f64>, decimals| value.map_or_else(String::new, |v| fixed(v, decimals));
+    let teaches = row.teaches.split("; ").filter_map(|part| {
+        let (derivative, rest) = part.split_once(' ')?;
+        Some(Taught {
+            symbol: symbol(derivative),
+            rest: rest.to_owned(),
+        })
+    });
+    CardLine {
+        place,
+        at: fixed(at, 1),
+        class: row.class.clone(),
+        title: title.unwrap_or_default(),
+        times: row.times,
+        alpha: angle(row.alpha_deg),
+        altitude: fixed(row.altitude_ft, 0),
+        scale: row.scale,
+        minutes: fixed(row.minutes * row.times as f64, 1),
+        reaches: format!(
+            "{} to {}°, {} to {} g, {} psf",
+            reach(row.lowest_alpha_deg, 0),
+            reach(row.highest_alpha_deg, 0),
+            reach(row.lowest_an_g, 1),
+            reach(row.highest_an_g, 1),
+            reach(row.highest_qbar_psf, 0),
+        ),
+        teaches: teaches.take(1).collect(),
+    }
+}
+
+/// Lines of the derivatives that gain most, and the number of the others.
+fn goal_lines(rows: &[NextGoalRow]) -> (Vec<GoalLine>, usize) {
+    let mut by_derivative: BTreeMap<&str, Vec<&NextGoalRow>> = BTreeMap::new();
+    for row in rows {
+        by_derivative.entry(&row.derivative).or_default().push(row);
+    }
+    let gain = |own: &[&NextGoalRow]| median(own.iter().map(|r| (r.before / r.after).ln()));
+    let mut all: Vec<(&str, Vec<&NextGoalRow>)> = by_derivative.into_iter().collect();
+    all.sort_by(|(_, a), (_, b)| gain(b).unwrap_or(0.0).total_cmp(&gain(a).unwrap_or(0.0)));
+    let further = all.len().saturating_sub(MOST_GOALS);
+    let lines = all.into_iter().take(MOST_GOALS);
+    (
+        lines.map(|(name, own)| goal_line(name, &own)).collect(),
+        further,
+    )
+}
+
+fn goal_line(derivative: &str, rows: &[&NextGoalRow]) -> GoalLine {
+    let alphas = || rows.iter().map(|row| row.alpha_deg);
+    let before = median(rows.iter().map(|row| row.before));
+    let after = median(rows.iter().map(|row| row.after));
+    let fall = median(
+        rows.iter()
+            .map(|row| 100.0 * (1.0 - row.after / row.before)),
+    );
+    let wanted = rows.iter().filter(|row| row.wanted.is_some()).count();
+    let is_reached = |row: &&&NextGoalRow| row.wanted.is_some_and(|wanted| row.after <= wanted);
+    let reached = rows.iter().filter(is_reached).count();
+    GoalLine {
+        symbol: symbol(derivative),
+        unit: unit(
+            &rows
+                .first()
+                .map_or_else(String::new, |row| row.unit.clone()),
+        ),
+        range: format!(
+            "{} to {}",
+            angle(alphas().fold(f64::INFINITY, f64::min)),
+            angle(alphas().fold(f64::NEG_INFINITY, f64::max)),
+        ),
+        before: deviation(before),
+        after: deviation(after),
+        fall_pct: fall.map_or_else(String::new, |fall| fixed(fall, 0)),
+        reached: if wanted > 0 {
+            format!("{reached} of {}", count(wanted, "angle"))
+        } else {
+            String::new()
+        },
+    }
+}
+
+/// Standard deviation with two digits.
+fn deviation(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| format!("{value:.1e}"))
+}
+
+fn refused_line(row: &NextCardRow) -> RefusedLine {
+    RefusedLine {
+        class: row.class.clone(),
+        alpha: angle(row.alpha_deg),
+        reason: row.refused.clone(),
+    }
+}
+
+/// The limits in one sentence; empty without any.
+fn limits_in_words(limits: &FlightLimits) -> String {
+    let ranges = [
+        ("alpha", limits.alpha_deg, "°"),
+        ("normal acceleration", limits.an_g, " g"),
+        ("dynamic pressure", limits.qbar_psf, " psf"),
+    ];
+    let ranges = ranges.into_iter().filter_map(|(what, range, unit)| {
+        let (low, high) = range?;
+        Some(format!("{what} {low} to {high}{unit}"))
+    });
+    let rates = limits.surface_rates_deg_s.iter();
+    let rates = rates.map(|(name, rate)| format!("{name} {rate}°/s"));
+    ranges.chain(rates).collect::<Vec<_>>().join(", ")
+}

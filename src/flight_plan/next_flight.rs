@@ -1,0 +1,177 @@
+//! The next flight: posterior, cards and goals read, the plan made and published.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rayon::prelude::*;
+
+use super::candidate::{Candidate, candidates};
+use super::choice::Budget;
+use super::experience::CampaignHistory;
+use super::goals::{Goal, Goals};
+use super::kneeboard;
+use super::plan::{Plan, Rehearsal, Tonight, plan};
+use super::rehearsal::{self, RehearsalBasis};
+use crate::config::{Config, Source};
+use crate::error::{Error, Problem, Result, did_you_mean};
+use crate::lab::campaign::TestCards;
+use crate::lineage::Stage;
+use crate::model::Model;
+use crate::night::{campaign_lineage, shelf_of_stage};
+use crate::pdf;
+use crate::pipeline::{Campaign, Conductor, Progress, evidence};
+use crate::proof_of_match::of_posterior;
+use crate::store::{atomic, files, table};
+
+/// Published files of the page.
+const PAGE: &str = "kneeboard.html";
+const PRINTED_PAGE: &str = "kneeboard.pdf";
+
+/// Request for a plan.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Test cards, YAML.
+    pub cards: &'a Path,
+    /// Goals, YAML; everything without.
+    pub goals: Option<&'a Path>,
+    /// Flight time.
+    pub minutes: f64,
+}
+
+/// The plan of the next flight as published.
+#[derive(Clone, Debug)]
+pub struct PlannedFlight {
+    pub plan: Plan,
+    pub files: Vec<PathBuf>,
+    /// Problems of the campaign.
+    pub problems: Vec<Problem>,
+}
+
+/// Plans the next flight from the posterior, which is brought up to date first, waiting up to `wait`
+/// for another run to leave the store. Writes tables and page into a folder. The published night stays
+/// as it is.
+///
+/// # Errors
+/// A fault that stops the run, or a mistake in the cards or goals.
+pub fn plan_next_flight(
+    config: &Config,
+    request: &Request,
+    folder: &Path,
+    wait: Duration,
+    progress: &dyn Progress,
+) -> Result<PlannedFlight> {
+    let cards = read_cards(config, request.cards)?;
+    let conductor = Conductor::open(config, wait, progress)?;
+    let campaign = conductor.campaign(Stage::Model)?;
+    let goals = read_goals(request.goals, &campaign.model)?;
+    let rehearsals = rehearse(config, &cards, &campaign, progress)?;
+    let flown = evidence(&campaign);
+    let tonight = Tonight {
+        model: &campaign.model,
+        evidence: &flown,
+        history: CampaignHistory {
+            maneuvers: &campaign.maneuvers,
+            fits: &campaign.fits,
+            covariances: &campaign.covariances,
+            contributions: &campaign.model.rows.contributions,
+        },
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+        settings: &config.model,
+    };
+    let next = &cards.cards.next;
+    let budget = Budget {
+        minutes: request.minutes,
+        minutes_per_deg: next.change_s_per_deg / 60.0,
+        repeats: next.repeats,
+    };
+    let plan = plan(&tonight, &rehearsals, &goals, budget);
+    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
+    table::publish(&shelf, &plan.cards)?;
+    table::publish(&shelf, &plan.goals)?;
+    let page = kneeboard::page(config, &plan, request.minutes, next)
+        .map_err(|what| Error::store(&folder.join(PAGE), &what))?;
+    files::place_text(&folder.join(PAGE), &page)?;
+    let printed = folder.join(PRINTED_PAGE);
+    let bytes = pdf::pdf(&page).map_err(|what| Error::store(&printed, &what))?;
+    atomic::place(&printed, &bytes)?;
+    let names = [
+        "next_cards.csv",
+        "next_cards.parquet",
+        "next_goals.csv",
+        "next_goals.parquet",
+    ];
+    let files = names.into_iter().chain([PAGE, PRINTED_PAGE]);
+    Ok(PlannedFlight {
+        plan,
+        files: files.map(|name| folder.join(name)).collect(),
+        problems: campaign.problems,
+    })
+}
+
+/// Reads the cards and checks them against the pipeline's classes.
+fn read_cards(config: &Config, file: &Path) -> Result<TestCards> {
+    if !files::is_file(file) {
+        let what = "there is no such file of test cards: write one after pipelines/harv/cards.yaml \
+                    (docs/next.md), or name another with --cards";
+        return Err(Error::not_found(file, what));
+    }
+    let cards = TestCards::read(file)?;
+    let classes: Vec<&str> = config.classes.iter().map(|c| c.name.as_str()).collect();
+    cards.check_programs(&classes)?;
+    Ok(cards)
+}
+
+/// Reads the goals; without a file each quantity of the posterior is one.
+fn read_goals(file: Option<&Path>, model: &Model) -> Result<Vec<Goal>> {
+    let Some(file) = file else {
+        return Ok(model.quantities().map(Goal::of).collect());
+    };
+    let source = Source::read(file.to_owned())?;
+    let goals: Goals = source.parse()?;
+    if goals.goals.is_empty() {
+        return Err(source.error("goals", "`goals` lists no goal"));
+    }
+    for goal in &goals.goals {
+        let name = &goal.derivative;
+        if model.breakpoints_deg(name).is_none() {
+            let near = did_you_mean(name, model.quantities());
+            let what = format!("the posterior has no derivative `{name}`{near}");
+            return Err(source.error(name, what));
+        }
+        if let Some(mistake) = goal.mistake() {
+            return Err(source.error(name, format!("{name}: {mistake}")));
+        }
+    }
+    Ok(goals.goals)
+}
+
+/// Rehearses the candidates, in their order.
+fn rehearse(
+    config: &Config,
+    cards: &TestCards,
+    campaign: &Campaign,
+    progress: &dyn Progress,
+) -> Result<Vec<Rehearsal>> {
+    let posterior = of_posterior(&campaign.model.rows.posterior, &config.tunnel.clamped());
+    let derivatives = rehearsal::derivatives(config, posterior, &campaign.estimates);
+    let simulator = cards.simulator(config, derivatives)?;
+    let instruments = rehearsal::instruments(&cards.cards.instruments, &campaign.channels);
+    let basis = RehearsalBasis {
+        config,
+        simulator: &simulator,
+        instruments: &instruments,
+        delays: &campaign.delays,
+        limits: &cards.cards.next.limits,
+    };
+    let all = candidates(&cards.cards, config);
+    progress.begin("rehearse", all.len());
+    let rehearse = |candidate: Candidate| {
+        let result = basis.rehearse(&candidate);
+        progress.advance(&candidate.card.class);
+        (candidate, result)
+    };
+    let rehearsals = all.into_par_iter().map(rehearse).collect();
+    progress.end();
+    Ok(rehearsals)
+}

@@ -1,0 +1,346 @@
+//! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
+
+use super::candidate::Candidate;
+use super::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject};
+use super::experience::{CampaignHistory, noise_factors, with_noise};
+use super::goals::Goal;
+use super::rehearsal::Rehearsed;
+use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::estimate::Covariance;
+use crate::model::{self, Evidence, Model, Outlook, Point};
+use crate::tables::{NextCardRow, NextGoalRow};
+
+/// Number of goals that a card's row names.
+const NAMED_GOALS: usize = 3;
+
+/// The campaign as a plan takes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Tonight<'a> {
+    pub model: &'a Model,
+    pub evidence: &'a [Evidence<'a>],
+    pub history: CampaignHistory<'a>,
+    pub buildup: &'a Buildup,
+    pub tunnel: &'a WindTunnel,
+    pub settings: &'a model::Settings,
+}
+
+/// A candidate with its rehearsal, or the reason why it is refused.
+pub type Rehearsal = (Candidate, Result<Rehearsed, String>);
+
+/// A candidate that is not refused.
+type Kept<'a> = (&'a Candidate, &'a Rehearsed);
+
+/// A goal at one angle of attack.
+#[derive(Clone, Debug, PartialEq)]
+struct GoalPoint {
+    point: Point,
+    unit: &'static str,
+    weight: f64,
+    wanted: Option<f64>,
+}
+
+/// Rows of the next flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    pub cards: Vec<NextCardRow>,
+    pub goals: Vec<NextGoalRow>,
+    /// Minutes of the flight, with the changes of angle of attack.
+    pub minutes: f64,
+    /// Information of the flight, nats.
+    pub information: f64,
+}
+
+/// Plans the next flight.
+#[must_use]
+pub fn plan(tonight: &Tonight, rehearsals: &[Rehearsal], goals: &[Goal], budget: Budget) -> Plan {
+    let kept: Vec<Kept> = rehearsals
+        .iter()
+        .filter_map(|(candidate, result)| Some((candidate, result.as_ref().ok()?)))
+        .collect();
+    let points = goal_points(tonight, &kept, goals);
+    let choice = CardChoice {
+        subjects: subjects(tonight, &kept, &points),
+        prices: kept.iter().map(|(candidate, _)| price(candidate)).collect(),
+        budget,
+    };
+    let flown = choice.choose();
+    let rows = Rows {
+        tonight,
+        kept: &kept,
+        points: &points,
+        choice: &choice,
+        flown: &flown,
+    };
+    let refused = rehearsals.iter().filter_map(|(candidate, result)| {
+        let reason = result.as_ref().err()?;
+        Some(NextCardRow {
+            refused: reason.clone(),
+            ..rows.of_candidate(candidate)
+        })
+    });
+    Plan {
+        cards: rows.cards().into_iter().chain(refused).collect(),
+        goals: rows.goals(),
+        minutes: flown.minutes(),
+        information: flown.worth(),
+    }
+}
+
+fn price(candidate: &Candidate) -> Price {
+    Price {
+        minutes: candidate.minutes,
+        alpha_deg: candidate.card.alpha_deg,
+    }
+}
+
+/// Goals at each of their angles of attack. The weight of a goal is shared by its angles, so that the
+/// worth of a plan is the goals' weighted mean.
+fn goal_points(tonight: &Tonight, kept: &[Kept], goals: &[Goal]) -> Vec<GoalPoint> {
+    let alphas = || kept.iter().map(|(c, _)| c.card.alpha_deg);
+    let lowest = alphas().fold(f64::INFINITY, f64::min);
+    let highest = alphas().fold(f64::NEG_INFINITY, f64::max);
+    let all: f64 = goals.iter().map(|goal| goal.weight).sum();
+    let mut points = Vec::new();
+    for goal in goals {
+        let Some((unit, breakpoints)) = tonight.model.breakpoints_deg(&goal.derivative) else {
+            continue;
+        };
+        let alphas = goal.alphas_deg(breakpoints, (lowest, highest));
+        let weight = goal.weight / all / alphas.len() as f64;
+        let of_goal = alphas.into_iter().filter_map(|alpha_deg| {
+            Some(GoalPoint {
+                point: Point {
+                    derivative: goal.derivative.clone(),
+                    condition: condition(tonight, kept, alpha_deg)?,
+                },
+                unit,
+                weight,
+                wanted: goal.bound,
+            })
+        });
+        points.extend(of_goal);
+    }
+    points
+}
+
+/// Flight condition at an angle of attack: that of the nearest card; `None` without cards.
+fn condition(tonight: &Tonight, kept: &[Kept], alpha_deg: f64) -> Option<Condition> {
+    let distance = |(candidate, _): &&Kept| (candidate.card.alpha_deg - alpha_deg).abs();
+    let nearest = kept
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let condition = nearest?.1.maneuver.condition(tonight.tunnel);
+    Some(Condition {
+        alpha_deg,
+        ..condition
+    })
+}
+
+/// Observations of each coefficient by the cards, with the noise of the campaign's maneuvers.
+fn subjects(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Subject> {
+    let covariances = covariances(tonight, kept);
+    let planned = kept.iter().zip(&covariances);
+    let planned: Vec<Evidence> = planned
+        .filter_map(|((_, rehearsed), covariance)| {
+            Some(Evidence {
+                maneuver: &rehearsed.maneuver,
+                estimates: &rehearsed.estimated.estimates,
+                combined: &rehearsed.estimated.combined,
+                covariance: covariance.as_ref()?,
+            })
+        })
+        .collect();
+    let asked: Vec<Point> = points.iter().map(|p| p.point.clone()).collect();
+    let outlooks = tonight.model.outlook(
+        (tonight.evidence, &planned),
+        &asked,
+        (tonight.buildup, tonight.tunnel),
+        tonight.settings,
+    );
+    let shares: Vec<f64> = kept
+        .iter()
+        .map(|(candidate, _)| {
+            let experience = tonight.history.of(&candidate.card.class);
+            experience.usable * experience.weight
+        })
+        .collect();
+    let subjects = outlooks.into_iter();
+    subjects
+        .map(|outlook| subject(outlook, points, &shares))
+        .collect()
+}
+
+/// Covariance of each card, with the noise of the campaign's maneuvers of its class.
+fn covariances(tonight: &Tonight, kept: &[Kept]) -> Vec<Option<Covariance>> {
+    let simulated = kept.iter().filter_map(|(candidate, rehearsed)| {
+        let covariance = rehearsed.estimated.covariance.as_ref()?;
+        Some((candidate.card.class.as_str(), covariance))
+    });
+    let factors = noise_factors(&tonight.history, simulated);
+    let own = kept.iter().map(|(candidate, rehearsed)| {
+        let factor = factors.get(candidate.card.class.as_str());
+        let covariance = rehearsed.estimated.covariance.as_ref()?;
+        Some(with_noise(covariance, factor.copied().unwrap_or(1.0)))
+    });
+    own.collect()
+}
+
+/// Knowledge of a coefficient. A card that is usable, and weighs, by a share has that share of its
+/// information: its noise is so much larger.
+fn subject(outlook: Outlook, points: &[GoalPoint], shares: &[f64]) -> Subject {
+    let mut cards = outlook.planned;
+    for (card, share) in cards.iter_mut().zip(shares) {
+        if let Some(card) = card {
+            card.noise /= *share;
+        }
+    }
+    let aim = |(point, row): &(usize, usize)| Aim {
+        row: *row,
+        weight: points[*point].weight,
+        wanted: points[*point].wanted.unwrap_or(0.0),
+        point: *point,
+    };
+    Subject {
+        aims: outlook.points.iter().map(aim).collect(),
+        covariance: outlook.covariance,
+        cards,
+    }
+}
+
+/// Choice as rows of the tables.
+struct Rows<'a> {
+    tonight: &'a Tonight<'a>,
+    kept: &'a [Kept<'a>],
+    points: &'a [GoalPoint],
+    choice: &'a CardChoice,
+    flown: &'a CardSet<'a>,
+}
+
+impl Rows<'_> {
+    /// Cards in the order of flying, then the others by information per minute.
+    fn cards(&self) -> Vec<NextCardRow> {
+        let all = 0..self.kept.len();
+        let (mut flown, mut others): (Vec<usize>, Vec<usize>) =
+            all.partition(|card| self.flown.times[*card] > 0);
+        let key = |card: &usize| &self.kept[*card].0.card;
+        flown.sort_by(|a, b| {
+            let by_alpha = key(a).alpha_deg.total_cmp(&key(b).alpha_deg);
+            by_alpha.then_with(|| key(a).class.cmp(&key(b).class))
+        });
+        let nothing = CardSet::nothing(self.choice);
+        let per_minute = |card: &usize| nothing.gain(*card) / self.choice.prices[*card].minutes;
+        others.sort_by(|a, b| per_minute(b).total_cmp(&per_minute(a)));
+        let flown = flown.into_iter().enumerate().map(|(i, card)| NextCardRow {
+            place: Some(i + 1),
+            loss_without: Some(self.flown.worth() - self.flown.without(card).worth()),
+            ..self.card(card, &nothing)
+        });
+        let others = others.into_iter().map(|card| self.card(card, &nothing));
+        flown.chain(others).collect()
+    }
+
+    fn card(&self, card: usize, nothing: &CardSet) -> NextCardRow {
+        let (candidate, rehearsed) = self.kept[card];
+        let information = nothing.gain(card);
+        let extremes = rehearsed.extremes;
+        NextCardRow {
+            times: self.flown.times[card],
+            information: Some(information),
+            information_per_minute: Some(information / candidate.minutes),
+            lowest_alpha_deg: Some(extremes.alpha_deg.0),
+            highest_alpha_deg: Some(extremes.alpha_deg.1),
+            lowest_an_g: Some(extremes.an_g.0),
+            highest_an_g: Some(extremes.an_g.1),
+            highest_qbar_psf: Some(extremes.qbar_psf.1),
+            teaches: self.teaches(card, nothing),
+            ..self.of_candidate(candidate)
+        }
+    }
+
+    /// Row of a card before it is rehearsed.
+    fn of_candidate(&self, candidate: &Candidate) -> NextCardRow {
+        let card = &candidate.card;
+        NextCardRow {
+            place: None,
+            times: 0,
+            class: card.class.clone(),
+            alpha_deg: card.alpha_deg,
+            scale: candidate.scale,
+            altitude_ft: card.altitude_ft,
+            minutes: candidate.minutes,
+            usable_pct: 100.0 * self.tonight.history.of(&card.class).usable,
+            information: None,
+            information_per_minute: None,
+            loss_without: None,
+            lowest_alpha_deg: None,
+            highest_alpha_deg: None,
+            lowest_an_g: None,
+            highest_an_g: None,
+            highest_qbar_psf: None,
+            teaches: String::new(),
+            refused: String::new(),
+        }
+    }
+
+    /// Goals to which a card alone adds most, each derivative once.
+    fn teaches(&self, card: usize, nothing: &CardSet) -> String {
+        let mut after = nothing.clone();
+        after.fly(card);
+        let mut gains: Vec<(f64, &GoalPoint, f64, f64)> = self
+            .aims()
+            .map(|(subject, aim)| {
+                let (before, after) = (
+                    nothing.deviation(subject, aim),
+                    after.deviation(subject, aim),
+                );
+                let worth = aim.worth(before * before, after * after);
+                (worth, &self.points[aim.point], before, after)
+            })
+            .filter(|(worth, ..)| *worth > 0.0)
+            .collect();
+        gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut named: Vec<&str> = Vec::new();
+        let mut parts = Vec::new();
+        for (_, goal, before, after) in gains {
+            let Point {
+                derivative,
+                condition,
+            } = &goal.point;
+            if named.len() < NAMED_GOALS && !named.contains(&derivative.as_str()) {
+                named.push(derivative);
+                let alpha_deg = condition.alpha_deg;
+                parts.push(format!(
+                    "{derivative} at {alpha_deg}°: {before:.2e} to {after:.2e}"
+                ));
+            }
+        }
+        parts.join("; ")
+    }
+
+    fn aims(&self) -> impl Iterator<Item = (usize, &Aim)> {
+        let subjects = self.choice.subjects.iter().enumerate();
+        subjects.flat_map(|(i, subject)| subject.aims.iter().map(move |aim| (i, aim)))
+    }
+
+    /// Goals in the order of the goals' file, or of the posterior.
+    fn goals(&self) -> Vec<NextGoalRow> {
+        let nothing = CardSet::nothing(self.choice);
+        let mut rows: Vec<(usize, NextGoalRow)> = self
+            .aims()
+            .map(|(subject, aim)| {
+                let goal = &self.points[aim.point];
+                let row = NextGoalRow {
+                    derivative: goal.point.derivative.clone(),
+                    unit: goal.unit.to_owned(),
+                    alpha_deg: goal.point.condition.alpha_deg,
+                    before: nothing.deviation(subject, aim),
+                    after: self.flown.deviation(subject, aim),
+                    wanted: goal.wanted,
+                };
+                (aim.point, row)
+            })
+            .collect();
+        rows.sort_by_key(|(point, _)| *point);
+        rows.into_iter().map(|(_, row)| row).collect()
+    }
+}

@@ -1,0 +1,145 @@
+//! Rehearsal of a card: it is flown by the posterior's aircraft, recorded with the campaign's noise, and
+//! estimated as a flown maneuver is. Its covariance, with the nuisances of the maneuver in it, is what
+//! the card will teach.
+
+use std::collections::BTreeMap;
+
+use super::candidate::Candidate;
+use super::limits::{self, Extremes};
+use crate::aero::WindTunnel;
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::config::Config;
+use crate::estimate::Estimated;
+use crate::lab::campaign::FlightLimits;
+use crate::lab::simulator::{Instrument, Instruments, Simulator};
+use crate::maneuver::Maneuver;
+use crate::numerics::order_statistics::median;
+use crate::pipeline::estimate_maneuver;
+use crate::surfaces::DelayCorrection;
+use crate::tables::{ChannelRow, EstimateRow, Outcome};
+
+/// A card as it will be flown.
+#[derive(Clone, Debug)]
+pub struct Rehearsed {
+    pub maneuver: Maneuver,
+    pub estimated: Estimated,
+    pub extremes: Extremes,
+}
+
+/// Everything that rehearsals have in common.
+#[derive(Clone, Debug)]
+pub struct RehearsalBasis<'a> {
+    pub config: &'a Config,
+    pub simulator: &'a Simulator,
+    pub instruments: &'a Instruments,
+    pub delays: &'a [DelayCorrection],
+    pub limits: &'a FlightLimits,
+}
+
+impl RehearsalBasis<'_> {
+    /// Flies, records and estimates a card.
+    ///
+    /// # Errors
+    /// The reason why the card is refused: it cannot be flown, breaks a limit, or cannot be estimated.
+    pub fn rehearse(&self, candidate: &Candidate) -> Result<Rehearsed, String> {
+        let card = &candidate.card;
+        let flown = self.simulator.fly(card).map_err(|problem| problem.reason)?;
+        let extremes = Extremes::of(&flown.record);
+        if let Some(reason) = limits::broken(self.limits, &flown.record, &extremes) {
+            return Err(reason);
+        }
+        let maneuver = Maneuver {
+            maneuver_id: format!("{} {}", card.flight_id, card.seed),
+            ..flown.maneuver.clone()
+        };
+        let record = flown.recorded(self.instruments, card.seed);
+        let estimated = estimate_maneuver(self.config, &record, &maneuver, self.delays);
+        let fit = &estimated.fit;
+        if fit.outcome != Outcome::Converged || estimated.covariance.is_none() {
+            let (outcome, reason) = (fit.outcome, &fit.reason);
+            return Err(format!(
+                "its rehearsal cannot be estimated: {outcome}: {reason}"
+            ));
+        }
+        Ok(Rehearsed {
+            maneuver,
+            estimated,
+            extremes,
+        })
+    }
+}
+
+/// Instruments with the noise that the campaign's channels have, and no other errors: the uncertainty
+/// of calibration is part of each estimate. A channel without measured noise has that of the cards.
+#[must_use]
+pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instruments {
+    let of_cards = of_cards.0.iter();
+    let mut noise: BTreeMap<String, f64> = of_cards.map(|(s, i)| (s.clone(), i.noise)).collect();
+    let mut measured: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for row in channels {
+        let of_signal = measured.entry(&row.signal).or_default();
+        of_signal.extend(row.noise.filter(|noise| *noise > 0.0));
+    }
+    for (signal, values) in measured {
+        if let Some(median) = median(values) {
+            noise.insert(signal.to_owned(), median);
+        }
+    }
+    let instrument = |noise| Instrument {
+        noise,
+        ..Instrument::default()
+    };
+    Instruments(
+        noise
+            .into_iter()
+            .map(|(signal, noise)| (signal, instrument(noise)))
+            .collect(),
+    )
+}
+
+/// Derivatives of the aircraft that flies the rehearsals: the posterior's, else the tunnel's, else the
+/// median of the estimates at each degree, else zero.
+#[must_use]
+pub fn derivatives(
+    config: &Config,
+    mut posterior: WindTunnel,
+    estimates: &[EstimateRow],
+) -> WindTunnel {
+    for derivative in &config.buildup.derivatives {
+        let name = derivative.name.as_str();
+        if posterior.has(name) {
+            continue;
+        }
+        posterior.take_table(name, &config.tunnel);
+        if !posterior.has(name) {
+            for point in medians(name, estimates) {
+                posterior.insert(name, point);
+            }
+        }
+    }
+    posterior
+}
+
+/// Median of a derivative's estimates at each degree of angle of attack; zero without estimates.
+fn medians(name: &str, estimates: &[EstimateRow]) -> Vec<TunnelPoint> {
+    let mut by_degree: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+    for row in estimates.iter().filter(|row| row.derivative == name) {
+        #[expect(clippy::cast_possible_truncation, reason = "an angle in whole degrees")]
+        let degree = row.alpha_deg.round() as i64;
+        by_degree.entry(degree).or_default().extend(row.value);
+    }
+    let point = |alpha_deg: f64, value: f64| TunnelPoint {
+        alpha_deg,
+        mach: None,
+        value,
+        uncertainty: None,
+        source: None,
+    };
+    let by_degree = by_degree.into_iter();
+    let found = by_degree.filter_map(|(degree, own)| Some(point(degree as f64, median(own)?)));
+    let mut found: Vec<TunnelPoint> = found.collect();
+    if found.is_empty() {
+        found.push(point(0.0, 0.0));
+    }
+    found
+}

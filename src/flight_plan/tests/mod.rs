@@ -1,0 +1,6 @@
+//! Tests of the flight plan.
+
+mod choice;
+mod experience;
+mod limits;
+mod promise;

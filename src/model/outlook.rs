@@ -1,0 +1,218 @@
+//! Outlook: covariance of the posterior as planned maneuvers will find it.
+//!
+//! The covariance of a Gaussian posterior follows from the design and the noise of its data, not from
+//! their values. An [`Outlook`] has all that planned maneuvers need for their part: with A the rows of
+//! their estimates over the unknowns, K the effects of the calibration errors of their common flight, B
+//! the rows of the quantities asked for, and P the posterior's covariance, it has the covariance of
+//! (A z + K u, B z). A maneuver then observes its rows of A z + K u with its own noise.
+//!
+//! Scales and weights stay those of the posterior; its spread over open scales is in P. The values of the
+//! evidence do not matter, so it may have been read with other held values.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::campaign_model::Model;
+use super::coefficient::{CoefficientPosterior, Data};
+use super::evidence::Evidence;
+use super::observation::Observation;
+use super::posterior::{gaussian, information};
+use super::settings::Settings;
+use super::term::{Basis, Term, between_points};
+use super::unknowns::{SparseRow, Unknowns, between, is_of_campaign};
+use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::numerics::root::EXACT;
+use crate::output_error::error_effect::SharedError;
+
+/// A derivative, or sum of derivatives, at a flight condition.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    pub derivative: String,
+    pub condition: Condition,
+}
+
+/// Rows of a planned maneuver's estimates, with the covariance of what no other maneuver shares.
+#[derive(Clone, Debug)]
+pub struct PlannedRows {
+    pub rows: Range<usize>,
+    pub noise: DMatrix<f64>,
+}
+
+/// Joint covariance of planned maneuvers and points of one coefficient.
+#[derive(Clone, Debug)]
+pub struct Outlook {
+    /// Covariance of the rows of all planned maneuvers, then of the points.
+    pub covariance: DMatrix<f64>,
+    /// In the order of the planned maneuvers; `None` for one that estimates nothing of the
+    /// coefficient.
+    pub planned: Vec<Option<PlannedRows>>,
+    /// Place among the points asked for, and row, of each point of the coefficient.
+    pub points: Vec<(usize, usize)>,
+}
+
+impl Model {
+    /// Outlook of each coefficient on planned maneuvers of one flight and on points. `evidence`,
+    /// `buildup`, `tunnel` and `settings` are those of the posterior. A coefficient whose covariance
+    /// is not finite is left out.
+    #[must_use]
+    pub fn outlook(
+        &self,
+        (evidence, planned): (&[Evidence], &[Evidence]),
+        points: &[Point],
+        (buildup, tunnel): (&Buildup, &WindTunnel),
+        settings: &Settings,
+    ) -> Vec<Outlook> {
+        let mut evidence = evidence.to_vec();
+        evidence.sort_by(|a, b| a.maneuver.maneuver_id.cmp(&b.maneuver.maneuver_id));
+        let tunnel = tunnel.clamped();
+        let basis = Basis {
+            buildup,
+            tunnel: &tunnel,
+            settings,
+        };
+        let all = self.coefficients.iter();
+        all.filter_map(|(_, posterior)| posterior.outlook((&evidence, planned), points, &basis))
+            .collect()
+    }
+}
+
+impl Model {
+    /// Unit of a derivative or sum of the posterior, and the angles of attack at which the tunnel
+    /// tabulates it.
+    #[must_use]
+    pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
+        let all = self.coefficients.iter();
+        let mut terms = all.flat_map(|(_, posterior)| &posterior.terms);
+        let own = |t: &&Term| t.prior.name == derivative || t.derivative == derivative;
+        let term = terms.find(own)?;
+        Some((term.unit, &term.breakpoints_deg))
+    }
+
+    /// Derivatives and sums that are estimated, in the order of the model.
+    pub fn quantities(&self) -> impl Iterator<Item = &str> {
+        let all = self.coefficients.iter();
+        let terms = all.flat_map(|(_, posterior)| &posterior.terms);
+        terms.map(|term| term.prior.name.as_str())
+    }
+}
+
+impl CoefficientPosterior {
+    fn outlook(
+        &self,
+        (evidence, planned): (&[Evidence], &[Evidence]),
+        points: &[Point],
+        basis: &Basis,
+    ) -> Option<Outlook> {
+        let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
+        data.set_between(&self.terms, &self.scales);
+        let covariance = self.covariance(&data, evidence.len())?;
+        let unknowns = &data.unknowns;
+        let mut rows: Vec<SparseRow> = vec![];
+        let mut own = Vec::with_capacity(observed.len());
+        for observation in &observed {
+            let placed = observation.as_ref().map(|(class, observation)| {
+                let first = rows.len();
+                rows.extend(unknowns.rows(&self.terms, *class, observation));
+                PlannedRows {
+                    rows: first..rows.len(),
+                    noise: self.noise(observation),
+                }
+            });
+            own.push(placed);
+        }
+        let of_planned = rows.len();
+        let asked = points.iter().enumerate();
+        let asked: Vec<(usize, SparseRow)> = asked
+            .filter_map(|(i, point)| Some((i, self.row(point, unknowns)?)))
+            .collect();
+        rows.extend(asked.iter().map(|(_, row)| row.clone()));
+        let mut joint = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+            between(&rows[i], &rows[j], &covariance)
+        });
+        let mut calibrated = joint.view_mut((0, 0), (of_planned, of_planned));
+        calibrated += calibration(&observed, &own, of_planned);
+        let of_points = asked.iter().enumerate();
+        Some(Outlook {
+            covariance: joint,
+            planned: own,
+            points: of_points.map(|(k, (i, _))| (*i, of_planned + k)).collect(),
+        })
+    }
+
+    /// Covariance of the unknowns of data with planned maneuvers. That of the differences has the
+    /// posterior's spread over open scales, which is what it has beyond the covariance at its scales.
+    fn covariance(&self, data: &Data, maneuvers: usize) -> Option<DMatrix<f64>> {
+        let mut weights = vec![1.0; maneuvers];
+        for (place, weight) in &self.weights {
+            weights[*place] = *weight;
+        }
+        let unknowns = &data.unknowns;
+        let sums = information(&data.flights, &weights, unknowns.count);
+        let root = unknowns.root(&self.terms, &self.scales, EXACT);
+        let mut covariance = gaussian(&root, &sums)?.covariance;
+        if !covariance.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let differences = (unknowns.differences, unknowns.differences);
+        let published = self.gaussian.covariance.view((0, 0), differences);
+        let mut own = covariance.view_mut((0, 0), differences);
+        own += positive(&(published - &own));
+        Some(covariance)
+    }
+
+    /// Covariance of what no other maneuver shares, with what lies between the points of the grids.
+    fn noise(&self, observation: &Observation) -> DMatrix<f64> {
+        let (design, at) = (&observation.design, &observation.condition);
+        &observation.noise + between_points(&self.terms, &self.scales, design, at)
+    }
+
+    /// Row of a point over the unknowns: of a term, or of the constant of a sum; `None` for a
+    /// derivative of another coefficient.
+    fn row(&self, point: &Point, unknowns: &Unknowns) -> Option<SparseRow> {
+        let of_term = |place: usize, weight: f64| {
+            let shares = self.terms[place].prior.grid.shares(&point.condition);
+            let start = unknowns.starts[place];
+            let weighted = shares.into_iter();
+            weighted.map(move |(node, share)| (start + node, weight * share))
+        };
+        let place = |is: &dyn Fn(&Term) -> bool| self.terms.iter().position(is);
+        if let Some(term) = place(&|t| t.prior.name == point.derivative) {
+            return Some(of_term(term, 1.0).collect());
+        }
+        let term = place(&|t| t.derivative == point.derivative)?;
+        let slope = self.terms[term].slope.as_ref()?;
+        let slope = place(&|t| t.derivative == *slope)?;
+        let of_slope = of_term(slope, -point.condition.alpha_deg);
+        Some(of_term(term, 1.0).chain(of_slope).collect())
+    }
+}
+
+/// Positive part of a symmetric matrix: rounding leaves tiny negative eigenvalues.
+fn positive(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut eigen = matrix.clone().symmetric_eigen();
+    eigen.eigenvalues.apply(|value| *value = value.max(0.0));
+    eigen.recompose()
+}
+
+/// K Kᵀ of the calibration errors that the planned maneuvers share with their flight.
+fn calibration(
+    observed: &[Option<(usize, Observation)>],
+    placed: &[Option<PlannedRows>],
+    rows: usize,
+) -> DMatrix<f64> {
+    let mut effects: BTreeMap<&SharedError, DVector<f64>> = BTreeMap::new();
+    for (observation, placed) in observed.iter().flatten().zip(placed.iter().flatten()) {
+        let of_flight = observation.1.calibration.iter();
+        for (error, change) in of_flight.filter(|(error, _)| !is_of_campaign(error)) {
+            let effect = effects.entry(error).or_insert_with(|| DVector::zeros(rows));
+            effect.rows_range_mut(placed.rows.clone()).copy_from(change);
+        }
+    }
+    let mut sum = DMatrix::zeros(rows, rows);
+    for effect in effects.values() {
+        sum += effect * effect.transpose();
+    }
+    sum
+}

@@ -1,0 +1,71 @@
+//! Tables of the next flight: the cards with what they teach, and the goals before and after.
+
+use crate::schema::table;
+
+table! {
+    /// Cards that the next flight may fly, with what each teaches and the minutes it takes.
+    ///
+    /// `harvest next` writes it into `next/` of the reports. The cards of the flight come first, in the
+    /// order of flying; the others follow by what they teach per minute, then those that are refused.
+    /// Information is in nats: each nat divides the standard deviations of the goals by e, in their
+    /// weighted mean.
+    pub struct NextCardRow in "next_cards" per "candidate card" {
+        /// Place in the order of flying; empty for a card that is not flown.
+        pub place: Option<usize> ["1"],
+        /// Number of times that it is flown.
+        pub times: usize ["1"],
+        /// Class of the maneuver.
+        pub class: String,
+        /// Angle of attack of the card.
+        pub alpha_deg: f64 ["deg"],
+        /// Scale of the inputs of the class's program.
+        pub scale: f64 ["1"],
+        /// Altitude of the card.
+        pub altitude_ft: f64 ["ft"],
+        /// Time of the card once, with its trim and recovery.
+        pub minutes: f64 ["min"],
+        /// Share of the class's maneuvers that are usable.
+        pub usable_pct: f64 ["%"],
+        /// Information of the card flown once and alone; empty for a card that is refused, as in the
+        /// columns that follow.
+        pub information: Option<f64> ["nat"],
+        /// Information per minute.
+        pub information_per_minute: Option<f64> ["nat/min"],
+        /// Information that the flight loses without the card; empty for a card that is not flown.
+        pub loss_without: Option<f64> ["nat"],
+        /// Lowest angle of attack over the card, as the vane reads it.
+        pub lowest_alpha_deg: Option<f64> ["deg"],
+        /// Highest angle of attack over the card.
+        pub highest_alpha_deg: Option<f64> ["deg"],
+        /// Lowest normal acceleration over the card.
+        pub lowest_an_g: Option<f64> ["g"],
+        /// Highest normal acceleration over the card.
+        pub highest_an_g: Option<f64> ["g"],
+        /// Highest dynamic pressure over the card.
+        pub highest_qbar_psf: Option<f64> ["lbf/ft²"],
+        /// Goals to which the card alone adds most, with their standard deviation before and after it.
+        pub teaches: String,
+        /// Reason why the card is refused; empty for one that may be flown.
+        pub refused: String,
+    }
+}
+
+table! {
+    /// Goals of the next flight, with their standard deviations before and after it.
+    ///
+    /// Without a file of goals all derivatives of the posterior are goals.
+    pub struct NextGoalRow in "next_goals" per "goal and angle of attack" {
+        /// Derivative or sum.
+        pub derivative: String,
+        /// Unit of the derivative.
+        pub unit: String,
+        /// Angle of attack.
+        pub alpha_deg: f64 ["deg"],
+        /// Standard deviation by the posterior of tonight, in the column `unit`.
+        pub before: f64,
+        /// Expected standard deviation after the flight, in the column `unit`.
+        pub after: f64,
+        /// Wanted standard deviation, in the column `unit`; empty where each reduction counts.
+        pub wanted: Option<f64>,
+    }
+}

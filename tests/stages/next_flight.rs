@@ -1,0 +1,174 @@
+//! The next flight: its cards, goals and page, from the demonstration's posterior.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::{Campaign, Row, demo, number, run, table};
+
+/// Cards of the shipped campaign with few candidates and a limit that one of them breaks.
+fn cards(campaign: &Campaign) -> std::path::PathBuf {
+    let shipped = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
+    let (head, rest) = shipped.split_once("\nnext:").unwrap();
+    let (_, tail) = rest.split_once("\nstudy:").unwrap();
+    let next = "
+next:
+  settle_s: 20
+  repeats: 1
+  limits: { an_g: [-2, 4], alpha_deg: [0, 52] }
+  candidates:
+    - { class: OLAT, alpha_deg: [15, 25] }
+    - { class: \"3211\", alpha_deg: [15, 60] }
+";
+    let file = campaign.path("cards.yaml");
+    fs::write(&file, format!("{head}{next}\nstudy:{tail}")).unwrap();
+    file
+}
+
+fn next(campaign: &Campaign, cards: &Path) -> Command {
+    let mut command = campaign.command("next");
+    command.args(["--minutes", "1.6", "--cards"]).arg(cards);
+    command
+}
+
+fn rows(campaign: &Campaign, name: &str) -> Vec<Row> {
+    table(&campaign.path(&format!("reports/next/{name}.csv")))
+}
+
+#[test]
+fn the_cards_of_the_next_flight_are_chosen_priced_and_limited() {
+    let campaign = Campaign::on("data/demo/flights");
+    demo().fill_store(&campaign);
+    let file = cards(&campaign);
+    let outcome = run(next(&campaign, &file).args(["--threads", "1"]));
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let planned = rows(&campaign, "next_cards");
+    assert_eq!(planned.len(), 4, "{planned:?}");
+    // Programs of 17 and 22 s and 20 s to settle: two of them and their way of 10° take 1.6 min at most.
+    let flown: Vec<&Row> = planned
+        .iter()
+        .filter(|row| !row["place"].is_empty())
+        .collect();
+    assert_eq!(flown.len(), 2, "{planned:?}");
+    for row in &planned {
+        let program_s = if row["class"] == "OLAT" { 22.0 } else { 17.0 };
+        approx::assert_relative_eq!(number(row, "minutes"), (program_s + 20.0) / 60.0);
+    }
+    let refused: Vec<&Row> = planned
+        .iter()
+        .filter(|row| !row["refused"].is_empty())
+        .collect();
+    assert_eq!(refused.len(), 1, "{planned:?}");
+    assert_eq!(refused[0]["alpha_deg"], "60.0");
+    assert!(
+        refused[0]["refused"].contains("the limit is 52 deg"),
+        "{refused:?}"
+    );
+    let goals = rows(&campaign, "next_goals");
+    assert!(goals.len() > 100, "{}", goals.len());
+    for row in &goals {
+        assert!(
+            number(row, "after") <= number(row, "before") * (1.0 + 1e-9),
+            "{row:?}"
+        );
+    }
+    // Before: the deviations of the published posterior, where it has the angle of attack.
+    let posterior = &demo().tables["posterior"];
+    let same = |goal: &Row, row: &&Row| {
+        row["derivative"] == goal["derivative"] && row["alpha_deg"] == goal["alpha_deg"]
+    };
+    for goal in &goals {
+        let own = posterior.iter().find(|row| same(goal, row)).unwrap();
+        approx::assert_relative_eq!(
+            number(goal, "before"),
+            number(own, "standard_deviation"),
+            max_relative = 1e-3
+        );
+    }
+    let page = fs::read_to_string(campaign.path("reports/next/kneeboard.html")).unwrap();
+    assert!(
+        page.contains("OLAT") && page.contains("Limits kept: alpha 0"),
+        "{page}"
+    );
+    let printed = fs::read(campaign.path("reports/next/kneeboard.pdf")).unwrap();
+    let printed = lopdf::Document::load_mem(&printed).unwrap();
+    assert_eq!(printed.get_pages().len(), 1);
+
+    let before = campaign.bytes("reports/next");
+    let outcome = run(next(&campaign, &file).args(["--threads", "2"]));
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    assert!(
+        campaign.bytes("reports/next") == before,
+        "threads change the plan"
+    );
+}
+
+#[test]
+fn goals_decide_what_is_flown() {
+    let campaign = Campaign::on("data/demo/flights");
+    demo().fill_store(&campaign);
+    let (file, goals) = (cards(&campaign), campaign.path("goals.yaml"));
+    let plan = |text: &str, code| {
+        fs::write(&goals, text).unwrap();
+        let outcome = run(next(&campaign, &file).arg("--goal").arg(&goals));
+        assert_eq!(outcome.code, Some(code), "{outcome:?}");
+        outcome
+    };
+    plan("goals: [{ derivative: Cm_de, alpha_deg: [10, 20] }]", 0);
+    let planned = rows(&campaign, "next_cards");
+    let flown: Vec<&Row> = planned
+        .iter()
+        .filter(|row| !row["place"].is_empty())
+        .collect();
+    assert!(
+        flown.len() == 1 && flown[0]["class"] == "3211",
+        "{planned:?}"
+    );
+    let asked = rows(&campaign, "next_goals");
+    assert!(
+        asked.iter().all(|row| row["derivative"] == "Cm_de"),
+        "{asked:?}"
+    );
+    // A bound that tonight's posterior has already needs no flight.
+    plan(
+        "goals: [{ derivative: Cm_de, alpha_deg: [10, 20], bound: 1 }]",
+        0,
+    );
+    assert!(
+        rows(&campaign, "next_cards")
+            .iter()
+            .all(|row| row["place"].is_empty())
+    );
+    for (wrong, said) in [
+        ("goals: [{ derivative: Cm_dee }]", "did you mean `Cm_de`?"),
+        (
+            "goals: [{ derivative: Cm_de, bound: -1 }]",
+            "`bound` must be a positive",
+        ),
+        (
+            "goals: [{ derivative: Cm_de, bond: 1 }]",
+            "did you mean `bound`?",
+        ),
+        ("goals: []", "lists no goal"),
+    ] {
+        let outcome = plan(wrong, 1);
+        assert!(outcome.stderr.contains(said), "{wrong}: {outcome:?}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let campaign = Campaign::on("data/demo/flights");
+    let missing = campaign.path("none.yaml");
+    let outcome = run(&mut next(&campaign, &missing));
+    assert_eq!(outcome.code, Some(1), "{outcome:?}");
+    assert!(
+        outcome
+            .stderr
+            .contains("there is no such file of test cards"),
+        "{outcome:?}"
+    );
+    let mut command = campaign.command("next");
+    let outcome = run(command.args(["--minutes", "0"]));
+    assert_eq!(outcome.code, Some(64), "{outcome:?}");
+}
