@@ -12,6 +12,7 @@ pub mod minimise;
 pub mod normal;
 pub mod order_statistics;
 pub mod random;
+pub mod random_effects;
 pub mod root;
 pub(crate) mod row_products;
 pub mod runge_kutta;

@@ -30,6 +30,12 @@ pub fn widening_95(degrees_of_freedom: f64) -> f64 {
     quantile_95(degrees_of_freedom.max(FEWEST)) / NORMAL_95
 }
 
+/// Probability of a larger magnitude; one without a degree of freedom.
+#[must_use]
+pub fn exceedance(magnitude: f64, degrees_of_freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.0, |t| 2.0 * t.sf(magnitude))
+}
+
 #[cfg(test)]
 mod tests {
     use approx::assert_relative_eq;
@@ -50,6 +56,9 @@ mod tests {
             assert_relative_eq!(quantile_95(freedom), quantile, max_relative = 3e-4);
         }
         assert!(quantile_95(0.0).is_nan());
+        assert_relative_eq!(exceedance(2.776_445, 4.0), 0.05, max_relative = 1e-5);
+        assert_relative_eq!(exceedance(1.0, 1.0), 0.5, max_relative = 1e-9);
+        assert_relative_eq!(exceedance(1.0, 0.0), 1.0);
     }
 
     #[test]

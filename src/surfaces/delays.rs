@@ -12,6 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{DelayEvidence, FlightEvidence, SurfaceDelay};
+use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::symmetric;
 
 /// Error of the equations in a delay, as a share of the sampling interval: signals are linear
@@ -63,22 +64,15 @@ pub fn of_campaign(flights: &[FlightEvidence]) -> Vec<SurfaceDelay> {
     delays
 }
 
-/// Standard deviation of a surface's delay between flights beyond their bounds (DerSimonian and
-/// Laird).
-fn scatter_s<'a>(flights: impl Iterator<Item = &'a SurfaceDelay> + Clone) -> f64 {
-    let weights = flights.clone().map(|f| f.bound_s.powi(-2));
-    let sum: f64 = weights.clone().sum();
-    let squares: f64 = weights.clone().map(|w| w * w).sum();
-    let both = flights.clone().zip(weights.clone());
-    let mean = both.map(|(f, w)| w * f.delay_s).sum::<f64>() / sum;
-    let both = flights.clone().zip(weights);
-    let distance: f64 = both.map(|(f, w)| w * (f.delay_s - mean).powi(2)).sum();
-    let count = flights.count();
-    if count < 2 {
-        return 0.0;
-    }
-    let variance = (distance - (count as f64 - 1.0)) / (sum - squares / sum);
-    variance.max(0.0).sqrt()
+/// Standard deviation of a surface's delay between flights beyond their bounds.
+fn scatter_s<'a>(flights: impl Iterator<Item = &'a SurfaceDelay>) -> f64 {
+    let observation = |flight: &SurfaceDelay| Observation {
+        value: flight.delay_s,
+        variance: flight.bound_s * flight.bound_s,
+    };
+    let observations: Vec<Observation> = flights.map(observation).collect();
+    let pooled = RandomEffects::mean_of(&observations);
+    pooled.map_or(0.0, |pooled| pooled.scatter_variance.sqrt())
 }
 
 /// Delays from groups of maneuvers, of which the jackknife leaves out one at a time.
