@@ -16,7 +16,7 @@ use super::checks::{
     impossible_mass, impossible_signals, lift_curve, measure_gusts, report,
 };
 use super::clock::{Clock, Stretch};
-use super::compatibility::{self, Findings, OnFault};
+use super::compatibility::{self, ErrorEvidence, Findings, OnFault};
 use super::context::Context;
 use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
@@ -36,6 +36,8 @@ pub struct Assessment {
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,
+    /// Evidence of this stretch alone on the errors of its instruments.
+    pub error_evidence: Vec<ErrorEvidence>,
     /// Corrections that are applied to signals when the record is read.
     pub corrections: Vec<Correction>,
     /// Stand-ins of the signals that the stretch lacks, in the order in which they are computed.
@@ -114,6 +116,7 @@ pub fn assess(
         ),
         checks: relations.check_rows(flight_id),
         instruments: findings.rows(flight_id),
+        error_evidence: findings.evidence(),
         corrections: findings.corrections(),
         stand_ins,
         problems,

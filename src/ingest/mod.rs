@@ -30,6 +30,7 @@ pub use channel::{
 pub use checks::LiftPoint;
 pub use clock::{Clock, Stretch, Survey, survey};
 pub use column_source::ColumnSource;
+pub use compatibility::{Compatibility, ErrorEvidence};
 pub use computed_columns::ComputedColumns;
 pub use context::Context;
 pub use in_memory::{Ingested, record, records};

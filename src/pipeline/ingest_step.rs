@@ -209,6 +209,7 @@ fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: Brought<Ingested
         .extend(stretches.into_iter().map(|ingested| Flight {
             fingerprint: fingerprint.to_owned(),
             ingested,
+            by_all_flights: None,
         }));
 }
 

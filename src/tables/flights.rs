@@ -166,6 +166,126 @@ table! {
     }
 }
 
+words! {
+    /// Kind of an instrument's error.
+    pub enum InstrumentError {
+        /// Constant error of the reading.
+        Bias = "bias",
+        /// Error of the scale factor.
+        Scale = "scale",
+        /// Delay against the other channels.
+        Delay = "delay",
+    }
+}
+
+impl InstrumentRow {
+    /// An error with its bound, the scale as a difference from one; `None` where it is not determined.
+    #[must_use]
+    pub fn error(&self, error: InstrumentError) -> Option<(f64, f64)> {
+        match error {
+            InstrumentError::Bias => self.bias.zip(self.bias_bound),
+            InstrumentError::Scale => self.scale.map(|scale| scale - 1.0).zip(self.scale_bound),
+            InstrumentError::Delay => self.delay_s.zip(self.delay_bound_s),
+        }
+    }
+
+    /// Sets an error with its bound, the scale as a difference from one.
+    pub fn set_error(&mut self, error: InstrumentError, value: f64, bound: f64) {
+        let (own, own_bound, value) = match error {
+            InstrumentError::Bias => (&mut self.bias, &mut self.bias_bound, value),
+            InstrumentError::Scale => (&mut self.scale, &mut self.scale_bound, 1.0 + value),
+            InstrumentError::Delay => (&mut self.delay_s, &mut self.delay_bound_s, value),
+        };
+        (*own, *own_bound) = (Some(value), Some(bound));
+    }
+
+    /// `true` where the record is corrected by an error.
+    #[must_use]
+    pub fn is_applied(&self, error: InstrumentError) -> bool {
+        self.applied.split(' ').any(|word| word == error.name())
+    }
+
+    /// Sets whether the record is corrected by an error.
+    pub fn set_applied(&mut self, error: InstrumentError, is_applied: bool) {
+        let applied = InstrumentError::ALL.into_iter().filter(|other| {
+            if *other == error {
+                is_applied
+            } else {
+                self.is_applied(*other)
+            }
+        });
+        let names: Vec<&str> = applied.map(InstrumentError::name).collect();
+        self.applied = names.join(" ");
+    }
+}
+
+table! {
+    /// Each error of each instrument over the flights, in the order of the flights' ids.
+    ///
+    /// The flights draw an error from one distribution: a mean that belongs to the recorder, and a scatter
+    /// between flights. The unit of an error and of its bounds is in the column `unit`.
+    pub struct InstrumentTrendRow in "instrument_trends" per "channel and kind of error" {
+        /// Column of the archive's file.
+        pub channel: String,
+        /// Signal that the channel is mapped to.
+        pub signal: String,
+        /// Kind of the error.
+        pub error: InstrumentError,
+        /// Unit of the error.
+        pub unit: String,
+        /// Number of flights with evidence on the error.
+        pub flights: usize ["flights"],
+        /// Mean over the flights, without those in `far_flights`; of a scale the factor, 1 where right.
+        pub mean: Option<f64>,
+        /// Standard deviation of the mean.
+        pub mean_bound: Option<f64>,
+        /// Standard deviation of the error between flights, beside the bounds of the flights.
+        pub scatter: Option<f64>,
+        /// Verdict on the mean. A wrong one has a row in `problems`.
+        pub common: CommonErrorVerdict,
+        /// Flights whose error is far from the others', separated by spaces. No record is corrected by it.
+        pub far_flights: String,
+        /// Number of flights that do not determine the error by themselves and take it from the others.
+        pub completed_flights: usize ["flights"],
+        /// Verdict on the order of the flights.
+        pub verdict: InstrumentTrend,
+        /// First flight of a step or drift.
+        pub since: Option<String>,
+        /// Largest step, or drift from the first flight to the last: the less probable of the two.
+        pub change: Option<f64>,
+        /// Standard deviation of the change.
+        pub change_bound: Option<f64>,
+        /// Probability of so large a change by chance.
+        pub probability: Option<f64> ["1"],
+    }
+}
+
+words! {
+    /// Verdict on the error that all flights have in common.
+    pub enum CommonErrorVerdict {
+        /// An ordinary error.
+        Ordinary = "ordinary",
+        /// Surely larger than ordinary errors are.
+        Wrong = "wrong in every flight",
+        /// Fewer than four flights.
+        TooFewFlights = "too few flights",
+    }
+}
+
+words! {
+    /// Verdict on an error in the order of the flights.
+    pub enum InstrumentTrend {
+        /// Chance explains the differences between flights.
+        Steady = "steady",
+        /// The error is another since a flight.
+        Step = "step",
+        /// The error changes from flight to flight.
+        Drift = "drift",
+        /// Fewer than six flights.
+        TooFewFlights = "too few flights",
+    }
+}
+
 /// `flight_id` of what all flights give together.
 pub const ALL_FLIGHTS: &str = "all";
 
@@ -176,6 +296,8 @@ words! {
         Ok = "ok",
         /// No error beyond its limit; the flight moves it too little to determine its delay.
         NoDelay = "ok; its delay is not told",
+        /// The flight moves it too little; its errors are those of the other flights.
+        FromOthers = "ok; taken from the other flights",
         /// The flight moves it too little to determine any error.
         NotExcited = "not excited",
         /// No part of the flight is long enough for a reconstruction.

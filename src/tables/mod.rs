@@ -31,8 +31,9 @@ pub use estimates::{
 pub use export::{DrawRow, ExportRow};
 pub use flight_plan::{NextCardRow, NextGoalRow};
 pub use flights::{
-    ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, EventRow, EventVerdict,
-    FlightRow, InstrumentRow, InstrumentVerdict,
+    ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, CommonErrorVerdict, EventRow,
+    EventVerdict, FlightRow, InstrumentError, InstrumentRow, InstrumentTrend, InstrumentTrendRow,
+    InstrumentVerdict,
 };
 pub use history::{History, HistoryOutput};
 pub use page::page;

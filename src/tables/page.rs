@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
-    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, JointRow, LevelRow,
+    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, InstrumentTrendRow, JointRow, LevelRow,
     LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, NextCardRow, NextGoalRow,
     OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow, SelfCheckRow, StartRow,
     TrendRow, VerdictRow,
@@ -106,6 +106,7 @@ pub fn page() -> String {
     table::<ChannelRow>(&mut page);
     table::<CheckRow>(&mut page);
     table::<InstrumentRow>(&mut page);
+    table::<InstrumentTrendRow>(&mut page);
     table::<EventRow>(&mut page);
     table::<Problem>(&mut page);
     table::<ConditionRow>(&mut page);

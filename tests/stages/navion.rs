@@ -100,6 +100,35 @@ fn a_light_aircraft_is_estimated_within_its_bounds() {
     );
     let worst = errors.iter().copied().fold(0.0, f64::max);
     assert!(worst < 5.0, "an estimate is {worst} bounds from the truth");
+    instruments_are_within_their_bounds(folder.path());
+}
+
+/// Each file is one short window, whose bounds contain the noise of rates and accelerations.
+fn instruments_are_within_their_bounds(folder: &Path) {
+    let truths = table(Path::new("data/navion/truth/instruments.csv"));
+    let instruments = table(&published(folder, "instruments"));
+    let distance = |row: &Row| {
+        let bound: f64 = row["bias_bound"].parse().ok()?;
+        let is_same = |truth: &&Row| {
+            truth["flight_id"] == row["flight_id"] && truth["signal"] == row["signal"]
+        };
+        let truth = number(truths.iter().find(is_same)?, "bias");
+        Some((number(row, "bias") - truth).abs() / bound)
+    };
+    let distances: Vec<f64> = instruments.iter().filter_map(distance).collect();
+    let within = distances
+        .iter()
+        .filter(|distance| **distance < 1.96)
+        .count();
+    assert!(
+        distances.len() > 100 && within * 100 >= 92 * distances.len(),
+        "{within} of {} biases are within their intervals",
+        distances.len()
+    );
+    let trends = table(&published(folder, "instrument_trends"));
+    let changed = |row: &&Row| row["verdict"] == "step" || row["verdict"] == "drift";
+    assert_eq!(trends.iter().find(changed), None, "steady instruments");
+    assert!(trends.iter().all(|row| row["far_flights"].is_empty()));
 }
 
 /// Tables of the estimates of an archive beside it.

@@ -1,5 +1,5 @@
-//! Standard deviations of the instruments' errors: from the information, from the scatter between
-//! windows, and from gusts.
+//! Standard deviations of the instruments' errors: from the information, which contains the noise of
+//! outputs and inputs, from the scatter between windows, and from gusts.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,19 +17,36 @@ pub const MODEL_SCALE: f64 = 0.002;
 /// into a gust, so this share is taken for a scale error.
 const GUST_RESPONSE: f64 = 0.5;
 
+/// Standard deviations of the shared parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct ErrorBounds {
+    /// With all that is below.
+    pub total: Parameters,
+    /// Part by gusts and the equations' own error: no number of windows or flights averages it out.
+    pub systematic: Parameters,
+    /// Share of the information on each parameter that comes from the data and not from the prior.
+    pub data_shares: Parameters,
+}
+
 impl JointState<'_> {
     /// Standard deviations of the shared parameters: of the information or of the scatter between
     /// windows, whichever is larger, with the effects of gusts and of the equations' own error.
-    pub fn bounds(&self, windows: &[Window]) -> Option<Parameters> {
-        let inverse = self.inverse(&self.information())?;
+    pub fn bounds(&self, windows: &[Window]) -> Option<ErrorBounds> {
+        let inverse = self.inverse(&self.evidence_information())?;
         let jackknife = self.jackknife();
-        let mut variances = std::array::from_fn(|j| inverse[(j, j)].max(jackknife[j]));
+        let mut systematic = [0.0; PARAMETERS];
         for (i, ratio) in turning_over_force(windows).into_iter().enumerate() {
             let j = place(FIRST_ACCELEROMETER + i, Kind::Scale);
-            variances[j] += (MODEL_SCALE * ratio).powi(2);
+            systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
-        self.add_gust_errors(&inverse, &mut variances);
-        Some(variances.map(f64::sqrt))
+        self.add_gust_errors(&inverse, &mut systematic);
+        let variance = |j: usize| inverse[(j, j)].max(jackknife[j]) + systematic[j];
+        let total: Parameters = std::array::from_fn(variance);
+        Some(ErrorBounds {
+            total: total.map(f64::sqrt),
+            systematic: systematic.map(f64::sqrt),
+            data_shares: std::array::from_fn(|j| self.data_share(&inverse, j)),
+        })
     }
 
     /// Adds the variances that [`Self::gust_errors`] cause. An error of one parameter moves the
@@ -71,13 +88,13 @@ impl JointState<'_> {
     /// The variance of few windows is itself uncertain, so it is enlarged as Student's intervals
     /// are.
     fn jackknife(&self) -> Parameters {
-        let (information, gradient) = (self.information(), self.gradient());
+        let (information, gradient) = (self.evidence_information(), self.evidence_gradient());
         let steps_without: Vec<DVector<f64>> = self
             .windows
             .iter()
             .filter_map(|window| {
-                let inverse = self.inverse(&(&information - &window.information))?;
-                Some(inverse * (&gradient - &window.gradient))
+                let inverse = self.inverse(&(&information - &window.evidence.0))?;
+                Some(inverse * (&gradient - &window.evidence.1))
             })
             .collect();
         let count = steps_without.len() as f64;

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::parameters::{INSTRUMENTS, Kind, SIGNALS};
+use super::parameters::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS};
 use crate::flight::signal as s;
 
 /// Sizes of the errors of one instrument.
@@ -75,6 +75,11 @@ impl ErrorSizes {
             Kind::Scale => size.scale,
             Kind::Delay => size.delay_s,
         }
+    }
+
+    /// Size of a parameter.
+    pub(super) fn of_parameter(&self, parameter: usize) -> f64 {
+        self.of(parameter / KINDS, ALL_KINDS[parameter % KINDS])
     }
 
     /// Sizes of the instrument of a signal; `None` for a signal that no kinematic equation has.

@@ -3,13 +3,16 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::error_bounds::MODEL_SCALE;
 use super::joint_fit::FittedErrors;
+use super::joint_state::{is_at_limit, without_prior};
 use super::parameters::{ALL_KINDS, INSTRUMENTS, KINDS, Kind, SIGNALS, is_observable, place};
 use super::settings::{Action, Compatibility, OnFault};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
-use crate::tables::{InstrumentRow, InstrumentVerdict};
+use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
 
 /// Error of the equations in a bias, as a share of an ordinary bias.
@@ -22,7 +25,25 @@ const MODEL_DELAY_S: f64 = 0.001;
 /// then comes from the flight; with a larger bound the estimate is mostly the prior.
 const MOST_OF_PRIOR: f64 = 0.7;
 
-/// ErrorEstimate of one error of an instrument.
+/// Least share of the information on an error that must come from the flight for evidence: with less,
+/// the estimate without prior is rounding.
+const LEAST_SHARE: f64 = 0.02;
+
+/// Evidence of a flight alone on one error of an instrument, without the prior.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorEvidence {
+    pub signal: String,
+    pub error: InstrumentError,
+    pub value: f64,
+    /// Standard deviation, without the error of the equations.
+    pub bound: f64,
+    /// Standard deviation of the errors of healthy instruments.
+    pub ordinary: f64,
+    /// Part of the bound, and error of the equations, that all flights have alike.
+    pub systematic: f64,
+}
+
+/// Estimate of one error of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
     pub value: f64,
@@ -32,6 +53,8 @@ pub struct ErrorEstimate {
     pub fault: bool,
     /// As large as a fault but not as sure: neither named nor corrected.
     pub doubtful: bool,
+    /// At the limit of the search: named, and never corrected.
+    pub at_limit: bool,
     /// `true` where the record is corrected by it.
     pub applied: bool,
 }
@@ -44,6 +67,10 @@ pub struct InstrumentFinding {
     /// `false` where no window of the flight could be reconstructed.
     pub examined: bool,
     pub estimates: [Option<ErrorEstimate>; KINDS],
+    /// Mean airspeed of the windows.
+    pub speed_ft_s: Option<f64>,
+    /// Evidence of the flight alone on its errors.
+    pub evidence: Vec<ErrorEvidence>,
 }
 
 /// Findings on all recorded instruments of a flight.
@@ -65,6 +92,10 @@ impl Findings {
             let mut estimates =
                 ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
             correct_together(&mut estimates, settings);
+            let evidence = ALL_KINDS
+                .into_iter()
+                .filter_map(|kind| evidence(errors?, i, kind, settings));
+            let evidence = evidence.collect();
             recorded
                 .iter()
                 .any(|s| s == signal)
@@ -73,6 +104,8 @@ impl Findings {
                     channel: channel.clone(),
                     examined: errors.is_some(),
                     estimates,
+                    speed_ft_s: errors.and_then(|errors| errors.speed_ft_s),
+                    evidence,
                 })
         };
         Findings((0..INSTRUMENTS).filter_map(finding).collect())
@@ -101,7 +134,7 @@ impl Findings {
             .iter_mut()
             .flat_map(|f| f.estimates.iter_mut().flatten())
         {
-            estimate.applied |= estimate.fault;
+            estimate.applied |= estimate.fault && !estimate.at_limit;
         }
         corrected
     }
@@ -161,6 +194,12 @@ impl Findings {
         self.0.iter().map(|f| f.row(flight_id)).collect()
     }
 
+    /// Evidence of the flight alone on the errors of its instruments.
+    #[must_use]
+    pub fn evidence(&self) -> Vec<ErrorEvidence> {
+        self.0.iter().flat_map(|f| f.evidence.clone()).collect()
+    }
+
     /// A problem for each instrument with a fault.
     #[must_use]
     pub fn problems(&self, flight_id: &str) -> Vec<Problem> {
@@ -196,7 +235,47 @@ impl Findings {
     }
 }
 
-/// ErrorEstimate of one parameter; `None` where the flight does not determine it.
+/// Error of the equations in a parameter.
+fn model_error(instrument: usize, kind: Kind, settings: &Compatibility) -> f64 {
+    match kind {
+        Kind::Bias => MODEL_BIAS * settings.ordinary.of(instrument, kind),
+        Kind::Scale => MODEL_SCALE,
+        Kind::Delay => MODEL_DELAY_S,
+    }
+}
+
+/// Evidence on one parameter: estimate and bound as they would be without the prior. `None` where the
+/// flight says next to nothing.
+fn evidence(
+    errors: &FittedErrors,
+    instrument: usize,
+    kind: Kind,
+    settings: &Compatibility,
+) -> Option<ErrorEvidence> {
+    let j = place(instrument, kind);
+    let (share, variance) = (errors.data_shares[j], errors.bounds[j].powi(2));
+    let (factor, own_variance) = without_prior(share, variance, errors.prior[j]);
+    let is_inside = !is_at_limit(j, errors.values[j], settings);
+    let says = is_observable(instrument, kind) && own_variance > 0.0 && share > LEAST_SHARE;
+    (says && is_inside).then(|| ErrorEvidence {
+        signal: SIGNALS[instrument].to_owned(),
+        error: instrument_error(kind),
+        value: factor * errors.values[j],
+        bound: own_variance.sqrt(),
+        ordinary: settings.ordinary.of(instrument, kind),
+        systematic: errors.systematic[j].hypot(model_error(instrument, kind, settings)),
+    })
+}
+
+fn instrument_error(kind: Kind) -> InstrumentError {
+    match kind {
+        Kind::Bias => InstrumentError::Bias,
+        Kind::Scale => InstrumentError::Scale,
+        Kind::Delay => InstrumentError::Delay,
+    }
+}
+
+/// Estimate of one parameter; `None` where the flight does not determine it.
 fn estimate(
     errors: &FittedErrors,
     instrument: usize,
@@ -204,39 +283,30 @@ fn estimate(
     settings: &Compatibility,
 ) -> Option<ErrorEstimate> {
     let j = place(instrument, kind);
-    let (value, ordinary) = (errors.values[j], settings.ordinary.of(instrument, kind));
-    let model = match kind {
-        Kind::Bias => MODEL_BIAS * ordinary,
-        Kind::Scale => MODEL_SCALE,
-        Kind::Delay => MODEL_DELAY_S,
-    };
+    let value = errors.values[j];
     if !is_observable(instrument, kind)
         || errors.bounds[j] <= 0.0
         || errors.bounds[j] > MOST_OF_PRIOR * errors.prior[j]
     {
         return None;
     }
-    let bound = errors.bounds[j].hypot(model);
+    let bound = errors.bounds[j].hypot(model_error(instrument, kind, settings));
     let limit = settings.faulty.of(instrument, kind);
     let surely = settings.standard_errors_of_fault(kind, value) * bound;
-    let fault = value.abs() > limit && value.abs() > surely;
-    let action = match kind {
-        Kind::Bias => settings.bias,
-        Kind::Scale => settings.scale,
-        Kind::Delay => settings.delay,
-    };
+    let at_limit = is_at_limit(j, value, settings);
+    let fault = at_limit || value.abs() > limit && value.abs() > surely;
     let doubtful = value.abs() > limit && !fault;
-    let counts = value.abs() > settings.standard_errors * bound && !doubtful;
     let applied = if fault {
-        settings.fault == OnFault::Apply
+        settings.fault == OnFault::Apply && !at_limit
     } else {
-        action == Action::Apply && counts
+        settings.corrects(instrument_error(kind), value, bound) && !doubtful
     };
     Some(ErrorEstimate {
         value,
         bound,
         fault,
         doubtful,
+        at_limit,
         applied,
     })
 }
@@ -258,11 +328,16 @@ impl InstrumentFinding {
     fn faults(&self) -> Vec<String> {
         let fault = |kind: Kind| {
             let e = self.estimates[kind as usize].filter(|e| e.fault)?;
-            Some(match kind {
+            let words = match kind {
                 Kind::Bias => format!("off by {:.3} {}", e.value, self.unit()),
                 Kind::Scale => format!("reads {:.3} times what it should", 1.0 + e.value),
                 Kind::Delay if e.value > 0.0 => format!("delayed by {:.0} ms", 1e3 * e.value),
                 Kind::Delay => format!("ahead by {:.0} ms", -1e3 * e.value),
+            };
+            Some(if e.at_limit {
+                format!("{words} or more, the limit of the search")
+            } else {
+                words
             })
         };
         ALL_KINDS.into_iter().filter_map(fault).collect()
@@ -284,10 +359,25 @@ impl InstrumentFinding {
         let bounds: Vec<String> = ALL_KINDS.into_iter().filter_map(bound).collect();
         let (faults, bounds) = (self.faults().join(", "), bounds.join(", "));
         format!(
-            "`{}` is {faults} against the other channels ({bounds})",
-            self.channel
+            "`{}` is {faults} against the other channels ({bounds}){}",
+            self.channel,
+            self.vane_position().unwrap_or_default()
         )
         .replace("is reads", "reads")
+    }
+
+    /// Position that explains the delay of a vane. The flow at a distance x ahead of the c.g. is α − q x/V,
+    /// and in a pitching motion with q ≈ α̇ that is α(t − x/V); likewise β + r x/V with r ≈ −β̇.
+    fn vane_position(&self) -> Option<String> {
+        let is_vane = matches!(self.signal, signal::ALPHA_VANE | signal::BETA_VANE);
+        let delay = self.estimates[Kind::Delay as usize].filter(|e| e.fault && is_vane)?;
+        let (distance_ft, speed_ft_s) = (delay.value * self.speed_ft_s?, self.speed_ft_s?);
+        let direction = if distance_ft > 0.0 { "ahead" } else { "aft" };
+        Some(format!(
+            "; a vane {:.1} ft further {direction} than aircraft.yaml has it reads so at {speed_ft_s:.0} ft/s: check its \
+             position first",
+            distance_ft.abs()
+        ))
     }
 
     fn consequence(&self) -> &'static str {
@@ -311,7 +401,7 @@ impl InstrumentFinding {
         let applied: Vec<&str> = ALL_KINDS
             .into_iter()
             .filter(|k| of(*k).is_some_and(|e| e.applied))
-            .map(name)
+            .map(|kind| instrument_error(kind).name())
             .collect();
         let faults = self.faults();
         let is_determined = self.estimates.iter().any(Option::is_some);
@@ -339,14 +429,6 @@ impl InstrumentFinding {
     }
 }
 
-fn name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Bias => "bias",
-        Kind::Scale => "scale",
-        Kind::Delay => "delay",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::parameters::PARAMETERS;
@@ -355,13 +437,68 @@ mod tests {
     /// Estimate of the first vane's error of a kind.
     fn estimated(kind: Kind, value: f64, bound: f64) -> ErrorEstimate {
         let j = place(6, kind);
+        let errors = errors(j, value, bound);
+        estimate(&errors, 6, kind, &Compatibility::default()).unwrap()
+    }
+
+    fn errors(parameter: usize, value: f64, bound: f64) -> FittedErrors {
         let mut errors = FittedErrors {
             values: [0.0; PARAMETERS],
             bounds: [bound; PARAMETERS],
+            systematic: [0.0; PARAMETERS],
+            data_shares: [1.0; PARAMETERS],
             prior: [1.0; PARAMETERS],
+            speed_ft_s: Some(170.0),
         };
-        errors.values[j] = value;
-        estimate(&errors, 6, kind, &Compatibility::default()).unwrap()
+        errors.values[parameter] = value;
+        errors
+    }
+
+    #[test]
+    fn a_value_at_the_limit_of_its_search_is_named_and_never_applied() {
+        let limit_s = Compatibility::default().longest_delay_s;
+        let at_limit = estimated(Kind::Delay, limit_s, 0.001);
+        assert!(at_limit.fault && at_limit.at_limit && !at_limit.applied);
+        let inside = estimated(Kind::Delay, 0.9 * limit_s, 0.001);
+        assert!(inside.fault && inside.applied);
+        let j = place(6, Kind::Delay);
+        let of = |value| {
+            let settings = Compatibility::default();
+            evidence(&errors(j, value, 0.001), 6, Kind::Delay, &settings)
+        };
+        assert!(of(limit_s).is_none() && of(0.9 * limit_s).is_some());
+    }
+
+    #[test]
+    fn the_delay_of_a_vane_is_told_with_the_position_that_explains_it() {
+        let finding = |signal: &'static str, delay_s: f64| InstrumentFinding {
+            signal,
+            channel: "vane".to_owned(),
+            examined: true,
+            estimates: [None, None, Some(estimated(Kind::Delay, delay_s, 0.002))],
+            speed_ft_s: Some(170.0),
+            evidence: vec![],
+        };
+        let ahead = finding(signal::ALPHA_VANE, 0.088).fault_sentence();
+        assert!(ahead.contains("15.0 ft further ahead"), "{ahead}");
+        let aft = finding(signal::BETA_VANE, -0.088).fault_sentence();
+        assert!(aft.contains("15.0 ft further aft"), "{aft}");
+        assert!(
+            !finding(signal::THETA, 0.088)
+                .fault_sentence()
+                .contains("vane 15")
+        );
+    }
+
+    #[test]
+    fn evidence_is_the_estimate_without_its_prior() {
+        // Prior 0.3 and data 0.4 ± 0.3 have the mean 0.2 and the deviation 0.3/√2.
+        let j = place(6, Kind::Bias);
+        let mut errors = errors(j, 0.2, 0.3 / 2.0_f64.sqrt());
+        errors.prior = [0.3; PARAMETERS];
+        errors.data_shares = [0.5; PARAMETERS];
+        let found = evidence(&errors, 6, Kind::Bias, &Compatibility::default()).unwrap();
+        assert!((found.value - 0.4).abs() < 1e-12 && (found.bound - 0.3).abs() < 1e-12);
     }
 
     #[test]

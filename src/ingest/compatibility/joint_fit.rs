@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::joint_state::{JointState, kind_of, size_of};
+use super::joint_state::{JointState, Posterior, kind_of};
 use super::parameters::{
     ALL_KINDS, INPUTS, INSTRUMENTS, PARAMETERS, Parameters, is_observable, place,
 };
@@ -18,6 +18,7 @@ use super::settings::Compatibility;
 use super::window::{Window, margin};
 use super::window_fit::{FitContext, WindowFit};
 use crate::aircraft::Aircraft;
+use crate::numerics::mean::finite_mean;
 
 /// Most rounds in which R and P are estimated anew; the fit usually settles earlier.
 const ROUNDS: usize = 6;
@@ -51,8 +52,14 @@ pub struct FittedErrors {
     pub values: Parameters,
     /// Standard deviations; zero for what is not estimated.
     pub bounds: Parameters,
+    /// Part of the bounds that no number of windows or flights averages out.
+    pub systematic: Parameters,
+    /// Share of the information on each parameter that comes from the flight and not from the prior.
+    pub data_shares: Parameters,
     /// Standard deviations of the prior, √P.
     pub prior: Parameters,
+    /// Mean airspeed of the windows.
+    pub speed_ft_s: Option<f64>,
 }
 
 /// Fits the windows; `None` where too few of them can be integrated.
@@ -79,24 +86,36 @@ pub fn fit(
         estimated: estimated(windows),
         windows: fits,
         shared,
-        prior: std::array::from_fn(|j| FIRST_PRIOR * size_of(&settings.faulty, j)),
+        prior: std::array::from_fn(|j| FIRST_PRIOR * settings.faulty.of_parameter(j)),
     };
     reweight(&mut state)?;
     free_surest(&mut state)?;
+    let mut posterior = state.posterior()?;
     let mut bounds = state.bounds(windows)?;
-    let doubtful = doubtful(&state, &bounds);
+    let doubtful = doubtful(&state, &posterior.values, &bounds.total);
     if !doubtful.is_empty() {
         for j in doubtful {
-            state.prior[j] = size_of(&settings.ordinary, j);
+            state.prior[j] = settings.ordinary.of_parameter(j);
         }
         state.settle()?;
+        posterior = state.posterior()?;
         bounds = state.bounds(windows)?;
     }
     Some(FittedErrors {
-        values: state.shared,
-        bounds,
+        values: posterior.values,
+        bounds: bounds.total,
+        systematic: bounds.systematic,
+        data_shares: bounds.data_shares,
         prior: state.prior,
+        speed_ft_s: mean_speed_ft_s(windows),
     })
+}
+
+/// Place of the airspeed among the outputs.
+const AIRSPEED: usize = 2;
+
+fn mean_speed_ft_s(windows: &[Window]) -> Option<f64> {
+    finite_mean(windows.iter().flat_map(|w| &w.outputs[AIRSPEED]).copied())
 }
 
 /// Parameters of recorded instruments that are observable.
@@ -134,12 +153,12 @@ fn reweight(state: &mut JointState) -> Option<()> {
 
 /// √P of each parameter for its present value.
 fn reweighted_prior(state: &JointState) -> Option<Parameters> {
-    let inverse = state.inverse(&state.information())?;
+    let Posterior { values, covariance } = state.posterior()?;
     let gusts = state.gust_errors();
     Some(std::array::from_fn(|j| {
-        let ordinary = size_of(&state.context.settings.ordinary, j);
-        let value = state.shared[j];
-        if value.abs() > SURELY * inverse[(j, j)].sqrt().hypot(gusts[j]) {
+        let ordinary = state.context.settings.ordinary.of_parameter(j);
+        let value = values[j];
+        if value.abs() > SURELY * covariance[(j, j)].sqrt().hypot(gusts[j]) {
             ordinary.hypot(value)
         } else {
             ordinary
@@ -161,14 +180,14 @@ fn free_surest(state: &mut JointState) -> Option<()> {
 
 /// The parameter that the data alone put most surely beyond the ordinary, and its new prior.
 fn surest(state: &JointState) -> Option<(usize, f64)> {
-    let inverse = state.inverse(&state.information())?;
+    let Posterior { values, covariance } = state.posterior()?;
     let gusts = state.gust_errors();
     let freed = |j: usize| {
-        let ordinary = size_of(&state.context.settings.ordinary, j);
-        let (variance, prior) = (inverse[(j, j)], state.prior[j]);
-        let data_share = 1.0 - variance / (prior * prior);
+        let ordinary = state.context.settings.ordinary.of_parameter(j);
+        let (variance, prior) = (covariance[(j, j)], state.prior[j]);
+        let data_share = state.data_share(&covariance, j);
         // Value and bound as they would be without the prior.
-        let value = state.shared[j] / data_share;
+        let value = values[j] / data_share;
         let bound = (variance / data_share).sqrt().hypot(gusts[j]);
         let is_freed = state.estimated[j]
             && data_share > LEAST_DATA_SHARE
@@ -185,12 +204,12 @@ fn surest(state: &JointState) -> Option<(usize, f64)> {
 
 /// Parameters with a widened prior that came out as large as a fault but not as sure as one. No
 /// ordinary error is that large.
-fn doubtful(state: &JointState, bounds: &Parameters) -> Vec<usize> {
+fn doubtful(state: &JointState, values: &Parameters, bounds: &Parameters) -> Vec<usize> {
     let settings = state.context.settings;
     let is_doubtful = |j: &usize| {
-        let (j, value) = (*j, state.shared[*j]);
-        let is_widened = state.prior[j] > size_of(&settings.ordinary, j);
-        let is_large = value.abs() > size_of(&settings.faulty, j);
+        let (j, value) = (*j, values[*j]);
+        let is_widened = state.prior[j] > settings.ordinary.of_parameter(j);
+        let is_large = value.abs() > settings.faulty.of_parameter(j);
         let needed = settings.standard_errors_of_fault(kind_of(j), value);
         state.estimated[j] && is_widened && is_large && value.abs() <= needed * bounds[j]
     };

@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::error_sizes::ErrorSizes;
 use super::parameters::{ALL_KINDS, KINDS, Kind, PARAMETERS, Parameters};
+use super::settings::Compatibility;
 use super::window_fit::{FitContext, WindowFit};
 use crate::numerics::symmetric;
 
@@ -31,6 +31,19 @@ const SETTLED: f64 = 0.05;
 /// timing, so that the mean does not move.
 const COMMON_DELAY_S: f64 = 1e-4;
 
+/// Estimates of the shared parameters with their covariance, which contains the inputs' noise.
+pub struct Posterior {
+    pub values: Parameters,
+    pub covariance: DMatrix<f64>,
+}
+
+/// Factor on an estimate, and its variance, as they would be without the prior. The estimate is `share`
+/// times the truth with noise, and the prior's part of its variance is (1 − share)² P.
+pub fn without_prior(share: f64, variance: f64, prior: f64) -> (f64, f64) {
+    let of_noise = variance - ((1.0 - share) * prior).powi(2);
+    (share.recip(), of_noise.max(0.0) / (share * share))
+}
+
 /// Range of a scale error: a factor of 0.2 to 5, beyond which the relation checks have refused the
 /// channel.
 const SCALE_RANGE: (f64, f64) = (-0.8, 4.0);
@@ -46,9 +59,13 @@ pub struct JointState<'a> {
     pub prior: Parameters,
 }
 
-/// Size of a parameter in the settings.
-pub fn size_of(sizes: &ErrorSizes, parameter: usize) -> f64 {
-    sizes.of(parameter / KINDS, kind_of(parameter))
+/// `true` for a value at the limit of its search.
+pub fn is_at_limit(parameter: usize, value: f64, settings: &Compatibility) -> bool {
+    match kind_of(parameter) {
+        Kind::Delay => value.abs() >= settings.longest_delay_s,
+        Kind::Scale => value <= SCALE_RANGE.0 || value >= SCALE_RANGE.1,
+        Kind::Bias => false,
+    }
 }
 
 pub fn kind_of(parameter: usize) -> Kind {
@@ -57,7 +74,7 @@ pub fn kind_of(parameter: usize) -> Kind {
 
 impl JointState<'_> {
     /// Information of the data on the shared parameters.
-    pub fn information(&self) -> DMatrix<f64> {
+    fn information(&self) -> DMatrix<f64> {
         let zero = DMatrix::zeros(PARAMETERS, PARAMETERS);
         self.windows
             .iter()
@@ -73,11 +90,43 @@ impl JointState<'_> {
                 break;
             }
         }
-        let context = &self.context;
+        let (context, shared) = (&self.context, &self.shared);
         self.windows
             .par_iter_mut()
-            .for_each(|window| window.reweigh(context));
+            .for_each(|window| window.reweigh(context, shared));
         Some(steps)
+    }
+
+    /// Estimates of the shared parameters from the windows' evidence, to first order about the present
+    /// ones. The fit minimises a cost without the inputs' noise, so its own values follow the random
+    /// walk of short windows too closely.
+    pub fn posterior(&self) -> Option<Posterior> {
+        let covariance = self.inverse(&self.evidence_information())?;
+        let step = &covariance * self.evidence_gradient();
+        Some(Posterior {
+            values: self.moved(&step, 1.0),
+            covariance,
+        })
+    }
+
+    /// Share of the information on a parameter that comes from the data, for the inverse of all.
+    pub fn data_share(&self, inverse: &DMatrix<f64>, parameter: usize) -> f64 {
+        1.0 - inverse[(parameter, parameter)] / self.prior[parameter].powi(2)
+    }
+
+    /// Information of the data on the shared parameters, with the inputs' noise.
+    pub fn evidence_information(&self) -> DMatrix<f64> {
+        let zero = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        let windows = self.windows.iter();
+        windows.fold(zero, |sum, window| sum + &window.evidence.0)
+    }
+
+    /// Negative gradient on the shared parameters of data and prior, with the inputs' noise.
+    pub fn evidence_gradient(&self) -> DVector<f64> {
+        let windows = self.windows.iter();
+        windows.fold(self.prior_gradient(), |sum, window| {
+            sum + &window.evidence.1
+        })
     }
 
     /// Takes one step of all parameters. Returns the largest move of a shared one over its bound;
@@ -130,7 +179,13 @@ impl JointState<'_> {
     }
 
     /// Negative gradient of the cost on the shared parameters, of data and prior.
-    pub fn gradient(&self) -> DVector<f64> {
+    fn gradient(&self) -> DVector<f64> {
+        let windows = self.windows.iter();
+        windows.fold(self.prior_gradient(), |sum, window| sum + &window.gradient)
+    }
+
+    /// Negative gradient of the prior's cost.
+    fn prior_gradient(&self) -> DVector<f64> {
         let common = self.common_delay_weights();
         let mean: f64 = common.iter().zip(&self.shared).map(|(c, v)| c * v).sum();
         let of_prior = |j: usize| {
@@ -140,10 +195,7 @@ impl JointState<'_> {
                 0.0
             }
         };
-        let start = DVector::from_fn(PARAMETERS, |j, _| -of_prior(j) - common[j] * mean);
-        self.windows
-            .iter()
-            .fold(start, |sum, window| sum + &window.gradient)
+        DVector::from_fn(PARAMETERS, |j, _| -of_prior(j) - common[j] * mean)
     }
 
     /// Twice the cost 2J of windows at shared parameters.

@@ -11,6 +11,7 @@ mod equations;
 mod error_bounds;
 mod error_sizes;
 mod findings;
+mod input_noise;
 mod joint_fit;
 mod joint_state;
 mod parameters;
@@ -26,7 +27,7 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub use error_sizes::{ErrorSize, ErrorSizes};
-pub use findings::{ErrorEstimate, Findings, InstrumentFinding};
+pub use findings::{ErrorEstimate, ErrorEvidence, Findings, InstrumentFinding};
 pub use settings::{Action, Compatibility, OnFault};
 
 use crate::aircraft::Aircraft;

@@ -16,7 +16,7 @@
 use nalgebra::Matrix3;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::equations::{self, RateSlopes, STATES, State};
+use super::equations::{self, Inputs, RateSlopes, STATES, State};
 use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, Parameters, place};
 use super::window::{Window, input_factor};
 use crate::aircraft::Aircraft;
@@ -375,6 +375,12 @@ impl<S: Simd> Sum<S> {
             give(self.first + n * S::F64_LANES, self.lanes[n]);
         }
     }
+}
+
+/// Inputs without their errors at samples and at the halves between them, in rad/s and ft/s².
+pub fn input_values(window: &Window, shared: &Parameters) -> Vec<Inputs> {
+    let points = corrected_inputs(window, shared);
+    points.iter().map(|point| point.map(|p| p.value)).collect()
 }
 
 /// Corrected inputs at samples and at the halves between them.

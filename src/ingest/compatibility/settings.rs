@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::error_sizes::ErrorSizes;
 use super::parameters::Kind;
 use crate::settings::{settings, single_values};
+use crate::tables::InstrumentError;
 
 settings! {
     /// Settings of flight-path reconstruction and of the corrections that follow.
@@ -53,6 +54,17 @@ settings! {
 }
 
 impl Compatibility {
+    /// `true` where an ordinary error corrects the record.
+    #[must_use]
+    pub fn corrects(&self, error: InstrumentError, value: f64, bound: f64) -> bool {
+        let action = match error {
+            InstrumentError::Bias => self.bias,
+            InstrumentError::Scale => self.scale,
+            InstrumentError::Delay => self.delay,
+        };
+        action == Action::Apply && value.abs() > self.standard_errors * bound
+    }
+
     /// Standard errors from which an error counts as a fault. A channel ahead of the others needs
     /// twice as many: instruments and recorders delay, so all others would have to be late alike.
     pub(super) fn standard_errors_of_fault(&self, kind: Kind, value: f64) -> f64 {

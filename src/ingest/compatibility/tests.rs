@@ -12,6 +12,7 @@ use super::parameters::{
 };
 use super::reconstruction::{DRIVING, LOCAL, Local, ROW, reconstruct, shared_place};
 use super::window::{self, Window, choose_windows, input_factor};
+use super::window_fit::{FitContext, WindowFit};
 use super::window_sums::output_sums;
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
@@ -771,6 +772,7 @@ fn marks_move_with_an_applied_correction() {
             bound: 0.0,
             fault: true,
             doubtful: false,
+            at_limit: false,
             applied: true,
         })
     };
@@ -779,6 +781,8 @@ fn marks_move_with_an_applied_correction() {
         channel: "theta".into(),
         examined: true,
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
+        speed_ft_s: None,
+        evidence: vec![],
     }]);
     findings
         .corrections()
@@ -848,4 +852,103 @@ fn a_stand_in_is_no_instrument() {
         let expected = [true, false, true, true, false, false, true, true, true];
         assert_eq!(compared.collect::<Vec<_>>(), expected);
     }
+}
+
+/// One window of an exact flight, in which everything moves.
+fn exact_window() -> Window {
+    windows(&flight(24.0)).remove(0)
+}
+
+#[test]
+fn the_score_scatters_with_the_noise_of_the_inputs() {
+    const TIMES: u32 = 250;
+    let (settings, aircraft, exact) = (settings(), aircraft(), exact_window());
+    let shared = [0.0; PARAMETERS];
+    let context = FitContext {
+        aircraft: &aircraft,
+        settings: &settings,
+        margin: window::margin(&settings, exact.step_s),
+    };
+    let score = |window: &Window| {
+        WindowFit::begin(window, &context, &shared)
+            .unwrap()
+            .gradient
+    };
+    let without_noise = score(&exact);
+    let mut scatter = nalgebra::DMatrix::zeros(PARAMETERS, PARAMETERS);
+    let mut random = RandomStream::new(11, "inputs");
+    for _ in 0..TIMES {
+        let mut noisy = exact.clone();
+        for (values, deviation) in noisy.inputs.iter_mut().zip(NOISE) {
+            values
+                .iter_mut()
+                .for_each(|value| *value += deviation * random.normal());
+        }
+        let change = score(&noisy) - &without_noise;
+        scatter += &change * change.transpose() / f64::from(TIMES);
+    }
+    let mut noisy = exact.clone();
+    noisy.input_variances = std::array::from_fn(|i| NOISE[i] * NOISE[i]);
+    let fit = WindowFit::begin(&noisy, &context, &shared).unwrap();
+    let covariance = fit.input_noise_covariance(&context, &shared).unwrap();
+    for i in 0..INPUTS {
+        for kind in [Kind::Bias, Kind::Scale] {
+            let j = place(i, kind);
+            assert_relative_eq!(covariance[(j, j)], scatter[(j, j)], max_relative = 0.3);
+        }
+    }
+    // Of the signs: p and r share the roll of the flight path.
+    let (p, r) = (place(0, Kind::Bias), place(2, Kind::Bias));
+    let size = (scatter[(p, p)] * scatter[(r, r)]).sqrt();
+    assert_abs_diff_eq!(
+        covariance[(p, r)] / size,
+        scatter[(p, r)] / size,
+        epsilon = 0.2
+    );
+}
+
+#[test]
+fn the_noise_of_the_inputs_is_found_in_the_record() {
+    let record = recorded(&flight(24.0), &[0.0; PARAMETERS], 5);
+    let window = windows(&record).remove(0);
+    for i in 0..INPUTS {
+        let found = window.input_variances[i].sqrt();
+        assert_relative_eq!(found, NOISE[i], max_relative = 0.25);
+    }
+}
+
+/// Share of the inputs' biases inside their 95 % intervals, and the root mean square of their
+/// distances in bounds, in flights of one window.
+fn coverage_of_one_window(is_noise_counted: bool) -> (f64, f64) {
+    const TIMES: u64 = 16;
+    let (exact, aircraft, settings) = (flight(22.0), aircraft(), settings());
+    let mut distances = Vec::new();
+    for seed in 0..TIMES {
+        let mut draw = RandomStream::new(seed, "biases");
+        let mut truth = [0.0; PARAMETERS];
+        for i in 0..INSTRUMENTS {
+            let j = place(i, Kind::Bias);
+            truth[j] = 0.5 * settings.ordinary.of_parameter(j) * draw.normal();
+        }
+        let mut windows = windows(&recorded(&exact, &truth, seed));
+        windows.truncate(1);
+        if !is_noise_counted {
+            windows[0].input_variances = [0.0; INPUTS];
+        }
+        let errors = joint_fit::fit(&windows, &aircraft, &settings).unwrap();
+        let biases = (0..INPUTS).map(|i| place(i, Kind::Bias));
+        distances.extend(biases.map(|j| (errors.values[j] - truth[j]) / errors.bounds[j]));
+    }
+    let count = distances.len() as f64;
+    let inside = distances.iter().filter(|d| d.abs() < 1.96).count();
+    let squares: f64 = distances.iter().map(|d| d * d).sum();
+    (inside as f64 / count, (squares / count).sqrt())
+}
+
+#[test]
+fn bounds_of_one_short_window_hold_and_would_not_without_the_inputs_noise() {
+    let (share, rms) = coverage_of_one_window(true);
+    assert!(share > 0.88 && rms < 1.25, "{share} of 95 %, rms {rms}");
+    let (share, rms) = coverage_of_one_window(false);
+    assert!(share < 0.88 && rms > 1.25, "{share} of 95 %, rms {rms}");
 }

@@ -11,6 +11,7 @@ use super::settings::Compatibility;
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::earth::gravity_ft_s2;
 use crate::flight::{Mark, Record, signal as s};
+use crate::output_error::surface_noise::white_variance;
 use crate::units::{DEG, G0_FT_S2};
 
 /// The earth's rotation, rad/s (WGS 84).
@@ -44,6 +45,8 @@ pub struct Window {
     pub inputs: [Vec<f64>; INPUTS],
     /// `true` for an input with an instrument; the others have stand-ins.
     pub is_recorded: [bool; INPUTS],
+    /// Variance of the white noise of each input's sample, in the square of the signal's unit.
+    pub input_variances: [f64; INPUTS],
     /// Values of the outputs in the signals' units; NaN where a sample does not count, and throughout
     /// for an output without instrument.
     pub outputs: [Vec<f64>; OUTPUTS],
@@ -235,6 +238,9 @@ impl Window {
             terms,
             inputs: std::array::from_fn(input),
             is_recorded: std::array::from_fn(|i| record.is_recorded(SIGNALS[i])),
+            input_variances: std::array::from_fn(|i| {
+                white_level(record, SIGNALS[i], &range) / decimation as f64
+            }),
             outputs: std::array::from_fn(output),
         }
     }
@@ -295,6 +301,24 @@ fn decimate_measured(
         .zip(counted)
         .map(|(mean, counts)| if counts { mean } else { f64::NAN })
         .collect()
+}
+
+/// Variance of white noise with the power of a signal's own noise, for each sample of the record; zero
+/// for a signal that is not recorded. A sample measured once in a while stands for those between.
+fn white_level(record: &Record, name: &str, range: &Range<usize>) -> f64 {
+    let series = record.signals.get(name);
+    let Some((values, marks)) =
+        series.and_then(|s| Some((s.values.get(range.clone())?, s.marks.get(range.clone())?)))
+    else {
+        return 0.0;
+    };
+    let both = values.iter().zip(marks);
+    let measured: Vec<f64> = both
+        .filter(|(_, mark)| **mark == Mark::Measured)
+        .map(|(value, _)| *value)
+        .collect();
+    let spacing = values.len() as f64 / measured.len().max(1) as f64;
+    white_variance(&measured) * spacing
 }
 
 fn measured_terms(record: &Record, k: usize, aircraft: &Aircraft) -> MeasuredTerms {

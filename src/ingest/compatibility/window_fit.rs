@@ -6,7 +6,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::STATES;
-use super::parameters::{INPUTS, Kind, OUTPUTS, Parameters};
+use super::input_noise::{FittedWindow, score_covariance, with_input_noise};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters};
 use super::reconstruction::{LOCAL, Local, WIND, reconstruct};
 use super::settings::Compatibility;
 use super::window::Window;
@@ -35,7 +36,7 @@ pub struct FitContext<'a> {
 
 impl FitContext<'_> {
     /// Samples of a window whose outputs are compared.
-    fn compared(&self, window: &Window) -> Range<usize> {
+    pub fn compared(&self, window: &Window) -> Range<usize> {
         self.margin..window.samples.saturating_sub(self.margin)
     }
 }
@@ -52,7 +53,34 @@ pub struct WindowFit<'a> {
     pub information: DMatrix<f64>,
     /// Gradient on the shared parameters with the local ones eliminated.
     pub gradient: DVector<f64>,
+    /// Both of them with the noise of the inputs counted; set by [`WindowFit::reweigh`].
+    pub evidence: (DMatrix<f64>, DVector<f64>),
+    input_noise: InputNoise,
     residuals: Residuals,
+}
+
+/// Covariance of the score from the inputs' noise, with the variances R for which it was computed.
+#[derive(Clone)]
+struct InputNoise {
+    variances: [f64; OUTPUTS],
+    covariance: DMatrix<f64>,
+}
+
+impl InputNoise {
+    /// Largest ratio of a variance R to that of the covariance at which the covariance serves.
+    const SERVES: f64 = 1.2;
+
+    fn unknown() -> InputNoise {
+        InputNoise {
+            variances: [0.0; OUTPUTS],
+            covariance: DMatrix::zeros(PARAMETERS, PARAMETERS),
+        }
+    }
+
+    fn serves(&self, variances: &[f64; OUTPUTS]) -> bool {
+        let mut both = self.variances.iter().zip(variances);
+        both.all(|(own, now)| *own <= Self::SERVES * now && *now <= Self::SERVES * own)
+    }
 }
 
 impl<'a> WindowFit<'a> {
@@ -71,7 +99,14 @@ impl<'a> WindowFit<'a> {
             let bias = context.settings.ordinary.of(INPUTS + output, Kind::Bias);
             bias.powi(2)
         });
-        WindowFit::at(window, context, local, variances, shared)
+        WindowFit::at(
+            window,
+            context,
+            local,
+            variances,
+            shared,
+            InputNoise::unknown(),
+        )
     }
 
     fn at(
@@ -80,6 +115,7 @@ impl<'a> WindowFit<'a> {
         local: Local,
         variances: [f64; OUTPUTS],
         shared: &Parameters,
+        input_noise: InputNoise,
     ) -> Option<WindowFit<'a>> {
         let reconstructed = reconstruct(window, context.aircraft, &local, shared)?;
         let (output_sums, residuals) =
@@ -92,6 +128,8 @@ impl<'a> WindowFit<'a> {
             sums: WindowSums::zero(),
             information: DMatrix::zeros(0, 0),
             gradient: DVector::zeros(0),
+            evidence: (DMatrix::zeros(0, 0), DVector::zeros(0)),
+            input_noise,
             residuals,
         };
         fit.weigh(context);
@@ -114,7 +152,15 @@ impl<'a> WindowFit<'a> {
     ) -> Option<WindowFit<'a>> {
         let local_step = self.sums.local_step(step)?;
         let local = std::array::from_fn(|i| self.local[i] + share * local_step[i]);
-        WindowFit::at(self.window, context, local, self.variances, shared)
+        let input_noise = self.input_noise.clone();
+        WindowFit::at(
+            self.window,
+            context,
+            local,
+            self.variances,
+            shared,
+            input_noise,
+        )
     }
 
     /// Adds up the outputs' sums, each with its weight 1/R, and the priors of the wind's change and of
@@ -140,6 +186,23 @@ impl<'a> WindowFit<'a> {
         self.sums = sums;
     }
 
+    /// Covariance of the gradient on the shared parameters from the inputs' noise.
+    pub fn input_noise_covariance(
+        &self,
+        context: &FitContext,
+        shared: &Parameters,
+    ) -> Option<DMatrix<f64>> {
+        let fitted = FittedWindow {
+            window: self.window,
+            aircraft: context.aircraft,
+            compared: context.compared(self.window),
+            local: &self.local,
+            shared,
+        };
+        let weights = self.variances.map(|variance| 1.0 / variance);
+        score_covariance(&fitted, weights, &self.sums, &self.information)
+    }
+
     /// `true` where an output is compared.
     fn reads(&self, output: usize, context: &FitContext) -> bool {
         let compared = self.window.outputs[output].get(context.compared(self.window));
@@ -148,7 +211,7 @@ impl<'a> WindowFit<'a> {
 
     /// Estimates R anew from the residuals: coloured noise counts as white noise as strong as its
     /// slowest part.
-    pub fn reweigh(&mut self, context: &FitContext) {
+    pub fn reweigh(&mut self, context: &FitContext, shared: &Parameters) {
         let range = context.compared(self.window);
         for output in 0..OUTPUTS {
             let residuals = self.residuals[output]
@@ -160,6 +223,25 @@ impl<'a> WindowFit<'a> {
             self.variances[output] = level.max(least * least);
         }
         self.weigh(context);
+        self.count_input_noise(context, shared);
+    }
+
+    /// Computes the evidence. A window whose own parameters are not determined has none.
+    fn count_input_noise(&mut self, context: &FitContext, shared: &Parameters) {
+        if !self.input_noise.serves(&self.variances) {
+            let covariance = self.input_noise_covariance(context, shared);
+            self.input_noise = InputNoise {
+                variances: self.variances,
+                covariance: covariance.unwrap_or_else(|| DMatrix::zeros(PARAMETERS, PARAMETERS)),
+            };
+        }
+        let sizes: Parameters = std::array::from_fn(|j| context.settings.ordinary.of_parameter(j));
+        let noise = &self.input_noise.covariance;
+        let evidence = with_input_noise(&self.information, &self.gradient, noise, &sizes);
+        self.evidence = evidence.unwrap_or_else(|| {
+            let none = DMatrix::zeros(PARAMETERS, PARAMETERS);
+            (none, DVector::zeros(PARAMETERS))
+        });
     }
 
     /// Sums of squares of an output's slow residuals and of its reconstructed motion.

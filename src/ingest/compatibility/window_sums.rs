@@ -42,6 +42,9 @@ impl OutputSums {
     }
 }
 
+/// Number of parameters of a window, its own before the shared ones.
+pub const ALL: usize = LOCAL + PARAMETERS;
+
 /// Weighted sums over one window: information and gradient on the window's own (local) and on the
 /// shared parameters.
 #[derive(Clone, Debug)]
@@ -106,6 +109,14 @@ impl WindowSums {
         let information = &self.shared_information - &cross * own.solve(&self.cross_information);
         let gradient = &self.shared_gradient - &cross * own.solve(&self.local_gradient);
         (information, gradient)
+    }
+
+    /// Scores on the shared parameters with the local ones eliminated, from scores on all, one a
+    /// column. `None` where the local parameters are not determined.
+    pub fn eliminated(&self, scores: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let own = Cholesky::new(self.local_information.clone())?;
+        let local_steps = own.solve(&scores.rows(0, LOCAL).into_owned());
+        Some(scores.rows(LOCAL, PARAMETERS) - self.cross_information.tr_mul(&local_steps))
     }
 
     /// Step of the local parameters that follows a step of the shared ones.

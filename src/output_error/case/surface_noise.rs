@@ -101,7 +101,8 @@ fn samples_of(window: &Window, name: &str) -> Vec<f64> {
 ///
 /// Third differences have 1 + 9 + 9 + 1 times the noise's variance, and their median size ignores
 /// the steps.
-pub(super) fn white_variance(samples: &[f64]) -> f64 {
+#[must_use]
+pub fn white_variance(samples: &[f64]) -> f64 {
     let third_difference = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
     let mut sizes: Vec<u64> =
         Arch::new().dispatch(|| samples.windows(4).map(third_difference).collect());
